@@ -142,10 +142,11 @@ def command(
     if budget_us is not None and rate is not None:
         raise click.UsageError("--budget-us and --rate each pick a point: give one of them.")
     wanted, harness = Wanted(budget_us, rate), None if glove is None else load_harness(glove)
+    grasp_set = GraspSet.load(recordings)
     rounds = asked["rounds"]
     training = asked_settings(context, asked)
     search = Search(
-        methods=methods or usual(ours=True, wired=harness is not None),
+        methods=methods or usual(ours=True, wired=harness is not None or bool(grasp_set.taxel_columns)),
         rivals=usual(ours=False) if rivals is None else rivals,
         rounds=rounds,
         trainer=training.pop("trainer"),
@@ -154,7 +155,7 @@ def command(
     )
     with progress("frontier") as report:
         found = find_frontier(
-            GraspSet.load(recordings),
+            grasp_set,
             output,
             source=printable(recordings.name),
             harness=harness,

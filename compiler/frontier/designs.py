@@ -198,14 +198,14 @@ def points_of(
     several: Sequence[Design],
     latencies: Latencies,
     luck: Mapping[Judged, float],
-    names: Sequence[str],
+    names: Callable[[Candidate], Sequence[str]],
     training: Callable[[Candidate], Training],
     joints: Callable[[Candidate], Sequence[str]] = lambda _: (),
 ) -> tuple[Point, ...]:
     """Return those that are on a front, numbered from the fastest frame on.
 
     luck   by how much the rate of each is to be corrected
-    names  of all switches of the set
+    names  of what a choice keeps
     training  how a choice is trained
     joints    the names of its joints, where they are not all or none
     """
@@ -220,7 +220,7 @@ def points_of(
             latencies[design, kind],
             luck[design.judged],
             fronts[design, kind],
-            names,
+            tuple(names(design.close.screened.choice)),
             training(design.close.screened.choice),
             tuple(joints(design.close.screened.choice)),
         )
@@ -262,7 +262,7 @@ def _point(
     latency: Latency,
     luck: float,
     fronts: tuple[str, ...],
-    names: Sequence[str],
+    names: tuple[str, ...],
     training: Training,
     joints: tuple[str, ...],
 ) -> Point:
@@ -282,9 +282,10 @@ def _point(
             clock_hz=0 if wired is None else wired.clock_hz,
             table_bits=tabled.shape.table_bits,
             keep_joints=choice.keep_joints,
+            levels=choice.levels,
             **_trained(training),
         ),
-        switches=tuple(names[column] for column in close.screened.columns),
+        switches=names,
         rate=corrected(design.judged.rate, luck),
         luck=luck,
         frames=close.frames.get(tabled),

@@ -127,7 +127,7 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
         price.call(
             PRICE_S,
             survey.read(one.choice, cuts.everything),
-            tuple(survey.switch_names[column] for column in one.columns),
+            survey.names(one.choice),
             one.columns,
             tuple(dict.fromkeys([*worthwhile(judged[one.choice][1]), papers_tables(searches[one.choice])])),
             survey.training(one.choice),

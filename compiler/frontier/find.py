@@ -21,6 +21,7 @@ from thenar.runtime.names import list_names
 
 from ..evaluation.rates import Rate
 from ..limits import check_inputs, check_memory, check_types
+from ..placement.elements import Element, above
 from ..placement.methods.base import BEST, METHODS, PAPERS, usual
 from ..placement.ports import ports_of_whole_glove
 from ..publication import check_folder, entries, publish_folder
@@ -37,11 +38,11 @@ from .measure import TRIAL_S, measured
 from .plots import PICTURES, pictures
 from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, Way, frontier_to_bytes
 from .screen import FEWER_JOINTS, OTHER_TRAINERS, QUICK_PRICE_S, Screened, screen, screen_fewer, screen_others
-from .search import JOINTS, Candidate, Search, available_inputs, curve_ways, ways
+from .search import JOINTS, TAXEL_LEVELS, Candidate, Search, available_inputs, curve_ways, ways
 from .stream import Stream, stream_of
 from .survey import Cuts, Survey, fit_s, path_s, settle_s
 from .timing.scan_times import records_of, scan_times
-from .timing.wirings import reads_by_itself, wirings
+from .timing.wirings import Wiring, reads_by_itself, wirings
 from .words import csv_bytes
 
 RecordTime = Literal["formula", "wire"]
@@ -168,9 +169,11 @@ def find_frontier(
     >>> found.points[0].frame.us  # doctest: +SKIP
     """
     samples = _samples(grasp_set)
-    search, lacking = _installed(search or Search(methods=usual(ours=True, wired=harness is not None)))
+    # Levels of one taxel share its conversion.
+    costs = harness is not None or bool(grasp_set.taxel_columns)
+    search, lacking = _installed(search or Search(methods=usual(ours=True, wired=costs)))
     cuts = Cuts.of(samples, search)
-    ports = ports_of_whole_glove(harness, grasp_set.switch_names)
+    ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
     made = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
         cache = Cache(store, report or _unheard, jobs=jobs, cluster=cluster)
@@ -184,7 +187,7 @@ def find_frontier(
                 filtered=filtered,
                 masked=not reads_by_itself(target),
             )
-            equipment = equipment_for(target, wirings(harness, target), cache, records)
+            equipment = equipment_for(target, _wirings(grasp_set, harness, target), cache, records)
             untimed = (_UNTIMED.format(list_names(names)),) if records.how == "unknown" else ()
             renewed = (_RENEWED,) if store.renewed else ()
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
@@ -210,13 +213,21 @@ def _samples(grasp_set: GraspSet) -> Samples:
     if n_types < 2:
         raise FrontierError(f"the recordings hold {n_types} grasp type(s): there is nothing to tell apart")
     check_types(n_types, FrontierError)
-    # All switches at once are tried as well.
-    check_inputs(n_types, len(grasp_set.switch_names), len(grasp_set.joints), FrontierError)
+    # All switches and levels at once are tried as well.
+    elements = len(grasp_set.switch_names) + TAXEL_LEVELS[-1] * len(grasp_set.taxel_columns)
+    check_inputs(n_types, elements, len(grasp_set.joints), FrontierError)
     check_memory(len(grasp_set), n_types, FrontierError)
-    if grasp_set.taxel_columns:
-        raise FrontierError("the recordings have taxels, whose thresholds are learnt: import them with fixed ones")
     check_trials(grasp_set, FrontierError)
     return Samples.of(grasp_set)
+
+
+def _wirings(grasp_set: GraspSet, harness: Harness | None, target: str) -> tuple[Wiring, ...]:
+    return wirings(
+        harness,
+        target,
+        switches=bool(grasp_set.switch_names) or not grasp_set.taxel_columns,
+        taxels=bool(grasp_set.taxel_columns),
+    )
 
 
 def _installed(search: Search) -> tuple[Search, tuple[str, ...]]:
@@ -262,8 +273,8 @@ def _stream(survey: Survey, given: GraspSet | None) -> Stream:
             f"the stream is what is trained on, {survey.source}: name other recordings with --stream, or leave it out, "
             "and rows that are set aside are used"
         )
-    if (given.switch_names, given.joints) != (grasp_set.switch_names, grasp_set.joints):
-        raise FrontierError(f"the stream has other switches or joints than {survey.source}")
+    if (given.element_names, given.joints) != (grasp_set.element_names, grasp_set.joints):
+        raise FrontierError(f"the stream has other switches, taxels or joints than {survey.source}")
     number = {grasp: label for label, grasp in enumerate(survey.samples.grasps)}
     strange = sorted({str(grasp) for grasp in given.grasps} - set(number))
     if strange:
@@ -276,15 +287,16 @@ def foreseen(survey: Survey) -> dict[str, float]:
     """Return the expected seconds of one core of each stage, before any has begun: the time that is left does not grow
     on the way.
     """
-    search, cuts, n_switches = survey.search, survey.cuts, len(survey.switch_names)
+    search, cuts, sizes = survey.search, survey.cuts, [len(survey.elements(most)) for most in survey.levels]
     rows, simulated = len(survey.samples.labels), survey.equipment.model.part is not None
-    kinds = available_inputs(n_switches, survey.n_joints)
+    kinds = available_inputs(sizes[-1], survey.n_joints)
     wired = len(kinds) - ("joints" in kinds)
     train, more = ([len(fold.train) for fold in folds] for folds in (cuts.screening, cuts.others))
     # Once, or for each of the inputs if a method learns from joints.
-    methods = [name for name in search.methods for _ in range(wired if METHODS[name].uses_joints else min(wired, 1))]
-    choices = sum(len(ways(name, n_switches)) for name in search.methods) * wired + ("joints" in kinds)
-    rivals = sum(len(curve_ways(name, n_switches)) for name in search.rivals)
+    several = {name: len(sizes) * (wired if METHODS[name].uses_joints else min(wired, 1)) for name in search.methods}
+    methods = [name for name, count in several.items() for _ in range(count)]
+    choices = sum(len(ways(name, size)) for name in search.methods for size in sizes) * wired + ("joints" in kinds)
+    rivals = sum(len(curve_ways(name, sizes[-1])) for name in search.rivals)
     trainers = [search.alone(name) for name in search.trainers]
     last, again = min(search.finalists + _MARKED, choices), min(_WIDER * search.finalists, choices)
     few = papers_depth(search)
@@ -319,7 +331,8 @@ def foreseen(survey: Survey) -> dict[str, float]:
 
 
 def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...], lacking: tuple[str, ...]) -> Frontier:
-    search, n_switches = survey.search, len(survey.switch_names)
+    search, n_switches, most = survey.search, survey.samples.n_switches, survey.levels[-1]
+    n_elements = len(survey.elements(most))
     screened, curves = screen(survey)
     if not screened:
         raise FrontierError(
@@ -329,15 +342,13 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
     several = finalists(screened, (), _WIDER * search.finalists)
     screened += screen_fewer(survey, finalists([one for one in screened if one.choice.joints], (), _FEWER))
     screened += screen_others(survey, several)
-    named = choices_to_mark(n_switches, survey.n_joints, search.trainers[0])
+    named = choices_to_mark(n_elements, survey.n_joints, search.trainers[0], most)
     closes = look_closely(survey, finalists(screened, list(named), search.finalists))
     every = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
     by_time, by_switches = best_designs(every)
     kept, checks, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
     luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
-    points = points_of(
-        kept, _latencies(survey, stream, kept), luck, survey.switch_names, survey.training, survey.some_joints
-    )
+    points = points_of(kept, _latencies(survey, stream, kept), luck, survey.names, survey.training, survey.some_joints)
     picked, tried = wanted.pick(points), _tried(screened, closes, search)
     claimed = [sentence(INDEPENDENT)] if survey.grasp_set.independent else []
     early = [_EARLY] if any(design.scan_kind == "early" for design in kept) else []
@@ -351,6 +362,8 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
         subjects=len(np.unique(survey.cuts.people)),
         by=survey.cuts.by,
         n_switches=n_switches,
+        n_taxels=len(survey.grasp_set.taxel_columns),
+        n_levels=n_elements - n_switches,
         n_joints=survey.n_joints,
         grasps=survey.samples.grasps,
         target=survey.equipment.model.target,
@@ -381,7 +394,7 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
             survey.read(choice, fold),
             fold.train,
             survey.columns(choice, fold),
-            stream.with_joints(survey.joints(choice, fold)),
+            stream.with_elements(survey.elements(choice.levels, fold)).with_joints(survey.joints(choice, fold)),
             tuple(
                 Pace(design.tables.tabled, design.frame.us, design.decisions, design.slow_us, design.asked)
                 for design in mine
@@ -413,6 +426,7 @@ def _tried(screened: Sequence[Screened], closes: Sequence[Close], search: Search
             one.frame_us,
             sys.intern(one.choice.trainer),
             one.choice.keep_joints,
+            one.choice.levels,
         )
         for one, rounds, rate in (*first, *then)
     )
@@ -426,15 +440,19 @@ def _unheard(_done: int, _total: int) -> None:
 _PAPERS = (62.0,)
 
 
-def choices_to_mark(n_switches: int, n_joints: int, trainer: str = PAPERS_TRAINER) -> dict[Candidate, str]:
-    """Return what to mark, with its name: the paper's placement and all switches, alone and with the joints."""
+def choices_to_mark(
+    n_switches: int, n_joints: int, trainer: str = PAPERS_TRAINER, levels: int | None = None
+) -> dict[Candidate, str]:
+    """Return what to mark, with its name: the paper's placement and all switches, alone and with the joints; with so
+    many levels of each taxel.
+    """
     if not n_switches:
         return {}
     marked = {Way(PAPERS, prune): f"paper, S = {prune:g}" for prune in _PAPERS}
     # Whichever method says so, to keep all of them is the same.
     marked[Way(BEST, float(n_switches))] = f"all of {n_switches}"
-    alone = {Candidate(way, "switches", trainer): name for way, name in marked.items()}
-    with_joints = {Candidate(way, "both", trainer): f"{name}, joints" for way, name in marked.items()}
+    alone = {Candidate(way, "switches", trainer, levels=levels): name for way, name in marked.items()}
+    with_joints = {replace(one, inputs="both"): f"{name}, joints" for one, name in alone.items()}
     return alone | (with_joints if n_joints else {})
 
 
@@ -469,7 +487,9 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     if not options or (names and not fitting):
         raise FrontierError(f"{folder} cannot be built for {equipment.model.target}: leave --build out, or --target")
     joints = [joint.name for joint in manifest.joints]
-    bits = grasp_set.switches[:, _places(names, grasp_set.switch_names, folder)]
+    sources = _places([switch.source for switch in manifest.switches], grasp_set.element_names, folder)
+    above_codes = [0 if switch.threshold is None else switch.threshold.code for switch in manifest.switches]
+    bits = above(grasp_set.switches, grasp_set.taxels, tuple(map(Element, sources, above_codes)))
     codes = grasp_set.codes[:, _places(joints, [joint.name for joint in grasp_set.joints], folder)]
     scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.beside).full_us for wiring in fitting]
     frame_us = max(min(scans, default=0.0), equipment.records.of(len(joints)).us) + options[0].us

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..placement.elements import above, elements_of
 from ..recordings.graspset import GraspSet
+from ..samples import Samples
 
 Rows = NDArray[np.intp]
 Bits = NDArray[np.bool_]
@@ -52,7 +54,7 @@ def holds_movements(grasp_set: GraspSet) -> bool:
     """Return whether the rows of a set are the frames of whole movements.
 
     They are where most rows lie in runs (movement_numbers) of LEAST_FRAMES rows or more, and where, within these, a row
-    and the next are less than half as different as rows half a run apart, both in switches and in joints. So single
+    and the next are less than half as different as rows half a run apart, in switches, joints and taxels. So single
     trials that were recorded without trial numbers, which are as different from the next as from any other, are none.
     """
     first, beyond = _runs(grasp_set)
@@ -60,17 +62,22 @@ def holds_movements(grasp_set: GraspSet) -> bool:
     if 2 * (beyond - first)[long].sum() <= len(grasp_set):
         return False
     spans = list(zip(first[long].tolist(), beyond[long].tolist(), strict=True))
-    differences = [_differences(array, spans) for array in (grasp_set.switches, grasp_set.codes) if array.shape[1]]
+    arrays = (grasp_set.switches, grasp_set.codes, grasp_set.taxels)
+    differences = [_differences(array, spans) for array in arrays if array.shape[1]]
     return any(far for _, far in differences) and all(near <= _ALIKE * far for near, far in differences)
 
 
 def movements_of(grasp_set: GraspSet) -> Movements:
-    """Return the movements of a set of whole movements, in its order; runs of fewer than LEAST_FRAMES rows are none."""
+    """Return the movements of a set of whole movements, in its order; runs of fewer than LEAST_FRAMES rows are none.
+
+    A taxel is closed where it is pressed beyond the threshold that tells most about the grasp type.
+    """
     first, beyond = _runs(grasp_set)
     long = beyond - first >= LEAST_FRAMES
     first, beyond = first[long], beyond[long]
     spans = zip(first.tolist(), beyond.tolist(), strict=True)
-    held = [held_frames(grasp_set.switches[a:b], grasp_set.codes[a:b]) for a, b in spans]
+    closed = _closed(grasp_set)
+    held = [held_frames(closed[a:b], grasp_set.codes[a:b]) for a, b in spans]
     complete, released = np.array(held, np.intp).reshape(-1, 2).T
     return Movements(first, beyond, first + complete, first + released)
 
@@ -89,6 +96,15 @@ def held_frames(switches: Bits, codes: NDArray[np.uint16]) -> tuple[int, int]:
         away = np.abs(codes - np.median(codes[held], axis=0)).mean(axis=1)
         held &= away <= 2.0 * np.median(away[held]) + 0.5  # half a code: a hand without noise
     return _longest(held)
+
+
+def _closed(grasp_set: GraspSet) -> Bits:
+    """Return which switches and taxels (n, s + t) are closed."""
+    if not grasp_set.taxel_columns:
+        return grasp_set.switches
+    bits = above(grasp_set.switches, grasp_set.taxels, elements_of(Samples.of(grasp_set), 1))
+    bits[:, len(grasp_set.switch_names) :] ^= [taxel.step < 0 for taxel in grasp_set.taxel_columns]
+    return bits
 
 
 def _runs(grasp_set: GraspSet) -> tuple[Rows, Rows]:

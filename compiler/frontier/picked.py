@@ -6,10 +6,12 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from thenar.drivers.i2c.chips import expanders
+from thenar.drivers.i2c.chips import CHIPS, expanders
+from thenar.drivers.spi.chips import SPI_CHIPS
 from thenar.runtime.files import read_file
 from thenar.runtime.harness.wiring import SLOWEST_HZ, Harness
-from thenar.runtime.names import shortened
+from thenar.runtime.names import shortened, taxel_and_code
+from thenar.runtime.scanning.propose import CONVERTER
 
 from ..placement.methods.base import METHODS
 from ..recordings.graspset import GraspSet
@@ -43,6 +45,8 @@ class Picked:
             settled["max_bins"] = setting.max_bins
         if setting.keep_joints is not None:
             settled["keep_joints"] = setting.keep_joints
+        if setting.levels is not None:
+            settled["levels"] = setting.levels
         if setting.rounds is not None:
             settled["rounds"] = setting.rounds
         if setting.inputs == "joints":
@@ -121,7 +125,8 @@ def picked(path: Path, number: int | None, grasp_set: GraspSet) -> Picked:
 def _check(point: Point, grasp_set: GraspSet, what: str) -> None:
     """Raise FrontierError where a point cannot be built here: before the training, not after it."""
     setting = point.setting
-    if not set(grasp_set.switch_names).issuperset(point.switches):
+    levels = [taxel_and_code(name) or (name, 0) for name in point.switches]
+    if not set(grasp_set.element_names).issuperset(name for name, _ in levels):
         raise FrontierError(f"{what} keeps switches that the recordings do not have: run thenar frontier on these")
     if setting.inputs != "joints" and setting.way.method not in METHODS:
         raise FrontierError(f"{what} takes a method that is not there: {shortened(repr(setting.way.method))}")
@@ -134,10 +139,11 @@ def _check(point: Point, grasp_set: GraspSet, what: str) -> None:
         raise FrontierError(f"{what} takes a trainer that is not there: {shortened(repr(setting.trainer))}")
     if TRAINERS[setting.trainer].staged != (setting.rounds is not None):
         raise FrontierError(f"{what} gives rounds to a trainer that takes none, or none to one that does")
-    if setting.wiring not in ("", AS_WIRED, BOARD, *expanders()):
+    clocks = {name: chip.clock_hz for name, chip in (*expanders().items(), (CONVERTER, CHIPS[CONVERTER]))}
+    clocks |= {name: chip.clock_hz for name, chip in SPI_CHIPS.items()}
+    if setting.wiring not in ("", AS_WIRED, BOARD, *clocks):
         raise FrontierError(f"{what} takes a wiring that is not there: {shortened(repr(setting.wiring))}")
-    chip = expanders().get(setting.wiring)
-    if chip is not None and not SLOWEST_HZ <= setting.clock_hz <= chip.clock_hz:
+    if setting.wiring in clocks and not SLOWEST_HZ <= setting.clock_hz <= clocks[setting.wiring]:
         raise FrontierError(f"{what} runs its {setting.wiring} at {setting.clock_hz} Hz, which it cannot")
     if setting.wiring not in ("", AS_WIRED) and not Wiring(setting.wiring, setting.clock_hz).fits(point.switches):
         raise FrontierError(f"{what} has no room for its {len(point.switches)} switches on {setting.wiring}")

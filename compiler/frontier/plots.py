@@ -15,7 +15,7 @@ from ..pictures import on_paper, painting, rendered
 from ..text import counted, duration, percent
 from .labels import FAINT, LINE, Label, Labels
 from .points import Curve, Frontier, Mark, Point, Tried, front
-from .words import featured, inputs_of, shorten
+from .words import element_of, featured, inputs_of, shorten
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -132,9 +132,10 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     if cost.is_time:
         _scale_times(axes, [*(x for x, _ in (*marks, *tried, *points)), *(end for _, end, _ in ends)])
     else:
-        _scale_counts(axes, frontier.n_switches)
+        _scale_counts(axes, frontier.n_switches + frontier.n_levels)
     untimed = cost.is_time and any(point.transfer.how == "unknown" for _, point in points)
-    axes.set_xlabel(cost.axis + "; reading the joints is left out" * untimed, color=_INK)
+    axis = cost.axis.replace("switches", element_of(frontier, 2).split()[1])
+    axes.set_xlabel(axis + "; reading the joints is left out" * untimed, color=_INK)
 
     labels, spoken_of = Labels(axes), featured(frontier)
     _draw_tried(labels, tried)
@@ -157,7 +158,7 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     # What takes most room first.
     said = duration if cost.is_time else lambda _: ""
     labels.write(*(_loud_label(x, point, said(x)) for x, point in points if point is spoken_of))
-    labels.write(*names, *(_mark_label(x, mark, said(x)) for x, mark in marks))
+    labels.write(*names, *(_mark_label(x, mark, said(x), frontier) for x, mark in marks))
     several = len(frontier.trainers) > 1
     for x, point in points:
         if point is not spoken_of:
@@ -372,10 +373,10 @@ def _point_label(x: float, point: Point, words: str) -> Label:
     return Label(((x, point.rate.mean),), texts, _COLOURS[point.setting.inputs])
 
 
-def _mark_label(x: float, mark: Mark, cost: str) -> Label:
+def _mark_label(x: float, mark: Mark, cost: str, frontier: Frontier) -> Label:
     name = shorten(mark.name)
     if str(mark.n_switches) not in name:
-        name = f"{name} ({counted(mark.n_switches, 'switch', 'switches')})"
+        name = f"{name} ({element_of(frontier, mark.n_switches)})"
     return Label(((x, mark.rate.mean),), (f"{name}\n{_and_rate(cost, mark.rate)}",), _INK)
 
 

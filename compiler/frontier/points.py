@@ -63,6 +63,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
                 its bus, or baud of the board's line; 0 where no switch is read
     trainer     what makes the model, and `settings` of it that are no defaults; the paper's is not written
     keep_joints  how many joints are read; None: all, where `inputs` has any
+    levels      how many levels of a taxel there were to choose from; None: there are no taxels, or none are read
     """
 
     way: Way
@@ -79,6 +80,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     trainer: Name = PAPERS_TRAINER
     settings: dict[Name, Given] = {}
     keep_joints: Annotated[int, Meta(ge=1, le=2**16)] | None = None
+    levels: Annotated[int, Meta(ge=1, le=65535)] | None = None
 
 
 class Latency(Struct, frozen=True, forbid_unknown_fields=True):
@@ -98,7 +100,7 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One way to build the glove.
 
     number      what `compile --from frontier.json --point` takes
-    switches    names of the kept switches, in the order in which they were chosen from all rows
+    switches    names of the kept switches and levels, in the order in which they were chosen from all rows
     joints      names of the joints that are read, where these are not all or none
     rate        of new subjects, or pooled: what the point was chosen by, less its luck
     luck        by how much it looked better, as the best of all that was tried (`evaluation.luck`)
@@ -146,6 +148,7 @@ class Tried(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True)
     frame_us: Microseconds
     trainer: Name = PAPERS_TRAINER
     keep_joints: Annotated[int, Meta(ge=1, le=2**16)] | None = None
+    levels: Annotated[int, Meta(ge=1, le=65535)] | None = None
 
 
 class Curve(Struct, frozen=True, forbid_unknown_fields=True):
@@ -182,6 +185,7 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """All that `thenar frontier` found.
 
     by       what points are chosen by, and each `rate` is of; a point's `beside` is of the other
+    n_levels  levels of the n_taxels that there were to choose from, at most; they come on top of the switches
     picked   number of the point that suits the budget or the rate asked for; None where nothing was asked
     skipped  sentences: what could not be measured here, and what was left out
     """
@@ -209,6 +213,8 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     skipped: tuple[str, ...]
     picked: int | None = None
     wanted: str = ""
+    n_taxels: Count = 0
+    n_levels: Count = 0
 
     @property
     def trainers(self) -> tuple[str, ...]:
@@ -295,7 +301,7 @@ def _contradictions(frontier: Frontier) -> Iterator[str]:
 def _fault(point: Point, frontier: Frontier) -> str:
     """Return the first contradiction in a point's setting, or nothing."""
     setting = point.setting
-    if len(set(point.switches)) < len(point.switches) or len(point.switches) > frontier.n_switches:
+    if len(set(point.switches)) < len(point.switches) or len(point.switches) > frontier.n_switches + frontier.n_levels:
         return "keeps a switch twice, or more than there are"
     if point.switches and not (setting.wiring and setting.clock_hz):
         return "has switches without a wiring or its clock"

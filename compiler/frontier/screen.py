@@ -36,13 +36,19 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     """Return how well and how fast every choice is that may be built, with the first trainer; and everybody's curves,
     rivals' included.
     """
-    search, cuts, n_switches = survey.search, survey.cuts, len(survey.switch_names)
-    inputs, first = available_inputs(n_switches, survey.n_joints), search.trainers[0]
-    every = [way for name in search.methods for way in ways(name, n_switches)]
+    search, cuts, sizes = survey.search, survey.cuts, {most: len(survey.elements(most)) for most in survey.levels}
+    inputs, first = available_inputs(sizes[survey.levels[-1]], survey.n_joints), search.trainers[0]
+    every = [(way, most) for most, size in sizes.items() for name in search.methods for way in ways(name, size)]
     choices = [
-        Candidate(way, kind, first) for kind in inputs for way in (every if kind != "joints" else (NO_SWITCHES,))
+        Candidate(way, kind, first, levels=most)
+        for kind in inputs
+        for way, most in (every if kind != "joints" else ((NO_SWITCHES, None),))
     ]
-    rivals = [Candidate(way, "switches", first) for name in search.rivals for way in curve_ways(name, n_switches)]
+    rivals = [
+        Candidate(way, "switches", first, levels=survey.levels[-1])
+        for name in search.rivals
+        for way in curve_ways(name, sizes[survey.levels[-1]])
+    ]
     survey.choose("placements", choices, (cuts.everything, *cuts.screening))
     # A placement that keeps nothing is none.
     choices = [one for one in choices if one.way == NO_SWITCHES or survey.columns(one, cuts.everything)]
@@ -86,9 +92,9 @@ def _screened(
     calls = []
     for choice in choices:
         columns = survey.columns(choice, survey.cuts.everything)
-        names = tuple(survey.switch_names[column] for column in columns)
         some, training = survey.read(choice, survey.cuts.everything, few=True), survey.training(choice)
-        calls.append(price.call(QUICK_PRICE_S, some, names, columns, (_TABLED,), training, survey.equipment, None))
+        names, tabled = survey.names(choice), (_TABLED,)
+        calls.append(price.call(QUICK_PRICE_S, some, names, columns, tabled, training, survey.equipment, None))
     found = []
     for choice, (priced,) in zip(choices, survey.cache.ask(f"times{stage}", calls), strict=True):
         us = priced.fastest_us(survey.transfer(choice).us)
@@ -101,7 +107,7 @@ def _curve(survey: Survey, name: str, rates: dict[Candidate, Judged]) -> Curve:
     """Return a method's rates by the mean number of switches that it kept in the folds, switches alone."""
     folds, points = survey.cuts.screening, {}
     for choice, judged in rates.items():
-        if choice.way.method == name and choice.inputs == "switches":
+        if (choice.way.method, choice.inputs, choice.levels) == (name, "switches", survey.levels[-1]):
             points[sum(len(survey.columns(choice, fold)) for fold in folds) / len(folds)] = judged.rate
     sizes = tuple(sorted(points))
     return Curve(name, METHODS[name].help, METHODS[name].ours, sizes, tuple(points[size] for size in sizes))

@@ -6,6 +6,7 @@ from typing import Literal, NamedTuple
 
 from thenar.runtime.manifest import AUTO, PAPERS_TRAINER, Inputs, Options, TableBits
 
+from ..placement.elements import LEVELS
 from ..placement.methods.base import METHODS, usual
 from ..trainers.base import TRAINERS, Number, Training, changed
 from .points import FrontierError, Way
@@ -26,22 +27,29 @@ class Shape(NamedTuple):
 
 
 SHAPES = (*(Shape(width) for width in (16, 12, 8, 6, 5, 4)), Shape(16, 8))
+# So many levels of each taxel there are to choose from, at most.
+TAXEL_LEVELS = (1, 3, LEVELS)
 # So many joints are tried besides all of them.
 JOINTS = (2, 3, 4, 5, 6, 7, 8, 10, 12, 16)
 # Rounds of whose ensembles integer tables are made, in every shape.
 TABLED = (10, 30, 100)
 
 
+# A method, whether it looks at the joints, and how many levels of a taxel it chooses from.
+Choosing = tuple[str, bool, int | None]
+
+
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A way to choose switches, whether the joints are read besides, who trains, and how many joints are kept (None:
-    all); inputs "joints" have NO_SWITCHES.
+    """A way to choose elements, whether the joints are read besides, who trains, how many joints are kept (None: all),
+    and how many levels of a taxel there are to choose from (None: no taxel is read); inputs "joints" have NO_SWITCHES.
     """
 
     way: Way
     inputs: Inputs
     trainer: str = PAPERS_TRAINER
     keep_joints: int | None = None
+    levels: int | None = None
 
     @property
     def joints(self) -> bool:
@@ -52,6 +60,11 @@ class Candidate:
     def learns_from_joints(self) -> bool:
         """Whether its switches are chosen by the joints as well."""
         return self.inputs == "both" and METHODS[self.way.method].uses_joints
+
+    @property
+    def chosen_by(self) -> Choosing:
+        """The method, whether it looks at the joints, and the levels that it chooses from."""
+        return self.way.method, self.learns_from_joints, self.levels
 
 
 @dataclass(frozen=True, slots=True)

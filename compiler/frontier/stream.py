@@ -7,18 +7,20 @@ one: its joints follow a minimum-jerk path (Flash and Hogan 1985, J. Neurosci. 5
 hand, most at two thirds of the way (Jeannerod 1984, J. Motor Behav. 16: 235), in TRAVEL_US, told every RECORD_US as a
 CyberGlove would. It grips: the switches of the next grasp close one by one over GRIP_US; with the last one the grasp is
 complete. The times are those of the scene `continuous`. The open hand is, joint by joint, the one that only a twentieth
-of the trials opens further.
+of the trials opens further. A taxel is pressed and let go at once, as a switch is; between grasps it reads what it does
+in the twentieth of the trials that press it least.
 
 What that leaves out: a hand that holds is still, and a trial is one frame, so what a single frame gets wrong stays
 wrong for the whole hold, and no number of frames makes up for it; contacts that bounce; switches that are touched in
 passing.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..placement.elements import Elements, above
 from ..recordings.graspset import GraspSet
 from ..samples import Columns
 from .movements import Movements, holds_movements, movements_of
@@ -56,6 +58,7 @@ class Stream:
                               that is may be decided on from before, which tells nothing
     ends      (g,) intp       the states at which these grasps no longer are
     what      a sentence: what the stream is, and why this one
+    taxels    (T, t) uint16   the taxels
     """
 
     bits: NDArray[np.bool_]
@@ -65,9 +68,16 @@ class Stream:
     arrivals: Rows
     ends: Rows
     what: str = ""
+    taxels: Codes = field(default_factory=lambda: np.empty((0, 0), np.uint16))
 
     def __len__(self) -> int:
         return len(self.at_us)
+
+    def with_elements(self, elements: Elements) -> "Stream":
+        """Return the same stream, whose switches are these elements where it has taxels."""
+        if not self.taxels.shape[1]:
+            return self
+        return replace(self, bits=above(self.bits, self.taxels, elements), taxels=self.taxels[:, :0])
 
     def with_joints(self, joints: Columns) -> "Stream":
         """Return the same stream with the joints `joints` alone, where there are any: who reads none looks at none."""
@@ -101,6 +111,8 @@ def stream_of(
         seed=seed,
         grasps=grasps,
         opens_up=np.array([joint.step < 0 for joint in grasp_set.joints], np.bool_),
+        taxels=grasp_set.taxels[chosen],
+        eases_up=np.array([taxel.step < 0 for taxel in grasp_set.taxel_columns], np.bool_),
     )
 
 
@@ -143,22 +155,29 @@ def composed_stream(
     seed: int,
     grasps: int = GRASPS,
     opens_up: NDArray[np.bool_] | None = None,
+    taxels: Codes | None = None,
+    eases_up: NDArray[np.bool_] | None = None,
 ) -> Stream:
     """Return a stream composed of single trials (n, s), (n, j) of classes `labels` (n,): see this module.
 
     opens_up  (j,) the joints whose codes rise as the hand opens; None: the codes of all fall
+    taxels    (n, t) codes; eases_up (t,): those that rise as the taxel is let go; None: all fall
 
     Raises FrontierError for fewer than two grasp types: there is nothing to go from and to.
     """
     if len(np.unique(labels)) < 2:
         raise FrontierError("a latency is measured between grasps of different types, and the rows are of one")
-    rising = np.zeros(codes.shape[1], np.bool_) if opens_up is None else opens_up
+    pads = np.empty((len(labels), 0), np.uint16) if taxels is None else taxels
+    n_switches, rest = switches.shape[1], _open_hand(pads, eases_up).astype(np.uint16)
+    contacts, rest = np.hstack([switches, pads], dtype=np.uint16), np.append(np.zeros(n_switches, np.uint16), rest)
     random = np.random.default_rng(seed)
     order = _order(labels, grasps, random)
-    legs = _legs(switches, codes, _open_hand(codes, rising), order, random)
+    legs = _legs(contacts, rest, codes, _open_hand(codes, opens_up), order, random)
+    found = np.concatenate([leg.contacts for leg in legs])
     begins = np.concatenate([[0], np.cumsum([len(leg.at_us) for leg in legs])])
     return stream_from(
-        bits=np.concatenate([leg.bits for leg in legs]),
+        bits=found[:, :n_switches] > 0,
+        taxels=found[:, n_switches:],
         codes=np.concatenate([leg.codes for leg in legs]),
         at_us=np.concatenate([leg.at_us for leg in legs]),
         end_us=int(legs[-1].at_us[-1]) + HOLD_US[0],
@@ -181,12 +200,14 @@ def stream_from(
     ends: Rows,
     grasps: Rows,
     what: str,
+    taxels: Codes | None = None,
 ) -> Stream:
     """Return the stream of states that end at end_us; all grasps (g,), classes `grasps`, are told, in order."""
     types = np.full(len(at_us) + 1, -1, np.intp)
     for arrival, end, grasp in zip(arrivals.tolist(), ends.tolist(), grasps.tolist(), strict=True):
         types[arrival:end] = grasp
     another = np.concatenate([[True], grasps[1:] != grasps[:-1]])
+    pads = np.empty((len(at_us), 0), np.uint16) if taxels is None else taxels
     return Stream(
         bits=np.vstack([bits, bits[-1:]]),
         codes=np.vstack([codes, codes[-1:]]),
@@ -195,6 +216,7 @@ def stream_from(
         arrivals=arrivals[another],
         ends=ends[another],
         what=what,
+        taxels=np.vstack([pads, pads[-1:]]),
     )
 
 
@@ -221,6 +243,7 @@ def _laid_out(grasp_set: GraspSet, labels: Rows, movements: Movements, period_us
         ends=begins + movements.released - movements.first,
         grasps=labels[movements.first],
         what=what,
+        taxels=grasp_set.taxels[rows],
     )
 
 
@@ -228,7 +251,7 @@ def _laid_out(grasp_set: GraspSet, labels: Rows, movements: Movements, period_us
 class _Leg:
     """The way from one grasp to the next, and its hold: states (t,), of which number `arrival` is the first of it."""
 
-    bits: Bits
+    contacts: Codes
     codes: Codes
     at_us: Times
     arrival: int
@@ -247,27 +270,38 @@ def _order(labels: Rows, grasps: int, random: np.random.Generator) -> list[int]:
     return chosen
 
 
-def _open_hand(codes: Codes, opens_up: Bits) -> NDArray[np.float64]:
+def _open_hand(codes: Codes, opens_up: Bits | None) -> NDArray[np.float64]:
+    """Return what joints or taxels (n, c) read while nothing is held; opens_up: see composed_stream."""
     if not len(codes):
         return np.zeros(codes.shape[1])
     rising = np.sort(codes, axis=0)
     rank = int(_OPEN * (len(codes) - 1))
-    opened: NDArray[np.float64] = np.where(opens_up, rising[len(codes) - 1 - rank], rising[rank]).astype(np.float64)
+    opened: NDArray[np.float64] = np.where(
+        False if opens_up is None else opens_up, rising[len(codes) - 1 - rank], rising[rank]
+    ).astype(np.float64)
     return opened
 
 
 def _legs(
-    switches: Bits, codes: Codes, opened: NDArray[np.float64], order: list[int], random: np.random.Generator
+    contacts: Codes,
+    rest: Codes,
+    codes: Codes,
+    opened: NDArray[np.float64],
+    order: list[int],
+    random: np.random.Generator,
 ) -> list[_Leg]:
     legs: list[_Leg] = []
-    bits, pose, leaves_us = np.zeros(switches.shape[1], np.bool_), opened, 0
+    held, pose, leaves_us = rest, opened, 0
     for row in order:
-        lets_go = leaves_us + random.integers(0, RELEASE_US, len(bits))
-        grips = leaves_us + RELEASE_US + TRAVEL_US + random.integers(0, GRIP_US, len(bits))
-        open_us, close_us = np.where(bits, lets_go, -_NEVER), np.where(switches[row], grips, _NEVER)
-        path = _path(pose, codes[row].astype(np.float64), opened)
-        leg = _leg(leaves_us, open_us, close_us, path)
-        bits, pose = switches[row], codes[row].astype(np.float64)
+        lets_go = leaves_us + random.integers(0, RELEASE_US, len(rest))
+        grips = leaves_us + RELEASE_US + TRAVEL_US + random.integers(0, GRIP_US, len(rest))
+        open_us = np.where(held != rest, lets_go, -_NEVER)
+        close_us = np.where(contacts[row] != rest, grips, _NEVER)
+        at_us, travelled = _changes(leaves_us, open_us, close_us, _path(pose, codes[row].astype(np.float64), opened))
+        now = at_us[:, np.newaxis]
+        seen = np.where(now < open_us, held, np.where(now >= close_us, contacts[row], rest))
+        leg = _Leg(seen, travelled, at_us, len(at_us) - 1)
+        held, pose = contacts[row], codes[row].astype(np.float64)
         leaves_us = int(leg.at_us[-1]) + int(random.integers(*HOLD_US))
         legs.append(leg)
     return legs
@@ -282,12 +316,12 @@ def _path(start: NDArray[np.float64], end: NDArray[np.float64], opened: NDArray[
     return np.rint(bent).astype(np.uint16)
 
 
-def _leg(leaves_us: int, open_us: Times, close_us: Times, path: Codes) -> _Leg:
-    """Return the states from where the hand begins to let go: each in which something changes, up to the last."""
+def _changes(leaves_us: int, open_us: Times, close_us: Times, path: Codes) -> tuple[Times, Codes]:
+    """Return the times at which something changes, from where the hand begins to let go up to the last, and the joints
+    then.
+    """
     starts_us = leaves_us + RELEASE_US
     records_us = starts_us + RECORD_US * np.arange(len(path)) if path.shape[1] else np.array([starts_us + TRAVEL_US])
     changes = np.concatenate([[leaves_us], open_us[open_us > -_NEVER], records_us, close_us[close_us < _NEVER]])
     at_us = np.unique(changes.astype(np.int64))
-    now = at_us[:, np.newaxis]
-    travelled = np.clip((at_us - starts_us) // RECORD_US, 0, len(path) - 1)
-    return _Leg((now < open_us) | (now >= close_us), path[travelled], at_us, len(at_us) - 1)
+    return at_us, path[np.clip((at_us - starts_us) // RECORD_US, 0, len(path) - 1)]

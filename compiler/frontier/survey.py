@@ -2,8 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, field
 
 import numpy as np
 from msgspec import Struct
@@ -15,6 +14,7 @@ from ..boosting.stumps import winners
 from ..evaluation.choosing import choose_training
 from ..evaluation.folds import EvaluationError, Fold, Rows, leave_groups_out, trial_folds
 from ..evaluation.rates import Rate
+from ..placement.elements import Element, Elements, bits_of, elements_of, names_of, ports_of
 from ..placement.joints import joint_order
 from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts
@@ -25,8 +25,8 @@ from ..tables.quantise import integer_scores, quantise
 from ..trainers.base import Training
 from .cache import Cache, stored
 from .equipment import Equipment
-from .points import By, Time, Way
-from .search import NO_SWITCHES, SHAPES, Candidate, Search, Shape
+from .points import By, Time
+from .search import NO_SWITCHES, SHAPES, TAXEL_LEVELS, Candidate, Choosing, Search, Shape
 
 # Expected seconds of one core, for so many rows: they only say how the time that is left is told.
 _ROWS = 3000
@@ -162,7 +162,7 @@ class Survey:
     """Rows, what is tried on them, and of what a glove may be built; placements and fits that were asked for are known.
 
     source  what the recordings are called
-    ports   what they cost to read on the whole glove, None where that is not known
+    ports   what switches and taxels cost to read on the whole glove, None where that is not known
     """
 
     grasp_set: GraspSet
@@ -173,29 +173,36 @@ class Survey:
     cuts: Cuts
     equipment: Equipment
     cache: Cache
-    _columns: dict[tuple[Way, bool, Fold], Columns] = field(default_factory=dict, init=False)
-    _seconds: dict[tuple[str, bool], float] = field(default_factory=dict, init=False)
-    _joints: dict[tuple[Way, bool, Fold], Columns] = field(default_factory=dict, init=False)
+    _elements: dict[tuple[int, Fold], Elements] = field(default_factory=dict, init=False)
+    _inputs: dict[tuple[bool, int | None, Fold, bool], Samples] = field(default_factory=dict, init=False)
+    _columns: dict[tuple[Choosing, float, Fold], Columns] = field(default_factory=dict, init=False)
+    _seconds: dict[Choosing, float] = field(default_factory=dict, init=False)
+    _joints: dict[tuple[Choosing, float, Fold], Columns] = field(default_factory=dict, init=False)
     _trainings: dict[tuple[str, Inputs, Fold], Training] = field(default_factory=dict, init=False)
 
     @property
-    def switch_names(self) -> tuple[str, ...]:
-        """The names of all switches."""
-        return self.grasp_set.switch_names
+    def levels(self) -> tuple[int | None, ...]:
+        """How many levels of a taxel are tried; None alone where there are no taxels."""
+        return TAXEL_LEVELS if self.samples.taxels.shape[1] else (None,)
+
+    def elements(self, levels: int | None, fold: Fold | None = None) -> Elements:
+        """Return what there is to choose from, by the training rows of `fold`, None: by all rows."""
+        if levels is None:
+            return tuple(map(Element, range(self.samples.n_switches)))
+        key = levels, fold or self.cuts.everything
+        if key not in self._elements:
+            self._elements[key] = elements_of(self.samples.rows(key[1].train), levels)
+        return self._elements[key]
+
+    def names(self, choice: Candidate) -> tuple[str, ...]:
+        """Return the names of what a choice keeps by all rows."""
+        elements, columns = self.elements(choice.levels), self.columns(choice, self.cuts.everything)
+        return names_of(self.grasp_set, tuple(elements[column] for column in columns))
 
     @property
     def n_joints(self) -> int:
         """How many joints a frame has."""
         return int(self.samples.codes.shape[1])
-
-    @cached_property
-    def _alone(self) -> Samples:
-        return replace(self.samples, codes=self.samples.codes[:, :0])
-
-    @cached_property
-    def _few(self) -> tuple[Samples, Samples]:
-        spread = np.linspace(0, len(self.samples.labels) - 1, min(_FEW_ROWS, len(self.samples.labels))).astype(np.intp)
-        return self._alone.rows(spread), self.samples.rows(spread)
 
     def transfer(self, choice: Candidate) -> Time:
         """Return what reading the joints of a choice takes."""
@@ -205,7 +212,7 @@ class Survey:
         """Return the joints of a choice, ascending, once chosen from the training rows of `fold`."""
         if choice.keep_joints is None or not choice.joints:
             return tuple(range(self.n_joints)) if choice.joints else ()
-        order = self._joints[choice.way, choice.learns_from_joints, fold]
+        order = self._joints[choice.chosen_by, choice.way.parameter, fold]
         return tuple(sorted(order[: choice.keep_joints]))
 
     def some_joints(self, choice: Candidate) -> tuple[str, ...]:
@@ -215,12 +222,23 @@ class Survey:
 
     def read(self, choice: Candidate, fold: Fold, *, few: bool = False) -> Samples:
         """Return all rows, or a few of them, with the joints of a choice."""
-        some = self.inputs(choice.joints, few=few)
+        some = self.inputs(choice.joints, choice.levels, fold, few=few)
         return some if choice.keep_joints is None else some.with_joints(self.joints(choice, fold))
 
-    def inputs(self, joints: bool, *, few: bool = False) -> Samples:
-        """Return all rows, or a few of them, with the joints or without."""
-        return self._few[joints] if few else self.samples if joints else self._alone
+    def inputs(self, joints: bool, levels: int | None, fold: Fold, *, few: bool = False) -> Samples:
+        """Return all rows, or a few of them, with the joints or without; their switches are the elements that there
+        are to choose from by the training rows of `fold`.
+        """
+        key = joints, levels, self.cuts.everything if levels is None else fold, few
+        if key not in self._inputs:
+            if few:
+                spread = np.linspace(0, len(self.samples.labels) - 1, min(_FEW_ROWS, len(self.samples.labels)))
+                found = self.inputs(joints, levels, fold).rows(spread.astype(np.intp))
+            else:
+                rows = self.samples if joints else self.samples.with_joints(())
+                found = bits_of(rows, self.elements(levels, fold))
+            self._inputs[key] = found
+        return self._inputs[key]
 
     def training(self, choice: Candidate, fold: Fold | None = None) -> Training:
         """Return how a choice is trained on the training rows of a fold, None: on all rows; once settled."""
@@ -247,7 +265,7 @@ class Survey:
         calls = [
             choose_settings.call(
                 settle_s(self.search.alone(choice.trainer), len(fold.train)),
-                self.inputs(choice.joints),
+                self.inputs(choice.joints, choice.levels, fold),
                 fold.train,
                 self.columns(choice, fold),
                 self.search.alone(choice.trainer).candidates,
@@ -260,35 +278,37 @@ class Survey:
             self._trainings[choice.trainer, choice.inputs, fold] = Training.chosen(fitting)
 
     def choose(self, stage: str, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
-        """Have the switches of all choices chosen from the training rows of these folds."""
-        asked: dict[tuple[str, bool], dict[float, None]] = {}
+        """Have the switches and levels of all choices chosen from the training rows of these folds."""
+        asked: dict[Choosing, dict[float, None]] = {}
         for choice in choices:
             if choice.way != NO_SWITCHES:
-                asked.setdefault((choice.way.method, choice.learns_from_joints), {})[choice.way.parameter] = None
-        places = [(method, joints, fold) for method, joints in asked for fold in folds]
+                asked.setdefault(choice.chosen_by, {})[choice.way.parameter] = None
+        places = [(key, fold) for key in asked for fold in folds]
         calls = [
             choose_path.call(
                 path_s(method, len(fold.train)),
-                self.inputs(joints),
+                self.inputs(joints, levels, fold),
                 fold.train,
                 method,
-                tuple(asked[method, joints]),
-                self.ports if METHODS[method].uses_ports else None,
+                tuple(asked[method, joints, levels]),
+                ports_of(self.ports, self.elements(levels, fold))
+                if self.ports is not None and METHODS[method].uses_ports
+                else None,
             )
-            for method, joints, fold in places
+            for (method, joints, levels), fold in places
         ]
-        for (method, joints, fold), path in zip(places, self.cache.ask(stage, calls), strict=True):
-            for parameter, columns in zip(asked[method, joints], path.columns, strict=True):
-                self._columns[Way(method, parameter), joints, fold] = columns
+        for (key, fold), path in zip(places, self.cache.ask(stage, calls), strict=True):
+            for parameter, columns in zip(asked[key], path.columns, strict=True):
+                self._columns[key, parameter, fold] = columns
             if fold is self.cuts.everything:
-                self._seconds[method, joints] = path.seconds
+                self._seconds[key] = path.seconds
 
     def choose_joints(self, stage: str, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
         """Have the joints ranked beside the switches of those choices that keep only some, by rows of these folds."""
-        alike = {(one.way, one.learns_from_joints): one for one in choices if one.keep_joints is not None}
+        alike = {(one.chosen_by, one.way.parameter): one for one in choices if one.keep_joints is not None}
         places = [(key, fold) for key in alike for fold in folds]
         calls = [
-            rank_joints.call(_RANK_S, self.inputs(True), fold.train, self.columns(alike[key], fold))
+            rank_joints.call(_RANK_S, self.inputs(True, key[0][2], fold), fold.train, self.columns(alike[key], fold))
             for key, fold in places
         ]
         for (key, fold), order in zip(places, self.cache.ask(stage, calls), strict=True):
@@ -296,11 +316,11 @@ class Survey:
 
     def columns(self, choice: Candidate, fold: Fold) -> Columns:
         """Return the switches of a choice, once chosen, from the training rows of `fold`."""
-        return () if choice.way == NO_SWITCHES else self._columns[choice.way, choice.learns_from_joints, fold]
+        return () if choice.way == NO_SWITCHES else self._columns[choice.chosen_by, choice.way.parameter, fold]
 
     def choosing_s(self, choice: Candidate) -> float:
         """Return how long it took to choose the switches of a choice from all rows."""
-        return self._seconds.get((choice.way.method, choice.learns_from_joints), 0.0)
+        return self._seconds.get(choice.chosen_by, 0.0)
 
     def fit(
         self,

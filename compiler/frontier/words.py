@@ -5,7 +5,7 @@ import io
 from collections.abc import Callable, Iterable, Iterator
 
 from thenar.runtime.manifest import PAPERS_TRAINER, in_words
-from thenar.runtime.names import printable
+from thenar.runtime.names import printable, taxel_and_code
 
 from ..evaluation.rates import Rate
 from ..text import cells, counted, duration, interval, listed, percent
@@ -43,10 +43,26 @@ def inputs_of(point: Point) -> str:
     """Return what a point reads: "33 switches", "joints alone", "8 switches + joints"."""
     if point.setting.inputs == "joints":
         return f"{counted(len(point.joints), 'joint')} alone" if point.joints else "joints alone"
-    joints = counted(len(point.joints), "joint") if point.joints else "joints"
-    return counted(len(point.switches), "switch", "switches") + (
-        f" + {joints}" if point.setting.inputs == "both" else ""
-    )
+    joints = [counted(len(point.joints), "joint") if point.joints else "joints"]
+    switches, levels, taxels = _kinds(point)
+    kept = [counted(switches, "switch", "switches")] if switches or not levels else []
+    kept += [f"{counted(levels, 'level')} of {counted(taxels, 'taxel')}"] if levels else []
+    return " + ".join(kept + (joints if point.setting.inputs == "both" else []))
+
+
+def _kinds(point: Point) -> tuple[int, int, int]:
+    """Return how many switches and levels a point keeps, and of how many taxels."""
+    if point.setting.levels is None:
+        return len(point.switches), 0, 0
+    taxels = [level[0] for name in point.switches if (level := taxel_and_code(name))]
+    return len(point.switches) - len(taxels), len(taxels), len(set(taxels))
+
+
+def element_of(frontier: Frontier, count: int) -> str:
+    """Return so many of what is kept, by its name: "33 switches", "36 levels", and of both "40 elements"."""
+    if not frontier.n_taxels:
+        return counted(count, "switch", "switches")
+    return counted(count, "element" if frontier.n_switches else "level")
 
 
 def shorten(name: str) -> str:
@@ -56,8 +72,9 @@ def shorten(name: str) -> str:
 
 
 def way_of(setting: Recipe) -> str:
-    """Return how switches were chosen: "id3 62"."""
-    return f"{setting.way.method} {setting.way.parameter:g}"
+    """Return how switches were chosen: "id3 62", "id3 62, 3 levels"."""
+    levels = "" if setting.levels is None else f", {counted(setting.levels, 'level')}"
+    return f"{setting.way.method} {setting.way.parameter:g}{levels}"
 
 
 def training_of(setting: Recipe) -> str:
@@ -115,7 +132,7 @@ def summary(frontier: Frontier) -> str:
         f"Point {point.number}: {_inputs(frontier, point)}{trained} read and classified in "
         f"{duration(point.frame.us)} on {frontier.target}, reach {interval(point.rate)} % accuracy ({point.rate.what})"
     )
-    against = [_mark(mark) for mark in frontier.marks]
+    against = [_mark(mark, frontier) for mark in frontier.marks]
     return ". ".join(filter(None, (f"{said}, against {listed(against)}" if against else said, luck_of(point)))) + "."
 
 
@@ -156,18 +173,18 @@ def rates_of(frontier: Frontier) -> dict[str, Callable[[Point], Rate | None]]:
 
 
 def _inputs(frontier: Frontier, point: Point) -> str:
-    some = f"{len(point.switches)} of {frontier.n_switches} switches"
+    switches, levels, taxels = _kinds(point)
+    kept = [f"{switches} of {frontier.n_switches} switches"] if frontier.n_switches else []
+    kept += [f"{counted(levels, 'level')} of {taxels} of {frontier.n_taxels} taxels"] if frontier.n_taxels else []
+    some = listed(kept)
     some_joints = f"{len(point.joints)} of {counted(frontier.n_joints, 'joint')}"
     joints = some_joints if point.joints else counted(frontier.n_joints, "joint")
-    return {"switches": some, "joints": joints, "both": f"{some} and {joints}"}[point.setting.inputs]
+    return {"switches": some, "joints": joints, "both": listed([*kept, joints])}[point.setting.inputs]
 
 
-def _mark(mark: Mark) -> str:
-    name = (
-        mark.name
-        if str(mark.n_switches) in mark.name
-        else f"{counted(mark.n_switches, 'switch', 'switches')} ({mark.name})"
-    )
+def _mark(mark: Mark, frontier: Frontier) -> str:
+    named = str(mark.n_switches) in mark.name
+    name = mark.name if named else f"{element_of(frontier, mark.n_switches)} ({mark.name})"
     return f"{percent(mark.rate.mean)} in {duration(mark.frame_us)} with {name}"
 
 

@@ -93,9 +93,15 @@ def bits_of(samples: Samples, elements: Elements) -> Samples:
     """Return samples without taxels, whose switches are these elements, in their order."""
     if not samples.taxels.shape[1]:
         return samples if elements == elements_of(samples) else samples.keeping(columns_of(elements))
-    raw = np.hstack([samples.switches, samples.taxels], dtype=np.uint16)
+    return replace(samples, switches=above(samples.switches, samples.taxels, elements), taxels=samples.taxels[:, :0])
+
+
+def above(switches: NDArray[np.bool_], taxels: NDArray[np.uint16], elements: Elements) -> NDArray[np.bool_]:
+    """Return the bits (n, e) of these elements, of switches (n, s) and taxels (n, t)."""
+    raw = np.hstack([switches, taxels], dtype=np.uint16)
     columns, codes = np.array(elements, np.int64).reshape(-1, 2).T
-    return replace(samples, switches=raw[:, columns] > codes, taxels=samples.taxels[:, :0])
+    bits: NDArray[np.bool_] = raw[:, columns] > codes
+    return bits
 
 
 def columns_of(elements: Elements) -> Columns:

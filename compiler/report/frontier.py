@@ -286,12 +286,17 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
         yield PlainTable("How far the models of times are off", columns, checks)
 
 
+def _taxels(frontier: Frontier) -> str:
+    return f"{counted(frontier.n_taxels, 'taxel')} of {frontier.n_levels} levels, " if frontier.n_taxels else ""
+
+
 def _notes(frontier: Frontier) -> Iterator[str]:
     yield summary(frontier)
     yield (
         f"{frontier.combinations:,} combinations of {frontier.source}: {counted(frontier.rows, 'row')}, "
         f"{counted(frontier.trials, 'trial')}, "
         f"{counted(frontier.subjects, 'subject')}, {counted(frontier.n_switches, 'switch', 'switches')}, "
+        f"{_taxels(frontier)}"
         f"{counted(frontier.n_joints, 'joint')}; target {frontier.target}. {folds_of(frontier)}, placement inside the "
         f"fold, with 95{NBSP}% intervals. {LUCK}"
     )

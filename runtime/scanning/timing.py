@@ -18,7 +18,7 @@ from thenar.drivers import cyberglove_protocol as glove_protocol
 from thenar.drivers.cyberglove_protocol import sending_us, shortest_us
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import Conversion, Reading
-from thenar.drivers.scanner_protocol import OVERHEAD
+from thenar.drivers.scanner_protocol import OVERHEAD, Analog
 from thenar.drivers.spi.chips import SELECT_US, Transfer
 
 from ..harness.wiring import GloveWiring, Harness, MuxChannel, ScannerWiring
@@ -198,6 +198,17 @@ def glove_us(glove: GloveWiring, sensors: int, *, wire_only: bool = False) -> fl
         us *= glove.record_us / shortest_us(glove.all_sensors, baud, status=True, filtered=filtered)
     us += asking_us
     return max(us, 1e6 / glove.rate_hz if glove.rate_hz else 0.0)
+
+
+# From ANALOG to ANALOG, at least.
+_ANALOG_US = 2000.0
+
+
+def analog_us(channels: int, baud: int) -> float:
+    """Return how often a board sends the codes of so many channels, in microseconds: the line is free for half of the
+    time at least.
+    """
+    return max(_ANALOG_US, 2 * sending_us(OVERHEAD + Analog.LAYOUT.size + 2 * channels, baud))
 
 
 def scanner_us(scanner: ScannerWiring) -> float:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from math import ceil
 
 from thenar.drivers.scanner import Scanner
-from thenar.drivers.scanner_protocol import OVERHEAD, Analog, Channels
+from thenar.drivers.scanner_protocol import Channels
 from thenar.drivers.serial_line import BITS_A_BYTE
 
 from ..frames import PERIODS, Mask, Pauses, Rewired, SwitchFrame
@@ -12,14 +12,12 @@ from ..harness.wiring import Harness, ScannerWiring
 from ..names import list_names
 from ..published import Count
 from ..scanning.scanmap import ScanMap
+from ..scanning.timing import analog_us
 from ..taxels import Level, Taxels, calibration_of
 from .base import SHORTEST_US, Source, SourceKind, counted, debouncer_of, pause_us
 
 # A board that speaks less often is asked for a heartbeat, beside an event for every change: silence is missed sooner.
 STATE_US = SHORTEST_US
-
-# From ANALOG to ANALOG, at least; and what each takes on the line beside its codes.
-ANALOG_US, _ANALOG_BYTES = 2000, OVERHEAD + Analog.LAYOUT.size
 
 # The round trip of a PING on a good line: an adapter's 16 ms and the board's answer; and its bytes, both ways.
 _ANSWERED_US = 20_000
@@ -47,8 +45,7 @@ class _BoardTaxels:
         self._everything = len(everything)
         self.channels: Mask = sum(1 << channel for channel in asked)
         self.owned: Mask = sum(1 << switch for each in levels.values() for _, switch in each)
-        line_us = (_ANALOG_BYTES + 2 * len(asked)) * BITS_A_BYTE * 1e6 / wiring.baud
-        self.period_us = max(ANALOG_US, ceil(2 * line_us))
+        self.period_us = ceil(analog_us(len(asked), wiring.baud))
         self.begin()
 
     def begin(self) -> None:

@@ -22,9 +22,10 @@ from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring
 from thenar.runtime.scanning.decided import Decided
 from thenar.runtime.scanning.plan import Costs, plan_scan
 from thenar.runtime.scanning.scanmap import ScanMap
-from thenar.runtime.scanning.timing import glove_us, reading_of, scanner_us
+from thenar.runtime.scanning.timing import analog_us, glove_us, reading_of, scanner_us
 from thenar.runtime.tables import IntegerTables
 
+from ...firmware.board_inputs import CONVERSION_CYCLES, prescaler_of
 from ...firmware.targets import TARGETS
 from ..points import How, Time
 from .wirings import Wiring
@@ -189,8 +190,9 @@ def scan_times(
     harness = wiring.harness_of(names)
     rows = np.linspace(0, len(bits) - 1, min(_ORDERING, len(bits))).astype(np.intp)
     scan = plan_scan(names, tables, harness, bits[rows], codes[rows])
-    boards = [(board, keys) for board, keys in zip(harness.scanners, scan.scanners, strict=True) if keys]
-    board_us = max((_board_us(board) for board, _ in boards), default=0.0)
+    wanted = zip(harness.scanners, scan.scanners, scan.taxels or ((),) * len(harness.scanners), strict=True)
+    boards = [(board, {channel for channel, *_ in levels}) for board, keys, levels in wanted if keys or levels]
+    board_us = max((_board_us(board, len(channels)) for board, channels in boards), default=0.0)
     ports = [port.elements for port in scan.ports]
     known = Decided(tables, ports, bits, codes)
     full_us, early_us, early_ports = _bus_us(scan, harness, known, beside) if ports else (0.0, 0.0, 0.0)
@@ -213,9 +215,18 @@ def scan_times(
     )
 
 
-def _board_us(board: ScannerWiring) -> float:
+def _board_us(board: ScannerWiring, channels: int) -> float:
+    """Return what a board takes that is asked for so many of its taxels: their codes come in frames of their own, as
+    soon as all are converted. Behind a multiplexer each first conversion is thrown away.
+    """
     own = board_beside()
-    return own.scan_us + own.key_us * len(board.switches) + scanner_us(board)
+    keys_us = own.scan_us + own.key_us * len(board.switches) + scanner_us(board)
+    if not channels:
+        return keys_us
+    clock_hz = TARGETS[_BOARD].clock_hz
+    assert clock_hz is not None
+    conversion_us = (CONVERSION_CYCLES + 1) * (1 << prescaler_of(clock_hz)) * 1e6 / clock_hz
+    return max(keys_us, analog_us(channels, board.baud), channels * conversion_us * (1 if board.mux is None else 2))
 
 
 def _bus_us(scan: ScanMap, harness: Harness, frames: Decided, beside: Beside) -> tuple[float, float, float]:

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from thenar.drivers.i2c import tca9548a
-from thenar.drivers.i2c.chips import expanders
+from thenar.drivers.i2c.chips import CHIPS, expanders
+from thenar.drivers.spi.chips import SPI_CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.scanning.plan import unwired
-from thenar.runtime.scanning.propose import propose_board, propose_cyberglove, propose_harness
+from thenar.runtime.scanning.propose import CONVERTER, propose_board, propose_cyberglove, propose_harness
 
 from ...firmware.targets import TARGETS
 
@@ -19,6 +20,8 @@ AS_WIRED, BOARD = "as wired", "board"
 # Standard mode, Fast mode, Fast-mode Plus.
 CLOCKS_HZ = (100_000, 400_000, 1_000_000)
 BAUDS = (115_200, 1_000_000)
+# Chips that SPI0 of a Raspberry Pi selects.
+_SELECTS = 2
 # What an AVR's own bus is allowed in board.toml.
 _AVR_HZ = range(50_000, 400_001)
 
@@ -27,8 +30,9 @@ _AVR_HZ = range(50_000, 400_001)
 class Wiring:
     """A way to wire switches.
 
-    name      "as wired" (the given harness), "board" (a switch scanner), or a kind of port expander for a new glove
-    clock_hz  of the bus, or baud of the board's line
+    name      "as wired" (the given harness), "board" (a switch scanner), or a kind of port expander or of converter for
+              a new glove
+    clock_hz  of the bus, of a converter's SPI, or baud of the board's line
     harness   the given one, for "as wired"
     muxes     whether chips may go behind a TCA9548A
     """
@@ -50,6 +54,10 @@ class Wiring:
             proposed = propose_board(names, cyberglove=glove)
             return replace(proposed, scanners=tuple(replace(each, baud=self.clock_hz) for each in proposed.scanners))
         proposed = propose_harness(names, self.name, cyberglove=glove)
+        if self.name in SPI_CHIPS:
+            if len(proposed.spi) > _SELECTS:
+                raise HarnessError(f"{len(proposed.spi)} {self.name}, a Raspberry Pi's SPI selects {_SELECTS}")
+            return replace(proposed, spi=tuple(replace(each, hz=self.clock_hz) for each in proposed.spi))
         self._check_muxes(proposed)
         return replace(proposed, buses=tuple(replace(bus, clock_hz=self.clock_hz) for bus in proposed.buses))
 
@@ -78,9 +86,11 @@ class Wiring:
             )
 
 
-def wirings(given: Harness | None, target: str = "host") -> tuple[Wiring, ...]:
+def wirings(
+    given: Harness | None, target: str = "host", *, switches: bool = True, taxels: bool = False
+) -> tuple[Wiring, ...]:
     """Return the wirings worth trying for `target` (a name of `thenar frontier --target`): the given one, and those of
-    a new glove.
+    a new glove with `switches` and `taxels`. Taxels are on ADS7828, or on one of the converters on SPI.
 
     An AVR reads its chips itself: without muxes, with registers, at 50 to 400 kHz, as board.toml has it. What is wired
     otherwise, a board of its own included, is none of its wirings.
@@ -91,10 +101,12 @@ def wirings(given: Harness | None, target: str = "host") -> tuple[Wiring, ...]:
         if given is None or not (given.switches or given.taxel_names) or (avr and not _of_an_avr(given))
         else [_as_wired(given)]
     )
-    for chip in expanders().values():
-        if chip.tried and (chip.registers or not avr):
+    for chip in expanders().values() if switches else (CHIPS[CONVERTER],) if taxels else ():
+        if (chip.tried or not switches) and (chip.registers or not avr):
             clocks = (hz for hz in CLOCKS_HZ if hz <= chip.clock_hz and (not avr or hz in _AVR_HZ))
             found += [Wiring(chip.name, hz, muxes=not avr) for hz in clocks]
+    if taxels and not avr:
+        found += [Wiring(kind, chip.clock_hz) for kind, chip in SPI_CHIPS.items()]
     return tuple(found if avr else [*found, *(Wiring(BOARD, baud) for baud in BAUDS)])
 
 

@@ -21,7 +21,10 @@ from thenar.drivers.cyberglove_protocol import SENSORS_18
 
 TABLED = Tabled(10, Shape(16))
 WAIT = Latency(1000.0, 2000.0, 0.0)
-NAMES = [f"s{number}" for number in range(40)]
+
+
+def names(choice: Candidate) -> list[str]:
+    return [f"s{number}" for number in range(int(choice.way.parameter))]
 
 
 def trained(choice: Candidate) -> Training:
@@ -69,7 +72,7 @@ def test_joints_alone_have_one_design_a_layout_and_wait_for_a_record() -> None:
 def test_compiling_is_choosing_training_and_making_the_tables() -> None:
     design = next(designs(close_of()))
     (point, *_) = points_of(
-        [design], dict.fromkeys(((design, kind) for kind in POLICIES), WAIT), {design.judged: 0.0}, NAMES, trained
+        [design], dict.fromkeys(((design, kind) for kind in POLICIES), WAIT), {design.judged: 0.0}, names, trained
     )
     assert point.compile_s == 3.25
 
@@ -99,7 +102,7 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
     assert other.frame.us < one.frame.us
     several = [simulated(one, 20.0), simulated(other, 60.0)]
     waits = {(design, kind): WAIT for design in several for kind in design.decisions}
-    points = points_of(several, waits, {each.judged: 0.01 for each in several}, NAMES, trained)
+    points = points_of(several, waits, {each.judged: 0.01 for each in several}, names, trained)
     assert [point.frame.us for point in points] == sorted(point.frame.us for point in points)
     fronts = {(len(point.switches), point.setting.decision): point.fronts for point in points}
     assert fronts[20, "single"] == ("frame", "switches", "latency")
@@ -112,7 +115,7 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
 def test_a_points_rate_and_the_lower_end_of_its_interval_are_less_its_luck() -> None:
     design = next(designs(close_of(20, 0.9)))
     waits = dict.fromkeys(((design, kind) for kind in POLICIES), WAIT)
-    (point, *_) = points_of([design], waits, {design.judged: 0.25}, NAMES, trained)
+    (point, *_) = points_of([design], waits, {design.judged: 0.25}, names, trained)
     found = design.judged.rate
     assert (point.rate.mean, point.rate.low, point.rate.high) == pytest.approx(
         (found.mean - 0.25, found.low - 0.25, found.high)
@@ -124,7 +127,7 @@ def test_a_decision_that_is_quicker_is_on_its_own_front() -> None:
     one, other = (next(designs(close_of(n, rate))) for n, rate in ((20, 0.9), (10, 0.8)))
     waits = {(design, kind): WAIT for design in (one, other) for kind in design.decisions}
     waits[other, "sequential"] = replace_latency(WAIT, 10.0)
-    points = points_of([one, other], waits, {each.judged: 0.0 for each in (one, other)}, NAMES, trained)
+    points = points_of([one, other], waits, {each.judged: 0.0 for each in (one, other)}, names, trained)
     (found,) = (each for each in points if len(each.switches) == 10 and each.setting.decision == "sequential")
     assert found.fronts == ("latency",)
     assert found.latency.mean_us == 10.0
@@ -146,7 +149,7 @@ def test_a_point_says_its_trainer_and_every_setting_that_is_no_default() -> None
     waits = dict.fromkeys(((other, kind) for kind in POLICIES), WAIT)
     usual = {own.name: own.default for own in TRAINERS["logit"].settings}
     chosen = Training("logit", {**usual, "penalty": 17.0, "max_bins": 8})
-    (point, *_) = points_of([other], waits, {other.judged: 0.0}, NAMES, lambda _: chosen)
+    (point, *_) = points_of([other], waits, {other.judged: 0.0}, names, lambda _: chosen)
     setting = point.setting
     assert (setting.trainer, setting.settings, setting.max_bins, setting.rounds) == (
         "logit",
