@@ -198,9 +198,9 @@ def print_frontier(frontier: "Frontier") -> None:
 
 
 def _grid(frontier: "Frontier") -> "Table":
-    from thenar.compiler.frontier.words import rates_of
+    from thenar.compiler.frontier.words import elements_of, rates_of
 
-    counts, rates = ("point", "switches"), rates_of(frontier)
+    counts, rates = ("point", elements_of(frontier)), rates_of(frontier)
     numbers = (*(f"{what} %" for what in rates), *_NUMBERS)
     grid = table((*counts, *_WORDS, *numbers), (*counts, *numbers), Text(_title(frontier)))
     for point in frontier.points:

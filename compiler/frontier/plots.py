@@ -15,7 +15,7 @@ from ..pictures import on_paper, painting, rendered
 from ..text import counted, duration, percent
 from .labels import FAINT, LINE, Label, Labels
 from .points import Curve, Frontier, Mark, Point, Tried, front
-from .words import element_of, featured, inputs_of, shorten
+from .words import counted_elements, elements_of, featured, inputs_of, shorten
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -115,7 +115,7 @@ def pictures(frontier: Frontier, kind: Literal["svg", "png"], *, letters: bool =
 
 
 def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
-    figure, axes = _sheet(frontier, cost.title)
+    figure, axes = _sheet(frontier, cost.title.replace("switches", elements_of(frontier)))
     marks = [(max(x, _LOWEST), mark) for mark in frontier.marks if (x := cost.of_mark(mark)) is not None]
     points = [(max(x, _LOWEST), point) for point in frontier.points if (x := cost.of_point(point)) is not None]
     ends = [(x, end, point) for x, point in points if (end := cost.end(point)) is not None]
@@ -134,7 +134,7 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     else:
         _scale_counts(axes, frontier.n_switches + frontier.n_levels)
     untimed = cost.is_time and any(point.transfer.how == "unknown" for _, point in points)
-    axis = cost.axis.replace("switches", element_of(frontier, 2).split()[1])
+    axis = cost.axis.replace("switches", elements_of(frontier))
     axes.set_xlabel(axis + "; reading the joints is left out" * untimed, color=_INK)
 
     labels, spoken_of = Labels(axes), featured(frontier)
@@ -376,7 +376,7 @@ def _point_label(x: float, point: Point, words: str) -> Label:
 def _mark_label(x: float, mark: Mark, cost: str, frontier: Frontier) -> Label:
     name = shorten(mark.name)
     if str(mark.n_switches) not in name:
-        name = f"{name} ({element_of(frontier, mark.n_switches)})"
+        name = f"{name} ({counted_elements(frontier, mark.n_switches)})"
     return Label(((x, mark.rate.mean),), (f"{name}\n{_and_rate(cost, mark.rate)}",), _INK)
 
 

@@ -58,11 +58,17 @@ def _kinds(point: Point) -> tuple[int, int, int]:
     return len(point.switches) - len(taxels), len(taxels), len(set(taxels))
 
 
-def element_of(frontier: Frontier, count: int) -> str:
-    """Return so many of what is kept, by its name: "33 switches", "36 levels", and of both "40 elements"."""
+def elements_of(frontier: Frontier) -> str:
+    """Return how what is kept is called: switches, levels, or both elements."""
     if not frontier.n_taxels:
-        return counted(count, "switch", "switches")
-    return counted(count, "element" if frontier.n_switches else "level")
+        return "switches"
+    return "elements" if frontier.n_switches else "levels"
+
+
+def counted_elements(frontier: Frontier, count: int) -> str:
+    """Return so many of them: "33 switches", "1 level"."""
+    several = elements_of(frontier)
+    return counted(count, several.removesuffix("es" if several == "switches" else "s"), several)
 
 
 def shorten(name: str) -> str:
@@ -184,7 +190,7 @@ def _inputs(frontier: Frontier, point: Point) -> str:
 
 def _mark(mark: Mark, frontier: Frontier) -> str:
     named = str(mark.n_switches) in mark.name
-    name = mark.name if named else f"{element_of(frontier, mark.n_switches)} ({mark.name})"
+    name = mark.name if named else f"{counted_elements(frontier, mark.n_switches)} ({mark.name})"
     return f"{percent(mark.rate.mean)} in {duration(mark.frame_us)} with {name}"
 
 

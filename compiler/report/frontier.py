@@ -12,7 +12,18 @@ from msgspec import Struct
 
 from ..frontier.plots import POINT_ID, RING_ID, pictures
 from ..frontier.points import Frontier, Point, Time
-from ..frontier.words import LUCK, featured, folds_of, inputs_of, rates_of, summary, training_of, way_of, wiring_of
+from ..frontier.words import (
+    LUCK,
+    elements_of,
+    featured,
+    folds_of,
+    inputs_of,
+    rates_of,
+    summary,
+    training_of,
+    way_of,
+    wiring_of,
+)
 from ..hand import HandShape
 from ..pictures import PALETTE
 from ..text import DASH, NBSP, counted, interval, microseconds, percent, sentence
@@ -219,7 +230,7 @@ def _time(time: Time) -> str:
 def _points(frontier: Frontier) -> PlainTable:
     columns = (
         "Point",
-        "Switches",
+        elements_of(frontier).capitalize(),
         "Inputs",
         "Method",
         *rates_of(frontier),
@@ -247,12 +258,13 @@ def _points(frontier: Frontier) -> PlainTable:
 
 def _tables(frontier: Frontier) -> Iterator[PlainTable]:
     """Yield what to compare with, the rivals, what was screened and how far models are off, where there are any."""
+    kept = elements_of(frontier).capitalize()
     if frontier.marks:
         marks = tuple(
             (mark.name, str(mark.n_switches), interval(mark.rate), microseconds(mark.frame_us))
             for mark in frontier.marks
         )
-        yield PlainTable("To compare with", ("What", "Switches", f"{frontier.by}, %", "Frame, µs"), marks)
+        yield PlainTable("To compare with", ("What", kept, f"{frontier.by}, %", "Frame, µs"), marks)
     if frontier.curves:
         sizes = sorted({size for curve in frontier.curves for size in curve.sizes})
         rows = []
@@ -275,7 +287,7 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
             )
             for each in frontier.tried
         )
-        columns = ("Placement", "Inputs", "Switches", "Rounds", f"{frontier.by}, %", "Frame, µs")
+        columns = ("Placement", "Inputs", kept, "Rounds", f"{frontier.by}, %", "Frame, µs")
         yield PlainTable("Placements that were screened", columns, tried)
     if frontier.checks:
         checks = tuple(

@@ -106,7 +106,8 @@ def wirings(
             clocks = (hz for hz in CLOCKS_HZ if hz <= chip.clock_hz and (not avr or hz in _AVR_HZ))
             found += [Wiring(chip.name, hz, muxes=not avr) for hz in clocks]
     if taxels and not avr:
-        found += [Wiring(kind, chip.clock_hz) for kind, chip in SPI_CHIPS.items()]
+        most = max(len(chip.pins) for chip in SPI_CHIPS.values())
+        found += [Wiring(kind, chip.clock_hz) for kind, chip in SPI_CHIPS.items() if len(chip.pins) == most]
     return tuple(found if avr else [*found, *(Wiring(BOARD, baud) for baud in BAUDS)])
 
 

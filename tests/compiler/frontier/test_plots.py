@@ -11,6 +11,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from msgspec.structs import replace
 
 from thenar.compiler.frontier.plots import PICTURES, POINT_ID, pictures
 from thenar.compiler.frontier.points import Frontier, Latency, Mark, Point, Time
@@ -94,6 +95,29 @@ def test_every_way_to_choose_switches_is_named_once(examples: Any) -> None:
 @pytest.mark.parametrize("name", list(PICTURES))
 def test_no_words_stand_on_others(examples: Any, name: str) -> None:
     assert _overlaps(_drawn(examples.example_frontier(), name)) == []
+
+
+@pytest.mark.parametrize("name", list(PICTURES))
+def test_levels_of_taxels_are_named_and_no_words_stand_on_others(examples: Any, name: str) -> None:
+    frontier = _pressed(examples.example_frontier())
+    figure = _drawn(frontier, name)
+    assert _overlaps(figure) == []
+    axes = figure.axes[0]
+    assert axes.get_xlabel().startswith("levels kept" if name == "switches" else "time")
+    if name == "frontier":
+        assert any("levels of" in text for text in _texts(figure))
+
+
+def _pressed(frontier: Frontier) -> Frontier:
+    """Return the frontier as one of 54 taxels, three levels of each, in place of switches."""
+
+    def of_taxels(point: Point) -> Point:
+        levels = tuple(f"pad{number // 3}>{40 * (number % 3 + 1)}" for number in range(len(point.switches)))
+        setting = point.setting if point.setting.inputs == "joints" else replace(point.setting, levels=3)
+        return replace(point, switches=levels, setting=setting)
+
+    points = tuple(map(of_taxels, frontier.points))
+    return replace(frontier, points=points, n_switches=0, n_taxels=54, n_levels=162)
 
 
 @pytest.mark.parametrize("name", ["frontier", "latency"])

@@ -102,6 +102,15 @@ def test_a_board_scans_its_keys_and_then_sends_its_whole_frame() -> None:
     assert (times.ports, times.chips, times.how) == (1, 1, "model")
 
 
+@pytest.mark.parametrize(("taxels", "us"), [(4, 2000.0), (8, 2000.0), (16, 16 * 2 * 112.0)])
+def test_a_board_converts_each_taxel_once_however_many_levels_it_has(taxels: int, us: float) -> None:
+    """A taxel is converted in 14 cycles of 125 kHz; behind a multiplexer twice."""
+    wiring, size = Wiring(BOARD, 1_000_000), 2 * taxels
+    names = [f"pad{number // 2}>{100 * (number % 2 + 1)}" for number in range(size)]
+    times = scan_times(names, random_tables(size, 0, 4), wiring, *frames(size, 0))
+    assert (times.full_us, times.ports) == (pytest.approx(us), 1)
+
+
 def test_without_switches_there_is_nothing_to_read() -> None:
     none = scan_times((), random_tables(0, 16, 4), Wiring("mcp23017", 400_000), *frames(0, 16))
     assert none == ScanTimes(0.0, 0.0, 0, 0, "wire", 0.0)

@@ -53,6 +53,25 @@ def test_a_new_glove_has_every_sort_of_chip_at_every_clock_that_it_allows_or_a_b
     assert found == [*chips, (BOARD, 115_200), (BOARD, 1_000_000)]
 
 
+def test_a_new_glove_with_taxels_has_them_on_ads7828_on_spi_or_on_a_board() -> None:
+    levels = ["pad0>3", "pad0>9", "pad1>9"]
+    every = wirings(None, switches=False, taxels=True)
+    assert {wiring.name for wiring in every} == {"ads7828", BOARD, "mcp3008", "mcp3208"}
+    for wiring in every:
+        fitting = not (wiring.name == "ads7828" and wiring.clock_hz > CHIPS["ads7828"].clock_hz)
+        assert wiring.fits(levels) == fitting
+        assert wiring.harness_of(levels).taxel_names == ("pad0", "pad1")
+    both = wirings(None, taxels=True)
+    assert all(wiring.fits(["s0", *levels]) for wiring in both if wiring.clock_hz <= 400_000)
+    assert not any(wiring.fits(levels) for wiring in wirings(None, "avr2560", taxels=True))
+
+
+def test_an_spi_of_a_raspberry_pi_selects_two_converters() -> None:
+    levels = [f"pad{number}>9" for number in range(17)]
+    assert Wiring("mcp3208", 1_000_000).fits(levels[:16])
+    assert not Wiring("mcp3208", 1_000_000).fits(levels)
+
+
 def test_the_given_harness_comes_first_and_stays_as_it_is() -> None:
     harness = propose_harness(names_of(20), "pca9555")
     first = wirings(harness)[0]
