@@ -169,7 +169,8 @@ def lucks(
     for best, price, cost in zip(fronts, prices, costs, strict=True):
         limits = [*(price(design) for design in best[1:]), np.inf]
         for design, luck in zip(best, draws.luck(np.array(cost), limits), strict=True):
-            found[design.judged] = max(luck, found.get(design.judged, 0.0))
+            # Of a share, where the draws count hits in all repeats.
+            found[design.judged] = max(luck / most, found.get(design.judged, 0.0))
     return found
 
 

@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.frontier.designs import Design, best_designs, designs, points_of, with_whole_scans
+from thenar.compiler.frontier.designs import Design, best_designs, designs, lucks, points_of, with_whole_scans
 from thenar.compiler.frontier.finalists import Close
 from thenar.compiler.frontier.latency import POLICIES
 from thenar.compiler.frontier.points import Latency, Time, Way
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Search, Shape
-from thenar.compiler.frontier.survey import Judged
+from thenar.compiler.frontier.survey import Cuts, Judged
 from thenar.compiler.frontier.timing.classify_times import Classified
 from thenar.compiler.frontier.timing.scan_times import ScanTimes, records_of
+from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import TRAINERS, Training
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 
@@ -75,6 +76,29 @@ def test_compiling_is_choosing_training_and_making_the_tables() -> None:
         [design], dict.fromkeys(((design, kind) for kind in POLICIES), WAIT), {design.judged: 0.0}, names, trained
     )
     assert point.compile_s == 3.25
+
+
+def test_luck_is_the_same_however_often_the_same_folds_are_repeated() -> None:
+    """Each trial that is recognised is, in every repeat; the luck is of a share of trials all the same."""
+    cuts = Cuts.of(samples_of_trials(200), Search(methods=("id3",)))
+    found = []
+    for repeats in (1, 3):
+        random = np.random.default_rng(1)
+        several = []
+        for switches in range(1, 9):
+            close = close_of(switches, 0.9, layout_us=50.0 + switches)
+            hits = (random.random(200) < 0.8).astype(np.intp)
+            judged_so = Judged(Rate.counted((int(hits.sum()),), 200, of="pooled"), repeats * hits, repeats)
+            close = replace(close, tables={TABLED: judged_so}, screened=replace(close.screened, judged=judged_so))
+            several.append(next(designs(close)))
+        fronts = best_designs(several)
+        found.append(sorted(lucks(fronts, several, [], cuts, 1).values()))
+    assert found[0] == pytest.approx(found[1])
+    assert found[0][-1] > 0.001
+
+
+def samples_of_trials(trials: int) -> Samples:
+    return Samples(np.zeros((trials, 1), bool), np.zeros((trials, 0), np.uint16), np.arange(trials) % 2, ("a", "b"))
 
 
 def test_fronts_hold_the_quickest_and_the_smallest() -> None:
