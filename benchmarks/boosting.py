@@ -1,4 +1,5 @@
-"""LogitBoost against Weka 3.6, LightGBM and XGBoost, in the same run, on one thread: 100 rounds of decision stumps.
+"""LogitBoost against Weka 3.6, LightGBM and XGBoost, in the same run, on one thread: 100 rounds of decision stumps;
+and a fit of the additive logit on the same rows.
 
     python benchmarks/boosting.py [--quick]
 
@@ -28,6 +29,7 @@ from rich.console import Console
 from rich.table import Table
 from synthetic import grasp_like
 
+from thenar.compiler.additive.logit import fit_logit
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 
@@ -106,6 +108,7 @@ def measured(rows: int, joints: str, repeats: int) -> list[str]:
     values = codes + np.random.default_rng(2).uniform(-0.5, 0.5, codes.shape) if joints == "doubles" else codes
     X = np.hstack([bits, values])
     ours = least(lambda: boost(X, labels, CLASSES, rounds=ROUNDS), repeats)
+    ridge = least(lambda: fit_logit(X, labels, CLASSES), repeats)
     doubles = X.astype(np.float64)
     peers: list[float | None] = [None] * 4
     if rows <= MOST_WEKA_ROWS and WEKA_JAR.exists() and shutil.which("java"):
@@ -118,7 +121,7 @@ def measured(rows: int, joints: str, repeats: int) -> list[str]:
     if find_spec("xgboost"):
         peers[3] = least(lambda: xgboost(doubles, labels), repeats)
     cells = ["-" if peer is None else f"{peer:.2f} ({peer / ours:.1f})" for peer in peers]
-    return [str(rows), JOINTS[joints], f"{ours:.3f}", *cells]
+    return [str(rows), JOINTS[joints], f"{ours:.3f}", f"{ridge:.2f} ({ridge / ours:.1f})", *cells]
 
 
 def main() -> None:
@@ -126,13 +129,13 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="1400 rows only")
     quick = parser.parse_args().quick
     table = Table(title=f"{ROUNDS} rounds x {CLASSES} classes of decision stumps, 160 switches and 16 joints, seconds")
-    for heading in ("rows", "joints", "thenar", "Weka, numeric", "Weka, nominal", "LightGBM", "XGBoost"):
+    for heading in ("rows", "joints", "thenar", "logit", "Weka, numeric", "Weka, nominal", "LightGBM", "XGBoost"):
         table.add_column(heading, justify="right")
     for rows, joints in ((1400, "codes"), (1400, "doubles"), (4200, "codes"), (50_000, "codes"))[: 2 if quick else 4]:
         table.add_row(*measured(rows, joints, 5 if rows < 50_000 else 2))
     console = Console(width=120)
     console.print(table)
-    console.print("In brackets: how many times thenar's time that is.")
+    console.print("In brackets: how many times the time of thenar's LogitBoost that is.")
     here = {"Weka": WEKA_JAR.exists() and shutil.which("java"), "LightGBM": find_spec("lightgbm")}
     if missing := [name for name, found in (here | {"XGBoost": find_spec("xgboost")}).items() if not found]:
         console.print(f"Not installed, and left out: {', '.join(missing)}")

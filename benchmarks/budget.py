@@ -43,8 +43,8 @@ Costs = NDArray[np.float64]
 
 def ccqr(bits: Bits, _: Labels, costs: Costs) -> Columns:
     """Return the columns in the order of QR's pivots, less their costs."""
-    from pysensors.optimizers import CCQR
-    from pysensors.reconstruction import SSPOR
+    from pysensors.optimizers import CCQR  # pyright: ignore[reportMissingImports]
+    from pysensors.reconstruction import SSPOR  # pyright: ignore[reportMissingImports]
 
     norms = np.linalg.norm(bits, axis=0)
     model = SSPOR(optimizer=CCQR(sensor_costs=costs * np.median(norms) / 4))
@@ -70,7 +70,7 @@ def forward(bits: Bits, labels: Labels, costs: Costs) -> Columns:
         return float(model.score(X, y)) - PRICE * float(X.max(axis=0).sum())
 
     model = SequentialFeatureSelector(BernoulliNB(), n_features_to_select=MOST, scoring=score, cv=2)
-    chosen = model.fit(bits * costs, labels).get_support()
+    chosen: Bits = np.asarray(model.fit(bits * costs, labels).get_support())
     order = METHODS["mutual-information"].chooser(samples_of(bits, labels))(bits.shape[1])
     return tuple(column for column in order if chosen[column])
 

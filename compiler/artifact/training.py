@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import By, Fitting, Of, Options, Protocol, Recognised
-from thenar.runtime.tables import MAX_JOINTS, IntegerTables
+from thenar.runtime.tables import IntegerTables
 
 from ..boosting.stumps import Stumps
 from ..evaluation.choosing import choose_training
@@ -92,7 +92,8 @@ def samples_of(grasp_set: GraspSet, options: Options) -> Samples:
     samples = Samples.of(grasp_set, wanted)
     if options.keep_joints is not None and not samples.codes.shape[1]:
         raise CompileError("there are no joints to keep some of: leave keep_joints (--keep-joints) out")
-    joints = min(options.keep_joints or MAX_JOINTS + 1, samples.codes.shape[1])
+    there = samples.codes.shape[1]
+    joints = min(options.keep_joints or there, there)
     check_types(found, CompileError)
     check_inputs(found, min(options.keep or 0, len(grasp_set.element_names)), joints, CompileError)
     check_memory(len(samples.codes), found, CompileError)

@@ -3,8 +3,6 @@
 import os
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,7 +13,7 @@ from scipy.linalg import block_diag
 from sklearn.linear_model import LogisticRegression
 
 from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, PENALTY, SMOOTHNESS, ColumnTables, fit_logit
-from thenar.compiler.boosting.boost import BoostingError, boost
+from thenar.compiler.boosting.boost import BoostingError
 from thenar.compiler.elementary import softmax
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -178,23 +176,6 @@ def test_score_tables_add_what_the_columns_add(linear: bool) -> None:
 def test_what_makes_no_sense_is_refused(changes: dict[str, Any], because: str) -> None:
     with pytest.raises(BoostingError, match=because):
         fit_logit(*grasps(0), 3, **changes)
-
-
-@pytest.mark.slow
-def test_a_fit_takes_no_longer_than_a_hundred_rounds_of_boosting() -> None:
-    """Of the processor's time; the quickest of some runs, in turn."""
-    X, labels = grasps(1, n=4200, bits=160, joints=16, classes=14)
-
-    def seconds(work: Callable[[], Any]) -> float:
-        start = time.process_time()
-        work()
-        return time.process_time() - start
-
-    fits = [
-        (seconds(lambda: fit_logit(X, labels, 14)), seconds(lambda: boost(X, labels, 14, rounds=100))) for _ in range(3)
-    ]
-    ours, theirs = map(min, zip(*fits, strict=True))
-    assert ours < 1.1 * theirs
 
 
 _FIT = """

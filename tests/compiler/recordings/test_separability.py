@@ -1,5 +1,6 @@
 from collections import Counter
 from dataclasses import replace
+from itertools import chain
 
 import hypothesis.strategies as st
 import numpy as np
@@ -36,11 +37,11 @@ def test_the_ceiling_is_the_rate_of_the_best_memory(
     drawn = data.draw(grasp_sets)
     grasp_set = drawn.rows(data.draw(st.lists(st.integers(0, len(drawn) - 1), min_size=1, max_size=9)))
     for line in separabilities(grasp_set):
-        switches = grasp_set.switches.tolist() if line.inputs != "joints" else [[]] * len(grasp_set)
-        codes = grasp_set.codes.tolist() if line.inputs != "switches" else [[]] * len(grasp_set)
+        parts = {"switches": grasp_set.switches, "taxels": grasp_set.taxels, "joints": grasp_set.codes}
+        read = [part.tolist() for name, part in parts.items() if line.inputs in (name, "both", "all")]
         memory: dict[tuple[int, ...], Counter[str]] = {}
-        for bits, numbers, grasp in zip(switches, codes, grasp_set.grasps.tolist(), strict=True):
-            memory.setdefault((*bits, *numbers), Counter())[grasp] += 1
+        for *frame, grasp in zip(*read, grasp_set.grasps.tolist(), strict=True):
+            memory.setdefault(tuple(chain.from_iterable(frame)), Counter())[grasp] += 1
         assert line.distinct_frames == len(memory)
         assert line.ceiling == sum(max(counts.values()) for counts in memory.values()) / len(grasp_set)
 

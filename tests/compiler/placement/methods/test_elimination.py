@@ -227,11 +227,10 @@ def test_no_joints_give_no_bits() -> None:
     assert thermometer(np.zeros((5, 0), np.uint16)).shape == (0, 5)
 
 
-def test_a_sample_keeps_the_shares_of_the_classes_and_the_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(elimination, "MOST_ROWS", 30)
+def test_a_sample_keeps_the_shares_of_the_classes_and_the_order() -> None:
     labels = np.array([0] * 100 + [1] * 200)[np.random.default_rng(0).permutation(300)]
     codes = np.arange(300, dtype=np.uint16)[:, np.newaxis]
-    few = sampled(Samples(np.zeros((300, 1), np.bool_), codes, labels, tuple("01")))
+    few = sampled(Samples(np.zeros((300, 1), np.bool_), codes, labels, tuple("01")), 30)
     assert np.bincount(few.labels).tolist() == [10, 20]
     assert (np.diff(few.codes[:, 0].astype(int)) > 0).all()
     assert (labels[few.codes[:, 0]] == few.labels).all()
