@@ -145,7 +145,7 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
         _draw_best(labels, [(x, point.rate.mean) for x, point in points if cost.front in point.fronts], cost.best)
     _draw_ends(labels, ends)
     names = list(_draw_curves(labels, curves))
-    _draw_points(labels, points, cost.front)
+    _draw_points(labels, points, cost.front, elements_of(frontier))
     _draw_marks(labels, marks)
     for x, point in points:
         if point is spoken_of:
@@ -287,8 +287,10 @@ def _draw_best(labels: Labels, best: Iterable[tuple[float, float]], name: str) -
         labels.avoid_line((x, after, after), (y, y, higher))
 
 
-def _draw_points(labels: Labels, points: Sequence[tuple[float, Point]], best: str) -> None:
-    """Draw points with intervals: those of the front `best` filled, the others hollow; all filled without a front."""
+def _draw_points(labels: Labels, points: Sequence[tuple[float, Point]], best: str, kept: str) -> None:
+    """Draw points with intervals: those of the front `best` filled, the others hollow; all filled without a front.
+    `kept` is what switches are called.
+    """
     hollow = [point for _, point in points if best and best not in point.fronts]
     for inputs, colour in _COLOURS.items():
         some = [(x, point) for x, point in points if point.setting.inputs == inputs]
@@ -303,7 +305,9 @@ def _draw_points(labels: Labels, points: Sequence[tuple[float, Point]], best: st
                 labels.axes.scatter([x], [point.rate.mean], s=_SIZE, lw=1.2, zorder=4, gid=gid, **look)
             labels.avoid([x for x, _ in drawn], [point.rate.mean for _, point in drawn])
         if some:
-            labels.axes.scatter([], [], s=_SIZE, marker=_SHAPES[inputs], color=colour, label=_NAMES[inputs])
+            labels.axes.scatter(
+                [], [], s=_SIZE, marker=_SHAPES[inputs], color=colour, label=_NAMES[inputs].replace("switches", kept)
+            )
     if hollow:
         labels.axes.scatter([], [], s=_SIZE, facecolor=_WHITE, edgecolor=_GREY, lw=1.2, label="not the best here")
 
