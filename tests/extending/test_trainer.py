@@ -91,7 +91,7 @@ def test_a_frontier_of_the_trainer_has_one_stage_and_its_points_are_built(
     assert all(each["settings"] == {"joint_bins": 5.0} for each in settings)
     assert {each["rounds"] for each in found["tried"]} == {None}
     header, *lines = (folder / "frontier.csv").read_text().splitlines()
-    assert header.endswith(",switches,trainer,settings")
+    assert header.endswith(",trainer,settings")
     assert all(line.endswith(",naive-bayes,joint-bins 5") for line in lines)
     assert "--rounds is no setting of --trainer naive-bayes" in installed.thenar(*given, "--rounds", "9", code=2)
 
