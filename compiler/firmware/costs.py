@@ -41,7 +41,7 @@ class Core:
     """Instructions of an answer; of a class, and how many more where classes are added up in parts; of a look-up, and
     of a joint in it; in each part of a look-up, of a word of two 16-bit entries, of four 8-bit entries, and of all of
     those together; in update() of a word of two or of four that is replaced, and more of four upper halves; of a word
-    of two sums that a slope adds to; of a threshold that is compared.
+    of two sums that a slope adds to, and of one in update(); of a threshold that is compared.
     """
 
     fixed: int
@@ -58,6 +58,7 @@ class Core:
     replaced_quad: int
     replaced_halves: int
     product: int = 2
+    moved: int = 6
     compared: int = 4
 
 
@@ -83,9 +84,9 @@ _REPLACING, _REPLACING_PART = 13, 32  # of a row in update(), but for its words;
 # bits clamped; a code searched, and each step of the search.
 _BELOW, _ABOVE, _WIDE = 6, 4, 10
 _SEARCHED, _SEARCH_STEP = 16, 11
-# The distance of a code, looked up or not, and how much more in update(); in each part all but the products; and of
-# each word of sums, at the end and where entries are upper halves.
-_DISTANCE_KNOWN, _DISTANCE, _MOVED, _MULTIPLYING, _WORD, _HALVES = 7, 14, 5, 27, 2, 8
+# The distance of a code, looked up or not; in each part all but the products; and of each word of sums, at the end and
+# where entries are upper halves. In update(), the change of a distance; and of it in each part all but the words.
+_DISTANCE_KNOWN, _DISTANCE, _MULTIPLYING, _WORD, _HALVES, _CHANGED, _MOVING = 7, 14, 27, 2, 8, 5, 18
 
 # Of code; where classes are added up in parts, that takes more.
 _BYTES, _BYTES_PARTS, _BYTES_CLASS = 186, 432, 15
@@ -110,8 +111,8 @@ def word_cost(layout: Layout, core: Core) -> Cost:
     replacing = _REPLACING + _REPLACING_PART * (parts - 1) + parts * words * replaced
     answering = (core.a_class + (core.in_parts if parts > 1 else 0)) * classes + finding + core.fixed
     classify, update = (len(layout.lookups) * (core.lookup + each) + answering for each in (adding, replacing))
-    multiplying, slopes = _multiplying(layout, core), len(layout.tables.slopes)
-    classify, update = classify + multiplying, update + multiplying + _MOVED * slopes
+    multiplying, moving = _multiplying(layout, core)
+    classify, update = classify + multiplying, update + moving
     flash = _flash(layout) + NAME_BYTES * (classes + 1)
     replaced_bytes = _BYTES_UPDATE_QUAD if layout.biased else _BYTES_UPDATE_PAIR
     update_flash = _BYTES_UPDATE + _BYTES_UPDATE_CLASS * classes + words * replaced_bytes
@@ -119,14 +120,16 @@ def word_cost(layout: Layout, core: Core) -> Cost:
     return Cost(classify, update, flash + update_flash + losing, flash, _ram(layout))
 
 
-def _multiplying(layout: Layout, core: Core) -> int:
-    """Return the instructions that slopes take."""
-    slopes, parts = len(layout.tables.slopes), layout.parts
+def _multiplying(layout: Layout, core: Core) -> tuple[int, int]:
+    """Return the instructions that slopes take in classify(), where sums are in registers, and in update()."""
+    slopes, width, parts = len(layout.tables.slopes), layout.parts.width, len(layout.parts.firsts)
     if not slopes:
-        return 0
+        return 0, 0
     word = slopes * core.product + _WORD + (core.product + _HALVES if layout.entry_shift else 0)
     distance = _DISTANCE_KNOWN if layout.stores_distances else _DISTANCE
-    return slopes * distance + len(parts.firsts) * (_MULTIPLYING + -(-parts.width // 2) * word)
+    lanes = 2 * -(-width // 4) if layout.biased else -(-width // 2)
+    classify = slopes * distance + parts * (_MULTIPLYING + -(-width // 2) * word)
+    return classify, slopes * (distance + _CHANGED + parts * (_MOVING + lanes * core.moved))
 
 
 def _words(layout: Layout) -> int:

@@ -161,6 +161,7 @@ MEMBER = (
             replaced_quad=29,
             replaced_halves=5,
             product=5,
+            moved=8,
             compared=6,
         ),
         flags=("-mcpu=cortex-m0plus", "-mthumb", "-O2", "-ffreestanding"),

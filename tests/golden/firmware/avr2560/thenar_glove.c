@@ -238,7 +238,7 @@ static uint32_t start[LANES] = {
 /* What is in the sums of update(), once it has begun: after classify() it begins anew. */
 static bool begun;
 static const thenar_glove_row *added[LOOKUPS];
-static const thenar_glove_row nothing = {0u};
+static const thenar_glove_row nothing = {0u, 0u};
 static uint32_t sums[LANES];
 
 /* Open the switches that are missing, and make the codes of such joints 0. */
