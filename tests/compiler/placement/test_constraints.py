@@ -116,7 +116,8 @@ def test_a_limit_that_forbids_nothing_changes_nothing_and_one_that_does_is_obeye
     free = Limits(names=NAMES, n_switches=3, taxels=9).on(ELEMENTS, PORTS)
     plain = choose(samples, name, parameter, PORTS)
     assert choose(samples, name, parameter, PORTS, free) == plain
-    limits = Limits(names=NAMES, n_switches=3, never=(NAMES[ELEMENTS[plain.columns[0]].column],), taxels=1)
+    first = (*plain.columns, 0)[0]  # reduced-error pruning may keep none
+    limits = Limits(names=NAMES, n_switches=3, never=(NAMES[ELEMENTS[first].column],), taxels=1)
     assert obeys(limits, choose(samples, name, parameter, PORTS, limits.on(ELEMENTS, PORTS)).columns)
 
 
