@@ -100,6 +100,7 @@ def _with_fewer(tables: IntegerTables, switches: int, joints: int) -> IntegerTab
         joint_rows=tables.joint_rows[:joints],
         joint_means=tables.joint_means[:joints],
         slopes=tuple(slope for slope in tables.slopes if slope.joint < joints),
+        pairs=tuple(pair for pair in tables.pairs if max(pair.joints) < joints),
     )
 
 
