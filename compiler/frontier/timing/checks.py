@@ -87,10 +87,10 @@ def _smaller(several: Sequence[IntegerTables]) -> Iterator[IntegerTables]:
         switches, joints = ceil(share * each.n_switches), ceil(share * each.n_joints)
         if (number, switches, joints) not in seen:
             seen.add((number, switches, joints))
-            yield _with_fewer(each, switches, joints)
+            yield with_fewer(each, switches, joints)
 
 
-def _with_fewer(tables: IntegerTables, switches: int, joints: int) -> IntegerTables:
+def with_fewer(tables: IntegerTables, switches: int, joints: int) -> IntegerTables:
     """Return the tables of the first switches and joints alone."""
     return replace(
         tables,
