@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 @click.command("doctor")
 @click.argument("glove", metavar="glove.toml", type=existing_file)
 @click.option("--build", metavar="BUILD", type=existing_folder, help="Look only at what this build reads of the glove.")
-@click.option("--write", is_flag=True, help="Write what a record of the CyberGlove takes (record_us) into glove.toml.")
+@click.option("--write", is_flag=True, help="Write the CyberGlove's measured record time into glove.toml.")
 @json_flag
 def command(glove: Path, build: Path | None, write: bool) -> None:
     """Open every device of glove.toml and say what is there, how fast it is and how fast its wire would let it be.

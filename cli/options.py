@@ -60,7 +60,10 @@ keep_option = click.option(
     "--keep", type=click.IntRange(1), metavar="M", help="How many switches to keep: for methods that take it."
 )
 levels_option = click.option(
-    "--levels", type=click.IntRange(1, 65535), metavar="L", help="Most levels of a taxel to choose from.  [default: 7]"
+    "--levels",
+    type=click.IntRange(1, 65535),
+    metavar="L",
+    help="Choose from L levels of each taxel.  [default: 7]",
 )
 keep_joints_option = click.option(
     "--keep-joints", type=click.IntRange(1), metavar="N", help="Keep the best N joints.  [default: all]"
@@ -85,26 +88,26 @@ def limit_options(command: Command) -> Command:
         click.option(
             "--robust",
             is_flag=True,
-            help="Choose for the worst single lost switch; train on rows with lost inputs.",
+            help="Choose elements for the loss of the worst one; train on rows with lost inputs.",
         ),
         click.option(
-            "--budget-us", type=Number(0), metavar="US", help="A scan of what is kept takes at most this, by its ports."
+            "--budget-us", type=Number(0), metavar="US", help="Limit the time of a scan of the kept elements."
         ),
         click.option(
             "--at-most",
             type=(click.IntRange(0), click.Choice(["taxels"])),
             callback=lambda _context, _parameter, most: None if most is None else most[0],
             metavar="N taxels",
-            help="Keep at most so many taxels, with however many levels.",
+            help="Keep at most N taxels, each with any number of levels.",
         ),
         click.option(
             "--apart-mm",
             type=Number(0, min_open=True),
             metavar="MM",
-            help="Least distance of any two that are kept.",
+            help="Keep elements at least this far apart.",
         ),
-        click.option("--never", callback=_names, metavar="NAMES", help="Inputs that are not kept, by name: a,b."),
-        click.option("--keep-these", callback=_names, metavar="NAMES", help="Inputs that are kept, by name: a,b."),
+        click.option("--never", callback=_names, metavar="NAMES", help="Never keep these inputs, by name: a,b."),
+        click.option("--keep-these", callback=_names, metavar="NAMES", help="Always keep these inputs, by name: a,b."),
     ):
         command = option(command)
     return command

@@ -203,7 +203,7 @@ class _Asked:
 @overwrite_flag
 @json_flag
 def command(**options: Any) -> None:
-    """Choose the switches of GRASPS, a .grasps file, that distinguish its grasp types.
+    """Choose the switches and levels of GRASPS, a .grasps file, that distinguish its grasp types.
 
     The paper's method, ID3, keeps the switches of its tree, printed in the order of their decisions, each with its
     information gain and the cumulative share of the grasp types' entropy. Other methods keep a given number of

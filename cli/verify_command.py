@@ -35,7 +35,9 @@ def _kinds() -> tuple[str, ...]:
     help="Also compile the classifier for these, and run it there or in a simulator.",
 )
 @click.option(
-    "--faults", is_flag=True, help="Print instead what faults leave: each input lost or stuck, ports, chips, any two."
+    "--faults",
+    is_flag=True,
+    help="Print the accuracy that each fault leaves: lost or stuck inputs, dead ports.",
 )
 @json_flag
 def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bool) -> int:

@@ -19,9 +19,9 @@ class Pairs(Trainer):
     rank = 2
     settings = (
         *(setting for setting in LOGIT.settings if setting.name != "linear"),
-        Setting("pairs", "At most so many pairs of joints, each joint in one.", int, 4, 1),
+        Setting("pairs", "Use at most this many pairs of joints; each joint is in one pair at most.", int, 4, 1),
         # As additive.pairs.MOST_PAIR_BINS.
-        Setting("pair_bins", "At most so many bins a joint in a pair.", int, 8, 2, 16),
+        Setting("pair_bins", "Give a joint at most this many bins in a pair.", int, 8, 2, 16),
         Setting("pair_smoothness", "Pull of a pair's neighbouring bins towards each other.", float, 0.5, 0.0, 1e6),
     )
     tried = (
