@@ -9,8 +9,8 @@ import pytest
 
 from thenar.runtime.errors import FrameError
 from thenar.runtime.scanning.decided import Decided, EarlyExit, reach_of
-from thenar.runtime.scores import Scorer
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.scores import Scorer, joint_reaches
+from thenar.runtime.tables import IntegerTables, Pair
 
 MakeTables = Callable[..., IntegerTables]
 
@@ -127,3 +127,29 @@ def test_on_demand_the_record_is_left_out_exactly_when_no_state_of_the_joints_ch
             assert not early.unread(number) & scorer.joints_bit
             seen.add(len(winners) == 1 and sure)
     assert seen == {False, True}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_joints_of_a_pair_reach_as_far_as_they_can_say_together(seed: int) -> None:
+    """Against every bin of every joint, read or lost."""
+    random = np.random.default_rng(seed)
+
+    def rows(*shape: int) -> np.ndarray:
+        return random.integers(-9, 10, (*shape, 3)).astype(np.int16)
+
+    steps = tuple(np.sort(random.choice(20, 2, replace=False)).astype(np.uint16) for _ in range(5))
+    pair = Pair((0, 2), steps[3:], rows(3, 3))
+    tables = IntegerTables(
+        rows(), rows(0), steps[:3], (rows(3), rows(3), rows(3)), rows(0), rows(3), 1.0, pairs=(pair,)
+    )
+    scorer, each = Scorer(tables), range(22)
+    unread = np.array(scorer.lanes_without([], [0, 0, 0], [], [True] * 3))
+    codes = [sorted({0, *(int(step) + 1 for step in tables.steps_of(joint))} & set(each)) for joint in range(3)]
+    said = [
+        np.array(scorer.lanes_without([], list(frame), [], list(lost))) - unread
+        for frame in product(*codes)
+        for lost in product([False, True], repeat=3)
+    ]
+    for leader in range(3):
+        assert joint_reaches(tables, leader).tolist() == np.max([one - one[leader] for one in said], axis=0).tolist()
+    assert (tables.jointless + 2**15 == unread).all()
