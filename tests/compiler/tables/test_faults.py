@@ -72,9 +72,10 @@ def test_every_fault_is_counted_as_the_runtime_scores_it(
     # A label beyond the classes is a type that the build does not know.
     labels = random.integers(0, classes + 1, n)[trials % n]
     scorer, inputs = Scorer(tables), switches + joints
+    ends = tuple({switches, inputs - 1}) if joints else ()  # of a pair, where there is one
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(faults, "_HELD", held)
-        found = count_faults(tables, bits, codes, labels, trials, [range(inputs), ()])
+        found = count_faults(tables, bits, codes, labels, trials, [range(inputs), (), ends])
 
     def without(*lost: int) -> int:
         mask = np.isin(np.arange(inputs), lost)
@@ -87,6 +88,7 @@ def test_every_fault_is_counted_as_the_runtime_scores_it(
     assert found.lost == tuple(without(one) for one in range(inputs))
     assert found.pairs == tuple(without(*two) for two in combinations(range(inputs), 2))
     assert found.dead[0] == without(*range(inputs))
+    assert found.dead[2] == without(*ends)
     for element, (counts, values) in enumerate(zip(found.stuck, found.values, strict=True)):
         for count, value in zip(counts, values, strict=True):
             stuck, asked = bits.copy(), codes.copy()
