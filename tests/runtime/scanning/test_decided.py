@@ -138,7 +138,7 @@ def test_joints_of_a_pair_reach_as_far_as_they_can_say_together(seed: int) -> No
         return random.integers(-9, 10, (*shape, 3)).astype(np.int16)
 
     steps = tuple(np.sort(random.choice(20, 2, replace=False)).astype(np.uint16) for _ in range(5))
-    pair = Pair((0, 2), steps[3:], rows(3, 3))
+    pair = Pair((0, 2), (steps[3], steps[4]), rows(3, 3))
     tables = IntegerTables(
         rows(), rows(0), steps[:3], (rows(3), rows(3), rows(3)), rows(0), rows(3), 1.0, pairs=(pair,)
     )
