@@ -449,9 +449,6 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     yield from _wrong_names("texts", texts)
     yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
     yield from _wrong_columns(manifest)
-    shares = {len(text) for switch in manifest.switches for text in (switch.closed_least, switch.closed_most)}
-    if len(shares) > 1 or not shares <= {0, 2 * len(manifest.grasps)}:
-        yield "says of other grasp types how often switches are closed"
     for joint in (*manifest.joints, *taxels):
         if joint.code_a == joint.code_b or joint.value_a == joint.value_b:
             yield "gives a joint two points that make no line"
@@ -473,6 +470,9 @@ def _wrong_columns(manifest: Manifest) -> Iterator[str]:
             yield "takes two inputs from one column"
     if max((column for column, _ in levels), default=-1) >= manifest.source.switches:
         yield "keeps a switch that the recordings do not have"
+    shares = {len(text) for switch in manifest.switches for text in (switch.closed_least, switch.closed_most)}
+    if len(shares) > 1 or not shares <= {0, 2 * len(manifest.grasps)}:
+        yield "says of other grasp types how often switches are closed"
 
 
 def _wrong_names(kind: str, names: Iterable[str], longest: int = LONGEST_NAME) -> Iterator[str]:

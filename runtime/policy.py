@@ -24,6 +24,7 @@ class Policy:
                 ends wrong no more often, under the assumptions that it states; `dwell_us` is not used then, and
                 `hold_us` is the longest that one test may take and that its answer holds
     spacing_us  sequential test: frames count only if they are so far apart
+    quarantine  whether inputs that are read and yet wrong (quarantine.py) are treated as lost
     """
 
     lead: float = 0.5
@@ -32,6 +33,7 @@ class Policy:
     max_lost: float = 0.5
     error_rate: float | None = None
     spacing_us: int = 0
+    quarantine: bool = True
 
     def __post_init__(self) -> None:
         if not 0 <= self.lead <= _LARGEST_LEAD:

@@ -116,7 +116,8 @@ class System:
         Hand `start` the codes of the glove's record that the recogniser will be given with the scan.
         """
         lead = self.policy.lead_steps(self.build.tables.scale)
-        return EarlyExit(self.build.scorer, ports, lead=lead, on_demand=self.on_demand)
+        watch = self.policy.quarantine
+        return EarlyExit(self.build.scorer, ports, lead=lead, on_demand=self.on_demand, watch=watch)
 
     def joints(self) -> Joints:
         """Return what makes the build's joint codes of the CyberGlove's records."""
