@@ -384,7 +384,7 @@ def _print_training(manifest: "Manifest") -> None:
 
 def _print_scan(scan: "ScanMap", harness: "Harness") -> None:
     """Print the map chip by chip in the order in which chips are read first, with what the wire is bound to take."""
-    from thenar.runtime.scanning.timing import scan_us, scanner_us
+    from thenar.runtime.scanning.timing import scan_us, scanner_us, taxels_us
 
     time = scan_us(scan, harness)
     if time.chips:
@@ -395,6 +395,7 @@ def _print_scan(scan: "ScanMap", harness: "Harness") -> None:
         out().print(
             f"board {board.port}: {len(pairs)} kept switches of {len(board.switches)} keys{levels}, "
             f"{scanner_us(board):.0f} us a bitmap"
+            + (f", {taxels_us(board, channels):.0f} us its taxels" if (channels := scan.board_channels[number]) else "")
         )
 
 

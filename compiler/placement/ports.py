@@ -12,7 +12,7 @@ from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.scanning.plan import Costs, Unit, ports_in, unwired
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
-from thenar.runtime.scanning.timing import scanner_us
+from thenar.runtime.scanning.timing import scanner_us, taxels_us
 
 from .inputs import PlacementError
 
@@ -79,7 +79,8 @@ def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
     """Return what reading each port costs where all switches `names` hang on the ports of a whole scan.
 
     A selection of a mux's channel is shared evenly by the ports that need it. A port is charged as a whole even if a
-    shorter reading would show the one switch that is kept. A board is one port: it always sends all its keys. Raises
+    shorter reading would show the one switch that is kept. A board's keys are one port, since it always sends them all.
+    Each of its taxels is one: its conversion, its bytes, and its share of the frame around all of theirs. Raises
     HarnessError if a switch is wired to nothing.
     """
     scan = whole_scan(harness, names)
@@ -92,9 +93,12 @@ def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
     for number, port in enumerate(scan.ports):
         port_of |= dict.fromkeys(port.elements, number)
     for number, board in enumerate(harness.scanners):
-        levels = scan.taxels[number] if scan.taxels else ()
-        port_of |= dict.fromkeys((switch for *_, switch in (*scan.scanners[number], *levels)), len(us))
+        port_of |= dict.fromkeys((switch for _, switch in scan.scanners[number]), len(us))
         us.append(scanner_us(board))
+        levels = scan.taxels[number] if scan.taxels else ()
+        channels = sorted({channel for channel, *_ in levels})
+        port_of |= {switch: len(us) + channels.index(channel) for channel, _, switch in levels}
+        us += [taxels_us(board, len(channels)) / len(channels) for _ in channels]
     lacking = next((name for number, name in enumerate(names) if number not in port_of), None)
     if lacking is not None:
         raise HarnessError(
