@@ -40,6 +40,7 @@ from .options import (
     method_option,
     prune_option,
     trainer_option,
+    warn_of_budget,
 )
 
 if TYPE_CHECKING:
@@ -231,6 +232,7 @@ def command(
     if chosen is not None:
         options |= chosen.options
         documents = documents and replace(documents, frontier=chosen.frontier, point=chosen.point.number)
+    warn_of_budget(asked["budget_us"], grasp_set.joint_names, None if given is None else given.cyberglove)
     with progress("compiling, then the paper's tables" if report and asked["folds"] else "compiling") as told:
         made = compile_build(
             grasp_set,

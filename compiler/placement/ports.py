@@ -7,12 +7,13 @@ from math import fsum
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.drivers.cyberglove_protocol import SENSORS, sensors_with
 from thenar.runtime.errors import HarnessError
-from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.scanning.plan import Costs, Unit, ports_in, unwired
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
-from thenar.runtime.scanning.timing import scanner_us, taxels_us
+from thenar.runtime.scanning.timing import glove_us, scanner_us, taxels_us
 
 from .inputs import PlacementError
 
@@ -73,6 +74,19 @@ def ports_of_whole_glove(harness: Harness | None, names: Sequence[str], taxels: 
         return port_costs(harness or propose_harness(names[:switches], taxels=names[switches:]), names)
     except HarnessError:
         return None
+
+
+def record_times_us(joints: Sequence[str], glove: GloveWiring | None = None) -> tuple[float, ...]:
+    """Return what a CyberGlove's record of one, of two, ... and of all of these joints takes; () of other joints.
+
+    It is the record of `glove`, whose mask may let all sensors through, or of one at 115200 baud.
+    """
+    own = glove is not None and set(joints) <= set(glove.joints)
+    sensors = glove.all_sensors if glove is not None and own else sensors_with(joints)
+    if sensors is None or not joints:
+        return ()
+    glove = glove or GloveWiring(port="-", sensors=22 if sensors > SENSORS else None)
+    return tuple(glove_us(glove, count if glove.mask else sensors) for count in range(1, len(joints) + 1))
 
 
 def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
