@@ -186,7 +186,8 @@ def compile_build(
     ports = ports or ports_of_whole_glove(None, grasp_set.element_names, len(grasp_set.taxel_columns))
     hand = hand or (None if documents is None else documents.hand)
     groups = groups_for(grasp_set, asked)
-    limits = Limits.of(asked, grasp_set, {} if hand is None else hand.by_name)
+    glove = harness.cyberglove if isinstance(harness, Harness) else None
+    limits = Limits.of(asked, grasp_set, {} if hand is None else hand.by_name, glove)
     trained = train(samples, asked, steps.trained, ports, groups, jobs, limits)
     made = Making(grasp_set, samples, asked, trained, harness)
     tested = cross_validated(
