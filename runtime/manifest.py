@@ -38,6 +38,8 @@ Name = Annotated[str, Meta(min_length=1)]
 # A number, or one of a few names.
 Given = Value | Name
 Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+# A byte for each grasp type.
+Bytes = Annotated[str, Meta(pattern="^([0-9a-f]{2})*$")]
 _T = TypeVar("_T")
 
 
@@ -222,12 +224,17 @@ class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     """A kept switch: its column in the recordings, from 0, its name, and the information (bits) that it brought: to the
     tree of ID3, or alone where another method chose it; of a taxel, which follow the switches, also the threshold. A
     taxel may have several, each a switch with a name of its own.
+
+    closed_least, closed_most  for each grasp type, in 255ths, the share of a subject's trials in which it is closed, of
+                               the subject with the least and the most; "" in builds of older versions
     """
 
     column: Count
     name: Name
     gain: Value
     threshold: Threshold | None = None
+    closed_least: Bytes = ""
+    closed_most: Bytes = ""
 
     @property
     def source(self) -> str:
@@ -453,6 +460,9 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
     yield from _wrong_columns(manifest)
     yield from _wrong_segments(manifest)
+    shares = {len(text) for switch in manifest.switches for text in (switch.closed_least, switch.closed_most)}
+    if len(shares) > 1 or not shares <= {0, 2 * len(manifest.grasps)}:
+        yield "says of other grasp types how often switches are closed"
     for joint in (*manifest.joints, *taxels):
         if joint.code_a == joint.code_b or joint.value_a == joint.value_b:
             yield "gives a joint two points that make no line"
