@@ -460,9 +460,6 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
     yield from _wrong_columns(manifest)
     yield from _wrong_segments(manifest)
-    shares = {len(text) for switch in manifest.switches for text in (switch.closed_least, switch.closed_most)}
-    if len(shares) > 1 or not shares <= {0, 2 * len(manifest.grasps)}:
-        yield "says of other grasp types how often switches are closed"
     for joint in (*manifest.joints, *taxels):
         if joint.code_a == joint.code_b or joint.value_a == joint.value_b:
             yield "gives a joint two points that make no line"
@@ -478,6 +475,9 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
 
 
 def _wrong_columns(manifest: Manifest) -> Iterator[str]:
+    shares = {len(text) for switch in manifest.switches for text in (switch.closed_least, switch.closed_most)}
+    if len(shares) > 1 or not shares <= {0, 2 * len(manifest.grasps)}:
+        yield "says of other grasp types how often switches are closed"
     levels = [(switch.column, switch.threshold and switch.threshold.code) for switch in manifest.switches]
     for columns in (levels, [joint.column for joint in manifest.joints]):
         if len(set(columns)) < len(columns):
