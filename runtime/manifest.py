@@ -38,6 +38,8 @@ Name = Annotated[str, Meta(min_length=1)]
 # A number, or one of a few names.
 Given = Value | Name
 Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+# A byte for each grasp type.
+Bytes = Annotated[str, Meta(pattern="^([0-9a-f]{2})*$")]
 _T = TypeVar("_T")
 
 
@@ -222,12 +224,17 @@ class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     """A kept switch: its column in the recordings, from 0, its name, and the information (bits) that it brought: to the
     tree of ID3, or alone where another method chose it; of a taxel, which follow the switches, also the threshold. A
     taxel may have several, each a switch with a name of its own.
+
+    closed_least, closed_most  for each grasp type, in 255ths, the share of a subject's trials in which it is closed, of
+                               the subject with the least and the most; "" in builds of older versions
     """
 
     column: Count
     name: Name
     gain: Value
     threshold: Threshold | None = None
+    closed_least: Bytes = ""
+    closed_most: Bytes = ""
 
     @property
     def source(self) -> str:
@@ -468,6 +475,9 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
 
 
 def _wrong_columns(manifest: Manifest) -> Iterator[str]:
+    shares = {len(text) for switch in manifest.switches for text in (switch.closed_least, switch.closed_most)}
+    if len(shares) > 1 or not shares <= {0, 2 * len(manifest.grasps)}:
+        yield "says of other grasp types how often switches are closed"
     levels = [(switch.column, switch.threshold and switch.threshold.code) for switch in manifest.switches]
     for columns in (levels, [joint.column for joint in manifest.joints]):
         if len(set(columns)) < len(columns):
