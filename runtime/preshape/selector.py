@@ -33,8 +33,9 @@ class Preshape(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class PreshapeTable:
-    """The preshapes of one robot hand: `chosen` holds one for every grasp type that the table names. It may name "none" as
-    well: what opens the hand while nothing is held.
+    """The preshapes of one robot hand: `chosen` holds one for every grasp type that the table names.
+
+    It may name "none" as well: what opens the hand while nothing is held.
     """
 
     name: str
