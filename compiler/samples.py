@@ -91,7 +91,7 @@ class Samples:
             switches=grasp_set.switches[:, : None if inputs != "joints" else 0],
             codes=grasp_set.codes[:, : None if inputs != "switches" else 0],
             labels=labels,
-            grasps=tuple(grasp_set.taxonomy.types[label] for label in found),
+            grasps=tuple(grasp_set.taxonomy.names[label] for label in found),
             trials=grasp_set.trial_ids,
             subjects=np.unique(grasp_set.subjects, return_inverse=True)[1],
             taxels=grasp_set.taxels[:, : None if inputs != "joints" else 0],

@@ -5,8 +5,11 @@ from typing import Literal
 import msgspec
 
 UNKNOWN = "unknown"
+# Nothing is held: the type that every taxonomy has besides its own.
+NONE = "none"
 
 Health = Literal["ok", "changing", "degraded", "unknown"]
+State = Literal["none", "forming", "held", "releasing"]
 
 
 class LiveGrasp(msgspec.Struct, frozen=True, omit_defaults=False):
@@ -25,6 +28,11 @@ class LiveGrasp(msgspec.Struct, frozen=True, omit_defaults=False):
     switch_age_us, glove_age_us   how old the newest frames are; None before the first, or without such a device
     latency_us    from the newer of both frames to this moment
     lost          names of the switches and joints that are missing
+    state         "none": nothing is held. "forming": a segment of a grasp type begins, but may yet turn out otherwise.
+                  "held": it has begun. "releasing": it seems to end
+    segment       counts the segments of a grasp type of this run from 1; 0 before the first
+    segment_type  the type of the segment, "none" between segments
+    segment_us    when the segment began, on the clock of `time_us`; None between segments
     """
 
     time_us: int
@@ -39,6 +47,10 @@ class LiveGrasp(msgspec.Struct, frozen=True, omit_defaults=False):
     glove_age_us: int | None
     latency_us: int
     lost: tuple[str, ...] = ()
+    state: State = "none"
+    segment: int = 0
+    segment_type: str = NONE
+    segment_us: int | None = None
 
 
 class JointAngles(msgspec.Struct, frozen=True):

@@ -95,7 +95,7 @@ def stream_of(
 ) -> Stream:
     """Return a stream of rows of a set: its own movements where it holds whole ones, else one composed of its trials.
 
-    labels  (n,) the classes of all rows, as the tables number them
+    labels  (n,) the classes of all rows, as the tables number them; -1 where nothing is held
     rows    those that may be used, the tables' test rows; None: all. Of a set of whole movements only movements all of
             whose rows are among them are
 
@@ -104,6 +104,7 @@ def stream_of(
     if holds_movements(grasp_set):
         return recorded_stream(grasp_set, labels, rows, grasps=grasps, period_us=period_us)
     chosen = np.arange(len(grasp_set)) if rows is None else rows
+    chosen = chosen[labels[chosen] >= 0]
     return composed_stream(
         grasp_set.switches[chosen],
         grasp_set.codes[chosen],
@@ -241,7 +242,7 @@ def _laid_out(grasp_set: GraspSet, labels: Rows, movements: Movements, period_us
         end_us=int(at_us[-1]) + period_us,
         arrivals=begins + movements.complete - movements.first,
         ends=begins + movements.released - movements.first,
-        grasps=labels[movements.first],
+        grasps=labels[movements.complete],
         what=what,
         taxels=grasp_set.taxels[rows],
     )

@@ -1,14 +1,15 @@
 """`GraspSet`: labelled grasps, as everything else in the compiler takes them, and their `.grasps` file.
 
-The file is a sealed npz (arrays.py) of a JSON header and six arrays:
+The file is a sealed npz (arrays.py) of a JSON header and these arrays:
 
 switches  (n, ceil(s / 8)) uint8    eight switches to the byte, the first in the highest bit
 codes     (n, j) uint16
-grasps    (n,) uint32               index into the taxonomy's types
+grasps    (n,) uint32               index into the taxonomy's types; their number: nothing is held
 subjects, objects (n,) uint32       index into the header's names
 trials    (n,) int64
 sessions  (n,) uint32               index into the header's names; only where there are several, and then in format 2
 taxels    (n, t) uint16             only where there are any, and then in format 2
+times     (n,) int64                microseconds; only where they are known, and then in format 2
 """
 
 import hashlib
@@ -122,7 +123,7 @@ class GraspSet:
     joints : tuple of Joint
         The codes' names, and what they mean in degrees or another unit.
     grasps : (n,) array of str
-        The grasp type of each row; the taxonomy holds every one of them.
+        The grasp type of each row, which the taxonomy holds, or "none" where nothing is held.
     taxonomy : Taxonomy
         The grasp types that there may be, in their order.
     subjects, objects : (n,) arrays of str
@@ -140,13 +141,20 @@ class GraspSet:
         The codes of analog columns of which training makes switches, by a threshold that it learns.
     taxel_columns : tuple of Joint
         Their names, and what their codes mean.
+    times_us : (n,) array of int64, optional
+        When each row was recorded, in microseconds on a clock of its subject and session; none given: it is not known.
 
     Attributes
     ----------
     labels : (n,) array of intp
-        The place of each grasp in `taxonomy.types`.
+        The place of each grasp in `taxonomy.types`, and the number of types where nothing is held.
+    is_none : (n,) array of bool
+        Where nothing is held.
     trial_ids : (n,) array of intp
         The trial of each row, numbered from 0 in the order of first appearance.
+    movement_ids : (n,) array of intp
+        The movement of each row: its trial, with the rows before and after it in which nothing is held. No fold parts
+        the rows of a movement.
 
     Raises
     ------
@@ -190,6 +198,7 @@ class GraspSet:
     independent: bool = False
     taxels: NDArray[np.uint16] = field(default_factory=lambda: np.empty(0, np.uint16))
     taxel_columns: tuple[Joint, ...] = ()
+    times_us: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 
     def __post_init__(self) -> None:
         rows = len(self.grasps)
@@ -207,6 +216,7 @@ class GraspSet:
             self._freeze(name, np.str_, (rows,))
             check_names(name[:-1], np.unique(getattr(self, name)).tolist())
         self._freeze("trials", np.int64, (rows,))
+        self._freeze("times_us", np.int64, (rows if self.times_us.size else 0,))
         check_simulated(self.simulated)
         object.__setattr__(self, "labels", self._label())
         self.labels.setflags(write=False)
@@ -227,7 +237,7 @@ class GraspSet:
 
     def _label(self) -> NDArray[np.intp]:
         found, where = np.unique(self.grasps, return_inverse=True)
-        number = {grasp: label for label, grasp in enumerate(self.taxonomy.types)}
+        number = {grasp: label for label, grasp in enumerate(self.taxonomy.names)}
         for grasp in found.tolist():
             if grasp not in number:
                 row = int(np.flatnonzero(self.grasps == grasp)[0])
@@ -240,7 +250,9 @@ class GraspSet:
 
     def __repr__(self) -> str:
         types, subjects, objects = (len(np.unique(each)) for each in (self.grasps, self.subjects, self.objects))
-        what = f"{len(self)} grasps of {types} types ({shortened(self.taxonomy.name)})"
+        none = int(np.count_nonzero(self.is_none))
+        what = f"{len(self)} grasps of {types - (none > 0)} types ({shortened(self.taxonomy.name)})"
+        what += f", in {none} of which nothing is held" if none else ""
         taxels = f"{len(self.taxel_columns)} taxels, " if self.taxel_columns else ""
         read = f"{len(self.switch_names)} switches, {taxels}{len(self.joints)} joints"
         who = f"{read}, {subjects} subjects, {objects} objects"
@@ -250,11 +262,12 @@ class GraspSet:
         """Return it as a notebook shows it: the line, and rows and trials of each grasp type."""
         first = np.unique(self.trial_ids, return_index=True)[1]
         counts = (
-            np.bincount(labels, minlength=len(self.taxonomy.types)) for labels in (self.labels[first], self.labels)
+            np.bincount(labels, minlength=len(self.taxonomy.names)) for labels in (self.labels[first], self.labels)
         )
         body = "".join(
             f"<tr><td>{escape(name)}</td><td>{trials}</td><td>{rows}</td></tr>"
-            for name, trials, rows in zip(self.taxonomy.types, *counts, strict=True)
+            for name, trials, rows in zip(self.taxonomy.names, *counts, strict=True)
+            if rows or name in self.taxonomy.types
         )
         head = "<tr><th>grasp type</th><th>trials</th><th>rows</th></tr>"
         return f"<p>{escape(repr(self)).replace(chr(10), '<br>')}</p><table>{head}{body}</table>"
@@ -281,6 +294,35 @@ class GraspSet:
             return np.arange(len(self))
         return groups(self.labels, self.subjects, self.objects, self.sessions, self.trials)
 
+    @property
+    def is_none(self) -> NDArray[np.bool_]:
+        """Where nothing is held (n,)."""
+        return np.asarray(self.labels == len(self.taxonomy.types))
+
+    @property
+    def movement_ids(self) -> NDArray[np.intp]:
+        """The movement of each row: a trial, with the rows of its number, subject, object and session in which nothing
+        is held; of several trials the one before, or the first.
+        """
+        trials, none = self.trial_ids, self.is_none
+        if not none.any() or self.independent:
+            return trials
+        key = groups(self.subjects, self.objects, self.sessions, self.trials)
+        order = np.argsort(key, kind="stable")
+        place, held = np.arange(len(order)), ~none[order]
+        first = np.concatenate([[0], np.flatnonzero(np.diff(key[order])) + 1])
+        beyond = np.append(first[1:], len(order))[key[order]]
+        before = np.maximum.accumulate(np.where(held, place, -1))
+        after = np.minimum.accumulate(np.where(held, place, len(order))[::-1])[::-1]
+        chosen = np.where(before >= first[key[order]], before, np.where(after < beyond, after, place))
+        joined = trials.copy()
+        joined[order] = trials[order[chosen]]
+        return groups(joined)
+
+    def without_none(self) -> "GraspSet":
+        """Return the set of the rows in which something is held."""
+        return self.rows(~self.is_none) if self.is_none.any() else self
+
     def rows(self, index: ArrayLike) -> "GraspSet":
         """Return the set of the rows that `index` picks (numbers or a mask of n), in that order."""
         pick = np.asarray(index)
@@ -300,6 +342,7 @@ class GraspSet:
             independent=self.independent,
             taxels=self.taxels[pick],
             taxel_columns=self.taxel_columns,
+            times_us=self.times_us[pick] if self.times_us.size else self.times_us,
         )
 
     def fingerprint(self) -> str:
@@ -316,12 +359,17 @@ class GraspSet:
         if self.taxel_columns:
             digest.update(msgspec.json.encode(self.taxel_columns))
             digest.update(self.taxels.astype("<u2").tobytes())
+        if self.times_us.size:
+            digest.update(self.times_us.astype("<i8").tobytes())
         return digest.hexdigest()
 
     @property
     def _format(self) -> int:
-        """The format of its file: 2 where there are sessions or taxels, or rows that are stated to be independent."""
-        return 1 + bool(self.independent or self.taxel_columns or (self.sessions != "1").any())
+        """The format of its file: 2 where there are sessions, taxels, times or rows in which nothing is held, or rows
+        that are stated to be independent.
+        """
+        several = (self.sessions != "1").any() or self.times_us.size > 0 or self.is_none.any()
+        return 1 + bool(self.independent or self.taxel_columns or several)
 
     @classmethod
     def from_dataframe(cls, frame: "pd.DataFrame", columns: "Columns | str | Path | None" = None) -> "GraspSet":
@@ -401,7 +449,7 @@ VERSION = 2
 # Rows, columns and grasp types of a set.
 MOST = 10_000_000
 
-_DTYPES = {"switches": "u1", "codes": "<u2", "taxels": "<u2", "trials": "<i8"}
+_DTYPES = {"switches": "u1", "codes": "<u2", "taxels": "<u2", "trials": "<i8", "times": "<i8"}
 _DTYPES |= dict.fromkeys(("grasps", "subjects", "objects", "sessions"), "<u4")
 
 AnyGraspSet = TypeVar("AnyGraspSet", bound=GraspSet)
@@ -418,6 +466,7 @@ class _Header(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
     sessions: tuple[str, ...] = ()
     independent: bool = False
     taxels: tuple[Joint, ...] = ()
+    times: bool = False
 
 
 def _pack(grasp_set: GraspSet) -> bytes:
@@ -436,6 +485,7 @@ def _pack(grasp_set: GraspSet) -> bytes:
         sessions=tuple(sessions.tolist()) if several else (),
         independent=grasp_set.independent,
         taxels=grasp_set.taxel_columns,
+        times=grasp_set.times_us.size > 0,
     )
     arrays: dict[str, AnyArray] = {
         "switches": np.packbits(grasp_set.switches, axis=1),
@@ -449,6 +499,8 @@ def _pack(grasp_set: GraspSet) -> bytes:
         arrays["sessions"] = session
     if header.taxels:
         arrays["taxels"] = grasp_set.taxels
+    if header.times:
+        arrays["times"] = grasp_set.times_us
     return pack(msgspec.json.encode(header), {name: array.astype(_DTYPES[name]) for name, array in arrays.items()})
 
 
@@ -466,7 +518,7 @@ def _unpack(cls: type[AnyGraspSet], size: int, header_bytes: bytes, arrays: dict
         switch_names=header.switches,
         codes=arrays["codes"].astype(np.uint16),
         joints=header.joints,
-        grasps=_names("grasps", header.taxonomy.types, arrays, size),
+        grasps=_names("grasps", header.taxonomy.names, arrays, size),
         taxonomy=header.taxonomy,
         subjects=_names("subjects", header.subjects, arrays, size),
         objects=_names("objects", header.objects, arrays, size),
@@ -476,6 +528,7 @@ def _unpack(cls: type[AnyGraspSet], size: int, header_bytes: bytes, arrays: dict
         independent=header.independent,
         taxels=arrays["taxels"].astype(np.uint16) if header.taxels else np.empty(0, np.uint16),
         taxel_columns=header.taxels,
+        times_us=arrays["times"].astype(np.int64) if header.times else np.empty(0, np.int64),
     )
 
 
@@ -483,7 +536,8 @@ def _check_arrays(header: _Header, arrays: dict[str, AnyArray]) -> None:
     columns = len(header.switches) + len(header.joints) + len(header.taxels)
     if max(header.rows, columns, len(header.taxonomy.types)) > MOST:
         raise RecordingError(f"it has more than {MOST} rows, columns or grasp types")
-    absent = {name for name, there in (("sessions", header.sessions), ("taxels", header.taxels)) if not there}
+    optional = {"sessions": header.sessions, "taxels": header.taxels, "times": header.times}
+    absent = {name for name, there in optional.items() if not there}
     expected = _DTYPES.keys() - absent
     if arrays.keys() != expected:
         raise RecordingError(f"it holds the arrays {sorted(arrays)}, not {sorted(expected)}")

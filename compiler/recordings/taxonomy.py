@@ -16,6 +16,7 @@ from pathlib import Path
 from unicodedata import decimal
 
 from thenar.runtime.names import LONGEST_SHOWN, MOST_COMPARED, shortened
+from thenar.runtime.published import NONE
 from thenar.runtime.recording.session import Task
 from thenar.runtime.toml_source import TomlText, read_source
 
@@ -67,8 +68,10 @@ _PUBLISHED = {
 class Taxonomy:
     """The grasp types that a set may hold, in their order: a type's index is its label.
 
-    `name` is "kamakura14", "cutkosky16", "feix33", or the user's own. Raises RecordingError if two types are equal, a
-    name is empty, or a published name stands over other types than the published ones.
+    `name` is "kamakura14", "cutkosky16", "feix33", or the user's own. That nothing is held, "none", is no type: every
+    taxonomy has it besides, and its label follows those of the types. A user's own types may name it all the same: then
+    it is a type as any other. Raises RecordingError if two types are equal, a name is empty, or a published name
+    stands over other types than the published ones.
     """
 
     name: str
@@ -82,13 +85,18 @@ class Taxonomy:
             raise RecordingError(f"taxonomy {self.name} has {len(published)} types of its own: name yours otherwise")
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """What labels mean: the types, in their order, and that nothing is held."""
+        return self.types if NONE in self.types else (*self.types, NONE)
+
+    @property
     def full_names(self) -> tuple[str, ...]:
         """The types written out, in the same order."""
         return tuple(_KAMAKURA.values()) if self.name == "kamakura14" else self.types
 
     def finder(self) -> Callable[[str], str | None]:
         """Return a function from a label to the type that it means, or None; made once for many labels."""
-        types, aliases = frozenset(self.types), self._aliases()
+        types, aliases = frozenset(self.names), self._aliases()
         return lambda label: label if label in types else aliases.get(_plain(label))
 
     def find(self, label: str) -> str | None:
@@ -124,6 +132,7 @@ class Taxonomy:
             spellings = {name, full, str(number)} if self.name in _PUBLISHED else {name}
             for plain in {_plain(spelling) for spelling in spellings}:
                 found[plain] = None if plain in found else name
+        found[NONE] = NONE
         return {plain: name for plain, name in found.items() if name is not None}
 
 

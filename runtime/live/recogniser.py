@@ -15,6 +15,7 @@ from ..policy import Policy
 from ..preshape.selector import Preshape
 from ..published import UNKNOWN, Health, JointAngles, LiveGrasp
 from ..scores import LiveScores
+from ..segmenting.live import LiveSegments, Segment
 from ..tables import IntegerTables
 from .decision import Decision, SequentialTest, Standing
 
@@ -78,13 +79,19 @@ class LiveRecognizer:
         self._scored: Sequence[int] | None = None
         self._missing = MissingInputs(build, self._policy.max_lost)
         self._decider, self._lead = _decider(build, self._policy), self._policy.lead_steps(tables.scale)
+        self._segments = LiveSegments(build.manifest.segmenting, build.grasps, self._policy.lag_us)
+        self._whole_until_us, self._whole = -1, tuple[int, ...]()
         self._number = 0
         self._alone = LiveScores(build.scorer) if on_demand else None
 
     def wants_record(self, now_us: int, switches: SwitchFrame | None, glove: GloveFrame | None) -> bool:
-        """Return whether a record that is newer than this frame is to be asked for: the frame cannot decide without."""
+        """Return whether a record is to be asked for: one newer than this frame, which cannot decide without, or one
+        newer than the last tick of the segments.
+        """
         if self._alone is None:
             return False
+        if self._segments.due(now_us) and (glove is None or glove.time_us <= now_us - self._segments.tick_us):
+            return True
         # Where no switch is read any more, records come as often as switches would.
         silent = switches is None or not self._all_switches & ~switches.lost
         since_us = now_us - self._longest_us if silent or switches is None else min(switches.time_us, now_us)
@@ -125,7 +132,9 @@ class LiveRecognizer:
             decided = None
         else:
             decided = self._decider.update(max(seen_us, 0), standing, whole=not missing.names)
-        grasp = self._published(now_us, unix_us, standing, missing, decided, seen_us)
+        scores = None if missing.too_much else self._whole_scores(now_us, frame, standing)
+        segment = self._segments.update(now_us, scores)
+        grasp = self._published(now_us, unix_us, standing, missing, decided, seen_us, segment)
         self._number += 1
         return Moment(grasp, switches, glove, codes)
 
@@ -145,8 +154,26 @@ class LiveRecognizer:
         lost |= unread
         return Standing(self._scores.lanes(frame.closed & ~lost, lost), self._scorer), lost
 
+    def _whole_scores(self, now_us: int, frame: SwitchFrame | None, standing: Standing) -> tuple[int, ...]:
+        """Return the scores for a tick of the segments: those of the newest frame of which nothing was left unread, if
+        it is at most two ticks old; otherwise what is unread counts as lost.
+        """
+        if standing.whole:
+            self._whole_until_us, self._whole = now_us + PERIODS * self._segments.tick_us, standing.lanes
+        elif frame is not None and now_us > self._whole_until_us:
+            lost = frame.lost | frame.unread
+            return self._scores.lanes(frame.closed & ~lost, lost)
+        return self._whole
+
     def _published(
-        self, now_us: int, unix_us: int, standing: Standing, missing: "Missing", decided: int | None, seen_us: int
+        self,
+        now_us: int,
+        unix_us: int,
+        standing: Standing,
+        missing: "Missing",
+        decided: int | None,
+        seen_us: int,
+        segment: Segment,
     ) -> LiveGrasp:
         switches_us, glove_us = self._switches.time_us, self._joints.newest.time_us
         unknown = missing.too_much
@@ -170,6 +197,10 @@ class LiveRecognizer:
             glove_age_us=None if glove_us < 0 else now_us - glove_us,
             latency_us=0 if seen_us < 0 else now_us - seen_us,
             lost=missing.names,
+            state=segment.state,
+            segment=segment.number,
+            segment_type=segment.type,
+            segment_us=segment.began_us,
         )
 
 

@@ -87,7 +87,7 @@ def test_a_newer_file_is_refused_with_the_reason(good: bytes, tmp_path: Path) ->
         ({"switches": ["a", "b", "c", "c"]}, "occurs twice"),
         ({"joints": []}, r"codes is uint16 \(6, 2\), not <u2 \(6, 0\)"),
         ({"taxonomy": {"name": "kamakura14", "types": ["PoS"]}}, "14 types of its own"),
-        ({"taxonomy": {"name": "own", "types": ["PoS"]}}, "grasps refers to name 11 of 1"),
+        ({"taxonomy": {"name": "own", "types": ["PoS"]}}, "grasps refers to name 11 of 2"),
     ],
 )
 def test_a_sealed_header_that_contradicts_its_arrays_is_refused(
@@ -105,7 +105,7 @@ def test_a_sealed_header_that_contradicts_its_arrays_is_refused(
     [
         ({"codes": np.zeros((6, 2), "<f4")}, "codes is float32"),
         ({"trials": np.zeros(5, "<i8")}, "trials is int64 (5,)"),
-        ({"grasps": np.full(6, 14, "<u4")}, "grasps refers to name 14 of 14"),
+        ({"grasps": np.full(6, 15, "<u4")}, "grasps refers to name 15 of 15"),
         ({"more": np.zeros(6)}, "it holds the arrays"),
     ],
 )
