@@ -48,6 +48,8 @@ from ..tables import HIGHEST_CODE, IntegerTables
 
 # How long contacts have to stay for a grasp to be looked at.
 SETTLED_US = 100_000
+# So often all switches must be read, where scans may end early.
+WHOLE_US = 50_000
 # Grasps from one false alarm to the next, in the mean.
 GRASPS = 1_000
 # Evidence is counted in sixteenths of a nat.
@@ -91,7 +93,7 @@ class StuckTest:
             np.array([list(bytes.fromhex(text)) for text in texts], np.int64)
             for texts in zip(*((switch.closed_least, switch.closed_most) for switch in switches), strict=True)
         )
-        self._shares = np.stack([most, 255 - least])
+        self._shares = np.stack([most, 255 - (least + most) // 2])
         # Twice the number of contacts of a grasp type, in 255ths.
         self._contacts: Ints = (least + most).sum(axis=0)
         self._rows, self._means = (rows.astype(np.int64) for rows in (tables.switch_rows, tables.switch_means))

@@ -21,8 +21,6 @@ from ..scores import LiveScores, Scorer, joint_reaches, reaches
 from ..tables import IntegerTables
 
 _KEPT = 1 << 16
-# Where all switches are to be seen now and then, so often a scan goes to its end.
-WHOLE_US = 50_000
 
 
 class EarlyExit:
@@ -31,24 +29,29 @@ class EarlyExit:
     groups are the switches of each port, in the order in which ports are read; no switch may be in two of them. With a
     `lead` in steps, the scan goes on until the leader is sure to lead everybody by so much: a decision that asks for
     such a lead (`Policy.lead`) is then the same as after the whole scan. `on_demand`: the joints are read after the
-    switches, and only where these do not decide; until then nothing is known of them. `watch`: every WHOLE_US a scan
-    goes to its end.
+    switches, and only where these do not decide; until then nothing is known of them. `whole_us`: after so long without
+    one, a scan is to go to its end whatever is decided, for those who need all scores; None: nobody does.
 
     left_out  switches and joints that are scored as lost, though they are read
     """
 
     def __init__(
-        self, scorer: Scorer, groups: Sequence[Mask], *, lead: int = 0, on_demand: bool = False, watch: bool = False
+        self,
+        scorer: Scorer,
+        groups: Sequence[Mask],
+        *,
+        lead: int = 0,
+        on_demand: bool = False,
+        whole_us: int | None = None,
     ) -> None:
         """Raise SettingError if a switch is in two groups or is none of the build's."""
         tables = scorer.tables
         self._groups = tuple(groups)
         self._later = _later(self._groups, tables.n_switches)
-        self._lead, self.on_demand, self._watch = lead, on_demand, watch
-        self.left_out: tuple[Mask, Mask] = 0, 0
-        self._whole, self._whole_us = False, -WHOLE_US
+        self._lead, self.on_demand, self.whole_us = lead, on_demand, whole_us
         if on_demand:
             self._later = [later | scorer.joints_bit for later in self._later]
+        self.left_out: tuple[Mask, Mask] = 0, 0
         self._all: Mask = (1 << tables.n_switches) - 1
         self._scores = LiveScores(scorer)
         self._reach = scorer.reach
@@ -57,11 +60,8 @@ class EarlyExit:
         self._closed: Mask = 0
         self._lost: Mask = 0
 
-    def start(
-        self, codes: Sequence[int] | None, closed: Mask = 0, lost: Mask | None = None, *, time_us: int = 0
-    ) -> None:
-        """Begin a scan: the joints' codes (None: lost; on demand: whatever), what is known of switches of no port, and
-        when it is.
+    def start(self, codes: Sequence[int] | None, closed: Mask = 0, lost: Mask | None = None) -> None:
+        """Begin a scan: the joints' codes (None: lost; on demand: whatever), and what is known of switches of no port.
 
         With lost=None all of those are lost. Raises FrameError.
         """
@@ -69,21 +69,15 @@ class EarlyExit:
         self._closed = closed & self._elsewhere
         self._lost = (self._elsewhere if lost is None else lost & self._elsewhere) | out
         self._scores.joints(None if self.on_demand else codes, joints)
-        self._whole = self._watch and time_us - self._whole_us >= WHOLE_US
-        if self._whole:
-            self._whole_us = time_us
 
     def after(self, port: int, closed: Mask, lost: Mask = 0) -> bool:
         """Take what port number `port` read, of its own switches; return whether the ports after it can be left out.
 
-        Ports come in order. After the last, with no `lead`, the answer is always yes, if the joints are known and the
-        scan may end early.
+        Ports come in order. After the last, with no `lead`, the answer is always yes, if the joints are known.
         """
         group = self._groups[port]
         self._closed |= closed & group
         self._lost |= lost & group
-        if self._whole:
-            return False
         lanes = self._scores.lanes(self._closed, self._lost)
         best = max(lanes)
         nearest: int = max(map(add, lanes, self._hurdles(port, lanes.index(best))))
