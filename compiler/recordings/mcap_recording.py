@@ -206,7 +206,10 @@ class _Watch:
                 self.ticks, self._due_us = [], label.time_us + self._tick_us
         elif label.event == "captured":
             row = self._row(label, label.time_us)
-            rows = [replace(tick, label=label) for tick in self.ticks] if self._due_us and not self._stream else []
+            ticks = self.ticks if self._due_us is not None and not self._stream else []
+            # The last tick may be a moment before the capture.
+            enough_us = label.time_us - self._tick_us // 2
+            rows = [replace(tick, label=label) for tick in ticks if tick.time_us <= enough_us]
             begun_us = self._begun_us
             if begun_us is None:
                 begun_us = self.attempts[-1].judged_us if self.attempts else label.time_us
