@@ -15,6 +15,7 @@ from ..policy import Policy
 from ..preshape.selector import Preshape
 from ..published import UNKNOWN, Health, JointAngles, LiveGrasp
 from ..scores import LiveScores
+from ..segmenting.live import LiveSegments, Segment
 from ..tables import IntegerTables
 from .decision import Decision, SequentialTest, Standing
 
@@ -29,6 +30,7 @@ class Moment(msgspec.Struct):
     preshape  what the robot's hand shall have now; None where it shall be told nothing, as before the first grasp has
               settled (`PreshapeSelector`: 0.1 s)
     angles    the glove's joints; None without a calibration, and while the glove says nothing
+    scores    those of all classes that segments are made of; None while too little can be read
     """
 
     grasp: LiveGrasp
@@ -37,6 +39,7 @@ class Moment(msgspec.Struct):
     codes: Sequence[int] | None
     preshape: Preshape | None = None
     angles: JointAngles | None = None
+    scores: Sequence[int] | None = None
 
 
 class LiveRecognizer:
@@ -78,13 +81,21 @@ class LiveRecognizer:
         self._scored: Sequence[int] | None = None
         self._missing = MissingInputs(build, self._policy.max_lost)
         self._decider, self._lead = _decider(build, self._policy), self._policy.lead_steps(tables.scale)
+        lag_us, model = self._policy.lag_us, build.manifest.segmenting
+        self._segments = None if lag_us is None else LiveSegments(model, build.grasps, lag_us)
+        self._whole_until_us, self._whole = -1, tuple[int, ...]()
         self._number = 0
         self._alone = LiveScores(build.scorer) if on_demand else None
 
     def wants_record(self, now_us: int, switches: SwitchFrame | None, glove: GloveFrame | None) -> bool:
-        """Return whether a record that is newer than this frame is to be asked for: the frame cannot decide without."""
+        """Return whether a record is to be asked for: one newer than this frame, which cannot decide without, or one
+        newer than the last tick of the segments.
+        """
         if self._alone is None:
             return False
+        segments = self._segments
+        if segments and segments.due(now_us) and (glove is None or glove.time_us <= now_us - segments.tick_us):
+            return True
         # Where no switch is read any more, records come as often as switches would.
         silent = switches is None or not self._all_switches & ~switches.lost
         since_us = now_us - self._longest_us if silent or switches is None else min(switches.time_us, now_us)
@@ -125,9 +136,13 @@ class LiveRecognizer:
             decided = None
         else:
             decided = self._decider.update(max(seen_us, 0), standing, whole=not missing.names)
-        grasp = self._published(now_us, unix_us, standing, missing, decided, seen_us)
+        segment = Segment()
+        if self._segments is not None:
+            scores = None if missing.too_much else self._whole_scores(now_us, frame, standing, self._segments.tick_us)
+            segment = self._segments.update(now_us, scores)
+        grasp = self._published(now_us, unix_us, standing, missing, decided, seen_us, segment)
         self._number += 1
-        return Moment(grasp, switches, glove, codes)
+        return Moment(grasp, switches, glove, codes, scores=scores)
 
     def _standing(self, frame: SwitchFrame | None) -> tuple[Standing, Mask]:
         """Return who leads, and what is lost: unread switches are, unless the candidate is certain without them.
@@ -145,8 +160,28 @@ class LiveRecognizer:
         lost |= unread
         return Standing(self._scores.lanes(frame.closed & ~lost, lost), self._scorer), lost
 
+    def _whole_scores(
+        self, now_us: int, frame: SwitchFrame | None, standing: Standing, tick_us: int
+    ) -> tuple[int, ...]:
+        """Return the scores for a tick of the segments: those of the newest frame of which nothing was left unread, if
+        it is at most two ticks old; otherwise what is unread counts as lost.
+        """
+        if standing.whole:
+            self._whole_until_us, self._whole = now_us + PERIODS * tick_us, standing.lanes
+        elif frame is not None and now_us > self._whole_until_us:
+            lost = frame.lost | frame.unread
+            return self._scores.lanes(frame.closed & ~lost, lost)
+        return self._whole
+
     def _published(
-        self, now_us: int, unix_us: int, standing: Standing, missing: "Missing", decided: int | None, seen_us: int
+        self,
+        now_us: int,
+        unix_us: int,
+        standing: Standing,
+        missing: "Missing",
+        decided: int | None,
+        seen_us: int,
+        segment: Segment,
     ) -> LiveGrasp:
         switches_us, glove_us = self._switches.time_us, self._joints.newest.time_us
         unknown = missing.too_much
@@ -157,19 +192,28 @@ class LiveRecognizer:
             health = "degraded"
         elif decided is None or standing.contradicts(decided, self._lead):
             health = "changing"
+        probability = 0.0 if decided is None else standing.probability(decided, self._scale)
+        label, of_segment = segment.label, 0.0
+        if label is not None and not unknown:
+            of_segment = probability if label == decided else standing.probability(label, self._scale)
         return LiveGrasp(
             time_us=now_us,
             unix_us=unix_us,
             number=self._number,
             grasp=UNKNOWN if decided is None else self._grasps[decided],
             candidate=UNKNOWN if unknown else self._grasps[standing.candidate],
-            probability=0.0 if decided is None else standing.probability(decided, self._scale),
+            probability=probability,
             margin=0 if unknown else standing.margin,
             health=health,
             switch_age_us=None if switches_us < 0 else now_us - switches_us,
             glove_age_us=None if glove_us < 0 else now_us - glove_us,
             latency_us=0 if seen_us < 0 else now_us - seen_us,
             lost=missing.names,
+            state=segment.state,
+            segment=segment.number,
+            segment_type=segment.type,
+            segment_us=segment.began_us,
+            segment_probability=of_segment,
         )
 
 

@@ -111,12 +111,14 @@ class System:
         return Sources(self.harness, self.switch_names, scan, early, sensors, on_demand=self.on_demand)
 
     def early_exit(self, ports: Sequence[Mask]) -> EarlyExit:
-        """Return what ends a scan of these ports early without changing any decision.
+        """Return what ends a scan of these ports early without changing any decision. Segments need all scores: every
+        half tick a scan goes to its end.
 
         Hand `start` the codes of the glove's record that the recogniser will be given with the scan.
         """
         lead = self.policy.lead_steps(self.build.tables.scale)
-        return EarlyExit(self.build.scorer, ports, lead=lead, on_demand=self.on_demand)
+        whole_us = None if self.policy.lag_us is None else self.build.manifest.segmenting.tick_us // 2
+        return EarlyExit(self.build.scorer, ports, lead=lead, on_demand=self.on_demand, whole_us=whole_us)
 
     def joints(self) -> Joints:
         """Return what makes the build's joint codes of the CyberGlove's records."""

@@ -29,15 +29,24 @@ class EarlyExit:
     groups are the switches of each port, in the order in which ports are read; no switch may be in two of them. With a
     `lead` in steps, the scan goes on until the leader is sure to lead everybody by so much: a decision that asks for
     such a lead (`Policy.lead`) is then the same as after the whole scan. `on_demand`: the joints are read after the
-    switches, and only where these do not decide; until then nothing is known of them.
+    switches, and only where these do not decide; until then nothing is known of them. `whole_us`: after so long without
+    one, a scan is to go to its end whatever is decided, for those who need all scores; None: nobody does.
     """
 
-    def __init__(self, scorer: Scorer, groups: Sequence[Mask], *, lead: int = 0, on_demand: bool = False) -> None:
+    def __init__(
+        self,
+        scorer: Scorer,
+        groups: Sequence[Mask],
+        *,
+        lead: int = 0,
+        on_demand: bool = False,
+        whole_us: int | None = None,
+    ) -> None:
         """Raise SettingError if a switch is in two groups or is none of the build's."""
         tables = scorer.tables
         self._groups = tuple(groups)
         self._later = _later(self._groups, tables.n_switches)
-        self._lead, self.on_demand = lead, on_demand
+        self._lead, self.on_demand, self.whole_us = lead, on_demand, whole_us
         if on_demand:
             self._later = [later | scorer.joints_bit for later in self._later]
         self._all: Mask = (1 << tables.n_switches) - 1
