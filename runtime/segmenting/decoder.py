@@ -47,12 +47,11 @@ class Decoded(msgspec.Struct, frozen=True):
 class _Sources(msgspec.Struct):
     """What a segment that begins at a tick could come from, each a state and the tick at which its segment began.
 
-    The cheapest type and the second, from which a type begins; none, from which those types begin whose bit is set in
-    `from_none`; the type from which none begins.
+    The cheapest type, from which a type begins (itself never does: to go on costs no more); none, from which those
+    types begin whose bit is set in `from_none`; the type from which none begins.
     """
 
     first: tuple[int, int]
-    second: tuple[int, int]
     none: tuple[int, int]
     ending: tuple[int, int]
     from_none: int
@@ -60,9 +59,7 @@ class _Sources(msgspec.Struct):
     def of(self, state: int) -> tuple[int, int]:
         if state == self.none[0]:
             return self.ending
-        if self.from_none >> state & 1:
-            return self.none
-        return self.second if self.first[0] == state else self.first
+        return self.none if self.from_none >> state & 1 else self.first
 
 
 class _Paths:
@@ -76,8 +73,8 @@ class _Paths:
         self._sums, self._best, self._starts = [0] * (K + 1), [0] * (K + 1), [0] * (K + 1)
         # Of each state, b and the beginning that it is of, of the last least - 1 ticks.
         self._waiting = [deque([(0, 0)] * (least - 1)) for least in model.least]
-        self._costs = (_NEVER, _NEVER, _NEVER, _NEVER)
-        self._next = _Sources((0, 0), (0, 0), (K, 0), (0, 0), 0)
+        self._costs = (_NEVER, _NEVER, _NEVER)
+        self._next = _Sources((0, 0), (K, 0), (0, 0), 0)
         self.sources: deque[_Sources] = deque(maxlen=depth)
         self.newest = K, 0
 
@@ -85,13 +82,13 @@ class _Paths:
         """Take the next tick, which costs the states `costs`."""
         self.tick = tick = self.tick + 1
         sums, best, starts, none, sources = self._sums, self._best, self._starts, self._none, self._next
-        first_cost, second_cost, none_cost, ending_cost = self._costs
-        first, from_none = sources.first[0], 0
-        one = two = ending = least = _NEVER
-        one_of = two_of = ending_of = least_of = (0, 0)
+        first_cost, none_cost, ending_cost = self._costs
+        from_none = 0
+        first = ending = least = _NEVER
+        first_of = ending_of = least_of = (0, 0)
         for k, (enter, direct, leave) in enumerate(self._changes):
             total = sums[k]
-            begun = (second_cost if k == first else first_cost) + direct
+            begun = first_cost + direct
             if none_cost + enter < begun:
                 begun = none_cost + enter
                 from_none |= 1 << k
@@ -107,10 +104,8 @@ class _Paths:
             if begun + total < least:
                 least, least_of = begun + total, (k, starts[k])
             mature += total
-            if mature < two:
-                two, two_of = mature, (k, start)
-                if two < one:
-                    one, one_of, two, two_of = two, two_of, one, one_of
+            if mature < first:
+                first, first_of = mature, (k, start)
             if mature + leave < ending:
                 ending, ending_of = mature + leave, (k, start)
         total = sums[none]
@@ -124,8 +119,8 @@ class _Paths:
         self.newest = (none, starts[none]) if best[none] + total < least else least_of
         sources.from_none = from_none
         self.sources.append(sources)
-        self._costs = one, two, mature + total, ending
-        self._next = _Sources(one_of, two_of, (none, start), ending_of, 0)
+        self._costs = first, mature + total, ending
+        self._next = _Sources(first_of, (none, start), ending_of, 0)
 
     def back(self, tick: int) -> tuple[int, int]:
         """Return the state of an earlier tick on the cheapest path to the newest, and when its segment began."""
