@@ -302,7 +302,9 @@ def test_a_scan_ends_only_when_the_lead_that_the_decision_asks_for_is_sure(make_
     build, ends = make_build(), []
     for lead in (0.0, 0.4):
         system = System.of(
-            build, Harness(name="any", scanners=(ScannerWiring(port="p", switches=NAMES),)), Policy(lead)
+            build,
+            Harness(name="any", scanners=(ScannerWiring(port="p", switches=NAMES),)),
+            Policy(lead, quarantine=False),
         )
         made = system.early_exit(PORTS)
         expected = EarlyExit(build.scorer, PORTS, lead=round(lead * build.tables.scale))
