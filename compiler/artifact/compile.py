@@ -56,6 +56,7 @@ from .training import (
     answers_of,
     cross_validated,
     cuts_of,
+    detection_of,
     groups_for,
     integers_of,
     rates_of,
@@ -262,7 +263,8 @@ class Making:
         sources = [grasp_set.element_names[element.column] for element in trained.kept]
         self._groups = groups_of(self.scan, sources, len(trained.joints))
         groups = tuple(self._groups.values())
-        self.faults = count_faults(self.integers, kept.switches, kept.codes, kept.labels, kept.trials, groups)
+        held = kept.without_none()
+        self.faults = count_faults(self.integers, held.switches, held.codes, held.labels, held.trials, groups)
 
     def publish(
         self,
@@ -308,7 +310,9 @@ class Making:
         """Return what `build.json` says, not sealed yet; `files` are name -> content of what lies beside it."""
         digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
         grasp_set, options, fitting = self.grasp_set, self.options, self.trained.fitting
-        rates = rates_of("training", self.samples, self.comparison.deployed, options.seed)
+        deployed = self.comparison.deployed
+        rates = rates_of("training", self.samples, deployed, options.seed)
+        detection = detection_of("training", self.samples, deployed, options.seed)
         switches = zip(self.trained.kept, names_of(grasp_set, self.trained.kept), self.trained.gains, strict=True)
         return Manifest(
             schema=SCHEMA,
@@ -338,6 +342,7 @@ class Making:
             scan_sha256=digests.get(SCAN_NAME),
             fitting=fitting if fitting is not None and fitting.compared else None,
             faults=worst_faults(self.faults, self._inputs, self._groups),
+            detection=detection if tested is None else (*detection, *tested.detection),
         )
 
     def _switch(self, element: Element, name: str, gain: float) -> Switch:

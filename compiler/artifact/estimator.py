@@ -12,6 +12,7 @@ from sklearn.base import clone
 
 from thenar.runtime.build import Build as LoadedBuild
 from thenar.runtime.manifest import By, Inputs, Options, TableBits
+from thenar.runtime.published import NONE
 from thenar.runtime.tables import HIGHEST_CODE
 
 from ..additive.classifier import AdditiveLogitClassifier
@@ -169,7 +170,7 @@ def compile(  # noqa: A001
         check_trials(grasp_set, CompileError)
     cuts = cuts_of(grasp_set, options)
     options, gains = _placed_by(estimator, _trained_by(classifier, options))
-    trained = replace(trained, gains=gains or information_alone(samples, trained.columns))
+    trained = replace(trained, gains=gains or information_alone(samples.without_none(), trained.columns))
     made = Making(grasp_set, samples, options, trained, harness)
     test = partial(_answers_of, estimator, samples, options)
     tested = cross_validated(samples, cuts, options, test, jobs, progress or _silent)
@@ -220,9 +221,10 @@ def _columns(estimator: Any, X: NDArray[np.uint16]) -> Columns:
 
 def _labelled(samples: Samples, grasp_set: GraspSet, classes: NDArray[Any]) -> Samples:
     """Return the samples with the classes of the estimator: names of grasp types, or their numbers in the taxonomy."""
-    types = grasp_set.taxonomy.types
-    numbered = classes.dtype.kind in "iu"
+    types, numbered = grasp_set.taxonomy.names, classes.dtype.kind in "iu"
     names = [types[number] if numbered and 0 <= number < len(types) else str(number) for number in classes.tolist()]
+    if samples.has_none and NONE in names[:-1]:
+        raise CompileError(f"the estimator sorts {NONE!r} before {names[-1]!r}: fit it on grasp_set.labels instead")
     lacking = sorted(set(samples.grasps) - set(names))
     if lacking:
         raise CompileError(f"the estimator knows no {lacking[0]!r}: fit it with the names of all grasp types as labels")

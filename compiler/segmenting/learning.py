@@ -145,7 +145,7 @@ def model_of(
 
 
 def live_states(
-    model: SegmentModel, lanes: NDArray[np.int64], lag_ticks: int, refused: NDArray[np.bool_] | None = None
+    model: SegmentModel, lanes: NDArray[np.integer], lag_ticks: int, refused: NDArray[np.bool_] | None = None
 ) -> Labels:
     """Return the state (T,) that a live decoder gives each tick of the scores (T, n_lanes), `lag_ticks` after it."""
     decoder = Decoder(model, lag_ticks)

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 Labels = NDArray[np.intp]
 # Shares of overlap, in percent: a found segment is right from there on.
 OVERLAPS = (10, 25, 50)
-_COUNTED = ("true", "found", "recognised", "distance", "longer", "false")
 
 
 class Segment(NamedTuple):
@@ -64,11 +63,24 @@ class Score:
     def total(cls, scores: Iterable[Self]) -> Self:
         """Return the sum of several."""
         every = list(scores)
-        ticks = ("onsets", "ends", "latencies")
+
+        def added(name: str) -> int:
+            return sum(getattr(one, name) for one in every)
+
+        def joined(name: str) -> tuple[int, ...]:
+            return tuple(tick for one in every for tick in getattr(one, name))
+
         return cls(
+            true=added("true"),
+            found=added("found"),
             right=tuple(sum(one.right[place] for one in every) for place in range(len(OVERLAPS))),
-            **{name: sum((getattr(one, name) for one in every), ()) for name in ticks},
-            **{each: sum(getattr(one, each) for one in every) for each in _COUNTED},
+            recognised=added("recognised"),
+            distance=added("distance"),
+            longer=added("longer"),
+            onsets=joined("onsets"),
+            ends=joined("ends"),
+            latencies=joined("latencies"),
+            false=added("false"),
         )
 
     def f1(self, place: int) -> float:

@@ -41,8 +41,8 @@ def streams_of(grasp_set: GraspSet, tick_us: int = TICK_US) -> tuple[Stream, ...
     """
     if grasp_set.independent or len(np.unique(grasp_set.movement_ids)) == len(grasp_set):
         raise SegmentingError(
-            "each row of the set is a trial of its own: segments need whole movements, such as `thenar record` records, "
-            'and scenes with rows = "all"'
+            "each row of the set is a trial of its own: segments need whole movements, as `thenar record` and "
+            'scenes with rows = "all" make them'
         )
     owner, found = groups(grasp_set.subjects, grasp_set.sessions), []
     for number in range(int(owner.max()) + 1):

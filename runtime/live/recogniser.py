@@ -30,6 +30,7 @@ class Moment(msgspec.Struct):
     preshape  what the robot's hand shall have now; None where it shall be told nothing, as before the first grasp has
               settled (`PreshapeSelector`: 0.1 s)
     angles    the glove's joints; None without a calibration, and while the glove says nothing
+    scores    those of all classes that segments are made of; None while too little can be read
     """
 
     grasp: LiveGrasp
@@ -38,6 +39,7 @@ class Moment(msgspec.Struct):
     codes: Sequence[int] | None
     preshape: Preshape | None = None
     angles: JointAngles | None = None
+    scores: Sequence[int] | None = None
 
 
 class LiveRecognizer:
@@ -136,7 +138,7 @@ class LiveRecognizer:
         segment = self._segments.update(now_us, scores)
         grasp = self._published(now_us, unix_us, standing, missing, decided, seen_us, segment)
         self._number += 1
-        return Moment(grasp, switches, glove, codes)
+        return Moment(grasp, switches, glove, codes, scores=scores)
 
     def _standing(self, frame: SwitchFrame | None) -> tuple[Standing, Mask]:
         """Return who leads, and what is lost: unread switches are, unless the candidate is certain without them.
