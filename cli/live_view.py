@@ -71,6 +71,7 @@ def drawn(grasp: LiveGrasp, devices: Sequence[DeviceHealth], lines: Sequence[str
     table.add_row("grasp", Text(grasp.grasp, style=_STYLES[grasp.health]))
     table.add_row("", f"{_bar(grasp.probability)} {grasp.probability:5.1%}")
     table.add_row("this frame", f"{grasp.candidate}, ahead by {grasp.margin} steps")
+    table.add_row("segment", _segment(grasp))
     table.add_row("health", Text(grasp.health, style=_STYLES[grasp.health]))
     if grasp.lost:
         more = f" and {len(grasp.lost) - _SHOWN} more" if len(grasp.lost) > _SHOWN else ""
@@ -80,6 +81,13 @@ def drawn(grasp: LiveGrasp, devices: Sequence[DeviceHealth], lines: Sequence[str
     for device in devices:
         table.add_row(device.name, Text(device.error, style="red") if device.error else "connected")
     return Group(table, *(Text(line, style="dim") for line in lines))
+
+
+def _segment(grasp: LiveGrasp) -> str:
+    """Return "3, PMF: held, 1.2 s"."""
+    if grasp.segment_us is None:
+        return f"none, {grasp.segment} so far"
+    return f"{grasp.segment}, {grasp.segment_type}: {grasp.state}, {(grasp.time_us - grasp.segment_us) / 1e6:.1f} s"
 
 
 def _bar(share: float) -> str:

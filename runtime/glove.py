@@ -22,8 +22,7 @@ from .live.recogniser import Moment
 from .live.sources import Taken
 from .live.system import System
 from .policy import Policy
-from .preshape.loading import load_preshapes
-from .preshape.selector import PreshapeSelector
+from .preshape.loading import preshape_selector
 from .published import DeviceHealth, HealthReport, JointAngles
 from .recording.session import Session
 from .recording.writer import Recorder
@@ -56,6 +55,9 @@ class Glove:
         When a grasp type is decided on, and when too much is missing.
     preshapes : str or path, optional
         Preshapes of a robot's hand: a table that ships, "barrett_bh8" or "parallel_gripper", or a file of your own.
+    change_while_held : bool
+        Whether the preshape may change while something is held. Otherwise that takes nothing held in between, where the
+        build knows that.
     sinks : sequence of str or Sink
         Where each moment goes besides: "unix:/run/grasps", as `thenar run --sink` spells them.
     record : str or path, optional
@@ -111,6 +113,7 @@ class Glove:
         *,
         policy: Policy | None = None,
         preshapes: str | PathLike[str] | None = None,
+        change_while_held: bool = False,
         sinks: Sequence[str | Sink] = (),
         record: str | PathLike[str] | None = None,
         full_scan: bool = False,
@@ -129,10 +132,12 @@ class Glove:
         devices = system.sources(full_scan=full_scan, all_sensors=record is not None)
         self._recognizer, self.sources = system.recognizer(), devices
         self.feed: Feed = self.sources if feed is None else feed
-        self._selector: PreshapeSelector | None = None
+        self._selector = None
         if preshapes is not None:
-            table = load_preshapes(preshapes)
-            self.lacking, self._selector = table.check(loaded.grasps), PreshapeSelector(table)
+            by_segments = system.policy.lag_us is not None
+            self._selector, self.lacking = preshape_selector(
+                preshapes, loaded, segments=by_segments, change_while_held=change_while_held
+            )
         calibration = system.calibration
         read = system.sensor_names if record is not None else system.read_sensors
         self._angles = None if calibration is None else AngleReader(system.sensor_names, calibration, read)

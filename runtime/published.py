@@ -33,6 +33,7 @@ class LiveGrasp(msgspec.Struct, frozen=True, omit_defaults=False):
     segment       counts the segments of a grasp type of this run from 1; 0 before the first
     segment_type  the type of the segment, "none" between segments
     segment_us    when the segment began, on the clock of `time_us`; None between segments
+    segment_probability  of `segment_type` in this frame; 0 between segments, and when unknown
     """
 
     time_us: int
@@ -51,6 +52,7 @@ class LiveGrasp(msgspec.Struct, frozen=True, omit_defaults=False):
     segment: int = 0
     segment_type: str = NONE
     segment_us: int | None = None
+    segment_probability: float = 0.0
 
 
 class JointAngles(msgspec.Struct, frozen=True):

@@ -81,7 +81,8 @@ class LiveRecognizer:
         self._scored: Sequence[int] | None = None
         self._missing = MissingInputs(build, self._policy.max_lost)
         self._decider, self._lead = _decider(build, self._policy), self._policy.lead_steps(tables.scale)
-        self._segments = LiveSegments(build.manifest.segmenting, build.grasps, self._policy.lag_us)
+        lag_us, model = self._policy.lag_us, build.manifest.segmenting
+        self._segments = None if lag_us is None else LiveSegments(model, build.grasps, lag_us)
         self._whole_until_us, self._whole = -1, tuple[int, ...]()
         self._number = 0
         self._alone = LiveScores(build.scorer) if on_demand else None
@@ -92,7 +93,8 @@ class LiveRecognizer:
         """
         if self._alone is None:
             return False
-        if self._segments.due(now_us) and (glove is None or glove.time_us <= now_us - self._segments.tick_us):
+        segments = self._segments
+        if segments and segments.due(now_us) and (glove is None or glove.time_us <= now_us - segments.tick_us):
             return True
         # Where no switch is read any more, records come as often as switches would.
         silent = switches is None or not self._all_switches & ~switches.lost
@@ -134,8 +136,10 @@ class LiveRecognizer:
             decided = None
         else:
             decided = self._decider.update(max(seen_us, 0), standing, whole=not missing.names)
-        scores = None if missing.too_much else self._whole_scores(now_us, frame, standing)
-        segment = self._segments.update(now_us, scores)
+        segment = Segment()
+        if self._segments is not None:
+            scores = None if missing.too_much else self._whole_scores(now_us, frame, standing, self._segments.tick_us)
+            segment = self._segments.update(now_us, scores)
         grasp = self._published(now_us, unix_us, standing, missing, decided, seen_us, segment)
         self._number += 1
         return Moment(grasp, switches, glove, codes, scores=scores)
@@ -156,12 +160,14 @@ class LiveRecognizer:
         lost |= unread
         return Standing(self._scores.lanes(frame.closed & ~lost, lost), self._scorer), lost
 
-    def _whole_scores(self, now_us: int, frame: SwitchFrame | None, standing: Standing) -> tuple[int, ...]:
+    def _whole_scores(
+        self, now_us: int, frame: SwitchFrame | None, standing: Standing, tick_us: int
+    ) -> tuple[int, ...]:
         """Return the scores for a tick of the segments: those of the newest frame of which nothing was left unread, if
         it is at most two ticks old; otherwise what is unread counts as lost.
         """
         if standing.whole:
-            self._whole_until_us, self._whole = now_us + PERIODS * self._segments.tick_us, standing.lanes
+            self._whole_until_us, self._whole = now_us + PERIODS * tick_us, standing.lanes
         elif frame is not None and now_us > self._whole_until_us:
             lost = frame.lost | frame.unread
             return self._scores.lanes(frame.closed & ~lost, lost)
@@ -186,13 +192,17 @@ class LiveRecognizer:
             health = "degraded"
         elif decided is None or standing.contradicts(decided, self._lead):
             health = "changing"
+        probability = 0.0 if decided is None else standing.probability(decided, self._scale)
+        label, of_segment = segment.label, 0.0
+        if label is not None and not unknown:
+            of_segment = probability if label == decided else standing.probability(label, self._scale)
         return LiveGrasp(
             time_us=now_us,
             unix_us=unix_us,
             number=self._number,
             grasp=UNKNOWN if decided is None else self._grasps[decided],
             candidate=UNKNOWN if unknown else self._grasps[standing.candidate],
-            probability=0.0 if decided is None else standing.probability(decided, self._scale),
+            probability=probability,
             margin=0 if unknown else standing.margin,
             health=health,
             switch_age_us=None if switches_us < 0 else now_us - switches_us,
@@ -203,6 +213,7 @@ class LiveRecognizer:
             segment=segment.number,
             segment_type=segment.type,
             segment_us=segment.began_us,
+            segment_probability=of_segment,
         )
 
 

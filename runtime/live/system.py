@@ -117,7 +117,7 @@ class System:
         Hand `start` the codes of the glove's record that the recogniser will be given with the scan.
         """
         lead = self.policy.lead_steps(self.build.tables.scale)
-        whole_us = self.build.manifest.segmenting.tick_us // 2
+        whole_us = None if self.policy.lag_us is None else self.build.manifest.segmenting.tick_us // 2
         return EarlyExit(self.build.scorer, ports, lead=lead, on_demand=self.on_demand, whole_us=whole_us)
 
     def joints(self) -> Joints:

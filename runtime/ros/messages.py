@@ -145,6 +145,7 @@ def segment(name: str, grasp: LiveGrasp) -> DiagnosticArray:
         "state": grasp.state,
         "segment": str(grasp.segment),
         "segment_type": grasp.segment_type,
+        "segment_probability": f"{grasp.segment_probability:.6f}",
         "segment_stamp": "" if began_us is None else f"{began_us / 1e6:.6f}",
         "candidate": grasp.candidate,
         "margin": str(grasp.margin),

@@ -13,10 +13,13 @@ _MOST_SET = 16
 
 
 class Segment(msgspec.Struct, frozen=True):
-    """The segment of a moment, as `LiveGrasp` publishes it: its state, number, grasp type and beginning."""
+    """The segment of a moment, as `LiveGrasp` publishes it: its state, number, grasp type (that of class `label`, None
+    between segments) and beginning.
+    """
 
     state: State = "none"
     number: int = 0
+    label: int | None = None
     type: str = NONE
     began_us: int | None = None
 
@@ -91,7 +94,7 @@ class LiveSegments:
         if of == none:
             self.newest = Segment(number=number)
         else:
-            self.newest = Segment(state, number, self._grasps[of], self._time_us(start))
+            self.newest = Segment(state, number, of, self._grasps[of], self._time_us(start))
 
     def _time_us(self, tick: int) -> int:
         first, time_us = next((each for each in reversed(self._set) if each[0] <= tick), self._set[0])

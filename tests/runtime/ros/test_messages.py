@@ -261,6 +261,7 @@ def test_the_tools_of_ros_2_read_a_segment(
     grasp = replace(
         of_frame, time_us=70_000, health=health, state="held", segment=3, segment_type="PMF", segment_us=50_000
     )
+    grasp = replace(grasp, segment_probability=0.25)
     read = decoded("diagnostic_msgs/msg/DiagnosticArray", ros.segment("/thenar", grasp))
     assert (read.header.stamp.sec, read.header.stamp.nanosec) == (1_700_000_000, 123_456_000)
     (status,) = read.status
@@ -272,6 +273,7 @@ def test_the_tools_of_ros_2_read_a_segment(
         "state": "held",
         "segment": "3",
         "segment_type": "PMF",
+        "segment_probability": "0.250000",
         "segment_stamp": "1700000000.103456",
         "candidate": "PoS",
         "margin": "120",
