@@ -59,7 +59,7 @@ def command(
         thenar run build/ --glove glove.toml --task task.json
     """
     from thenar.compiler.artifact.demonstrations import demonstrations as shown_in
-    from thenar.compiler.segmenting.teaching import behaviour_tree, task_json, taught
+    from thenar.compiler.segmenting.teaching import Demonstration, behaviour_tree, task_json, taught
     from thenar.compiler.segmenting.transitions import Transitions
     from thenar.runtime import Build
     from thenar.runtime.files import write_atomically
@@ -74,7 +74,7 @@ def command(
     if preshapes is not None and (lacking := preshapes.check(loaded.grasps)):
         warning(lacking)
     graph = None if transitions is None else Transitions.load(transitions)
-    shown = []
+    shown = list[Demonstration]()
     with progress("finding segments") as report:
         for done, path in enumerate(demonstrations):
             report(done, len(demonstrations))

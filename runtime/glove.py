@@ -27,6 +27,7 @@ from .published import DeviceHealth, HealthReport, JointAngles, Quarantined
 from .recording.session import Session
 from .recording.writer import Recorder
 from .sinks.base import Fanout, Sink, SinkReport, open_sink
+from .task import TaskFollower
 from .taxels import calibration_of
 
 _REPORT_US = 1_000_000
@@ -64,6 +65,8 @@ class Glove:
         A new .mcap file for the raw frames and what came of them.
     full_scan : bool
         Whether every scan reads all ports, even when the rest cannot matter.
+    task : str or path, optional
+        A task of `thenar teach`: sinks get how far the hand has come in it, whenever that changes.
     status : bool
         Whether sinks get a report of the glove's health once a second, and whenever a device comes or goes.
     stop : threading.Event, optional
@@ -81,6 +84,8 @@ class Glove:
         The devices.
     recorder : Recorder or None
         What writes the recording.
+    follower : TaskFollower or None
+        What follows the hand through `task`: its `progress` says where it is.
     health : HealthReport or None
         How the glove fares, worked out anew once a second, and whenever a device comes or goes, or an input is
         quarantined or taken back.
@@ -119,6 +124,7 @@ class Glove:
         record: str | PathLike[str] | None = None,
         full_scan: bool = False,
         status: bool = False,
+        task: str | PathLike[str] | None = None,
         stop: Event | None = None,
         feed: Feed | None = None,
     ) -> None:
@@ -145,6 +151,7 @@ class Glove:
         self._measured: GloveFrame | None = None
         self._newest_angles: JointAngles | None = None
         self._sinks, self._record, self._status = tuple(sinks), record, status
+        self.follower = None if task is None else TaskFollower.of(Path(task), loaded.grasps)
         self._health, self._due_us = Health(loaded), 0
         self._quarantined: tuple[Quarantined, ...] = ()
         self._fanout = Fanout(())
@@ -191,6 +198,7 @@ class Glove:
             self.recorder.grasp(grasp)
         if self._selector is not None:
             moment.preshape = self._selector.update(grasp)
+        progress = None if self.follower is None else self.follower.update(grasp)
         if self._angles is not None:
             if measured is not self._measured:
                 self._measured = measured
@@ -198,6 +206,8 @@ class Glove:
                 self._newest_angles = self._angles.angles(measured.sensors) if measured and there else None
             moment.angles = self._newest_angles
         self._fanout.publish(grasp, moment.preshape, moment.angles)
+        if progress is not None:
+            self._fanout.task(progress)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None, moment.codes)
         if self._recognizer.quarantine.found != self._quarantined:
             self._quarantined = self._recognizer.quarantine.found

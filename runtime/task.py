@@ -146,6 +146,13 @@ class TaskFollower:
     def __init__(self, task: Task) -> None:
         self.task, self.progress, self._segment = task, _at(task, 0), 0
 
+    @classmethod
+    def of(cls, path: Path, grasps: tuple[str, ...]) -> "TaskFollower":
+        """Load a task for a build that recognises `grasps`. Raises SettingError where it is none for it, OSError."""
+        task = load_task(path)
+        task.check(grasps)
+        return cls(task)
+
     def update(self, grasp: LiveGrasp) -> Progress | None:
         """Return the progress where this moment changes it."""
         before = self.progress

@@ -223,4 +223,5 @@ def behaviour_tree(task: Task) -> bytes:
     for port in _PORTS:
         ElementTree.SubElement(action, "input_port", {"name": port})
     ElementTree.indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, "utf-8") + b"\n"
+    tree_text: bytes = ElementTree.tostring(root, "utf-8")
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tree_text + b"\n"

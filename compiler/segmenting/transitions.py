@@ -93,7 +93,7 @@ class Transitions:
         """Return the content of its file."""
         rounded = self.probabilities.round(6).tolist()
         found = TransitionFile(self.types, tuple(map(tuple, self.counts.tolist())), tuple(map(tuple, rounded)))
-        return msgspec.json.format(msgspec.json.encode(found), indent=1) + b"\n"
+        return msgspec.json.encode(found) + b"\n"
 
 
 # Of the picture: its side, the radius of the circle of types and of a type's own.
@@ -173,6 +173,7 @@ def _edge(start: tuple[float, float], end: tuple[float, float], angle: float, sh
     """
     width, opacity = 1 + 6 * share, 0.12 if share < FREQUENT else min(1.0, 0.35 + share)
     if start == end:
+        angle += 1.2  # past the name
         x, y = start[0] + _DOT * cos(angle), start[1] + _DOT * sin(angle)
         turned = [(x + 26 * cos(angle + turn), y + 26 * sin(angle + turn)) for turn in (-1.0, 1.0)]
         points = [(x, y), *turned, (x, y)]

@@ -18,6 +18,7 @@ from thenar.simulator.scenes import shipped
     [
         ("evalute", "evaluate"),
         ("imprt", "import"),
+        ("teech", "teach"),
         ("compile {set} -o new --preset smalest", "smallest"),
         ("compile {set} -o new --trainer logitbost", "logitboost"),
         ("compile {set} -o new --metod id3", "--method"),
