@@ -1,4 +1,4 @@
-"""Whole movements of a simulated hand, recognised frame by frame: how often a preshape changes while nothing is held."""
+"""Whole movements of a simulated hand, recognised frame by frame: how often a preshape changes on an empty hand."""
 
 from collections.abc import Sequence
 from pathlib import Path
