@@ -11,7 +11,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp
+from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp, Quarantined
 from thenar.runtime.task import Progress
 
 Devices = Callable[[], Sequence[DeviceHealth]]
@@ -69,11 +69,16 @@ class LiveView:
                 if newest is not None and newest is not shown:
                     grasp, devices, health, progress = shown = newest
                     lines = health_lines(health) if self._status else ()
-                    self._live.update(drawn(grasp, devices(), lines, progress), refresh=True)
+                    wrong = () if health is None else health.quarantined
+                    self._live.update(drawn(grasp, devices(), lines, wrong, progress), refresh=True)
 
 
 def drawn(
-    grasp: LiveGrasp, devices: Sequence[DeviceHealth], lines: Sequence[str] = (), progress: Progress | None = None
+    grasp: LiveGrasp,
+    devices: Sequence[DeviceHealth],
+    lines: Sequence[str] = (),
+    wrong: Sequence[Quarantined] = (),
+    progress: Progress | None = None,
 ) -> RenderableType:
     """Return the picture of one moment."""
     table = Table.grid(padding=(0, 2))
@@ -87,6 +92,8 @@ def drawn(
     if grasp.lost:
         more = f" and {len(grasp.lost) - _SHOWN} more" if len(grasp.lost) > _SHOWN else ""
         table.add_row("missing", ", ".join(grasp.lost[:_SHOWN]) + more)
+    for one in wrong:
+        table.add_row(one.name, Text(one.what, style="yellow"))
     table.add_row("age", f"switches {_ms(grasp.switch_age_us)}, glove {_ms(grasp.glove_age_us)}")
     table.add_row("frame", str(grasp.number))
     for device in devices:

@@ -81,6 +81,7 @@ class _SinkOption(click.Option):
 @click.option("--lead", type=Number(0), help="Lead in score units that a new grasp type needs.")
 @click.option("--dwell-ms", type=Number(0, 10_000), help="Time for which it has to keep the lead.")
 @click.option("--max-lost", type=Number(0, 1), help="Share of the build's weight that may be missing.")
+@click.option("--no-quarantine", is_flag=True, help="Use inputs that are stuck, chatter or drift all the same.")
 @click.option("--error-rate", type=Number(0, 1), help="Decide by a sequential test of this error rate instead.")
 @click.option("--spacing-ms", type=Number(0, 10_000), help="Minimum spacing of frames in the sequential test.")
 @click.option(
@@ -102,6 +103,7 @@ def command(
     lead: float | None,
     dwell_ms: float | None,
     max_lost: float | None,
+    no_quarantine: bool,
     error_rate: float | None,
     spacing_ms: float | None,
     lag_ms: float | None,
@@ -132,6 +134,7 @@ def command(
             "lead": lead,
             "dwell_us": _us(dwell_ms),
             "max_lost": max_lost,
+            "quarantine": False if no_quarantine else None,
             "error_rate": error_rate,
             "spacing_us": _us(spacing_ms),
             "lag_us": _us(lag_ms),
@@ -155,7 +158,7 @@ def command(
 
 
 _LIVE = ("record", "full_scan", "status")
-_POLICY = ("lead", "dwell_ms", "max_lost", "error_rate", "spacing_ms", "lag_ms")
+_POLICY = ("lead", "dwell_ms", "max_lost", "no_quarantine", "error_rate", "spacing_ms", "lag_ms")
 
 
 def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
@@ -239,12 +242,15 @@ def _look_on(glove: "Glove", view: "LiveView | None", frames: int | None) -> Non
 
 
 def _say_news(glove: "Glove", health: "HealthReport", said: dict[str, str]) -> None:
-    """Say on stderr how devices and recording fare, once each time that it changes."""
+    """Say on stderr how devices, recording and inputs in quarantine fare, once each time that it changes."""
     from thenar.runtime.live.sources import NOT_YET
 
     news = {device.name: device.error or "connected" for device in health.devices}
     if glove.recorder is not None and glove.recorder.failure:
         news["recording"] = glove.recorder.failure
+    news |= {wrong.name: wrong.what for wrong in health.quarantined}
+    # Devices stay in the news.
+    news |= {name: "behaves again" for name in said if name not in news}
     for name, state in news.items():
         if said.get(name) != state and state != NOT_YET:
             _say(of_device(name, state))

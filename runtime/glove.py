@@ -23,7 +23,7 @@ from .live.sources import Taken
 from .live.system import System
 from .policy import Policy
 from .preshape.loading import preshape_selector
-from .published import DeviceHealth, HealthReport, JointAngles
+from .published import DeviceHealth, HealthReport, JointAngles, Quarantined
 from .recording.session import Session
 from .recording.writer import Recorder
 from .sinks.base import Fanout, Sink, SinkReport, open_sink
@@ -87,7 +87,8 @@ class Glove:
     follower : TaskFollower or None
         What follows the hand through `task`: its `progress` says where it is.
     health : HealthReport or None
-        How the glove fares, worked out anew once a second, and whenever a device comes or goes.
+        How the glove fares, worked out anew once a second, and whenever a device comes or goes, or an input is
+        quarantined or taken back.
     lacking : str
         A sentence on grasp types for which `preshapes` names none; "" if there are none.
 
@@ -152,6 +153,7 @@ class Glove:
         self._sinks, self._record, self._status = tuple(sinks), record, status
         self.follower = None if task is None else TaskFollower.of(Path(task), loaded.grasps)
         self._health, self._due_us = Health(loaded), 0
+        self._quarantined: tuple[Quarantined, ...] = ()
         self._fanout = Fanout(())
         self._open = ExitStack()
 
@@ -207,6 +209,10 @@ class Glove:
         if progress is not None:
             self._fanout.task(progress)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None, moment.codes)
+        if self._recognizer.quarantine.found != self._quarantined:
+            self._quarantined = self._recognizer.quarantine.found
+            self.sources.leave_out(*self._recognizer.quarantine.out)
+            self._due_us = now
         if now >= self._due_us or self.sources.changed:
             self._look(now)
         self.frames += 1
@@ -235,7 +241,8 @@ class Glove:
 
     def _look(self, now: int) -> None:
         self._due_us, self.sources.changed = now + _REPORT_US, False
-        self.health = self._health.report(now, self.sources.health(), self.sources.overflowed)
+        devices, overflowed = self.sources.health(), self.sources.overflowed
+        self.health = self._health.report(now, devices, overflowed, self._quarantined)
         if self._status:
             self._fanout.health(self.health)
         self.sources.raise_settings()

@@ -507,6 +507,9 @@ def _wrong_columns(manifest: Manifest) -> Iterator[str]:
             yield "takes two inputs from one column"
     if max((column for column, _ in levels), default=-1) >= manifest.source.switches:
         yield "keeps a switch that the recordings do not have"
+    shares = {len(text) for switch in manifest.switches for text in (switch.closed_least, switch.closed_most)}
+    if len(shares) > 1 or not shares <= {0, 2 * len(manifest.grasps)}:
+        yield "says of other grasp types how often switches are closed"
 
 
 def _wrong_segments(manifest: Manifest) -> Iterator[str]:

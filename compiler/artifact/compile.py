@@ -53,7 +53,6 @@ from .ensemble import ensemble_to_bytes
 from .training import (
     Tested,
     Trained,
-    answers_of,
     cross_validated,
     cuts_of,
     detection_of,
@@ -61,6 +60,8 @@ from .training import (
     integers_of,
     rates_of,
     samples_of,
+    scores_of,
+    segments_for,
     train,
 )
 from .verify_firmware import made_firmware
@@ -193,7 +194,7 @@ def compile_build(
     trained = train(samples, asked, steps.trained, ports, groups, jobs, limits)
     made = Making(grasp_set, samples, asked, trained, harness)
     tested = cross_validated(
-        samples, cuts, asked, partial(answers_of, samples, asked, ports, groups, limits), jobs, steps.tested
+        samples, cuts, asked, partial(scores_of, samples, asked, ports, groups, limits), jobs, steps.tested
     )
     return made.publish(target, tested, documents, jobs, progress)
 
@@ -343,6 +344,9 @@ class Making:
             fitting=fitting if fitting is not None and fitting.compared else None,
             faults=worst_faults(self.faults, self._inputs, self._groups),
             detection=detection if tested is None else (*detection, *tested.detection),
+            segments=segments_for(
+                grasp_set, self.samples, None if tested is None else tested.scores, self.integers.scale
+            ),
         )
 
     def _switch(self, element: Element, name: str, gain: float) -> Switch:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import By, Detected, Fitting, Of, Options, Protocol, Recognised
+from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables
 
 from ..boosting.stumps import Stumps
@@ -24,6 +25,8 @@ from ..placement.ports import PortCosts
 from ..placement.tree import Tree
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
+from ..segmenting.learning import learnt
+from ..segmenting.streams import TICK_US, SegmentingError, streams_of
 from ..tables.collapse import Model, collapse
 from ..tables.quantise import integer_scores, quantise
 from ..trainers.base import Report, Training
@@ -162,7 +165,8 @@ def integers_of(trained: Trained, samples: Samples, options: Options) -> Integer
 
 USUAL_ROUNDS = 100  # where a fit is chosen, its work is taken to be that of so many
 
-Test = Callable[[Fold], Answers]
+Scores = NDArray[np.float64]
+Test = Callable[[Fold], Scores]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -207,18 +211,20 @@ def cuts_of(grasp_set: GraspSet, options: Options) -> tuple[Cut, ...]:
 @dataclass(frozen=True, slots=True, eq=False)
 class Tested:
     """What came of the folds: the rates, the headline first; and how often frames of each class (rows) were answered by
-    each (columns) in the folds of the headline, (K, K).
+    each (columns) in the folds of the headline, (K, K); and the scores of all rows there, (n, K).
     """
 
     rates: tuple[Recognised, ...]
     detection: tuple[Detected, ...]
     confusion: NDArray[np.intp]
+    scores: Scores
 
 
-def answers_of(
+def scores_of(
     samples: Samples, options: Options, ports: PortCosts | None, groups: Groups, limits: Limits | None, fold: Fold
-) -> Answers:
-    """Choose and train on the fold's training rows alone; return the classes that the integers give its test rows.
+) -> Scores:
+    """Choose and train on the fold's training rows alone; return the scores (m, K), in units, that the integers give
+    its test rows.
 
     Raises CompileError, which names the fold, as `train` does.
     """
@@ -230,13 +236,13 @@ def answers_of(
         raise CompileError(f"in fold {fold.name}: {wrong}, or do without folds (0)") from None
     tables = integers_of(trained, learning, options)
     test = trained.read(samples.rows(fold.test))
-    return np.asarray(integer_scores(tables, test.switches, test.codes).argmax(axis=1))
+    return integer_scores(tables, test.switches, test.codes) / tables.scale
 
 
 def cross_validated(
     samples: Samples, cuts: Sequence[Cut], options: Options, test: Test, jobs: int, report: Report
 ) -> Tested | None:
-    """Return what comes of the folds, None if there are none; `test` returns the classes of a fold's test rows.
+    """Return what comes of the folds, None if there are none; `test` returns the scores of a fold's test rows.
 
     jobs  worker processes that call `test`; report: called with (done, all) after each fold
     """
@@ -244,23 +250,39 @@ def cross_validated(
         return None
     folds = [(place, fold) for place, cut in enumerate(cuts) for fold in cut.folds]
     answers = np.empty((len(cuts), len(samples.labels)), np.intp)
+    scores = np.empty((len(samples.labels), samples.n_classes))
     tasks = ((place, fold, test) for place, fold in folds)
     for done, (place, fold, found) in enumerate(
         in_workers(_done, tasks, little(len(folds) * len(samples.labels) * (options.rounds or USUAL_ROUNDS), jobs)), 1
     ):
-        answers[place, fold.test] = found
+        answers[place, fold.test] = found.argmax(axis=1)
+        if not place:
+            scores[fold.test] = found
         report(done, len(folds))
     confusion = np.zeros((len(samples.grasps),) * 2, dtype=np.intp)
     np.add.at(confusion, (samples.labels, answers[0]), 1)
     measured, seed = list(zip(cuts, answers, strict=True)), options.seed
     rates = [rate for cut, own in measured for rate in rates_of("nested", samples, own, seed, cut)]
     detection = [each for cut, own in measured for each in detection_of("nested", samples, own, seed, cut)]
-    return Tested(tuple(rates), tuple(detection), confusion)
+    return Tested(tuple(rates), tuple(detection), confusion, scores)
 
 
-def _done(task: tuple[int, Fold, Test]) -> tuple[int, Fold, Answers]:
+def _done(task: tuple[int, Fold, Test]) -> tuple[int, Fold, Scores]:
     place, fold, test = task
     return place, fold, test(fold)
+
+
+def segments_for(grasp_set: GraspSet, samples: Samples, scores: Scores | None, scale: float) -> SegmentModel | None:
+    """Return the costs of segments for tables of `scale` steps per unit, learnt from whole movements and from the
+    scores (n, K) of folds; None without movements.
+    """
+    if not samples.is_none.any():
+        return None
+    try:
+        streams = streams_of(grasp_set)
+    except SegmentingError:
+        return None
+    return learnt(streams, samples.labels, scores, samples.n_types, scale, TICK_US)
 
 
 def rates_of(
