@@ -34,12 +34,18 @@ class Samples:
     labels : ndarray of intp, shape (n,)
         Class numbers, that index `grasps`.
     grasps : tuple of str
-        The grasp types. A fold keeps all of them, whether they occur in it or not.
+        The grasp types, and last of all NONE with `has_none`. A fold keeps all of them, whether they occur in it or
+        not.
     trials, subjects : ndarray of intp, shape (n,), optional
         The number of each row's trial and subject: what is chosen by inner folds must not part them. None given: each
         row is a trial of its own, of one subject.
     taxels : ndarray of uint16, shape (n, t), optional
         Codes of which a placement makes bits first, by thresholds that it learns: placement/elements.py.
+    movements : ndarray of intp, shape (n,), optional
+        The number of each row's movement, which no fold parts: a trial, and the rows of nothing held before and after
+        it. None given: each trial is one.
+    has_none : bool
+        Whether the last class is that nothing is held.
 
     Raises
     ------
@@ -61,6 +67,8 @@ class Samples:
     trials: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
     subjects: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
     taxels: NDArray[np.uint16] = field(default_factory=lambda: np.empty(0, np.uint16))
+    movements: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
+    has_none: bool = False
 
     def __post_init__(self) -> None:
         if not self.trials.size:
@@ -69,14 +77,15 @@ class Samples:
             object.__setattr__(self, "subjects", np.zeros(len(self.labels), np.intp))
         if not self.taxels.size:
             object.__setattr__(self, "taxels", np.empty((len(self.labels), 0), np.uint16))
-        parts = (self.switches, self.codes, self.labels, self.trials, self.subjects, self.taxels)
-        rows = set(map(len, parts))
-        if len(rows) != 1 or [part.ndim for part in parts] != [2, 2, 1, 1, 1, 2]:
-            raise SamplesError(
-                f"switches {self.switches.shape}, codes {self.codes.shape}, labels {self.labels.shape}, trials "
-                f"{self.trials.shape}, subjects {self.subjects.shape} and taxels {self.taxels.shape} must be (n, s), "
-                "(n, j), (n,), (n,), (n,) and (n, t) of the same n rows"
-            )
+        if not self.movements.size:
+            object.__setattr__(self, "movements", self.trials)
+        shapes = {"switches": "(n, s)", "codes": "(n, j)", "labels": "(n,)", "trials": "(n,)", "subjects": "(n,)"}
+        shapes |= {"taxels": "(n, t)", "movements": "(n,)"}
+        parts = {name: getattr(self, name) for name in shapes}
+        rows = set(map(len, parts.values()))
+        if len(rows) != 1 or any(parts[name].ndim != 1 + shape.count(" ") for name, shape in shapes.items()):
+            found = ", ".join(f"{name} {part.shape}" for name, part in parts.items())
+            raise SamplesError(f"{found} must be {', '.join(shapes.values())} of the same n rows")
         if not rows.pop():
             raise SamplesError("nothing can be learnt from a set without rows")
         if self.labels.min() < 0 or self.labels.max() >= self.n_classes:
@@ -95,6 +104,8 @@ class Samples:
             trials=grasp_set.trial_ids,
             subjects=np.unique(grasp_set.subjects, return_inverse=True)[1],
             taxels=grasp_set.taxels[:, : None if inputs != "joints" else 0],
+            movements=grasp_set.movement_ids,
+            has_none=bool(grasp_set.is_none.any()),
         )
 
     @property
@@ -104,8 +115,31 @@ class Samples:
 
     @property
     def n_classes(self) -> int:
-        """The number of grasp types."""
+        """The number of classes: grasp types, and NONE where it is one."""
         return len(self.grasps)
+
+    @property
+    def n_types(self) -> int:
+        """The number of grasp types, and the class of rows in which nothing is held."""
+        return self.n_classes - self.has_none
+
+    @property
+    def is_none(self) -> NDArray[np.bool_]:
+        """Whether nothing is held in each row (n,)."""
+        return np.asarray(self.labels == self.n_types)
+
+    def without_none(self) -> "Samples":
+        """Return the rows in which something is held, and the grasp types alone."""
+        if not self.has_none:
+            return self
+        return replace(self.rows(~self.is_none), grasps=self.grasps[:-1], has_none=False)
+
+    def balanced(self) -> NDArray[np.intp]:
+        """Return the numbers of rows of which no more show nothing than a grasp: of more, as many, evenly spaced."""
+        none, held = np.flatnonzero(self.is_none), np.flatnonzero(~self.is_none)
+        if len(none) > len(held):
+            none = none[np.arange(len(held)) * len(none) // max(1, len(held))]
+        return np.sort(np.concatenate([held, none]))
 
     def rows(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> "Samples":
         """Return some of the rows, by number or by mask (n,)."""
@@ -117,6 +151,8 @@ class Samples:
             self.trials[chosen],
             self.subjects[chosen],
             self.taxels[chosen],
+            self.movements[chosen],
+            self.has_none,
         )
 
     def keeping(self, columns: Columns) -> "Samples":

@@ -14,6 +14,7 @@ from . import tables as tables_file
 from .errors import BuildError
 from .files import read_file
 from .manifest import Manifest, manifest_from_bytes
+from .published import NONE
 from .scanning import scanmap as scan_file
 from .scanning.scanmap import ScanMap, check_switches, scanmap_from_bytes
 from .scores import LANE_OFFSET, Scorer, softmax
@@ -62,6 +63,11 @@ class Build:
         self.scan = scan
         self.grasps = manifest.grasps
         self.scorer = Scorer(tables)
+
+    @property
+    def knows_none(self) -> bool:
+        """Whether it says when nothing is held."""
+        return self.grasps[-1] == NONE
 
     @classmethod
     def load(cls, folder: str | PathLike[str]) -> Self:

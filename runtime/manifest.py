@@ -14,6 +14,8 @@ from msgspec.structs import replace
 
 from .errors import BuildError
 from .names import LONGEST_NAME, fault, list_names, shortened
+from .published import NONE
+from .segmenting.model import SegmentModel
 
 SCHEMA = 1
 MAX_BYTES = 16 << 20
@@ -36,6 +38,8 @@ Name = Annotated[str, Meta(min_length=1)]
 # A number, or one of a few names.
 Given = Value | Name
 Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+# A byte for each grasp type.
+Bytes = Annotated[str, Meta(pattern="^([0-9a-f]{2})*$")]
 _T = TypeVar("_T")
 
 
@@ -220,12 +224,17 @@ class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     """A kept switch: its column in the recordings, from 0, its name, and the information (bits) that it brought: to the
     tree of ID3, or alone where another method chose it; of a taxel, which follow the switches, also the threshold. A
     taxel may have several, each a switch with a name of its own.
+
+    closed_least, closed_most  for each grasp type, in 255ths, the share of a subject's trials in which it is closed, of
+                               the subject with the least and the most; "" in builds of older versions
     """
 
     column: Count
     name: Name
     gain: Value
     threshold: Threshold | None = None
+    closed_least: Bytes = ""
+    closed_most: Bytes = ""
 
     @property
     def source(self) -> str:
@@ -299,6 +308,21 @@ class Recognised(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=
         return f"{self.title}: {100 * self.rate:.1f} %{',' if self.low is None else ''} {self.basis}"
 
 
+class Detected(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """How surely a build says whether something is held: the share of trials or frames of grasps in which it says so,
+    `held`, and the share of those of nothing held in which it says that; None where the recordings have no such rows.
+    """
+
+    held: Recognised
+    none: Recognised | None = None
+
+    def __str__(self) -> str:
+        """Return "new subject: 98.1 % [...] of grasps are held, 97.0 % [...] of nothing held are none"."""
+        parts = [(self.held, "said to be held")] + ([] if self.none is None else [(self.none, "of nothing held, none")])
+        shares = (f"{100 * rate.rate:.1f} % {words} ({rate.basis})" for rate, words in parts)
+        return f"{self.held.title}: {'; '.join(shares)}"
+
+
 class Faulty(Struct, frozen=True, forbid_unknown_fields=True):
     """A fault: what happens ("lost", "stuck closed", "stuck at codes 0 to 40", "lost with chip 1 of bus 1"), the names
     of the inputs to which it does, and how many trials are recognised all the same.
@@ -348,6 +372,8 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     scan_sha256      of scan.json; left out where the build was compiled for no harness
     fitting          how the fit was chosen; left out where the options leave no choice
     faults           what faults of inputs leave of the rows trained on; None in builds of older versions
+    detection        how surely the build says whether something is held, of the rows trained on and of folds
+    segments         costs of segments that were learnt from streams; None: there were none to learn from
     """
 
     schema: int
@@ -367,6 +393,14 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     scan_sha256: Digest | None = None
     fitting: Fitting | None = None
     faults: Faults | None = None
+    detection: tuple[Detected, ...] = ()
+    segments: SegmentModel | None = None
+
+    @property
+    def segmenting(self) -> SegmentModel:
+        """The costs of segments: those that were learnt, or the usual ones."""
+        has_none = self.grasps[-1] == NONE
+        return self.segments or SegmentModel.usual(len(self.grasps) - has_none, has_none, self.proof.scale)
 
     @property
     def fit(self) -> Fitting:
@@ -385,6 +419,11 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     def headline(self) -> Recognised | None:
         """The rate to expect of new grasps; None where none was measured."""
         return next((rate for rate in self.rates if rate.protocol != "training"), None)
+
+    @property
+    def detected(self) -> Detected | None:
+        """How surely it says of new grasps whether something is held; None where that was not measured."""
+        return next((each for each in self.detection if each.held.protocol != "training"), None)
 
 
 class _SchemaVersion(Struct, frozen=True):
@@ -442,13 +481,15 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     yield from _wrong_names("texts", texts)
     yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
     yield from _wrong_columns(manifest)
+    yield from _wrong_segments(manifest)
     for joint in (*manifest.joints, *taxels):
         if joint.code_a == joint.code_b or joint.value_a == joint.value_b:
             yield "gives a joint two points that make no line"
     proof = manifest.proof
     if proof.width != options.width or max(proof.covered, proof.changed) > manifest.source.rows:
         yield "proves something of other tables than it describes"
-    counted = [(rate.correct, rate.total) for rate in manifest.rates]
+    shares = [rate for each in manifest.detection for rate in (each.held, each.none) if rate is not None]
+    counted = [(rate.correct, rate.total) for rate in (*manifest.rates, *shares)]
     counted += [(each.correct, each.total) for each in fit.compared]
     if faults is not None:
         counted += [(count, faults.total) for count in (faults.correct, *(each.correct for each in worst))]
@@ -457,12 +498,24 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
 
 
 def _wrong_columns(manifest: Manifest) -> Iterator[str]:
+    shares = {len(text) for switch in manifest.switches for text in (switch.closed_least, switch.closed_most)}
+    if len(shares) > 1 or not shares <= {0, 2 * len(manifest.grasps)}:
+        yield "says of other grasp types how often switches are closed"
     levels = [(switch.column, switch.threshold and switch.threshold.code) for switch in manifest.switches]
     for columns in (levels, [joint.column for joint in manifest.joints]):
         if len(set(columns)) < len(columns):
             yield "takes two inputs from one column"
     if max((column for column, _ in levels), default=-1) >= manifest.source.switches:
         yield "keeps a switch that the recordings do not have"
+    shares = {len(text) for switch in manifest.switches for text in (switch.closed_least, switch.closed_most)}
+    if len(shares) > 1 or not shares <= {0, 2 * len(manifest.grasps)}:
+        yield "says of other grasp types how often switches are closed"
+
+
+def _wrong_segments(manifest: Manifest) -> Iterator[str]:
+    segments, has_none = manifest.segments, manifest.grasps[-1] == NONE
+    if segments and (segments.n_lanes, segments.refusal is None) != (len(manifest.grasps), has_none):
+        yield "has costs of segments of other classes than its tables"
 
 
 def _wrong_names(kind: str, names: Iterable[str], longest: int = LONGEST_NAME) -> Iterator[str]:

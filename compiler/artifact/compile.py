@@ -10,6 +10,7 @@ from typing import Any, get_args
 
 import numpy as np
 from msgspec.structs import replace
+from numpy.typing import NDArray
 
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
 from thenar.runtime.harness.wiring import Harness
@@ -52,13 +53,15 @@ from .ensemble import ensemble_to_bytes
 from .training import (
     Tested,
     Trained,
-    answers_of,
     cross_validated,
     cuts_of,
+    detection_of,
     groups_for,
     integers_of,
     rates_of,
     samples_of,
+    scores_of,
+    segments_for,
     train,
 )
 from .verify_firmware import made_firmware
@@ -186,11 +189,12 @@ def compile_build(
     ports = ports or ports_of_whole_glove(None, grasp_set.element_names, len(grasp_set.taxel_columns))
     hand = hand or (None if documents is None else documents.hand)
     groups = groups_for(grasp_set, asked)
-    limits = Limits.of(asked, grasp_set, {} if hand is None else hand.by_name)
+    glove = harness.cyberglove if isinstance(harness, Harness) else None
+    limits = Limits.of(asked, grasp_set, {} if hand is None else hand.by_name, glove)
     trained = train(samples, asked, steps.trained, ports, groups, jobs, limits)
     made = Making(grasp_set, samples, asked, trained, harness)
     tested = cross_validated(
-        samples, cuts, asked, partial(answers_of, samples, asked, ports, groups, limits), jobs, steps.tested
+        samples, cuts, asked, partial(scores_of, samples, asked, ports, groups, limits), jobs, steps.tested
     )
     return made.publish(target, tested, documents, jobs, progress)
 
@@ -260,7 +264,8 @@ class Making:
         sources = [grasp_set.element_names[element.column] for element in trained.kept]
         self._groups = groups_of(self.scan, sources, len(trained.joints))
         groups = tuple(self._groups.values())
-        self.faults = count_faults(self.integers, kept.switches, kept.codes, kept.labels, kept.trials, groups)
+        held = kept.without_none()
+        self.faults = count_faults(self.integers, held.switches, held.codes, held.labels, held.trials, groups)
 
     def publish(
         self,
@@ -306,7 +311,9 @@ class Making:
         """Return what `build.json` says, not sealed yet; `files` are name -> content of what lies beside it."""
         digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
         grasp_set, options, fitting = self.grasp_set, self.options, self.trained.fitting
-        rates = rates_of("training", self.samples, self.comparison.deployed, options.seed)
+        deployed = self.comparison.deployed
+        rates = rates_of("training", self.samples, deployed, options.seed)
+        detection = detection_of("training", self.samples, deployed, options.seed)
         switches = zip(self.trained.kept, names_of(grasp_set, self.trained.kept), self.trained.gains, strict=True)
         return Manifest(
             schema=SCHEMA,
@@ -324,7 +331,10 @@ class Making:
             ),
             options=options,
             grasps=self.samples.grasps,
-            switches=tuple(self._switch(*each) for each in switches),
+            switches=tuple(
+                replace(self._switch(*each), closed_least=least.tobytes().hex(), closed_most=most.tobytes().hex())
+                for each, least, most in zip(switches, *closed_shares(self.trained.read(self.samples)), strict=True)
+            ),
             joints=tuple(_calibration(column, grasp_set.joints[column]) for column in self.trained.joints),
             proof=_proof(self.integers, self.comparison, options.width),
             rates=rates if tested is None else (*rates, *tested.rates),
@@ -333,6 +343,10 @@ class Making:
             scan_sha256=digests.get(SCAN_NAME),
             fitting=fitting if fitting is not None and fitting.compared else None,
             faults=worst_faults(self.faults, self._inputs, self._groups),
+            detection=detection if tested is None else (*detection, *tested.detection),
+            segments=segments_for(
+                grasp_set, self.samples, None if tested is None else tested.scores, self.integers.scale
+            ),
         )
 
     def _switch(self, element: Element, name: str, gain: float) -> Switch:
@@ -341,6 +355,27 @@ class Making:
             return Switch(column, name, gain)
         joint = self.grasp_set.taxel_columns[taxel]
         return Switch(column, name, gain, Threshold(code, float(joint.value(code + 0.5)), _calibration(taxel, joint)))
+
+
+def closed_shares(samples: Samples) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return, for each switch and grasp type (s, K), the share of a subject's trials in which it is closed, in 255ths:
+    of the subject with the least, rounded down, and of the one with the most, rounded up.
+
+    A trial counts as closed where most of its frames are. c of n trials are a share of (c + 1/2) / (n + 1).
+    """
+    shape = samples.n_switches, samples.n_classes
+    least, most = np.full(shape, 255, np.uint8), np.zeros(shape, np.uint8)
+    _, first, trial = np.unique(samples.trials, return_index=True, return_inverse=True)
+    frames, closed = np.bincount(trial), np.zeros((len(first), samples.n_switches), np.intp)
+    np.add.at(closed, trial, samples.switches)
+    of_trial = samples.subjects[first] * samples.n_classes + samples.labels[first]
+    for group in np.unique(of_trial):
+        who, label = np.flatnonzero(of_trial == group), group % samples.n_classes
+        count = np.count_nonzero(2 * closed[who] >= frames[who, np.newaxis], axis=0)
+        parts, whole = 255 * (2 * count + 1), 2 * len(who) + 2
+        least[:, label] = np.minimum(least[:, label], parts // whole)
+        most[:, label] = np.maximum(most[:, label], -(-parts // whole))
+    return least, most
 
 
 def _calibration(column: int, joint: Joint) -> Calibration:

@@ -12,6 +12,7 @@ from sklearn.base import clone
 
 from thenar.runtime.build import Build as LoadedBuild
 from thenar.runtime.manifest import By, Inputs, Options, TableBits
+from thenar.runtime.published import NONE
 from thenar.runtime.tables import HIGHEST_CODE
 
 from ..additive.classifier import AdditiveLogitClassifier
@@ -36,7 +37,10 @@ from . import CompileError
 from .compile import Making, Wired, check_target
 from .documents import BuildReport, Documents, Progress
 from .ensemble import model_fault
-from .training import Answers, Trained, cross_validated, cuts_of, integers_of
+from .training import Scores, Trained, cross_validated, cuts_of, integers_of
+
+# The score of a class that a fold's training rows do not have.
+_UNSEEN = -1e6
 
 
 class Build(LoadedBuild):
@@ -169,9 +173,9 @@ def compile(  # noqa: A001
         check_trials(grasp_set, CompileError)
     cuts = cuts_of(grasp_set, options)
     options, gains = _placed_by(estimator, _trained_by(classifier, options))
-    trained = replace(trained, gains=gains or information_alone(samples, trained.columns))
+    trained = replace(trained, gains=gains or information_alone(samples.without_none(), trained.columns))
     made = Making(grasp_set, samples, options, trained, harness)
-    test = partial(_answers_of, estimator, samples, options)
+    test = partial(_scores_of, estimator, samples, options)
     tested = cross_validated(samples, cuts, options, test, jobs, progress or _silent)
     return made.publish(target, tested, documents, jobs, progress)
 
@@ -220,9 +224,10 @@ def _columns(estimator: Any, X: NDArray[np.uint16]) -> Columns:
 
 def _labelled(samples: Samples, grasp_set: GraspSet, classes: NDArray[Any]) -> Samples:
     """Return the samples with the classes of the estimator: names of grasp types, or their numbers in the taxonomy."""
-    types = grasp_set.taxonomy.types
-    numbered = classes.dtype.kind in "iu"
+    types, numbered = grasp_set.taxonomy.names, classes.dtype.kind in "iu"
     names = [types[number] if numbered and 0 <= number < len(types) else str(number) for number in classes.tolist()]
+    if samples.has_none and NONE in names[:-1]:
+        raise CompileError(f"the estimator sorts {NONE!r} before {names[-1]!r}: fit it on grasp_set.labels instead")
     lacking = sorted(set(samples.grasps) - set(names))
     if lacking:
         raise CompileError(f"the estimator knows no {lacking[0]!r}: fit it with the names of all grasp types as labels")
@@ -279,12 +284,14 @@ def _trained_by(classifier: Any, options: Options) -> Options:
     )
 
 
-def _answers_of(estimator: Any, samples: Samples, options: Options, fold: Fold) -> Answers:
-    """Fit a clone on the fold's training rows alone; return the classes that its integers give the test rows."""
+def _scores_of(estimator: Any, samples: Samples, options: Options, fold: Fold) -> Scores:
+    """Fit a clone on the fold's training rows alone; return the scores (m, K) that its integers give the test rows."""
     learnt, classes = samples.rows(fold.train), estimator.classes_
     fitted = clone(estimator).fit(learnt.inputs, classes[learnt.labels])
     trained = _trained(fitted, learnt)
     tables = integers_of(trained, learnt, options)
     test = trained.read(samples.rows(fold.test))
-    found = _classifier(fitted).classes_[integer_scores(tables, test.switches, test.codes).argmax(axis=1)]
-    return np.asarray((found[:, np.newaxis] == classes).argmax(axis=1))
+    scores = np.full((len(fold.test), len(classes)), _UNSEEN)
+    known = (_classifier(fitted).classes_[:, np.newaxis] == classes).argmax(axis=1)
+    scores[:, known] = integer_scores(tables, test.switches, test.codes) / tables.scale
+    return scores

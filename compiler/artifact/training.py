@@ -6,14 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.manifest import By, Fitting, Of, Options, Protocol, Recognised
+from thenar.runtime.manifest import By, Detected, Fitting, Of, Options, Protocol, Recognised
+from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables
 
 from ..boosting.stumps import Stumps
 from ..evaluation.choosing import choose_training
 from ..evaluation.folds import Fold, leave_groups_out, leave_one_out, trial_folds
 from ..evaluation.populations import OF, groups_of
-from ..evaluation.rates import rated
+from ..evaluation.rates import UNITS, rated
 from ..limits import check_inputs, check_memory, check_types
 from ..placement.constraints import Limits
 from ..placement.elements import Elements, bits_of, elements_of, ports_of
@@ -24,6 +25,8 @@ from ..placement.ports import PortCosts
 from ..placement.tree import Tree
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
+from ..segmenting.learning import learnt
+from ..segmenting.streams import TICK_US, SegmentingError, streams_of
 from ..tables.collapse import Model, collapse
 from ..tables.quantise import integer_scores, quantise
 from ..trainers.base import Report, Training
@@ -87,9 +90,10 @@ def samples_of(grasp_set: GraspSet, options: Options) -> Samples:
     for kind, names in (("switches", grasp_set.element_names), ("joints", grasp_set.joint_names)):
         if wanted == kind and not names:
             raise CompileError(f"the recordings have no {kind}: choose other inputs than {kind!r}")
-    if (found := len(np.unique(grasp_set.labels))) < 2:
-        raise CompileError(f"the recordings hold {found} grasp type(s): there is nothing to tell apart")
     samples = Samples.of(grasp_set, wanted)
+    found = samples.n_classes
+    if samples.n_types < 2:
+        raise CompileError(f"the recordings hold {samples.n_types} grasp type(s): there is nothing to tell apart")
     if options.keep_joints is not None and not samples.codes.shape[1]:
         raise CompileError("there are no joints to keep some of: leave keep_joints (--keep-joints) out")
     there = samples.codes.shape[1]
@@ -117,30 +121,34 @@ def train(
 ) -> Trained:
     """Choose elements and fit, and train on them and the joints. Raises CompileError if no input tells grasps apart.
 
+    Elements and joints are chosen to tell grasp types apart: rows of nothing held take part in the fit alone, and no
+    more of them than there are of grasps.
+
     ports   what reading switches and taxels costs, for methods that ask
     groups  what of each row (n,) is left out where the fit is to recognise new subjects, objects or sessions
     jobs    worker processes that compare fits
     limits  what the placement must obey
     """
-    elements = elements_of(samples, options.levels)
-    samples = bits_of(samples, elements)
+    held, rows = samples.without_none(), samples.balanced()
+    elements = elements_of(held, options.levels)
+    held = bits_of(held, elements)
     # Without switches the tree is a leaf.
-    method = options.placement if samples.n_switches else PAPERS
+    method = options.placement if held.n_switches else PAPERS
     parameter = options.keep or 0 if METHODS.named(method).by_number else options.prune
     own = None if ports is None else ports_of(ports, elements)
     bound = None if limits is None else limits.on(elements, own)
-    chosen = choose(samples, method, float(parameter), own, bound, robust=options.robust)
+    chosen = choose(held, method, float(parameter), own, bound, robust=options.robust)
     columns = chosen.columns
-    if not columns and not samples.codes.shape[1]:
+    if not columns and not held.codes.shape[1]:
         raise CompileError("no switch is worth keeping: lower --prune, or record switches that differ between grasps")
-    kept = samples.keeping(columns)
-    joints = kept_joints(kept, options.keep_joints, limits)
-    kept = kept.with_joints(joints)
+    joints = kept_joints(held.keeping(columns), options.keep_joints, limits)
+    kept = bits_of(samples.rows(rows), elements).keeping(columns).with_joints(joints)
     check_inputs(len(samples.grasps), len(columns), len(joints), CompileError)
     inputs = kept.inputs
     if not (inputs != inputs[0]).any():
         raise CompileError("no input differs between rows: there is nothing to tell grasp types apart by")
     candidates, of = Training.candidates(options), OF[options.by or "subject"]
+    groups = None if groups is None else groups[rows]
     fitting = choose_training(kept, candidates, seed=options.seed, groups=groups, of=of, jobs=jobs, report=report)
     model = Training.chosen(fitting, masked=options.robust).train(kept, report if len(candidates) == 1 else None)
     if fault := model_fault(model, kept.n_switches, kept.codes.shape[1], kept.n_classes):
@@ -150,14 +158,15 @@ def train(
 
 def integers_of(trained: Trained, samples: Samples, options: Options) -> IntegerTables:
     """Return the integer tables of what was trained on these samples."""
-    kept = trained.read(samples)
+    kept = trained.read(samples.rows(samples.balanced()))
     tables = collapse(trained.model, kept.n_switches)
     return quantise(tables, kept.switches, kept.codes, options.width, options.table_bits)
 
 
 USUAL_ROUNDS = 100  # where a fit is chosen, its work is taken to be that of so many
 
-Test = Callable[[Fold], Answers]
+Scores = NDArray[np.float64]
+Test = Callable[[Fold], Scores]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -181,12 +190,12 @@ def _by(grasp_set: GraspSet, options: Options) -> By:
 def cuts_of(grasp_set: GraspSet, options: Options) -> tuple[Cut, ...]:
     """Return the folds of each rate that is to be measured, those of the headline first; none without folds.
 
-    No fold parts a trial. Raises EvaluationError where the recordings cannot be cut so.
+    No fold parts a movement. Raises EvaluationError where the recordings cannot be cut so.
     """
     if not options.folds:
         return ()
     several = (grasp_set.subjects != grasp_set.subjects[0]).any()
-    trials = trial_folds(grasp_set.labels, grasp_set.trial_ids, options.folds, options.seed)
+    trials = trial_folds(grasp_set.labels, grasp_set.movement_ids, options.folds, options.seed)
     pooled = Cut("pooled" if several else "within subject", tuple(trials))
     by = _by(grasp_set, options)
     if by == "trial":
@@ -201,18 +210,21 @@ def cuts_of(grasp_set: GraspSet, options: Options) -> tuple[Cut, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tested:
-    """What came of the folds: the rates, the headline first; and how often frames of each grasp type (rows) were
-    answered by each (columns) in the folds of the headline, (K, K).
+    """What came of the folds: the rates, the headline first; and how often frames of each class (rows) were answered by
+    each (columns) in the folds of the headline, (K, K); and the scores of all rows there, (n, K).
     """
 
     rates: tuple[Recognised, ...]
+    detection: tuple[Detected, ...]
     confusion: NDArray[np.intp]
+    scores: Scores
 
 
-def answers_of(
+def scores_of(
     samples: Samples, options: Options, ports: PortCosts | None, groups: Groups, limits: Limits | None, fold: Fold
-) -> Answers:
-    """Choose and train on the fold's training rows alone; return the classes that the integers give its test rows.
+) -> Scores:
+    """Choose and train on the fold's training rows alone; return the scores (m, K), in units, that the integers give
+    its test rows.
 
     Raises CompileError, which names the fold, as `train` does.
     """
@@ -224,13 +236,13 @@ def answers_of(
         raise CompileError(f"in fold {fold.name}: {wrong}, or do without folds (0)") from None
     tables = integers_of(trained, learning, options)
     test = trained.read(samples.rows(fold.test))
-    return np.asarray(integer_scores(tables, test.switches, test.codes).argmax(axis=1))
+    return integer_scores(tables, test.switches, test.codes) / tables.scale
 
 
 def cross_validated(
     samples: Samples, cuts: Sequence[Cut], options: Options, test: Test, jobs: int, report: Report
 ) -> Tested | None:
-    """Return what comes of the folds, None if there are none; `test` returns the classes of a fold's test rows.
+    """Return what comes of the folds, None if there are none; `test` returns the scores of a fold's test rows.
 
     jobs  worker processes that call `test`; report: called with (done, all) after each fold
     """
@@ -238,30 +250,79 @@ def cross_validated(
         return None
     folds = [(place, fold) for place, cut in enumerate(cuts) for fold in cut.folds]
     answers = np.empty((len(cuts), len(samples.labels)), np.intp)
+    scores = np.empty((len(samples.labels), samples.n_classes))
     tasks = ((place, fold, test) for place, fold in folds)
     for done, (place, fold, found) in enumerate(
         in_workers(_done, tasks, little(len(folds) * len(samples.labels) * (options.rounds or USUAL_ROUNDS), jobs)), 1
     ):
-        answers[place, fold.test] = found
+        answers[place, fold.test] = found.argmax(axis=1)
+        if not place:
+            scores[fold.test] = found
         report(done, len(folds))
     confusion = np.zeros((len(samples.grasps),) * 2, dtype=np.intp)
     np.add.at(confusion, (samples.labels, answers[0]), 1)
-    measured = zip(cuts, answers, strict=True)
-    rates = [rate for cut, own in measured for rate in rates_of("nested", samples, own, options.seed, cut)]
-    return Tested(tuple(rates), confusion)
+    measured, seed = list(zip(cuts, answers, strict=True)), options.seed
+    rates = [rate for cut, own in measured for rate in rates_of("nested", samples, own, seed, cut)]
+    detection = [each for cut, own in measured for each in detection_of("nested", samples, own, seed, cut)]
+    return Tested(tuple(rates), tuple(detection), confusion, scores)
 
 
-def _done(task: tuple[int, Fold, Test]) -> tuple[int, Fold, Answers]:
+def _done(task: tuple[int, Fold, Test]) -> tuple[int, Fold, Scores]:
     place, fold, test = task
     return place, fold, test(fold)
+
+
+def segments_for(grasp_set: GraspSet, samples: Samples, scores: Scores | None, scale: float) -> SegmentModel | None:
+    """Return the costs of segments for tables of `scale` steps per unit, learnt from whole movements and from the
+    scores (n, K) of folds; None without movements.
+    """
+    if not samples.is_none.any():
+        return None
+    try:
+        streams = streams_of(grasp_set)
+    except SegmentingError:
+        return None
+    return learnt(streams, samples.labels, scores, samples.n_types, scale, TICK_US)
 
 
 def rates_of(
     protocol: Protocol, samples: Samples, answers: Answers, seed: int, cut: Cut | None = None
 ) -> tuple[Recognised, ...]:
-    """Return the rate of trials, and that of frames where trials have several."""
+    """Return the rate of trials of grasps, and that of their frames where trials have several."""
+    return _rates(protocol, samples, answers, samples.labels, ~samples.is_none, seed, cut)
+
+
+def detection_of(
+    protocol: Protocol, samples: Samples, answers: Answers, seed: int, cut: Cut | None = None
+) -> tuple[Detected, ...]:
+    """Return the share of trials of grasps in which something is said to be held, and of those of nothing held in which
+    nothing is; and those of their frames where trials have several. There are none where nothing can be said not to be.
+    """
+    none = samples.is_none
+    if not none.any():
+        return ()
+    said = (answers == samples.n_types).astype(np.intp)
+    held, empty = (
+        {rate.unit: rate for rate in _rates(protocol, samples, said, none.astype(np.intp), rows, seed, cut)}
+        for rows in (~none, none)
+    )
+    units = [unit for unit in UNITS if unit in held or unit in empty]
+    return tuple(Detected(held.get(unit, held["trials"]), empty.get(unit, empty["trials"])) for unit in units)
+
+
+def _rates(
+    protocol: Protocol,
+    samples: Samples,
+    answers: Answers,
+    truth: Answers,
+    rows: NDArray[np.bool_],
+    seed: int,
+    cut: Cut | None,
+) -> tuple[Recognised, ...]:
+    """Return what `rated` does of these rows (n,)."""
     cut = cut or Cut("pooled", ())
-    found = rated(answers, samples.labels, samples.trials, of=cut.of, groups=cut.groups)
+    groups = None if cut.groups is None else cut.groups[rows]
+    found = rated(answers[rows], truth[rows], samples.trials[rows], of=cut.of, groups=groups)
     return tuple(
         Recognised(
             protocol=protocol,

@@ -1,9 +1,10 @@
 """The fit is chosen inside the training rows: which trainer, with which settings, by inner folds.
 
-Inner folds part no trial; and where the fit is to recognise a new subject (object, session), they leave subjects out as
-well. Each way to train is scored by the trials that it recognises there, ties by the log-loss. Of those that are behind
-the best one by no more than the standard error of that difference, those with small tables are cheap to recognise with;
-of these, the one with the lowest log-loss is taken.
+Inner folds part no movement; and where the fit is to recognise a new subject (object, session), they leave subjects
+out as well. Each way to train is scored by the trials that it recognises there, ties by the log-loss. Of those that are
+behind the best one by no more than the standard error of that difference, those with small tables are cheap to
+recognise with; of these, the one with the lowest log-loss is taken. Rows of nothing held are no trials to recognise;
+they count in the log-loss.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -34,17 +35,17 @@ _SMALL, _LARGER = 8192, 1.25
 
 
 def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None = None) -> list[Fold]:
-    """Return folds of training rows that part no trial, and no group if there are three or more; none of one trial.
+    """Return folds of training rows that part no movement, and no group if there are three or more; none of one.
 
     groups  (n,) the subject, object or session of each row, where those are left out
     """
-    n_trials = len(np.unique(samples.trials))
+    n_trials = len(np.unique(samples.movements))
     number = next((folds for most, folds in _FOLDS if n_trials < most), 2)
     if groups is not None and len(np.unique(groups)) >= _LEAST_GROUPS:
         return leave_groups_out(groups, "group", number)
     if n_trials < 2:
         return []
-    return trial_folds(samples.labels, samples.trials, min(number, n_trials), seed)
+    return trial_folds(samples.labels, samples.movements, min(number, n_trials), seed)
 
 
 def choose_training(
@@ -85,7 +86,7 @@ def choose_training(
     if not folds:
         return Fitting(candidates[0].trainer, _values(candidates[0]))
     grouped = groups is not None and len(np.unique(groups)) >= _LEAST_GROUPS
-    clusters = groups if grouped and groups is not None else samples.trials
+    clusters = groups if grouped and groups is not None else samples.movements
     together = [list(each) for _, each in groupby(range(len(candidates)), lambda one: _alike(candidates[one]))]
     tasks = [(samples, fold, [candidates[one] for one in batch], batch) for fold in folds for batch in together]
     tests: dict[tuple[int, str], _Test] = {}
@@ -115,10 +116,13 @@ def _alike(training: Training) -> tuple[object, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Test:
-    """What became of a fold's trials: their first rows (T,), whether each was recognised, the sum of the losses."""
+    """What became of a fold's trials: first rows (T,) of those of grasps, whether each was recognised; how many there
+    were with those of nothing held, and the sum of their losses.
+    """
 
     first: Rows
     hits: NDArray[np.bool_]
+    trials: int
     loss: float
     rows: int
 
@@ -130,7 +134,7 @@ def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
     samples, fold, trainings, batch = task
     learning, test = samples.rows(fold.train), samples.rows(fold.test)
     _, first, trial = np.unique(test.trials, return_index=True, return_inverse=True)
-    weights = 1.0 / np.bincount(trial)[trial]
+    weights, held = 1.0 / np.bincount(trial)[trial], ~test.is_none[first]
     found = []
     for model in _models(trainings, learning):
         scores = model_scores(model, test.switches, test.codes)
@@ -138,7 +142,11 @@ def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
         loss = softmax_and_loss(np.ascontiguousarray(scores.T), test.labels, weights)[1] * len(first)
         found.append(
             _Test(
-                fold.test[first], answers == test.labels[first], loss, _table_rows(collapse(model, samples.n_switches))
+                fold.test[first[held]],
+                (answers == test.labels[first])[held],
+                len(first),
+                loss,
+                _table_rows(collapse(model, samples.n_switches)),
             )
         )
     return fold.name, batch, found
@@ -174,7 +182,7 @@ class _Score:
         return cls(
             np.concatenate([test.hits for test in tests]),
             np.unique(clusters[first], return_inverse=True)[1],
-            round(fsum(test.loss for test in tests) / len(first), 6),
+            round(fsum(test.loss for test in tests) / sum(test.trials for test in tests), 6),
             sum(test.rows for test in tests) / len(tests),
         )
 

@@ -85,9 +85,12 @@ def trial_folds(labels: ArrayLike, trials: NDArray[np.intp], n_folds: int, seed:
     """Return stratified folds of rows (n,) that part no trial: rows of one number in `trials` (n,) stay together.
 
     The trials, in the order of their first rows, are cut as `weka_folds` cuts rows; where each row is a trial of its
-    own, these are Weka's folds. All rows of a trial have one label. Raises EvaluationError as `weka_folds` does.
+    own, these are Weka's folds. The label of a trial is the least of its rows': of a movement, whose rows of nothing
+    held have the highest label, that of the grasp. Raises EvaluationError as `weka_folds` does.
     """
     _, first, number = np.unique(trials, return_index=True, return_inverse=True)
+    least = np.asarray(labels)[first]
+    np.minimum.at(least, number, labels)
     order = np.argsort(first)
     number = np.argsort(order)[number]
     rows, starts = np.argsort(number, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(number))])
@@ -96,7 +99,7 @@ def trial_folds(labels: ArrayLike, trials: NDArray[np.intp], n_folds: int, seed:
     def expanded(chosen: Rows) -> Rows:
         return np.concatenate([rows[starts[trial] : starts[trial + 1]] for trial in chosen.tolist()])
 
-    folds = weka_folds(np.asarray(labels)[first[order]], n_folds, seed)
+    folds = weka_folds(least[order], n_folds, seed)
     return [Fold(expanded(fold.train), expanded(fold.test), fold.name) for fold in folds]
 
 

@@ -1,6 +1,7 @@
 """Whole movements in a set of grasps: which rows belong together, and in which of them the grasp is complete."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,9 +46,9 @@ def movement_numbers(grasp_set: GraspSet) -> Rows:
     """Return the number (n,) of the run that each row belongs to: neighbouring rows of one subject, grasp type, object
     and trial, with those in which nothing is held. Folds of a set of whole movements must not part the rows of a run.
     """
-    told = (grasp_set.subjects, grasp_set.grasps, grasp_set.objects, grasp_set.trials)
+    told: list[NDArray[Any]] = [grasp_set.subjects, grasp_set.grasps, grasp_set.objects, grasp_set.trials]
     if grasp_set.is_none.any():
-        told = (grasp_set.movement_ids,)
+        told = [grasp_set.movement_ids]
     changes = np.logical_or.reduce([column[1:] != column[:-1] for column in told])
     return np.concatenate([np.zeros(min(len(grasp_set), 1), np.intp), np.cumsum(changes, dtype=np.intp)])
 
