@@ -11,12 +11,8 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-<<<<<<< HEAD
 from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp, Quarantined
-=======
-from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp
 from thenar.runtime.task import Progress
->>>>>>> h
 
 Devices = Callable[[], Sequence[DeviceHealth]]
 _Shown = tuple[LiveGrasp, Devices, HealthReport | None, Progress | None]
@@ -73,9 +69,8 @@ class LiveView:
                 if newest is not None and newest is not shown:
                     grasp, devices, health, progress = shown = newest
                     lines = health_lines(health) if self._status else ()
-<<<<<<< HEAD
                     wrong = () if health is None else health.quarantined
-                    self._live.update(drawn(grasp, devices(), lines, wrong), refresh=True)
+                    self._live.update(drawn(grasp, devices(), lines, wrong, progress), refresh=True)
 
 
 def drawn(
@@ -83,13 +78,7 @@ def drawn(
     devices: Sequence[DeviceHealth],
     lines: Sequence[str] = (),
     wrong: Sequence[Quarantined] = (),
-=======
-                    self._live.update(drawn(grasp, devices(), lines, progress), refresh=True)
-
-
-def drawn(
-    grasp: LiveGrasp, devices: Sequence[DeviceHealth], lines: Sequence[str] = (), progress: Progress | None = None
->>>>>>> h
+    progress: Progress | None = None,
 ) -> RenderableType:
     """Return the picture of one moment."""
     table = Table.grid(padding=(0, 2))
