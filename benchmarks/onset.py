@@ -5,8 +5,11 @@ model learns from the rows of all forces, since a glove does not know how far a 
 force on trials that it has not seen. Taxels are read as switches that close at one force, as levels, and as codes.
 """
 
+import argparse
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -15,16 +18,19 @@ from numpy.typing import NDArray
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import EvaluationError, Fold, trial_folds
 from thenar.compiler.evaluation.rates import Rate
+from thenar.compiler.pictures import on_paper, painting, rendered
 from thenar.compiler.placement.elements import Element, Elements, bits_of, elements_of
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.tables.collapse import model_scores
 from thenar.compiler.trainers.base import Training
 from thenar.compiler.workers import in_workers
+from thenar.runtime.files import write_atomically
 from thenar.runtime.manifest import Of, Options
 
 Reading = Literal["switches", "levels", "codes", "nothing"]
 READINGS: tuple[Reading, ...] = ("switches", "levels", "codes")
+COLOURS = {"switches": "ink", "levels": "switches", "codes": "rival-2", "nothing": "joints"}
 NEWTONS = tuple(step / 10 for step in range(1, 11))
 
 
@@ -158,3 +164,43 @@ def _coded(samples: Samples, reading: Reading) -> Samples:
     if reading == "nothing":
         return replace(samples, switches=samples.switches[:, :0], taxels=empty)
     return replace(samples, codes=np.hstack([samples.codes, samples.taxels]), taxels=empty)
+
+
+def draw(found: Onset, path: Path) -> None:
+    """Write the curves as an .svg: accuracy over the force, 95 % intervals as bands; with the joints dashed."""
+    from matplotlib.figure import Figure
+
+    with painting(font_size=10):
+        figure = Figure(figsize=(8.0, 4.8), layout="constrained")
+        axes = figure.subplots()
+        for curve in found.curves:
+            points = [(n, rate) for n, rate in zip(found.newtons, curve.rates, strict=True) if rate is not None]
+            forces, colour = [force for force, _ in points], on_paper(COLOURS[curve.reading])
+            low, mean, high = ([100 * getattr(rate, n) for _, rate in points] for n in ("low", "mean", "high"))
+            axes.fill_between(forces, low, high, color=colour, alpha=0.15, lw=0)
+            style = "--" if curve.joints and curve.reading != "nothing" else "-"
+            axes.plot(forces, mean, style, color=colour, marker="o", ms=3, label=curve.title)
+        axes.set_xlabel("force on the taxel pressed hardest, N")
+        axes.set_ylabel("accuracy of single frames, %; bands: 95 %")
+        axes.set_xticks(found.newtons)
+        axes.set_ylim(0, 100)
+        axes.grid(color=on_paper("line"), lw=0.6)
+        figure.legend(loc="outside right center", frameon=False)
+        write_atomically(path, rendered(figure, "svg"))
+
+
+def main(arguments: list[str]) -> None:
+    """Draw the curves of a set, with the additive logit and three levels a taxel."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("set", type=Path, help="a .grasps file with taxels in newtons and frames of the beginning")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="the .svg to write")
+    parser.add_argument("--levels", type=int, default=3, help="levels of a taxel at most (default: %(default)s)")
+    asked = parser.parse_args(arguments)
+    found = onset(GraspSet.load(asked.set), levels=asked.levels)
+    draw(found, asked.output)
+    for curve in found.curves:
+        print(curve.title, *("-" if rate is None else f"{100 * rate.mean:.1f}" for rate in curve.rates), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -41,6 +41,7 @@ from .options import (
     method_option,
     prune_option,
     trainer_option,
+    warn_of_budget,
 )
 
 if TYPE_CHECKING:
@@ -240,6 +241,7 @@ def command(
     if chosen is not None:
         options |= chosen.options
         documents = documents and replace(documents, frontier=chosen.frontier, point=chosen.point.number)
+    warn_of_budget(asked["budget_us"], grasp_set.joint_names, None if given is None else given.cyberglove)
     with progress("compiling, then the paper's tables" if report and asked["folds"] else "compiling") as told:
         made = compile_build(
             grasp_set,
@@ -395,7 +397,7 @@ def _print_training(manifest: "Manifest") -> None:
 
 def _print_scan(scan: "ScanMap", harness: "Harness") -> None:
     """Print the map chip by chip in the order in which chips are read first, with what the wire is bound to take."""
-    from thenar.runtime.scanning.timing import scan_us, scanner_us
+    from thenar.runtime.scanning.timing import scan_us, scanner_us, taxels_us
 
     time = scan_us(scan, harness)
     if time.chips:
@@ -406,6 +408,7 @@ def _print_scan(scan: "ScanMap", harness: "Harness") -> None:
         out().print(
             f"board {board.port}: {len(pairs)} kept switches of {len(board.switches)} keys{levels}, "
             f"{scanner_us(board):.0f} us a bitmap"
+            + (f", {taxels_us(board, channels):.0f} us its taxels" if (channels := scan.board_channels[number]) else "")
         )
 
 

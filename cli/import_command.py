@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from thenar.compiler.text import inputs_read
+from thenar.compiler.text import inputs_read, none_words
 
 from .common import (
     OutputFile,
@@ -133,7 +133,7 @@ def _print(report: "ImportReport", output: Path) -> None:
             coding.add_row(cost.joint, cost.unit, *errors, str(cost.distinct_before), str(cost.distinct_after))
         out().print(coding)
     echo(
-        f"{output}: {report.rows} grasps of {report.grasp_types} types ({report.taxonomy}); "
+        f"{output}: {report.rows} grasps of {report.grasp_types} types ({report.taxonomy}){none_words(report.none)}; "
         f"subjects {report.subjects}, objects {report.objects}, "
         f"{inputs_read(report.switches, report.taxels, report.joints)}, "
         f"trials {report.trials}"

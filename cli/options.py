@@ -10,12 +10,13 @@ from click.shell_completion import CompletionItem
 
 from thenar.runtime.manifest import AUTO
 
-from .common import Command, ListOf, Number, OneOf, existing_file, parted
+from .common import Command, ListOf, Number, OneOf, existing_file, parted, warning
 
 if TYPE_CHECKING:
     from thenar.compiler.hand import HandShape
     from thenar.compiler.placement.methods.base import Method
     from thenar.compiler.trainers.base import Setting
+    from thenar.runtime.harness.wiring import GloveWiring
 
 
 def _methods() -> Iterable[str]:
@@ -91,7 +92,10 @@ def limit_options(command: Command) -> Command:
             help="Choose elements for the loss of the worst one; train on rows with lost inputs.",
         ),
         click.option(
-            "--budget-us", type=Number(0), metavar="US", help="Limit the time of a scan of the kept elements."
+            "--budget-us",
+            type=Number(0),
+            metavar="US",
+            help="Limit the time of a scan of the kept elements, and of a record of the kept joints.",
         ),
         click.option(
             "--at-most",
@@ -111,6 +115,17 @@ def limit_options(command: Command) -> Command:
     ):
         command = option(command)
     return command
+
+
+def warn_of_budget(budget_us: float | None, joints: Sequence[str], glove: "GloveWiring | None") -> None:
+    """Say what `--budget-us` cannot limit."""
+    from thenar.compiler.placement.ports import record_times_us
+
+    if budget_us is not None and joints and not record_times_us(joints, glove):
+        warning(
+            "--budget-us limits the scan of switches and taxels alone: how long reading joints takes is known of a "
+            "CyberGlove's, and these are not"
+        )
 
 
 class WithMethods(click.Command):

@@ -35,6 +35,7 @@ from .options import (
     limit_options,
     method_option,
     prune_option,
+    warn_of_budget,
 )
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from thenar.compiler.placement.ports import PortCosts
     from thenar.compiler.placement.tree import Tree
     from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.runtime.harness.wiring import Harness
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,15 +133,23 @@ class _Asked:
             at_most_taxels=self.at_most,
             budget_us=self.budget_us,
         )
-        return Limits.of(asked, grasp_set, hand)
+        glove = None if self.harness is None else self.harness.cyberglove
+        warn_of_budget(self.budget_us, grasp_set.joint_names if self.keep_joints else (), glove)
+        return Limits.of(asked, grasp_set, hand, glove)
+
+    @property
+    def harness(self) -> "Harness | None":
+        """The wiring of the whole glove."""
+        from thenar.runtime.harness.loading import load_harness
+
+        return None if self.glove is None else load_harness(self.glove)
 
     def ports(self, grasp_set: "GraspSet") -> "PortCosts | None":
         """Return what reading each switch costs."""
         from thenar.compiler.placement.ports import ports_of_whole_glove
-        from thenar.runtime.harness.loading import load_harness
         from thenar.runtime.scanning.plan import unwired
 
-        harness = None if self.glove is None else load_harness(self.glove)
+        harness = self.harness
         lacking = [] if harness is None else unwired(harness, grasp_set.element_names)
         if lacking:
             raise click.UsageError(

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from thenar.simulator.running.explain import Explanation
     from thenar.simulator.running.report import Report, StepReport
     from thenar.simulator.scenes.decode import Shipped
-    from thenar.simulator.scenes.scene import Scene
+    from thenar.simulator.scenes.scene import Rest, Scene
 
 _MODES = ("--output", "--explain", "--ablate", "--list")
 _SHOWN = 10  # unsettled repetitions that are named one by one
@@ -62,6 +62,11 @@ _OWN = "dim"  # how own steps look
     help="Draw everything anew: habits, calibrations, the glove's parts, all grasps. The sizes of the hands stay.",
 )
 @click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Only this subject; may be given again.")
+@click.option(
+    "--rest",
+    type=click.Choice(("relaxed", "flat")),
+    help="Return to this open hand between grasps, for the scene's rest_ms. The scene records whole movements.",
+)
 @click.option("--keep-unsettled", is_flag=True, help="Keep repetitions in which the hand did not come to rest.")
 @jobs_option("Worker processes. The set does not depend on it.")
 @json_flag
@@ -75,6 +80,7 @@ def command(
     more: int | None,
     seed: int | None,
     subjects: tuple[str, ...],
+    rest: "Rest | None",
     keep_unsettled: bool,
     jobs: int,
 ) -> None:
@@ -88,6 +94,7 @@ def command(
         thenar simulate quick --explain
         thenar simulate quick -o set.grasps
         thenar simulate quick --more 3 -o fresh.grasps
+        thenar simulate continuous --rest flat -o flat.grasps
     """
     from thenar.simulator.scenes.decode import load_scene, own_file, shipped_scenes
 
@@ -95,7 +102,7 @@ def command(
     if scene is None:
         show(shipped_scenes(), _print_scenes)
         return
-    loaded = load_scene(scene).varied(repetitions, seed, subjects, more)
+    loaded = load_scene(scene).varied(repetitions, seed, subjects, more, rest)
     with _located(scene):
         if output is not None:
             keep_apart(own_file(scene), loaded.postures, output)
@@ -157,8 +164,10 @@ def _print_report(report: "Report", path: Path) -> None:
     """Print what came out, by grasp type and by step, and warn of what did not settle."""
     console = out()
     fresh = f"after repetition {report.done}, " if report.done else ""
+    none = report.rows - sum(grasp.rows for grasp in report.grasps)
+    free = f" (in {none} nothing is held)" if none else ""
     console.print(
-        f"{path}: {report.rows} rows, simulated: scene {report.scene}, seed {report.seed}, {fresh}"
+        f"{path}: {report.rows} rows{free}, simulated: scene {report.scene}, seed {report.seed}, {fresh}"
         f"{len(report.subjects)} subject(s), {report.repetitions} grasps in {report.seconds:.1f} s"
     )
     console.print()

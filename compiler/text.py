@@ -68,6 +68,11 @@ def inputs_read(switches: int, taxels: int, joints: int) -> str:
     return f"switches {switches}, {f'taxels {taxels}, ' if taxels else ''}joints {joints}"
 
 
+def none_words(rows: int) -> str:
+    """Return what follows a number of rows in so many of which nothing is held."""
+    return f", in {rows} of which nothing is held" if rows else ""
+
+
 def sentence(words: str) -> str:
     """Return words from within a sentence as a sentence."""
     return f"{words[:1].upper()}{words[1:].removesuffix('.')}."

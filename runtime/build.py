@@ -69,6 +69,11 @@ class Build:
         self.none = len(self.grasps) - 1 if self.grasps[-1] == NONE else None
         self.rejector = None if manifest.rejection is None else Rejector(manifest.rejection)
 
+    @property
+    def knows_none(self) -> bool:
+        """Whether it says when nothing is held."""
+        return self.grasps[-1] == NONE
+
     @classmethod
     def load(cls, folder: str | PathLike[str]) -> Self:
         """Return the build in `folder`.

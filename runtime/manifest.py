@@ -15,6 +15,7 @@ from msgspec.structs import replace
 from .errors import BuildError
 from .names import LONGEST_NAME, fault, list_names, shortened
 from .published import NONE
+from .segmenting.model import SegmentModel
 
 SCHEMA = 1
 MAX_BYTES = 16 << 20
@@ -37,6 +38,8 @@ Name = Annotated[str, Meta(min_length=1)]
 # A number, or one of a few names.
 Given = Value | Name
 Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+# A byte for each grasp type.
+Bytes = Annotated[str, Meta(pattern="^([0-9a-f]{2})*$")]
 _T = TypeVar("_T")
 
 
@@ -225,12 +228,17 @@ class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     """A kept switch: its column in the recordings, from 0, its name, and the information (bits) that it brought: to the
     tree of ID3, or alone where another method chose it; of a taxel, which follow the switches, also the threshold. A
     taxel may have several, each a switch with a name of its own.
+
+    closed_least, closed_most  for each grasp type, in 255ths, the share of a subject's trials in which it is closed, of
+                               the subject with the least and the most; "" in builds of older versions
     """
 
     column: Count
     name: Name
     gain: Value
     threshold: Threshold | None = None
+    closed_least: Bytes = ""
+    closed_most: Bytes = ""
 
     @property
     def source(self) -> str:
@@ -387,6 +395,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     faults           what faults of inputs leave of the rows trained on; None in builds of older versions
     detection        how surely the build says whether something is held, of the rows trained on and of folds
     rejection        what is refused; None where NONE is one of the grasps, or nothing is refused
+    segments         costs of segments that were learnt from streams; None: there were none to learn from
     """
 
     schema: int
@@ -408,11 +417,18 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     faults: Faults | None = None
     detection: tuple[Detected, ...] = ()
     rejection: Rejection | None = None
+    segments: SegmentModel | None = None
 
     @property
     def answers(self) -> tuple[str, ...]:
         """What a frame may be called: the grasps, and NONE where that may be and is none of them."""
         return self.grasps if self.rejection is None else (*self.grasps, NONE)
+
+    @property
+    def segmenting(self) -> SegmentModel:
+        """The costs of segments: those that were learnt, or the usual ones."""
+        has_none = self.grasps[-1] == NONE
+        return self.segments or SegmentModel.usual(len(self.grasps) - has_none, has_none, self.proof.scale)
 
     @property
     def fit(self) -> Fitting:
@@ -494,6 +510,7 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
     yield from _wrong_columns(manifest)
     yield from _wrong_rejection(manifest)
+    yield from _wrong_segments(manifest)
     for joint in (*manifest.joints, *taxels):
         if joint.code_a == joint.code_b or joint.value_a == joint.value_b:
             yield "gives a joint two points that make no line"
@@ -510,25 +527,29 @@ def _wrong_counts(manifest: Manifest) -> Iterator[str]:
     counted += [(each.correct, each.total) for each in fit.compared]
     if faults is not None:
         counted += [(count, faults.total) for count in (faults.correct, *(each.correct for each in faults.worst))]
-    if (held := manifest.rejection) is not None:
-        n_types, joints = len(manifest.grasps), {len(each) for each in held.ranges}
-        if {len(held.least_scores), len(held.closed), len(held.ranges)} != {n_types} or joints != {
-            len(manifest.joints)
-        }:
-            yield "refuses frames of other grasp types or joints than it has"
-        if NONE in manifest.grasps:
-            yield "refuses frames, and has a class for them"
     if any(correct > total for correct, total in counted) or manifest.stopped_after > fit.number("rounds"):
         yield "counts more than there is"
 
 
 def _wrong_columns(manifest: Manifest) -> Iterator[str]:
+    shares = {len(text) for switch in manifest.switches for text in (switch.closed_least, switch.closed_most)}
+    if len(shares) > 1 or not shares <= {0, 2 * len(manifest.grasps)}:
+        yield "says of other grasp types how often switches are closed"
     levels = [(switch.column, switch.threshold and switch.threshold.code) for switch in manifest.switches]
     for columns in (levels, [joint.column for joint in manifest.joints]):
         if len(set(columns)) < len(columns):
             yield "takes two inputs from one column"
     if max((column for column, _ in levels), default=-1) >= manifest.source.switches:
         yield "keeps a switch that the recordings do not have"
+    shares = {len(text) for switch in manifest.switches for text in (switch.closed_least, switch.closed_most)}
+    if len(shares) > 1 or not shares <= {0, 2 * len(manifest.grasps)}:
+        yield "says of other grasp types how often switches are closed"
+
+
+def _wrong_segments(manifest: Manifest) -> Iterator[str]:
+    segments, has_none = manifest.segments, manifest.grasps[-1] == NONE
+    if segments and (segments.n_lanes, segments.refusal is None) != (len(manifest.grasps), has_none):
+        yield "has costs of segments of other classes than its tables"
 
 
 def _wrong_rejection(manifest: Manifest) -> Iterator[str]:

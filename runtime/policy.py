@@ -8,6 +8,8 @@ from thenar.drivers.errors import SettingError
 # Beyond them no frames that a hand can hold ever decide.
 _LARGEST_LEAD = 1e6
 _LEAST_RATE = 1e-100
+# Paths are kept for so long.
+_LONGEST_LAG_US = 10_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +26,8 @@ class Policy:
                 ends wrong no more often, under the assumptions that it states; `dwell_us` is not used then, and
                 `hold_us` is the longest that one test may take and that its answer holds
     spacing_us  sequential test: frames count only if they are so far apart
+    quarantine  whether inputs that are read and yet wrong (quarantine.py) are treated as lost
+    lag_us      segments: how long after a moment its state is said for good; None: no segments are sought
     """
 
     lead: float = 0.5
@@ -32,6 +36,8 @@ class Policy:
     max_lost: float = 0.5
     error_rate: float | None = None
     spacing_us: int = 0
+    quarantine: bool = True
+    lag_us: int | None = 150_000
 
     def __post_init__(self) -> None:
         if not 0 <= self.lead <= _LARGEST_LEAD:
@@ -42,6 +48,8 @@ class Policy:
             raise SettingError(f"a share of {self.max_lost} that may be lost: it is 0 to 1")
         if self.error_rate is not None and not _LEAST_RATE <= self.error_rate < 1:
             raise SettingError(f"an error rate of {self.error_rate}: it lies between 0 and 1, from {_LEAST_RATE} on")
+        if self.lag_us is not None and not 0 <= self.lag_us <= _LONGEST_LAG_US:
+            raise SettingError(f"a lag of {self.lag_us} us: it is 0 to {_LONGEST_LAG_US}")
         if self.spacing_us < 0:
             raise SettingError(f"frames {self.spacing_us} us apart: it is 0 or more")
 

@@ -10,13 +10,14 @@ them.
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats, log, polynomial
+from thenar.runtime.published import NONE
 
 Words = NDArray[np.uint64]
 
@@ -146,6 +147,10 @@ class Draw:
     effect: str
     site: Site
     draws: Draws
+
+    def at_rest(self, numbers: NDArray[np.int64]) -> "Draw":
+        """Return the draws for the same subject's rests of these numbers (n,): that before trial t has the number t."""
+        return replace(self, site=Site(self.site.subject, NONE, "", numbers))
 
     def per_repetition(self, *shape: int) -> Numbers:
         """Return numbers of shape (n, *shape)."""

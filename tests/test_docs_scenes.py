@@ -1,5 +1,6 @@
 """docs/scenes.md against the structs that decode a scene: every key, every default and every limit is what it says."""
 
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -73,8 +74,8 @@ def shown(value: object) -> set[str]:
         return {"drawn", "1"}
     if value == ():
         return {"none"}
-    if isinstance(value, str):
-        return {f'`"{value}"`'}
+    if isinstance(value, str | bool):
+        return {f"`{json.dumps(value)}`"}
     return {str(value), f"{value:g}"}
 
 

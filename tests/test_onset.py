@@ -49,6 +49,18 @@ def pressed(trials: int = 24, joints: int = 0, unit: str = "N") -> GraspSet:
     )
 
 
+def test_the_curves_are_drawn_with_named_axes_and_bands(onset: Callable[..., Any], tmp_path: Path) -> None:
+    module = import_module("onset")
+    found = onset(pressed(12, joints=2), NEWTONS, n_folds=2, jobs=1, options=FAST)
+    module.draw(found, tmp_path / "onset.svg")
+    drawn = (tmp_path / "onset.svg").read_text()
+    for words in ("force on the taxel pressed hardest, N", "accuracy of single frames", "levels and joints"):
+        assert f"<!-- {words}" in drawn
+    assert drawn.count('id="FillBetweenPolyCollection_') == len(found.curves) == 7
+    module.draw(found, tmp_path / "again.svg")
+    assert (tmp_path / "again.svg").read_text() == drawn
+
+
 def test_levels_and_codes_tell_what_switches_do_not_before_their_force(onset: Callable[..., Any]) -> None:
     found = onset(pressed(), NEWTONS, jobs=1, options=FAST)
     curves = {curve.title: [rate.mean for rate in curve.rates if rate is not None] for curve in found.curves}

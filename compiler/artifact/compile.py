@@ -10,6 +10,7 @@ from typing import Any, get_args
 
 import numpy as np
 from msgspec.structs import replace
+from numpy.typing import NDArray
 
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
 from thenar.runtime.harness.wiring import Harness
@@ -53,7 +54,6 @@ from .training import (
     Tested,
     Trained,
     answered,
-    answers_of,
     cross_validated,
     cuts_of,
     detection_of,
@@ -62,6 +62,8 @@ from .training import (
     rates_of,
     rejected_by,
     samples_of,
+    scores_of,
+    segments_for,
     train,
 )
 from .verify_firmware import made_firmware
@@ -191,11 +193,12 @@ def compile_build(
     ports = ports or ports_of_whole_glove(None, grasp_set.element_names, len(grasp_set.taxel_columns))
     hand = hand or (None if documents is None else documents.hand)
     groups = groups_for(grasp_set, asked)
-    limits = Limits.of(asked, grasp_set, {} if hand is None else hand.by_name)
+    glove = harness.cyberglove if isinstance(harness, Harness) else None
+    limits = Limits.of(asked, grasp_set, {} if hand is None else hand.by_name, glove)
     trained = train(samples, asked, steps.trained, ports, groups, jobs, limits)
     made = Making(grasp_set, samples, asked, trained, harness)
     tested = cross_validated(
-        samples, cuts, asked, partial(answers_of, samples, asked, ports, groups, limits), jobs, steps.tested
+        samples, cuts, asked, partial(scores_of, samples, asked, ports, groups, limits), jobs, steps.tested
     )
     return made.publish(target, tested, documents, jobs, progress)
 
@@ -335,7 +338,10 @@ class Making:
             ),
             options=options,
             grasps=self.samples.grasps,
-            switches=tuple(self._switch(*each) for each in switches),
+            switches=tuple(
+                replace(self._switch(*each), closed_least=least.tobytes().hex(), closed_most=most.tobytes().hex())
+                for each, least, most in zip(switches, *closed_shares(self.trained.read(self.samples)), strict=True)
+            ),
             joints=tuple(_calibration(column, grasp_set.joints[column]) for column in self.trained.joints),
             proof=_proof(self.integers, self.comparison, options.width),
             rates=rates if tested is None else (*rates, *tested.rates),
@@ -346,6 +352,9 @@ class Making:
             faults=worst_faults(self.faults, self._inputs, self._groups),
             detection=detection if tested is None else (*detection, *tested.detection),
             rejection=self.rejection,
+            segments=segments_for(
+                grasp_set, self.samples, None if tested is None else tested.scores, self.integers.scale
+            ),
         )
 
     def _switch(self, element: Element, name: str, gain: float) -> Switch:
@@ -354,6 +363,27 @@ class Making:
             return Switch(column, name, gain)
         joint = self.grasp_set.taxel_columns[taxel]
         return Switch(column, name, gain, Threshold(code, float(joint.value(code + 0.5)), _calibration(taxel, joint)))
+
+
+def closed_shares(samples: Samples) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return, for each switch and grasp type (s, K), the share of a subject's trials in which it is closed, in 255ths:
+    of the subject with the least, rounded down, and of the one with the most, rounded up.
+
+    A trial counts as closed where most of its frames are. c of n trials are a share of (c + 1/2) / (n + 1).
+    """
+    shape = samples.n_switches, samples.n_classes
+    least, most = np.full(shape, 255, np.uint8), np.zeros(shape, np.uint8)
+    _, first, trial = np.unique(samples.trials, return_index=True, return_inverse=True)
+    frames, closed = np.bincount(trial), np.zeros((len(first), samples.n_switches), np.intp)
+    np.add.at(closed, trial, samples.switches)
+    of_trial = samples.subjects[first] * samples.n_classes + samples.labels[first]
+    for group in np.unique(of_trial):
+        who, label = np.flatnonzero(of_trial == group), group % samples.n_classes
+        count = np.count_nonzero(2 * closed[who] >= frames[who, np.newaxis], axis=0)
+        parts, whole = 255 * (2 * count + 1), 2 * len(who) + 2
+        least[:, label] = np.minimum(least[:, label], parts // whole)
+        most[:, label] = np.maximum(most[:, label], -(-parts // whole))
+    return least, most
 
 
 def _calibration(column: int, joint: Joint) -> Calibration:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.manifest import By, Detected, Fitting, Of, Options, Protocol, Recognised, Rejection
 from thenar.runtime.rejection import refused
+from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables
 
 from ..boosting.stumps import Stumps
@@ -25,6 +26,8 @@ from ..placement.ports import PortCosts
 from ..placement.tree import Tree
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
+from ..segmenting.learning import learnt
+from ..segmenting.streams import TICK_US, SegmentingError, streams_of
 from ..tables.collapse import Model, collapse
 from ..tables.quantise import integer_scores, quantise
 from ..trainers.base import Report, Training
@@ -172,7 +175,8 @@ def integers_of(trained: Trained, samples: Samples, options: Options) -> Integer
 _COMPARED = 4096
 USUAL_ROUNDS = 100  # where a fit is chosen, its work is taken to be that of so many
 
-Test = Callable[[Fold], Answers]
+Scores = NDArray[np.float64]
+Test = Callable[[Fold], Scores]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -217,18 +221,20 @@ def cuts_of(grasp_set: GraspSet, options: Options) -> tuple[Cut, ...]:
 @dataclass(frozen=True, slots=True, eq=False)
 class Tested:
     """What came of the folds: the rates, the headline first; and how often frames of each class (rows) were answered by
-    each (columns) in the folds of the headline, (K, K).
+    each (columns) in the folds of the headline, (K, K); and the scores of all rows there, (n, K).
     """
 
     rates: tuple[Recognised, ...]
     detection: tuple[Detected, ...]
     confusion: NDArray[np.intp]
+    scores: Scores
 
 
-def answers_of(
+def scores_of(
     samples: Samples, options: Options, ports: PortCosts | None, groups: Groups, limits: Limits | None, fold: Fold
-) -> Answers:
-    """Choose and train on the fold's training rows alone; return the classes that the integers give its test rows.
+) -> Scores:
+    """Choose and train on the fold's training rows alone; return the scores (m, K), in units, that the integers give
+    its test rows. Where frames are refused, column K is infinite for those that are, and else its negative.
 
     Raises CompileError, which names the fold, as `train` does.
     """
@@ -240,7 +246,12 @@ def answers_of(
         raise CompileError(f"in fold {fold.name}: {wrong}, or do without folds (0)") from None
     tables = integers_of(trained, learning, options)
     rejection = rejected_by(trained, learning, tables, options, own)
-    return answered(tables, rejection, trained.read(samples.rows(fold.test)))
+    test = trained.read(samples.rows(fold.test))
+    scores = integer_scores(tables, test.switches, test.codes)
+    if rejection is None:
+        return scores / tables.scale
+    beyond = np.where(refused(rejection, scores, test.switches, test.codes), np.inf, -np.inf)
+    return np.column_stack([scores / tables.scale, beyond])
 
 
 def rejected_by(
@@ -264,7 +275,7 @@ def answered(tables: IntegerTables, rejection: Rejection | None, samples: Sample
 def cross_validated(
     samples: Samples, cuts: Sequence[Cut], options: Options, test: Test, jobs: int, report: Report
 ) -> Tested | None:
-    """Return what comes of the folds, None if there are none; `test` returns the classes of a fold's test rows.
+    """Return what comes of the folds, None if there are none; `test` returns the scores of a fold's test rows.
 
     jobs  worker processes that call `test`; report: called with (done, all) after each fold
     """
@@ -272,11 +283,14 @@ def cross_validated(
         return None
     folds = [(place, fold) for place, cut in enumerate(cuts) for fold in cut.folds]
     answers = np.empty((len(cuts), len(samples.labels)), np.intp)
+    scores = np.empty((len(samples.labels), samples.n_classes))
     tasks = ((place, fold, test) for place, fold in folds)
     for done, (place, fold, found) in enumerate(
         in_workers(_done, tasks, little(len(folds) * len(samples.labels) * (options.rounds or USUAL_ROUNDS), jobs)), 1
     ):
-        answers[place, fold.test] = found
+        answers[place, fold.test] = found.argmax(axis=1)
+        if not place:
+            scores[fold.test] = found[:, : samples.n_classes]
         report(done, len(folds))
     refuses = not samples.has_none and bool((answers == samples.n_classes).any())
     confusion = np.zeros((samples.n_classes + refuses,) * 2, dtype=np.intp)
@@ -284,12 +298,25 @@ def cross_validated(
     measured, seed = list(zip(cuts, answers, strict=True)), options.seed
     rates = [rate for cut, own in measured for rate in rates_of("nested", samples, own, seed, cut)]
     detection = [each for cut, own in measured for each in detection_of("nested", samples, own, seed, cut)]
-    return Tested(tuple(rates), tuple(detection), confusion)
+    return Tested(tuple(rates), tuple(detection), confusion, scores)
 
 
-def _done(task: tuple[int, Fold, Test]) -> tuple[int, Fold, Answers]:
+def _done(task: tuple[int, Fold, Test]) -> tuple[int, Fold, Scores]:
     place, fold, test = task
     return place, fold, test(fold)
+
+
+def segments_for(grasp_set: GraspSet, samples: Samples, scores: Scores | None, scale: float) -> SegmentModel | None:
+    """Return the costs of segments for tables of `scale` steps per unit, learnt from whole movements and from the
+    scores (n, K) of folds; None without movements.
+    """
+    if not samples.is_none.any():
+        return None
+    try:
+        streams = streams_of(grasp_set)
+    except SegmentingError:
+        return None
+    return learnt(streams, samples.labels, scores, samples.n_types, scale, TICK_US)
 
 
 def rates_of(

@@ -87,10 +87,11 @@ def ablated(
     whole: tuple[GraspSet, dict[str, Labels]] | None = None
     for number, one in enumerate(made):
         report = None if progress is None else _further(progress, number * count, n_variants * count)
-        predicted = _predicted(one.grasp_set, jobs, report)
-        rates = tuple(_recognised(name, one.grasp_set, predicted, whole) for name in predicted)
-        found.append(Variant(one.without, len(one.grasp_set), one.unsettled, one.us_a_grasp, rates))
-        whole = whole or (one.grasp_set, predicted)
+        grasps = one.grasp_set.without_none()
+        predicted = _predicted(grasps, jobs, report)
+        rates = tuple(_recognised(name, grasps, predicted, whole) for name in predicted)
+        found.append(Variant(one.without, len(grasps), one.unsettled, one.us_a_grasp, rates))
+        whole = whole or (grasps, predicted)
     return tuple(found)
 
 

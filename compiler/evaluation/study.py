@@ -124,7 +124,7 @@ def evaluate(
     Parameters
     ----------
     grasp_set : GraspSet
-        The recordings.
+        The recordings. Rows in which nothing is held are left out.
     options : Options, optional
         What to evaluate, and how.
     jobs : int
@@ -160,7 +160,7 @@ def evaluate(
             raise EvaluationError(f"{name} takes S: a rival is a method that takes a number of switches")
     wanted = changed(Manifested(rounds=options.rounds, trainer=options.trainer), options.settings)
     training, ways = Training.of(wanted), ways_of(wanted)
-    chosen = _of_subjects(grasp_set, options.subjects)
+    chosen = _of_subjects(grasp_set.without_none(), options.subjects)
     parts = populations(chosen, options.scheme, options.folds, options.repeats, options.seed)
     reasons = {name: _why_not(name, chosen, parts, options) for name in options.tables}
     if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):

@@ -18,6 +18,7 @@ from thenar.runtime.errors import BuildError, HarnessError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import PAPERS_TRAINER
 from thenar.runtime.names import list_names
+from thenar.runtime.published import NONE
 
 from ..evaluation.rates import Rate
 from ..limits import check_inputs, check_memory, check_types
@@ -117,7 +118,8 @@ def find_frontier(
     Parameters
     ----------
     grasp_set : GraspSet
-        Recordings of at least two grasp types; no fold parts a trial.
+        Recordings of at least two grasp types; no fold parts a trial. Rows in which nothing is held count in decision
+        latency alone.
     output : Path, optional
         Folder for frontier.json, frontier.csv, three pictures, and the store, from which an interrupted run goes on.
         Without it nothing is written, and nothing is kept.
@@ -168,7 +170,7 @@ def find_frontier(
     >>> found = find_frontier(GraspSet.load("set.grasps"), Path("frontier"))  # doctest: +SKIP
     >>> found.points[0].frame.us  # doctest: +SKIP
     """
-    samples = _samples(grasp_set)
+    samples = _samples(grasp_set.without_none())
     # Levels of one taxel share its conversion.
     costs = harness is not None or bool(grasp_set.taxel_columns)
     search, lacking = _installed(search or Search(methods=usual(ours=True, wired=costs)))
@@ -208,7 +210,7 @@ def find_frontier(
 
 
 def _samples(grasp_set: GraspSet) -> Samples:
-    """Return the rows of a set, checked before any work."""
+    """Return the rows of a set in which something is held, checked before any work."""
     n_types = len(np.unique(grasp_set.labels))
     if n_types < 2:
         raise FrontierError(f"the recordings hold {n_types} grasp type(s): there is nothing to tell apart")
@@ -266,8 +268,12 @@ def _documents(found: Frontier) -> dict[str, bytes]:
 def _stream(survey: Survey, given: GraspSet | None) -> Stream:
     """Return the test rows of the first fold as a stream, or the recordings that are given for it."""
     grasp_set, seed = survey.grasp_set, survey.search.seed
+    number = {grasp: label for label, grasp in enumerate(survey.samples.grasps)} | {NONE: -1}
     if given is None:
-        return stream_of(grasp_set, survey.samples.labels, survey.cuts.screening[0].test, seed=seed)
+        labels = np.array([number[grasp] for grasp in grasp_set.grasps.tolist()], np.intp)
+        # The test rows, and those of their movements in which nothing is held.
+        movements, test = grasp_set.movement_ids, np.flatnonzero(~grasp_set.is_none)[survey.cuts.screening[0].test]
+        return stream_of(grasp_set, labels, np.flatnonzero(np.isin(movements, movements[test])), seed=seed)
     if given.fingerprint() == grasp_set.fingerprint():
         raise FrontierError(
             f"the stream is what is trained on, {survey.source}: name other recordings with --stream, or leave it out, "
@@ -275,7 +281,6 @@ def _stream(survey: Survey, given: GraspSet | None) -> Stream:
         )
     if (given.element_names, given.joints) != (grasp_set.element_names, grasp_set.joints):
         raise FrontierError(f"the stream has other switches, taxels or joints than {survey.source}")
-    number = {grasp: label for label, grasp in enumerate(survey.samples.grasps)}
     strange = sorted({str(grasp) for grasp in given.grasps} - set(number))
     if strange:
         raise FrontierError(f"the stream holds {strange[0]!r}, which {survey.source} does not")

@@ -1,6 +1,7 @@
 """Whole movements in a set of grasps: which rows belong together, and in which of them the grasp is complete."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,9 +44,11 @@ class Movements:
 
 def movement_numbers(grasp_set: GraspSet) -> Rows:
     """Return the number (n,) of the run that each row belongs to: neighbouring rows of one subject, grasp type, object
-    and trial. Folds of a set of whole movements must not part the rows of a run.
+    and trial, with those in which nothing is held. Folds of a set of whole movements must not part the rows of a run.
     """
-    told = (grasp_set.subjects, grasp_set.grasps, grasp_set.objects, grasp_set.trials)
+    told: list[NDArray[Any]] = [grasp_set.subjects, grasp_set.grasps, grasp_set.objects, grasp_set.trials]
+    if grasp_set.is_none.any():
+        told = [grasp_set.movement_ids]
     changes = np.logical_or.reduce([column[1:] != column[:-1] for column in told])
     return np.concatenate([np.zeros(min(len(grasp_set), 1), np.intp), np.cumsum(changes, dtype=np.intp)])
 
@@ -70,14 +73,18 @@ def holds_movements(grasp_set: GraspSet) -> bool:
 def movements_of(grasp_set: GraspSet) -> Movements:
     """Return the movements of a set of whole movements, in its order; runs of fewer than LEAST_FRAMES rows are none.
 
-    A taxel is closed where it is pressed beyond the threshold that tells most about the grasp type.
+    A taxel is closed where it is pressed beyond the threshold that tells most about the grasp type. A grasp is complete
+    while the labels say that it is held; of a set that never says that nothing is, as held_frames finds.
     """
     first, beyond = _runs(grasp_set)
-    long = beyond - first >= LEAST_FRAMES
-    first, beyond = first[long], beyond[long]
-    spans = zip(first.tolist(), beyond.tolist(), strict=True)
-    closed = _closed(grasp_set)
-    held = [held_frames(closed[a:b], grasp_set.codes[a:b]) for a, b in spans]
+    none = grasp_set.is_none
+    spans = [(a, b) for a, b in zip(first, beyond, strict=True) if b - a >= LEAST_FRAMES and not none[a:b].all()]
+    first, beyond = np.array(spans, np.intp).reshape(-1, 2).T
+    if none.any():
+        held = [_longest(~none[a:b]) for a, b in spans]
+    else:
+        closed = _closed(grasp_set)
+        held = [held_frames(closed[a:b], grasp_set.codes[a:b]) for a, b in spans]
     complete, released = np.array(held, np.intp).reshape(-1, 2).T
     return Movements(first, beyond, first + complete, first + released)
 

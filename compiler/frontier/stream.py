@@ -95,7 +95,7 @@ def stream_of(
 ) -> Stream:
     """Return a stream of rows of a set: its own movements where it holds whole ones, else one composed of its trials.
 
-    labels  (n,) the classes of all rows, as the tables number them
+    labels  (n,) the classes of all rows, as the tables number them; -1 where nothing is held
     rows    those that may be used, the tables' test rows; None: all. Of a set of whole movements only movements all of
             whose rows are among them are
 
@@ -104,6 +104,7 @@ def stream_of(
     if holds_movements(grasp_set):
         return recorded_stream(grasp_set, labels, rows, grasps=grasps, period_us=period_us)
     chosen = np.arange(len(grasp_set)) if rows is None else rows
+    chosen = chosen[labels[chosen] >= 0]
     return composed_stream(
         grasp_set.switches[chosen],
         grasp_set.codes[chosen],
@@ -126,9 +127,9 @@ def recorded_stream(
 ) -> Stream:
     """Return the movements of a set whose rows are the frames of whole movements, one after the other.
 
-    A set does not tell when its rows were recorded: they are taken to be `period_us` apart (the scene `continuous`:
-    100 Hz). Between two movements a part of a period goes by as well, so that no frame time stays in step with the
-    rows. Where there are more than `grasps` movements, as many of them, evenly spread.
+    Rows of a set without times are taken to be `period_us` apart. Between two movements a period and a part of one go
+    by, so that no frame time stays in step with the rows. Where there are more than `grasps` movements, as many of
+    them, evenly spread.
 
     Raises FrontierError if no movement lies in `rows` as a whole.
     """
@@ -140,8 +141,9 @@ def recorded_stream(
             "no whole movement is among the rows that a latency is measured on: cut the folds between movements"
         )
     found = found.pick(np.unique(np.linspace(0, len(found) - 1, min(grasps, len(found))).astype(np.intp)))
+    apart = "when they were recorded" if grasp_set.times_us.size else f"taken to be {period_us / 1000:g} ms apart"
     what = (
-        f"Latencies are over {len(found)} recorded movements, frames taken to be {period_us / 1000:g} ms apart: "
+        f"Latencies are over {len(found)} recorded movements, frames {apart}: "
         "neighbouring rows of a trial resemble each other, as the frames of a whole movement do."
     )
     return _laid_out(grasp_set, labels, found, period_us, what)
@@ -233,7 +235,10 @@ def _laid_out(grasp_set: GraspSet, labels: Rows, movements: Movements, period_us
     begins = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     number = np.repeat(np.arange(len(sizes)), sizes)
     rows = np.arange(sizes.sum()) - begins[number] + movements.first[number]
-    at_us = np.arange(len(rows), dtype=np.int64) * period_us + number * round(_GOLDEN * period_us)
+    times_us = grasp_set.times_us[rows] if grasp_set.times_us.size else np.arange(len(rows)) * period_us
+    steps_us = np.maximum(np.diff(times_us, prepend=times_us[:1]), 0)
+    steps_us[begins[1:]] = period_us + round(_GOLDEN * period_us)
+    at_us = np.cumsum(steps_us, dtype=np.int64)
     return stream_from(
         bits=grasp_set.switches[rows],
         codes=grasp_set.codes[rows],
@@ -241,7 +246,7 @@ def _laid_out(grasp_set: GraspSet, labels: Rows, movements: Movements, period_us
         end_us=int(at_us[-1]) + period_us,
         arrivals=begins + movements.complete - movements.first,
         ends=begins + movements.released - movements.first,
-        grasps=labels[movements.first],
+        grasps=labels[movements.complete],
         what=what,
         taxels=grasp_set.taxels[rows],
     )

@@ -87,7 +87,7 @@ def expectations(expected: Expected) -> Iterator[str]:
             "thenar doctor measures."
         )
     for us in expected.boards_us:
-        yield f"A scanner board's bitmap takes {us:.0f} us on its line."
+        yield f"A scanner board's keys, and the taxels kept of it, take {us:.0f} us to convert and to send."
     if expected.glove_us is not None:
         yield (
             f"The CyberGlove sends a record of {expected.sensors} sensors every {expected.glove_us:.0f} us at best, by "

@@ -15,7 +15,7 @@ from thenar.runtime.scanning.plan import check_harness, unwired
 from thenar.runtime.scanning.ports import whole_scan, wired_names
 from thenar.runtime.scanning.propose import own_joints, propose_cyberglove, propose_harness
 from thenar.runtime.scanning.scanmap import ScanMap
-from thenar.runtime.scanning.timing import glove_us, scan_us, scanner_us
+from thenar.runtime.scanning.timing import glove_us, scan_us, scanner_us, taxels_us
 
 from ..hand import HandShape
 from .circuit import BillLine, bill_of, glove_circuit
@@ -44,7 +44,7 @@ class Expected(Struct, frozen=True):
 
     scan_us      of all kept switches on expanders, in `transactions` transactions, selections of muxes included
     full_us      of all switches that are wired to expanders, kept or not
-    boards_us    of a full bitmap of each scanner board
+    boards_us    of a full bitmap of each scanner board, and of its kept taxels' conversions and codes
     glove_us     between records of the CyberGlove, of as many `sensors` as the build has joints; None where it has none
     rates        the recognition that was measured when the build was compiled
     faults       what the worst faults leave of the rows trained on; None in specs of older builds
@@ -71,9 +71,9 @@ def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected
         scan_us=time.us,
         full_us=time.full_us,
         boards_us=tuple(
-            scanner_us(board)
-            for number, board in enumerate(harness.scanners)
-            if scan.scanners[number] or (scan.taxels and scan.taxels[number])
+            scanner_us(board) + taxels_us(board, channels)
+            for board, keys, channels in zip(harness.scanners, scan.scanners, scan.board_channels, strict=True)
+            if keys or channels
         ),
         sensors=len(manifest.joints),
         glove_us=None if glove is None else glove_us(glove, len(manifest.joints)),

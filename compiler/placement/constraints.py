@@ -12,6 +12,7 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.manifest import Options
 from thenar.runtime.names import list_names, nearest
 
@@ -19,7 +20,7 @@ from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from .elements import Elements
 from .inputs import PlacementError
-from .ports import PortCosts
+from .ports import PortCosts, record_times_us
 
 Bits = NDArray[np.bool_]
 Places = Mapping[str, tuple[float, float]]
@@ -32,7 +33,8 @@ class Limits:
     keep, never  what must be kept, and what must not
     apart_mm     no two that are kept may be nearer to each other, by their `places` (mm); levels of a taxel may
     taxels       the most taxels that may be kept, with however many levels
-    budget_us    the most that reading the ports of what is kept may take
+    budget_us    the most that reading the ports of what is kept may take, and a record of the kept joints meanwhile
+    records_us   what a record of one, of two, ... of the joints takes; empty where that is not known, nor limited then
     names        of all switches, `n_switches`, and then of the taxels
     joints       names of the joints
     places       where switches and taxels lie on the hand, where that is known
@@ -48,6 +50,7 @@ class Limits:
     apart_mm: float = 0.0
     taxels: int | None = None
     budget_us: float | None = None
+    records_us: tuple[float, ...] = ()
     places: Places = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -67,8 +70,10 @@ class Limits:
                     )
 
     @classmethod
-    def of(cls, options: Options, grasp_set: GraspSet, places: Places) -> "Limits | None":
-        """Return what the options of a build ask of a set's elements; None where they ask nothing."""
+    def of(
+        cls, options: Options, grasp_set: GraspSet, places: Places, glove: GloveWiring | None = None
+    ) -> "Limits | None":
+        """Return what the options of a build ask of a set's elements and joints; None where they ask nothing."""
         asked = (options.keep_these, options.never, options.apart_mm, options.at_most_taxels, options.budget_us)
         if not any(each is not None and each != () for each in asked):
             return None
@@ -81,6 +86,7 @@ class Limits:
             apart_mm=options.apart_mm or 0.0,
             taxels=options.at_most_taxels,
             budget_us=options.budget_us,
+            records_us=record_times_us(grasp_set.joint_names, glove),
             places=places,
         )
 
@@ -89,7 +95,7 @@ class Limits:
 
         Raises PlacementError where they cannot be obeyed.
         """
-        if self.budget_us is not None and ports is None:
+        if self.budget_us is not None and ports is None and elements:
             raise PlacementError("--budget-us needs to know what reading the glove costs: name its --glove")
         own = [self.names[element.column] for element in elements]
         if lost := [name for name in self.keep if name in self.names and name not in own]:
@@ -107,14 +113,25 @@ class Limits:
         bound.check()
         return bound
 
-    def on_joints(self, most: int | None) -> tuple[Columns, Columns]:
-        """Return the joints to keep in any case, and those not to keep. Raises PlacementError for more than `most`."""
+    def on_joints(self, most: int | None) -> tuple[Columns, Columns, int]:
+        """Return the joints to keep in any case, those not to keep, and how many to keep at most.
+
+        Raises PlacementError for more to keep than `most`, or than there is time for.
+        """
         keep, never = (
             tuple(joint for joint, name in enumerate(self.joints) if name in asked) for asked in (self.keep, self.never)
         )
         if most is not None and len(keep) > most:
             raise PlacementError(f"--keep-these names {len(keep)} joints, --keep-joints allows {most}: name fewer")
-        return keep, never
+        fit = len(self.joints)
+        if self.budget_us is not None and self.records_us:
+            fit = sum(us <= self.budget_us for us in self.records_us)
+        if len(keep) > fit:
+            raise PlacementError(
+                f"--keep-these names {len(keep)} joints, whose record takes {self.records_us[len(keep) - 1]:.1f} us, "
+                f"--budget-us allows {self.budget_us:g}: name fewer, or allow more"
+            )
+        return keep, never, fit if most is None else min(most, fit)
 
     def _apart(self, one: str, other: str) -> float:
         (x, y), (u, v) = self.places[one], self.places[other]

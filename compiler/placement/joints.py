@@ -44,9 +44,12 @@ def kept_joints(samples: Samples, most: int | None, limits: Limits | None = None
 
     Raises PlacementError where the limits name more joints to keep.
     """
-    keep, never = ((), ()) if limits is None else limits.on_joints(most)
-    every = tuple(joint for joint in range(samples.codes.shape[1]) if joint not in never)
-    if most is None or most >= len(every):
-        return every
+    every: Columns = tuple(range(samples.codes.shape[1]))
+    if not every:
+        return ()
+    keep, never, most = ((), (), most or len(every)) if limits is None else limits.on_joints(most)
+    every = tuple(joint for joint in every if joint not in never)
+    if most >= len(every) or not most:
+        return every[:most]
     order = dict.fromkeys((*keep, *joint_order(samples)))
     return tuple(sorted([joint for joint in order if joint not in never][:most]))

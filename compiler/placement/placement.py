@@ -275,7 +275,8 @@ def place(
     Parameters
     ----------
     grasp_set : GraspSet
-        What is learnt from. A tie between grasp types goes to the first of them in the taxonomy.
+        What is learnt from, the rows in which nothing is held left out. A tie between grasp types goes to the first of
+        them in the taxonomy.
     parameter : float
         The paper's S (rows below which a node decides nothing), or how many switches to keep at most, as the method
         takes it.
@@ -305,6 +306,7 @@ def place(
     PlacementError
         If the set has no switches, no rows, or more grasp types than a build can hold.
     """
+    fingerprint, grasp_set = grasp_set.fingerprint(), grasp_set.without_none()
     read = samples_of(grasp_set, joints=joints or keep_joints is not None)
     elements = elements_of(read, levels)
     read = bits_of(read, elements)
@@ -327,7 +329,7 @@ def place(
         joints=joints,
         switches=kept,
         rows=len(grasp_set),
-        fingerprint=grasp_set.fingerprint(),
+        fingerprint=fingerprint,
         all_names=names_of(grasp_set, elements),
         n_levels=len(elements) - len(grasp_set.switch_names),
         grasps=samples.grasps,
@@ -343,6 +345,7 @@ def place_by_subject(grasp_set: GraspSet, prune: int, on_done: Progress) -> list
     """Return the paper's placement from the rows of each subject, by name, and from all rows "pooled" if they are of
     several; `on_done(done, all)` is called before each of them.
     """
+    grasp_set = grasp_set.without_none()
     subjects = np.unique(grasp_set.subjects).tolist()
     groups = [(subject, grasp_set.rows(grasp_set.subjects == subject)) for subject in subjects]
     if len(subjects) != 1:

@@ -197,6 +197,7 @@ def place_for_crowd(
 
     Raises PlacementError as `place` does, and for fewer than eight subjects; MemberError where there is no such method.
     """
+    fingerprint, grasp_set = grasp_set.fingerprint(), grasp_set.without_none()
     samples = samples_of(grasp_set, joints=joints)
     crowd = Crowd(samples, np.unique(grasp_set.subjects, return_inverse=True)[1])
     study = standard_placement(crowd, Asked(keep, method), jobs, on_done)
@@ -206,7 +207,7 @@ def place_for_crowd(
         joints=joints,
         switches=kept_of(grasp_set, study.elements, tuple(range(len(study.elements)))),
         rows=len(grasp_set),
-        fingerprint=grasp_set.fingerprint(),
+        fingerprint=fingerprint,
         all_names=names_of(grasp_set, every := elements_of(samples)),
         n_levels=len(every) - len(grasp_set.switch_names),
         grasps=samples.grasps,

@@ -7,12 +7,13 @@ from math import fsum
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.drivers.cyberglove_protocol import SENSORS, sensors_with
 from thenar.runtime.errors import HarnessError
-from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.scanning.plan import Costs, Unit, ports_in, unwired
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
-from thenar.runtime.scanning.timing import scanner_us
+from thenar.runtime.scanning.timing import glove_us, scanner_us, taxels_us
 
 from .inputs import PlacementError
 
@@ -75,11 +76,25 @@ def ports_of_whole_glove(harness: Harness | None, names: Sequence[str], taxels: 
         return None
 
 
+def record_times_us(joints: Sequence[str], glove: GloveWiring | None = None) -> tuple[float, ...]:
+    """Return what a CyberGlove's record of one, of two, ... and of all of these joints takes; () of other joints.
+
+    It is the record of `glove`, whose mask may let all sensors through, or of one at 115200 baud.
+    """
+    own = glove is not None and set(joints) <= set(glove.joints)
+    sensors = glove.all_sensors if glove is not None and own else sensors_with(joints)
+    if sensors is None or not joints:
+        return ()
+    glove = glove or GloveWiring(port="-", sensors=22 if sensors > SENSORS else None)
+    return tuple(glove_us(glove, count if glove.mask else sensors) for count in range(1, len(joints) + 1))
+
+
 def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
     """Return what reading each port costs where all switches `names` hang on the ports of a whole scan.
 
     A selection of a mux's channel is shared evenly by the ports that need it. A port is charged as a whole even if a
-    shorter reading would show the one switch that is kept. A board is one port: it always sends all its keys. Raises
+    shorter reading would show the one switch that is kept. A board's keys are one port, since it always sends them all.
+    Each of its taxels is one: its conversion, its bytes, and its share of the frame around all of theirs. Raises
     HarnessError if a switch is wired to nothing.
     """
     scan = whole_scan(harness, names)
@@ -92,9 +107,12 @@ def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
     for number, port in enumerate(scan.ports):
         port_of |= dict.fromkeys(port.elements, number)
     for number, board in enumerate(harness.scanners):
-        levels = scan.taxels[number] if scan.taxels else ()
-        port_of |= dict.fromkeys((switch for *_, switch in (*scan.scanners[number], *levels)), len(us))
+        port_of |= dict.fromkeys((switch for _, switch in scan.scanners[number]), len(us))
         us.append(scanner_us(board))
+        levels = scan.taxels[number] if scan.taxels else ()
+        channels = sorted({channel for channel, *_ in levels})
+        port_of |= {switch: len(us) + channels.index(channel) for channel, _, switch in levels}
+        us += [taxels_us(board, len(channels)) / len(channels) for _ in channels]
     lacking = next((name for number, name in enumerate(names) if number not in port_of), None)
     if lacking is not None:
         raise HarnessError(

@@ -97,7 +97,7 @@ class Taxonomy:
     def finder(self) -> Callable[[str], str | None]:
         """Return a function from a label to the type that it means, or None; made once for many labels."""
         types, aliases = frozenset(self.names), self._aliases()
-        return lambda label: label if label in types else aliases.get(_plain(label))
+        return lambda label: label if label in types else aliases.get(plain(label))
 
     def find(self, label: str) -> str | None:
         """Return the type that `label` means, or None."""
@@ -118,8 +118,8 @@ class Taxonomy:
         """Return " (did you mean ...?)" with the nearest types, or the types to choose from when none is near."""
         aliases = self._aliases()
         # Comparing takes the time of the label's length times a type's, for every type.
-        plain, compared = _plain(label[:LONGEST_SHOWN]), list(aliases)[:MOST_COMPARED]
-        near = {aliases[alias]: None for alias in difflib.get_close_matches(plain, compared, n=3)}
+        written, compared = plain(label[:LONGEST_SHOWN]), list(aliases)[:MOST_COMPARED]
+        near = {aliases[alias]: None for alias in difflib.get_close_matches(written, compared, n=3)}
         if near:
             return f" (did you mean {' or '.join(map(repr, near))}?)"
         shown = ", ".join(map(shortened, self.types[:5])) + (", ..." if len(self.types) > 5 else "")
@@ -130,13 +130,13 @@ class Taxonomy:
         found: dict[str, str | None] = {}
         for number, (name, full) in enumerate(zip(self.types, self.full_names, strict=True), start=1):
             spellings = {name, full, str(number)} if self.name in _PUBLISHED else {name}
-            for plain in {_plain(spelling) for spelling in spellings}:
-                found[plain] = None if plain in found else name
+            for written in map(plain, spellings):
+                found[written] = None if found.get(written, name) != name else name
         found[NONE] = NONE
-        return {plain: name for plain, name in found.items() if name is not None}
+        return {written: name for written, name in found.items() if name is not None}
 
 
-def _plain(label: str) -> str:
+def plain(label: str) -> str:
     """Return `label` without case, blanks, underscores and punctuation: "Sphere_4-Finger" -> "sphere4finger"."""
     words = re.sub(r"[\W_]+", "", label.casefold())
     # Without int(), which takes no more than 4,300 digits; other scripts' digits count as ours.
@@ -161,7 +161,7 @@ def published(name: str) -> Taxonomy:
 
 def published_for(labels: Iterable[str]) -> str | None:
     """Return the name of the one published taxonomy whose types all `labels` name, None where none or several have."""
-    written = [label for label in labels if not _plain(label).isdecimal()]
+    written = [label for label in labels if not plain(label).isdecimal()]
     fitting = [name for name in _PUBLISHED if written and all(map(published(name).finder(), labels))]
     return fitting[0] if len(fitting) == 1 and written else None
 

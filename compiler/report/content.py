@@ -15,6 +15,7 @@ from ..evaluation.study import Study
 from ..frontier.points import Frontier
 from ..hand import HandShape
 from ..placement.tree import Tree
+from ..segmenting.transitions import Transitions
 from ..tables.compare import Comparison, WorstCase
 from ..tables.faults import FaultCounts
 
@@ -39,6 +40,7 @@ class ReportContent:
     scan, harness the scan map and the harness that it was made for
     comparison    the rows trained on, through the model, its tables and the integers
     faults        what each fault of an input leaves of the rows trained on
+    transitions   which type follows which, where the recordings are whole movements
     worst         the worst that integers can do, over every frame there is
 
     Raises ReportError where parts do not belong together.
@@ -62,6 +64,7 @@ class ReportContent:
     comparison: Comparison | None = None
     faults: FaultCounts | None = None
     worst: WorstCase | None = None
+    transitions: Transitions | None = None
 
     def __post_init__(self) -> None:
         grasps, answers = len(self.manifest.grasps), len(self.manifest.answers)

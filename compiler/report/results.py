@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..evaluation.populations import PROTOCOLS
 from ..evaluation.study import Study
 from ..evaluation.tables import RateTable, both
+from ..segmenting.transitions import Transitions
 from ..text import NBSP, counted, percent, sentence
 from .content import PlainTable, ReportContent
 
@@ -44,6 +45,16 @@ def _table(table: RateTable) -> PlainTable:
         for row in table.rows
     )
     return PlainTable(table.title, columns, rows, words=(0, 1), note=table.note)
+
+
+def transition_table(found: Transitions) -> PlainTable:
+    """Return the changes from type to type, the most frequent first."""
+    counts, shares = found.counts, found.probabilities
+    changes = sorted(np.argwhere(counts).tolist(), key=lambda each: (-counts[tuple(each)], each))
+    rows = tuple(
+        (found.types[a], found.types[b], str(counts[a, b]), percent(float(shares[a, b]), NBSP)) for a, b in changes
+    )
+    return PlainTable("Changes of grasp type", ("From", "To", "Count", "Of its changes"), rows, words=(0, 1))
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import msgspec
 from thenar.runtime.manifest import AUTO, Manifest
 from thenar.runtime.published import NONE
 from thenar.runtime.scanning.propose import own_joints
-from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us, scanner_us
+from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us, scanner_us, taxels_us
 
 from ..placement.gain import entropy_bits
 from ..placement.methods.base import METHODS
@@ -270,10 +270,12 @@ def scan_sentences(content: ReportContent) -> Iterator[str]:
             f"{microseconds(time.us)} µs on the wire, {percent(time.share, NBSP)} of the "
             f"{microseconds(time.full_us)} µs that all {harness.on_chips} wired ones take."
         )
-    for board, pairs in zip(harness.scanners, scan.scanners, strict=True):
+    for board, pairs, taxels in zip(harness.scanners, scan.scanners, scan.board_channels, strict=True):
+        codes = f"; {counted(taxels, 'taxel')}, {microseconds(taxels_us(board, taxels))} µs to convert and to send"
         yield (
             f"The board on {board.port} shows {counted(len(pairs), 'kept switch', 'kept switches')} of "
-            f"{counted(len(board.switches), 'key')}, {microseconds(scanner_us(board))} µs a bitmap on its line."
+            f"{counted(len(board.switches), 'key')}, {microseconds(scanner_us(board))} µs a bitmap on its line"
+            + (f"{codes}." if taxels else ".")
         )
     if harness.cyberglove is not None and joints:
         us, glove = microseconds(glove_us(harness.cyberglove, joints)), harness.cyberglove

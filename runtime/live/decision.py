@@ -48,6 +48,11 @@ class Standing:
         self._rivals = self._nearest(self.candidate) if unread else lanes
 
     @property
+    def whole(self) -> bool:
+        """Whether nothing was left unread."""
+        return not self._unread
+
+    @property
     def certain(self) -> bool:
         """Whether the candidate wins whatever the unread switches are; of equal scores the lowest number wins."""
         return self._rivals.index(max(self._rivals)) == self.candidate

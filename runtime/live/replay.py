@@ -11,6 +11,7 @@ from ..harness.loading import parse_harness
 from ..policy import Policy
 from ..published import LiveGrasp
 from ..recording.reader import Reader
+from .recogniser import Moment
 from .system import System
 
 
@@ -24,6 +25,14 @@ def replayed(
 
     Raises McapError if it is no recording, SettingError if it is of another build.
     """
+    for entry, moment in moments(build, recording, policy, warn):
+        yield entry, moment.grasp
+
+
+def moments(
+    build: Build, recording: Path, policy: Policy | None = None, warn: Callable[[str], None] = lambda _: None
+) -> Iterator[tuple[LiveGrasp, Moment]]:
+    """Yield what was recognised and all that is known now; see `replayed`."""
     reader = Reader(recording)
     recognizer = _system(build, reader, policy).recognizer()
     switches: SwitchFrame | None = None
@@ -34,7 +43,7 @@ def replayed(
         elif isinstance(entry, GloveFrame):
             glove = entry
         elif isinstance(entry, LiveGrasp):
-            yield entry, recognizer.step(entry.time_us, entry.unix_us, switches, glove).grasp
+            yield entry, recognizer.step(entry.time_us, entry.unix_us, switches, glove)
     for fault in reader.faults():
         warn(fault.message)
 

@@ -18,6 +18,7 @@ from ..scanning.propose import own_joints
 from ..scanning.scanmap import ScanMap
 from ..sources.base import slowest_us
 from ..taxels import calibration_of, in_counts
+from .quarantine import WHOLE_US
 from .recogniser import LiveRecognizer
 from .sources import Sources
 
@@ -111,12 +112,16 @@ class System:
         return Sources(self.harness, self.switch_names, scan, early, sensors, on_demand=self.on_demand)
 
     def early_exit(self, ports: Sequence[Mask]) -> EarlyExit:
-        """Return what ends a scan of these ports early without changing any decision.
+        """Return what ends a scan of these ports early without changing any decision. Segments need all scores: every
+        half tick a scan goes to its end.
 
         Hand `start` the codes of the glove's record that the recogniser will be given with the scan.
         """
-        lead = self.policy.lead_steps(self.build.tables.scale)
-        return EarlyExit(self.build.scorer, ports, lead=lead, on_demand=self.on_demand)
+        policy = self.policy
+        lead = policy.lead_steps(self.build.tables.scale)
+        every_us = self.build.manifest.segmenting.tick_us // 2 if policy.lag_us is not None else WHOLE_US
+        whole_us = every_us if policy.lag_us is not None or policy.quarantine else None
+        return EarlyExit(self.build.scorer, ports, lead=lead, on_demand=self.on_demand, whole_us=whole_us)
 
     def joints(self) -> Joints:
         """Return what makes the build's joint codes of the CyberGlove's records."""

@@ -11,7 +11,7 @@ range = [0, 45]                 # in that unit; positions outside are refused
 [[preshapes]]
 name = "open"
 positions = [0]                 # one a joint, each in its joint's unit
-grasps = ["PoS", "CMF"]         # the grasp types, as the build spells them
+grasps = ["PoS", "CMF"]         # the grasp types, as the build spells them; "none": while nothing is held
 """
 
 import math
@@ -24,10 +24,11 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from ..build import Build
 from ..names import fault, nearest, shortened
 from ..toml_source import Place, TomlText, read_source
 from ..toml_struct import check_finite, convert
-from .selector import Preshape, PreshapeError, PreshapeTable
+from .selector import Preshape, PreshapeError, PreshapeSelector, PreshapeTable
 
 SHIPPED = ("barrett_bh8", "parallel_gripper")
 
@@ -70,6 +71,19 @@ def load_preshapes(name: str | os.PathLike[str]) -> PreshapeTable:
         grasp: preshape for entry in content.preshapes for preshape in [_made(content, entry)] for grasp in entry.grasps
     }
     return PreshapeTable(content.name, chosen)
+
+
+def preshape_selector(
+    name: str | os.PathLike[str], build: Build, *, segments: bool = True, change_while_held: bool = False
+) -> tuple[PreshapeSelector, str]:
+    """Return what selects from a table for a build, by segments where the build knows when nothing is held (without
+    `segments` by the grasp type alone), and a sentence on grasp types for which the table has no preshape, or nothing.
+
+    Raises PreshapeError.
+    """
+    table = load_preshapes(name)
+    by_segments = segments and build.knows_none
+    return PreshapeSelector(table, segments=by_segments, change_while_held=change_while_held), table.check(build.grasps)
 
 
 def _find(name: str | os.PathLike[str]) -> Traversable:

@@ -9,7 +9,7 @@ import msgspec
 
 from ..errors import ThenarError
 from ..names import list_names
-from ..published import UNKNOWN, LiveGrasp
+from ..published import NONE, UNKNOWN, LiveGrasp
 
 
 class PreshapeError(ThenarError, ValueError):
@@ -33,7 +33,10 @@ class Preshape(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class PreshapeTable:
-    """The preshapes of one robot hand: `chosen` holds one for every grasp type that the table names."""
+    """The preshapes of one robot hand: `chosen` holds one for every grasp type that the table names.
+
+    It may name "none" as well: what opens the hand while nothing is held.
+    """
 
     name: str
     chosen: Mapping[str, Preshape]
@@ -43,7 +46,7 @@ class PreshapeTable:
 
         Raises PreshapeError if the table names none of them: it is for another taxonomy.
         """
-        wanted = tuple(grasps)
+        wanted = tuple(grasp for grasp in grasps if grasp != NONE)
         missing = tuple(grasp for grasp in wanted if grasp not in self.chosen)
         if not missing:
             return ""
@@ -64,13 +67,34 @@ class PreshapeSelector:
 
     It changes to another only when that one was called for by every frame of the last `settle_ms`, each with at least
     `min_probability`. In between it answers with the preshape that it holds; on "unknown", and on a grasp type that the
-    table does not name, with none: whoever moves the hand then leaves it where it is.
+    table does not name, with none: whoever moves the hand then leaves it where it is. While nothing is held it goes on
+    with what it holds, unless the table names a preshape for "none".
+
+    With `segments`, the type of the segment calls, while it forms and while it is held; of a build that knows none.
+    Once the preshape of a held segment is taken, it changes only after nothing was held, unless `change_while_held`.
+    Otherwise `LiveGrasp.grasp` calls.
     """
 
-    __slots__ = ("_called", "_held", "_min_probability", "_settle_us", "_since_us", "_table")
+    __slots__ = (
+        "_called",
+        "_change",
+        "_held",
+        "_locked",
+        "_min_probability",
+        "_segments",
+        "_settle_us",
+        "_since_us",
+        "_table",
+    )
 
     def __init__(
-        self, table: PreshapeTable, *, min_probability: float = MIN_PROBABILITY, settle_ms: float = SETTLE_MS
+        self,
+        table: PreshapeTable,
+        *,
+        min_probability: float = MIN_PROBABILITY,
+        settle_ms: float = SETTLE_MS,
+        segments: bool = False,
+        change_while_held: bool = False,
     ) -> None:
         """Raise PreshapeError unless 0 <= min_probability <= 1 and settle_ms >= 0."""
         if not 0 <= min_probability <= 1:
@@ -80,19 +104,27 @@ class PreshapeSelector:
         self._table = table
         self._min_probability = min_probability
         self._settle_us = settle_ms * 1000
+        self._segments, self._change = segments, change_while_held
         self._held: Preshape | None = None
         self._called: Preshape | None = None
         self._since_us = 0
+        self._locked = False
 
     def update(self, grasp: LiveGrasp) -> Preshape | None:
         """Return the preshape that the hand shall have now, or None where it shall be told nothing."""
-        if grasp.grasp == UNKNOWN or grasp.health == "unknown":
+        type_, probability = grasp.grasp, grasp.probability
+        if self._segments:
+            type_, probability = grasp.segment_type, 1.0 if grasp.state == "none" else grasp.segment_probability
+            self._locked &= grasp.state != "none"
+        if type_ == UNKNOWN or grasp.health == "unknown":
             self._called = None
             return None
-        wanted = self._table.chosen.get(grasp.grasp)
-        called = wanted if grasp.probability >= self._min_probability else None
+        wanted = self._table.chosen.get(type_)
+        called = wanted if probability >= self._min_probability else None
         if called is not self._called:
             self._called, self._since_us = called, grasp.time_us
         if called is not None and grasp.time_us - self._since_us >= self._settle_us:
-            self._held = called
-        return None if wanted is None else self._held
+            if not self._locked:
+                self._held = called
+            self._locked |= grasp.state == "held" and called is self._held and self._segments and not self._change
+        return None if wanted is None and type_ != NONE else self._held

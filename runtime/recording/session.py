@@ -5,6 +5,7 @@ was resumed holds one for every time that it was begun, each with its own clock.
 """
 
 import re
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -118,6 +119,9 @@ def from_metadata(texts: dict[str, str]) -> Session:
         if field.required and field.name not in texts:
             raise McapError(f"its metadata lack {field.name!r}: damaged, or not recorded by thenar")
     session = Session(**{field.name: _value(field, texts) for field in _FIELDS if field.name in texts})
+    if session.policy is not None and "lag_us" not in texts["policy"]:
+        # By an early version, which sought no segments.
+        session = msgspec.structs.replace(session, policy=replace(session.policy, lag_us=None))
     _check_names(session)
     return session
 

@@ -19,6 +19,7 @@ from thenar.drivers.errors import SettingError
 from .messages import TYPE_HASHES
 
 _DEPTH = 10
+_UNLIMITED = -1
 _MAX_DOMAIN = 232  # above it the ports of DDS would pass 65535
 _MAX_LENGTH = 200
 
@@ -108,15 +109,25 @@ def domain() -> int:
     return int(text)
 
 
-def writer(participant: DomainParticipant, name: str, kind: Any) -> Any:
-    """Return what writes messages of a kind to the ROS topic `name`: reliable, volatile, the last 10 kept."""
-    qos = Qos(
+def writer(participant: DomainParticipant, name: str, kind: Any, *, kept: bool = False) -> Any:
+    """Return what writes messages of a kind to the ROS topic `name`: reliable, the last 10 kept, and volatile unless
+    the newest is `kept` for readers that come later (transient local).
+    """
+    policies = [
         # Nobody may hold the writer up: what does not fit is refused at once.
         Policy.Reliability.Reliable(max_blocking_time=0),
-        Policy.Durability.Volatile,
+        Policy.Durability.TransientLocal if kept else Policy.Durability.Volatile,
+        Policy.DurabilityService(0, Policy.History.KeepLast(1), _UNLIMITED, _UNLIMITED, _UNLIMITED),
         Policy.History.KeepLast(_DEPTH),
         Policy.WriterDataLifecycle(autodispose=False),
         Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
         Policy.Userdata(f"typehash={TYPE_HASHES[kind.__idl_typename__]};".encode()),
-    )
-    return DataWriter(participant, Topic(participant, dds_topic(name), kind), qos=qos)
+    ]
+    return DataWriter(participant, Topic(participant, dds_topic(name), kind), qos=Qos(*policies))
+
+
+def volatile_readers(of: Any) -> frozenset[int]:
+    """Return the readers that a writer has found and that ask for nothing of what was written before they came."""
+    readers = {handle: of.get_matched_subscription_data(handle) for handle in of.get_matched_subscriptions()}
+    wanted = {handle: data.qos[Policy.Durability] for handle, data in readers.items() if data is not None}
+    return frozenset(handle for handle, durability in wanted.items() if durability == Policy.Durability.Volatile)

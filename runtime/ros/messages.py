@@ -1,12 +1,8 @@
 """The ROS 2 messages that are published, as DDS types, under the names and with the layout that ROS 2 gives them.
 
-std_msgs/String, sensor_msgs/JointState and trajectory_msgs/JointTrajectory, field by field as their .msg files have
-them; a type pkg/msg/Name is pkg::msg::dds_::Name_ in DDS. They are final and keyless, and go out as plain CDR (XCDR1),
-as rmw_cyclonedds and rmw_fastrtps write theirs. Needs the extra `ros`.
-
-Cyclone's serialisation in Python takes most of the time that a frame has: of the messages that are sent again and again
-the bytes come from it once, and afterwards only the numbers in them are replaced. They are CDR: four bytes of header,
-then the fields, each aligned to its size counted from behind the header.
+std_msgs/String, sensor_msgs/JointState, trajectory_msgs/JointTrajectory and diagnostic_msgs/DiagnosticArray, field by
+field as their .msg files have them; a type pkg/msg/Name is pkg::msg::dds_::Name_ in DDS. They are final and keyless,
+and go out as plain CDR (XCDR1), as rmw_cyclonedds and rmw_fastrtps write theirs. Needs the extra `ros`.
 """
 
 from dataclasses import dataclass
@@ -14,17 +10,15 @@ from typing import TYPE_CHECKING
 
 from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.annotations import final
-from cyclonedds.idl.types import float64, int32, uint32
+from cyclonedds.idl.types import byte, float64, int32, uint32
 
 if TYPE_CHECKING:
     from collections.abc import Sequence as sequence  # noqa: N813 - Cyclone's says nothing to a type checker
 else:
     from cyclonedds.idl.types import sequence
-import struct
-from typing import Any
 
 from ..preshape.selector import Preshape
-from ..published import JointAngles
+from ..published import Health, JointAngles, LiveGrasp
 
 # REP-2011: ROS 2 from Iron on looks for it in the endpoint's user data, and warns where it is missing.
 TYPE_HASHES = {
@@ -32,6 +26,9 @@ TYPE_HASHES = {
     "sensor_msgs::msg::dds_::JointState_": "RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e",
     "trajectory_msgs::msg::dds_::JointTrajectory_": (
         "RIHS01_179b33eba59d676f6d967ac71fe35e7ca2f64b2f3928f4a018cec115e213796e"
+    ),
+    "diagnostic_msgs::msg::dds_::DiagnosticArray_": (
+        "RIHS01_5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"
     ),
 }
 
@@ -105,42 +102,68 @@ class JointTrajectory(IdlStruct, typename="trajectory_msgs::msg::dds_::JointTraj
     points: sequence[JointTrajectoryPoint]
 
 
-_STAMP_AT = 4
-_COUNTS = 8  # behind the positions: how many velocities and efforts, none each
+@dataclass
+@final
+class KeyValue(IdlStruct, typename="diagnostic_msgs::msg::dds_::KeyValue_"):
+    """A value, and what it is of."""
+
+    key: str
+    value: str
 
 
-class PackedString(String):
-    """A text that is published again and again."""
+@dataclass
+@final
+class DiagnosticStatus(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticStatus_"):
+    """How a component is doing: level 0 is fine, 1 a warning, 2 an error."""
 
-    def __init__(self, data: str) -> None:
-        super().__init__(data)
-        self._bytes = super().serialize(use_version_2=False)
-
-    def serialize(self, *_: Any, **__: Any) -> bytes:
-        """Return the bytes."""
-        return self._bytes
+    level: byte
+    name: str
+    message: str
+    hardware_id: str
+    values: sequence[KeyValue]
 
 
-class PackedAngles(JointState):
-    """The state of joints whose names stay the same."""
+@dataclass
+@final
+class DiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticArray_"):
+    """How components are doing."""
 
-    def __init__(self, names: tuple[str, ...]) -> None:
-        super().__init__(Header(Time(0, 0), ""), list(names), [0.0] * len(names), [], [])
-        self.names = names
-        self._bytes = bytearray(super().serialize(use_version_2=False))
-        self._stamp = struct.Struct("=iI")
-        self._positions = struct.Struct(f"={len(names)}d")
-        self._positions_at = len(self._bytes) - _COUNTS - self._positions.size
+    header: Header
+    status: sequence[DiagnosticStatus]
 
-    def set(self, unix_us: int, angles: JointAngles) -> None:
-        """Take over the angles of a moment, those of the same names."""
-        seconds, microseconds = divmod(unix_us, 1_000_000)
-        self._stamp.pack_into(self._bytes, _STAMP_AT, seconds, microseconds * 1000)
-        self._positions.pack_into(self._bytes, self._positions_at, *angles.positions_rad)
 
-    def serialize(self, *_: Any, **__: Any) -> bytes:
-        """Return the bytes."""
-        return bytes(self._bytes)
+LEVELS: dict[Health, int] = {"ok": 0, "changing": 0, "degraded": 1, "unknown": 2}
+
+
+def segment(name: str, grasp: LiveGrasp) -> DiagnosticArray:
+    """Return what is recognised as the status of component `name`, stamped with its moment."""
+    began_us = None if grasp.segment_us is None else grasp.unix_us - grasp.time_us + grasp.segment_us
+    values = {
+        "grasp": grasp.grasp,
+        "probability": f"{grasp.probability:.6f}",
+        "health": grasp.health,
+        "state": grasp.state,
+        "segment": str(grasp.segment),
+        "segment_type": grasp.segment_type,
+        "segment_probability": f"{grasp.segment_probability:.6f}",
+        "segment_stamp": "" if began_us is None else f"{began_us / 1e6:.6f}",
+        "candidate": grasp.candidate,
+        "margin": str(grasp.margin),
+        "lost": ", ".join(grasp.lost),
+    }
+    pairs = [KeyValue(key, value) for key, value in values.items()]
+    status = DiagnosticStatus(LEVELS[grasp.health], name, grasp.grasp, "", pairs)
+    return DiagnosticArray(_header(grasp.unix_us), [status])
+
+
+def joint_state(unix_us: int, angles: JointAngles) -> JointState:
+    """Return the glove's joints at a moment."""
+    return JointState(_header(unix_us), list(angles.names), list(angles.positions_rad), [], [])
+
+
+def _header(unix_us: int) -> Header:
+    seconds, microseconds = divmod(unix_us, 1_000_000)
+    return Header(Time(seconds, microseconds * 1000), "")
 
 
 def trajectory(preshape: Preshape) -> JointTrajectory:

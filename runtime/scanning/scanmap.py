@@ -63,6 +63,12 @@ class ScanMap(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
         levels = (switch for board in self.taxels for *_, switch in board)
         return (*keys, *levels, *(switch for port in self.ports for switch in port.elements))
 
+    @property
+    def board_channels(self) -> tuple[int, ...]:
+        """Of how many channels each board is asked for the codes."""
+        levels = self.taxels or ((),) * len(self.scanners)
+        return tuple(len({channel for channel, *_ in board}) for board in levels)
+
 
 def scanmap_to_bytes(scan: ScanMap) -> bytes:
     """Return the content of `scan.json`."""

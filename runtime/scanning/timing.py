@@ -200,15 +200,29 @@ def glove_us(glove: GloveWiring, sensors: int, *, wire_only: bool = False) -> fl
     return max(us, 1e6 / glove.rate_hz if glove.rate_hz else 0.0)
 
 
-# From ANALOG to ANALOG, at least.
-_ANALOG_US = 2000.0
+# From ANALOG to ANALOG, at least; and what thenar's boards take to convert a channel: 14 cycles of 125 kHz.
+_ANALOG_US, _CONVERSION_US = 2000.0, 112.0
 
 
 def analog_us(channels: int, baud: int) -> float:
     """Return how often a board sends the codes of so many channels, in microseconds: the line is free for half of the
     time at least.
     """
-    return max(_ANALOG_US, 2 * sending_us(OVERHEAD + Analog.LAYOUT.size + 2 * channels, baud))
+    return max(_ANALOG_US, 2 * _codes_us(channels, baud))
+
+
+def _codes_us(channels: int, baud: int) -> float:
+    return sending_us(OVERHEAD + Analog.LAYOUT.size + 2 * channels, baud)
+
+
+def conversions_us(scanner: ScannerWiring, channels: int) -> float:
+    """Return how long a board converts so many channels. Behind a multiplexer each first conversion is thrown away."""
+    return channels * _CONVERSION_US * (1 if scanner.mux is None else 2)
+
+
+def taxels_us(scanner: ScannerWiring, channels: int) -> float:
+    """Return how long a board takes to convert so many channels, and then to send their codes, in microseconds."""
+    return conversions_us(scanner, channels) + _codes_us(channels, scanner.baud) if channels else 0.0
 
 
 def scanner_us(scanner: ScannerWiring) -> float:

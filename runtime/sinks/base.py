@@ -2,8 +2,8 @@
 
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 
 import msgspec
 
@@ -13,6 +13,7 @@ from thenar.drivers.members import Members
 from ..names import shortened
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
+from ..task import Progress
 
 _log = logging.getLogger("thenar")
 
@@ -60,6 +61,9 @@ class Sink(ABC):
     def health(self, report: HealthReport) -> None:  # noqa: B027
         """Send on how the glove fares, once a second or so."""
 
+    def task(self, progress: Progress) -> None:  # noqa: B027
+        """Send on how far the hand has come in a task, whenever that changes."""
+
     def report(self) -> SinkReport:
         """Return how the sink itself is doing."""
         return SinkReport(type(self).__name__, None, 0, 0)
@@ -72,15 +76,15 @@ class Sink(ABC):
 class SinkPlace:
     """Where a sink is to be opened.
 
-    text     as the user wrote it: "ros:/thenar?public"
+    text     as the user wrote it: "ros:/thenar?public&rate=50"
     place    what follows the name: "/thenar"
-    options  the options that are given: {"public"}
+    options  the options that are given, and their values: {"public": "", "rate": "50"}
     wait     whether it had better wait for a slow reader than lose lines: right for a replay, wrong for a live glove
     """
 
     text: str
     place: str
-    options: frozenset[str] = frozenset()
+    options: Mapping[str, str] = field(default_factory=dict)
     wait: bool = False
 
 
@@ -103,7 +107,7 @@ class SinkKind:
         `open(where)` returns an open `Sink` at a `SinkPlace`. It raises SettingError about a place that means nothing,
         SinkError about one that cannot be opened. A package that only this sink needs is imported in here.
     options : tuple of str
-        Words that may follow the place behind a question mark.
+        Words that may follow the place behind a question mark, parted by &: "public"; "rate=HZ" takes a value.
     rank : int
         Orders the kinds.
     """
@@ -117,7 +121,7 @@ class SinkKind:
 
     @property
     def spelling(self) -> str:
-        """How `--sink` has it: "ros:/NAMESPACE[?public]"."""
+        """How `--sink` has it: "ros:/NAMESPACE[?public][?rate=HZ]"."""
         return f"{self.name}:{self.place}" + "".join(f"[?{option}]" for option in self.options)
 
 
@@ -135,14 +139,16 @@ def open_sink(where: str, *, wait: bool = False) -> Sink:
         kinds = ", ".join(kind.spelling for kind in SINKS.values())
         wrong = f"there is no kind of sink called {shortened(name)!r}" if place else "names no sink"
         raise SettingError(f"{shortened(repr(where))}: {wrong}: take one of {kinds}")
-    kind, options = SINKS[name], list[str]()
+    kind, options = SINKS[name], dict[str, str]()
     if kind.options:
         place, mark, given = place.partition("?")
-        options = given.split("&") if mark else []
-        if not set(options) <= set(kind.options):
-            known = " or ".join(f"`{option}`" for option in kind.options)
-            raise SettingError(f"{shortened(repr(where))}: behind the question mark can only be {known}")
-    return kind.open(SinkPlace(where, place, frozenset(options), wait))
+        parts = [option.partition("=") for option in given.split("&")] if mark else []
+        known = {option.partition("=")[:2] for option in kind.options}
+        if not {part[:2] for part in parts} <= known:
+            spelled = " or ".join(f"`{option}`" for option in kind.options)
+            raise SettingError(f"{shortened(repr(where))}: behind the question mark can only be {spelled}")
+        options = {option: value for option, _, value in parts}
+    return kind.open(SinkPlace(where, place, options, wait))
 
 
 class Fanout:
@@ -158,25 +164,15 @@ class Fanout:
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Publish to all sinks that work."""
-        for number, sink in enumerate(self._sinks):
-            if self._errors[number]:
-                self._lost[number] += 1
-                continue
-            try:
-                sink.publish(grasp, preshape, angles)
-            except Exception as reason:
-                self._leave_out(number, reason)
+        self._all(lambda sink: sink.publish(grasp, preshape, angles))
 
     def health(self, report: HealthReport) -> None:
         """Send on to all sinks that work how the glove fares."""
-        for number, sink in enumerate(self._sinks):
-            if self._errors[number]:
-                self._lost[number] += 1
-                continue
-            try:
-                sink.health(report)
-            except Exception as reason:
-                self._leave_out(number, reason)
+        self._all(lambda sink: sink.health(report))
+
+    def task(self, progress: Progress) -> None:
+        """Send on to all sinks that work how far the hand has come."""
+        self._all(lambda sink: sink.task(progress))
 
     def reports(self) -> tuple[SinkReport, ...]:
         """Return how every sink is doing, in their order."""
@@ -189,6 +185,16 @@ class Fanout:
                 sink.close()
             except Exception as reason:
                 self._blame(number, reason)
+
+    def _all(self, send: Callable[[Sink], None]) -> None:
+        for number, sink in enumerate(self._sinks):
+            if self._errors[number]:
+                self._lost[number] += 1
+                continue
+            try:
+                send(sink)
+            except Exception as reason:
+                self._leave_out(number, reason)
 
     def _report(self, number: int, sink: Sink) -> SinkReport:
         if not self._errors[number]:

@@ -1,49 +1,57 @@
 """ROS 2 topics without a ROS installation, through Eclipse Cyclone DDS (extra `ros`).
 
-    NAMESPACE/grasp     std_msgs/String                  every frame: the grasp type, "unknown" included
-    NAMESPACE/preshape  trajectory_msgs/JointTrajectory  when it changes, and again when somebody new listens
-    NAMESPACE/angles    sensor_msgs/JointState           every frame with angles: the glove's joints, in rad
+    NAMESPACE/grasp     std_msgs/String                  the grasp type, "unknown" and "none" included
+    NAMESPACE/segment   diagnostic_msgs/DiagnosticArray  the same with its stamp, probability, state, segment and health
+    NAMESPACE/preshape  trajectory_msgs/JointTrajectory  when it changes
+    NAMESPACE/angles    sensor_msgs/JointState           the glove's joints, in rad, where they are calibrated
     NAMESPACE/health    std_msgs/String                  once a second, if asked for: how the glove fares, as JSON
 
-Reliable, volatile, the last 10 kept: the default of ROS 2, which serves reliable and best-effort readers alike. Nodes
-of this machine can read, others where CYCLONEDDS_URI or `?public` lets them; ROS_DOMAIN_ID says which domain, as for a
-ROS 2 node.
+Grasp and segment are published when they change, and they and the angles `rate` times a second. Reliable, the last 10
+kept: that serves reliable and best-effort readers alike. Grasp, segment and preshape are transient local: whoever comes
+later has the newest at once. Nodes of this machine can read, others where CYCLONEDDS_URI or `?public` lets them;
+ROS_DOMAIN_ID says which domain, as for a ROS 2 node.
 """
 
+import re
 from collections.abc import Callable
-from functools import cache
-from typing import TYPE_CHECKING
 
 from msgspec import json
 
+from thenar.drivers.errors import SettingError
+
+from ..names import shortened
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
-if TYPE_CHECKING:
-    from ..ros.messages import PackedAngles
+RATE_HZ = 20
+_FASTEST_HZ = 1000
 
 
 class RosTopics(Sink):
     """Publishes under a namespace of ROS. What DDS refuses is counted as lost and told in the report."""
 
-    def __init__(self, name: str = "/thenar", *, public: bool = False) -> None:
-        """Publish under `name` to this machine, or to all networks that Cyclone DDS finds if `public`.
+    def __init__(self, name: str = "/thenar", *, public: bool = False, rate: int = RATE_HZ) -> None:
+        """Publish under `name` to this machine, or to all networks that Cyclone DDS finds if `public`; what does not
+        change, `rate` times a second.
 
-        Raise SettingError about a name or a domain that ROS cannot have, SinkError if DDS does not start.
+        Raise SettingError about a name, a domain or a rate that cannot be, SinkError if DDS does not start.
         """
         # Cyclone DDS, which these import, is an extra.
         from cyclonedds.core import DDSException
 
         from ..ros import domain, messages
 
+        if not 1 <= rate <= _FASTEST_HZ:
+            raise SettingError(f"ros:{name}: a rate of {rate}: it is 1 to {_FASTEST_HZ} a second")
         self._where = f"ros:{domain.namespace(name)}" + "?public" * public
-        self._messages = messages
+        self._name, self._messages, self._volatile_readers = name, messages, domain.volatile_readers
         number = domain.domain()
         try:
             self._domain, participant = domain.join(number, public=public)
-            self._grasp = domain.writer(participant, f"{name}/grasp", messages.String)
-            self._preshape = domain.writer(participant, f"{name}/preshape", messages.JointTrajectory)
+            self._grasp = domain.writer(participant, f"{name}/grasp", messages.String, kept=True)
+            self._segment = domain.writer(participant, f"{name}/segment", messages.DiagnosticArray, kept=True)
+            self._preshape = domain.writer(participant, f"{name}/preshape", messages.JointTrajectory, kept=True)
             self._angles = domain.writer(participant, f"{name}/angles", messages.JointState)
             self._health = domain.writer(participant, f"{name}/health", messages.String)
         except DDSException as reason:
@@ -57,50 +65,61 @@ class RosTopics(Sink):
                 f"ros:{name}?public lets other machines read"
             ) from None
         self._closed = False
-        self._string = cache(messages.PackedString)
-        self._state: PackedAngles | None = None
-        self._told: tuple[Preshape | None, int] = (None, 0)
+        self._period_us, self._written_us = 1_000_000 // rate, 0
+        self._shown: tuple[object, ...] = ()
+        self._told: Preshape | None = None
+        self._found, self._volatile = 0, frozenset[int]()
         self._sent = self._lost = 0
         self._error = ""
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Publish the grasp type, the preshape if it is news to somebody, and the angles."""
+        """Publish what is news to somebody, and once a period everything."""
         self._try(lambda: self._write(grasp, preshape, angles))
 
     def health(self, report: HealthReport) -> None:
         """Publish how the glove fares."""
-        self._try(lambda: self._health.write(self._messages.String(json.encode(report).decode())))
+        self._try(lambda: self._health.write(self._messages.String(json.encode(report).decode())) is None)
 
-    def _try(self, write: Callable[[], None]) -> None:
+    def _try(self, write: Callable[[], bool]) -> None:
         if self._closed:
             self._lost += 1
             return
         try:
-            write()
-            self._sent += 1
+            self._sent += write()
         except Exception as reason:  # Cyclone's Python side raises all kinds about what it cannot serialise
             self._lost += 1
             self._error = str(reason)
 
-    def _write(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        self._grasp.write(self._string(grasp.grasp))
-        if preshape is not None:
-            self._tell(preshape)
-        if angles is not None:
-            self._angles.write(self._packed(grasp.unix_us, angles))
+    def _write(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> bool:
+        """Return whether anything was published."""
+        messages = self._messages
+        shown = (grasp.grasp, messages.LEVELS[grasp.health], grasp.state, grasp.segment, grasp.segment_type)
+        # The recording of several sessions may go back in time.
+        due = not self._shown or not 0 <= grasp.time_us - self._written_us < self._period_us
+        news = due or shown != self._shown
+        if news:
+            self._grasp.write(messages.String(grasp.grasp))
+            self._segment.write(messages.segment(self._name, grasp))
+            self._shown = shown
+        if due:
+            self._written_us = grasp.time_us
+            if angles is not None:
+                self._angles.write(messages.joint_state(grasp.unix_us, angles))
+        if preshape is not None and (self._somebody_new() or preshape != self._told):
+            self._preshape.write(messages.trajectory(preshape))
+            self._told, news = preshape, True
+        return news
 
-    def _tell(self, preshape: Preshape) -> None:
-        """Publish `preshape` unless everybody who listens was told it."""
-        news = (preshape, self._preshape.get_publication_matched_status().total_count)
-        if news != self._told:
-            self._preshape.write(self._messages.trajectory(preshape))
-            self._told = news
-
-    def _packed(self, unix_us: int, angles: JointAngles) -> "PackedAngles":
-        if self._state is None or self._state.names != angles.names:
-            self._state = self._messages.PackedAngles(angles.names)
-        self._state.set(unix_us, angles)
-        return self._state
+    def _somebody_new(self) -> bool:
+        """Return whether a reader came to whom DDS does not tell the last preshape: a volatile one, as ros2_control's
+        trajectory controllers are.
+        """
+        found = self._preshape.get_publication_matched_status().total_count
+        if found == self._found:
+            return False
+        before, self._volatile = self._volatile, self._volatile_readers(self._preshape)
+        self._found = found
+        return not self._volatile <= before
 
     def report(self) -> SinkReport:
         """Return how this sink is doing; its readers are those of the grasp type."""
@@ -112,17 +131,25 @@ class RosTopics(Sink):
         if not self._closed:
             self._closed = True
             # Each goes with its last name; the domain, which ends what is left in it, goes last.
-            del self._grasp, self._preshape, self._angles, self._health
+            del self._grasp, self._segment, self._preshape, self._angles, self._health
             del self._domain
 
 
 def _open(where: SinkPlace) -> Sink:
+    rate = where.options.get("rate", str(RATE_HZ))
+    if not re.fullmatch("[0-9]{1,9}", rate):
+        raise SettingError(f"ros:{where.place}: a rate of {shortened(repr(rate))}: it is 1 to {_FASTEST_HZ} a second")
     try:
-        return RosTopics(where.place, public="public" in where.options)
+        return RosTopics(where.place, public="public" in where.options, rate=int(rate))
     except ImportError as reason:
         raise SinkError(f"ros:{where.place} needs Cyclone DDS: pip install 'thenar[ros]' ({reason})") from None
 
 
 MEMBER = SinkKind(
-    "ros", "/NAMESPACE", "topics of ROS 2 on this machine; with ?public others may read", _open, ("public",), rank=4
+    "ros",
+    "/NAMESPACE",
+    f"topics of ROS 2, {RATE_HZ} or HZ times a second and on change, on this machine; with public others may read",
+    _open,
+    ("public", "rate=HZ"),
+    rank=4,
 )

@@ -109,7 +109,7 @@ class I2cDevice(Source):
         self._scan: Interleaved | None = None
         self._groups: list[list[int]] = []
         self._early: tuple[EarlyExit, Joints, Newest[GloveFrame]] | None = None
-        self._held_up = 0
+        self._held_up = self._whole_us = 0
 
     @property
     def taxels(self) -> tuple[PortLevels, ...]:
@@ -119,6 +119,11 @@ class I2cDevice(Source):
     def end_early(self, exit_of: ExitOf, joints: Joints, glove: Newest[GloveFrame]) -> None:
         """Scan no further than until the ports not yet read cannot change the answer any more."""
         self._early = exit_of([port.targets for port in self._ports]), joints, glove
+
+    def leave_out(self, switches: Mask, joints: Mask) -> None:
+        """Score these as lost where scans end early."""
+        if self._early is not None:
+            self._early[0].left_out = switches, joints
 
     def open(self) -> None:
         """Open the bus and set up its chips."""
@@ -154,8 +159,10 @@ class I2cDevice(Source):
         closed = lost = unread = 0
         codes: list[int | None] = [None] * self._taxels
         glove: GloveFrame | None = None
+        ends = False
         if self._early is not None:
             early, joints, newest = self._early
+            ends = early.whole_us is None or now_us() - self._whole_us < early.whole_us
             # On demand, no scan ends by a record: what it leaves unread matters for none.
             glove = None if early.on_demand else newest.frame
             early.start(joints.codes(now_us(), glove))
@@ -166,9 +173,11 @@ class I2cDevice(Source):
                 closed, lost = closed | shut, lost | silent
                 if isinstance(port, PortLevels):
                     codes[port.place] = answer
-            if self._early is not None and early.after(group[0], shut, silent):
+            if ends and early.after(group[0], shut, silent):
                 unread = early.unread(group[0])
                 break
+        if not unread:
+            self._whole_us = now_us()
         taxels = tuple(codes) if any(code is not None for code in codes) else None
         return SwitchFrame(now_us(), closed, lost, unread, glove, taxels)
 

@@ -183,6 +183,14 @@ LIMITS_DEG = np.array(
     dtype=np.float64,
 )
 
+# Open hands that hold nothing, order of DOF. Flat: straight fingers, side by side. Relaxed is ours: half-way from there
+# to the position of function that hand surgery knows (MCP about 45, PIP 30 to 45, DIP 10 to 20), the little finger bent
+# most.
+RESTS_DEG = {
+    "relaxed": np.array([10, 10, 10, 15, 5, 20, 22, 8, 0, 22, 25, 9, -3, 25, 28, 10, -6, 28, 30, 11], np.float64),
+    "flat": np.zeros(20),
+}
+
 # Where spheres of skin sit along each segment, over its length; the last one of a digit makes its round tip.
 TIP_SPHERE = 0.62
 _DISTAL, _MIDDLE, _PROXIMAL = (0.20, TIP_SPHERE), (0.30, 0.80), (0.25, 0.55, 0.85)

@@ -1,5 +1,7 @@
 """From one grasp to the next: the hand leaves the posture of the trial before, opens, and closes on the object.
 
+In a scene with rests it comes from its rest, and after the release goes back the same way, in the same time.
+
 Joints follow a minimum-jerk path (Flash and Hogan 1985, J. Neurosci. 5: 1688, from point to point). On top of it all
 flexion is undone for a while, most at two thirds of the way, where the grip aperture of a reaching hand is largest
 (Jeannerod 1984, J. Motor Behav. 16: 235).
@@ -30,7 +32,10 @@ class Parameters(EffectParameters, frozen=True):
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that moves the angles of the frames before contact. Raises SceneError where there are none."""
+    """Return the step that moves the angles of the frames before contact, and after the release where the hand rests.
+
+    Raises SceneError where there are none before contact.
+    """
     if not (frame_times(setting) < 0).any():
         raise SceneError(
             "effects.hand.transition: there is no frame before contact; give the scene a recording.lead_ms of at least "
@@ -38,13 +43,16 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
         )
 
     def step(batch: Batch, draw: Draw) -> None:
-        before = batch.frame_us < 0
-        coming = before.any(axis=0)
-        way = np.clip(1.0 - batch.frame_us[:, coming] / setting.first_us, 0.0, 1.0)
-        angles = path(batch.previous_deg, batch.posture_deg, way, parameters.opening_deg)
-        felt = sensors_deg(angles)
         moved = batch.sensors_deg.copy()
-        moved[:, coming] = np.where(before[:, coming, None], felt, moved[:, coming])
+        legs = [(batch.frame_us, batch.previous_deg)]
+        if batch.rest_deg is not None:
+            legs.append((setting.released_us - batch.frame_us, batch.rest_deg))
+        for until_us, open_deg in legs:
+            away = until_us < 0
+            some = away.any(axis=0)
+            way = np.clip(1.0 - until_us[:, some] / setting.first_us, 0.0, 1.0)
+            felt = sensors_deg(path(open_deg, batch.posture_deg, way, parameters.opening_deg))
+            moved[:, some] = np.where(away[:, some, None], felt, moved[:, some])
         batch.sensors_deg = moved
 
     return step
@@ -69,7 +77,7 @@ MEMBER = Effect(
     summary="the hand comes from the grasp before",
     stage="sense",
     place=1,
-    reads=("previous_deg", "posture_deg", "frame_us", "sensors_deg"),
+    reads=("previous_deg", "rest_deg", "posture_deg", "frame_us", "sensors_deg"),
     writes=("sensors_deg",),
     timed=True,
     parameters=Parameters,

@@ -10,7 +10,7 @@ from thenar.compiler.elementary import Floats
 from ..body.condition import Condition
 from ..contact.model import Contact, Load
 from ..streams import Site
-from .ramp import Ramp
+from .ramp import NEVER, Ramp
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +46,8 @@ class Batch:
 
     repetitions (n,)      their numbers within the condition, from 0
     trials      (n,)      their places in the subject's session, from 0
-    previous_deg (n, 20)  the planned posture of the trial before, where the hand comes from
+    previous_deg (n, 20)  where the hand comes from: the planned posture of the trial before, or its rest
+    rest_deg    (n, 20)   the rest to which it goes after the release; None: it does not rest
     posture_deg (n, 20)   joint angles; first as commanded, then as settled by the contact model
     pose        (n, 6)    the object in hand axes: mm, rotation vector in radians; likewise
     commanded_deg, commanded_pose  what the contact model was told, (n, 20) and (n, 6)
@@ -73,6 +74,7 @@ class Batch:
     repetitions: Integers
     trials: Integers
     previous_deg: Floats
+    rest_deg: Floats | None = field(init=False, default=None)
     posture_deg: Floats = field(init=False)
     pose: Floats = field(init=False)
     commanded_deg: Floats = field(init=False)
@@ -103,6 +105,15 @@ class Batch:
     def site(self) -> Site:
         """Return whose draws its effects draw."""
         return self.condition.site(self.repetitions)
+
+    def holds(self, let_go_us: int | None) -> Bits:
+        """Return in which frames (n, F) the hand holds something: from first contact until the last switch has opened
+        after it let go, at let_go_us.
+        """
+        last = np.where(self.off_us == NEVER, -1, self.off_us).max(axis=1)
+        over = np.maximum(last, NEVER if let_go_us is None else let_go_us)
+        held: Bits = (self.frame_us >= 0) & (self.frame_us < over[:, None])
+        return held
 
     def load(self) -> Load:
         """Return what the batch tells its hands."""

@@ -100,6 +100,8 @@ class Setting:
                           contact is negative) to hold_us, where the row is read out, and on through release_us more
     timed, on_wire        whether any effect of the scene is
     taxels                numbers of the places that bear taxels, not switches
+    every_frame           whether every frame becomes a row
+    rest, rest_us         the posture (`RESTS_DEG`) of the rest between grasps, and how long it is; None: there is none
     """
 
     seed: int
@@ -112,6 +114,14 @@ class Setting:
     timed: bool
     on_wire: bool
     taxels: tuple[int, ...] = ()
+    every_frame: bool = False
+    rest: str | None = None
+    rest_us: int = 0
+
+    @property
+    def released_us(self) -> int:
+        """When the release is over, and the hand goes to its rest."""
+        return self.hold_us + self.release_us
 
     @property
     def let_go_us(self) -> int | None:
@@ -139,7 +149,9 @@ def frame_times(setting: Setting) -> Integers:
     """
     if not setting.timed:
         return np.array([setting.hold_us], dtype=np.int64)
-    after = setting.release_us // setting.period_us
+    # The hand goes to its rest in the time in which it comes from there.
+    away_us = 0 if setting.rest is None else setting.rest_us - setting.first_us
+    after = (setting.release_us + away_us) // setting.period_us
     return setting.hold_us + setting.period_us * np.arange(-hold_frame(setting), after + 1, dtype=np.int64)
 
 
@@ -159,10 +171,12 @@ def at_a_time(setting: Setting, repetitions: int) -> int:
 def drawn_rows(setting: Setting) -> NDArray[np.intp]:
     """Return which row of the random numbers of a repetition each frame (F,) takes.
 
-    The frame at hold_us takes the first, so that its numbers are the same whether or not there are others.
+    The frame at hold_us takes the first, so that its numbers are the same whether or not there are others; frames after
+    the release take the last, so that no other's change by a rest.
     """
-    count = len(frame_times(setting))
-    return (np.arange(count, dtype=np.intp) - hold_frame(setting)) % count
+    times, held = frame_times(setting), hold_frame(setting)
+    frames, moving = np.arange(len(times), dtype=np.intp), int((times <= setting.released_us).sum())
+    return np.where(frames < moving, (frames - held) % moving, frames)
 
 
 @dataclass(frozen=True, slots=True)

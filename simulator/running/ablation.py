@@ -18,7 +18,8 @@ def ablate(scene: Scene, jobs: int = -1, progress: Callable[[int, int], None] | 
     No scene can do without a contact model: contact.quasistatic is never removed, and takes the place of another.
     Raises SceneError if the scene cannot be simulated, EvaluationError if it has too few repetitions to cross-validate.
     """
-    scene = msgspec.structs.replace(scene, recording=msgspec.structs.replace(scene.recording, rows="last"))
+    recording = msgspec.structs.replace(scene.recording, rows="last", rest=False)
+    scene = msgspec.structs.replace(scene, recording=recording)
     variants = [None, *(each.name for each in scene.effects if each.name != DEFAULT_CONTACT)]
     times = best_us(scene, variants)
     simulated = (

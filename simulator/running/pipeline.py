@@ -18,6 +18,7 @@ from ..errors import SceneError
 from ..pipeline.batch import Batch
 from ..pipeline.effect import EFFECTS, Effect, Place, Setting, Step, Together, in_order
 from ..pipeline.glove import STEPS
+from ..pipeline.rest import resting
 from ..pipeline.taxels import STEPS as TAXEL_STEPS
 from ..scenes.scene import Scene
 from ..streams import Draw, Draws
@@ -142,6 +143,8 @@ def compile_pipeline(scene: Scene, without: str | None = None) -> Pipeline:
     setting = scene.setting(place.effect for place in listed)
     _check_taxels(listed, setting)
     own = [Place(effect, own=True) for effect in _own_steps(setting)]
+    if setting.rest is not None:
+        own.append(resting({place.effect.name: place.parameters for place in listed}, setting))
     ordered = in_order([*own, *listed])
     acts = {place.effect.name: _prepared(place, setting) for place in own}
     closing = next(place for place in listed if place.effect.model is not None)

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import Taxonomy
+from thenar.runtime.published import NONE
 
 from ..body.condition import Condition
 from ..pipeline.batch import SLID_OUT_MM, Batch, Bits
+from ..pipeline.effect import Setting, frame_times, hold_frame
 from .pipeline import Ledger
 
 
@@ -92,6 +94,8 @@ class Rows:
     condition (m,) uint32              number of the condition
     trial     (m,) uint32              place in the subject's session
     read_out  (m,) bool                the row of its repetition that is read while the object is held
+    held      (m,) bool                whether anything is
+    time_us   (m,) int64               on the subject's clock, movement after movement
     """
 
     bits: NDArray[np.uint8]
@@ -100,22 +104,25 @@ class Rows:
     condition: NDArray[np.uint32]
     trial: NDArray[np.uint32]
     read_out: Bits
+    held: Bits
+    time_us: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.bits)
 
     def pick(self, index: Places) -> "Rows":
         """Return the rows that `index` picks, in its order."""
-        picked = (self.condition[index], self.trial[index], self.read_out[index])
-        return Rows(self.bits[index], self.codes[index], self.taxels[index], *picked)
+        return Rows(*(getattr(self, field.name)[index] for field in fields(Rows)))
 
 
-def rows_of(batch: Batch, kept: Places, number: int, codes: Codes, held: int, *, every_frame: bool) -> Rows:
+def rows_of(batch: Batch, kept: Places, number: int, codes: Codes, setting: Setting) -> Rows:
     """Return the rows of the repetitions `kept` (k,) of a batch of condition `number`; codes (n, F, 16).
 
-    One row a repetition, that of frame number `held`, or one a frame.
+    One row a repetition, that of the frame that is read out, or one a frame.
     """
-    frames = np.arange(batch.bits.shape[1]) if every_frame else np.array([held])
+    held, times = hold_frame(setting), frame_times(setting)
+    frames = np.arange(len(times)) if setting.every_frame else np.array([held])
+    clock_us = batch.frame_us - times[0] + (batch.trials * len(times) * setting.period_us)[:, None]
     each = (np.repeat(kept, len(frames)), np.tile(frames, len(kept)))
     m = len(each[0])
     return Rows(
@@ -125,6 +132,8 @@ def rows_of(batch: Batch, kept: Places, number: int, codes: Codes, held: int, *,
         condition=np.full(m, number, dtype=np.uint32),
         trial=batch.trials[each[0]].astype(np.uint32),
         read_out=each[1] == held,
+        held=batch.holds(setting.let_go_us)[each],
+        time_us=clock_us[each],
     )
 
 
@@ -146,8 +155,12 @@ def grasp_set(
     joints: tuple[Joint, ...],
     taxonomy: Taxonomy,
     simulated: str,
+    *,
+    timed: bool,
 ) -> GraspSet:
     """Return the set of grasps that `rows` of these conditions make; `simulated` says what made them.
+
+    With `timed` the rows have their times; a clock never goes back, and begins at 0.
 
     Of the places of the glove, those that are no taxels are switches.
     """
@@ -159,17 +172,31 @@ def grasp_set(
         np.array(names, dtype=np.str_)[rows.condition]
         for names in zip(*((each.grasp, each.subject, each.thing.name) for each in conditions), strict=True)
     )
-    trials = rows.trial.astype(np.int64)
-    read = (bits, switches, rows.codes, joints)
+    clock_us = np.maximum(rows.time_us, 0)
+    for subject in np.unique(subjects):
+        own = subjects == subject
+        clock_us[own] = np.maximum.accumulate(clock_us[own])
     return GraspSet(
-        *(*read, grasps, taxonomy, subjects, objects, trials, simulated), taxels=rows.taxels, taxel_columns=taxels
+        bits,
+        switches,
+        rows.codes,
+        joints,
+        np.where(rows.held, grasps, NONE),
+        taxonomy,
+        subjects,
+        objects,
+        rows.trial.astype(np.int64),
+        simulated,
+        taxels=rows.taxels,
+        taxel_columns=taxels,
+        times_us=clock_us if timed else clock_us[:0],
     )
 
 
 class GraspReport(msgspec.Struct, frozen=True):
     """What came out for one grasp type. Switches are those closed at read-out, in grasps whose rows are in the set.
 
-    repetitions  all that were made                  rows        in the set
+    repetitions  all that were made                  rows        in the set, with something held
     unsettled    of them, not settled                patterns    distinct sets of closed switches
     switches_mean, switches_least, switches_most     no_contact  grasps without any closed switch
     residual_n, residual_nmm  largest force and moment on the object that nothing balances, of the settled repetitions

@@ -17,7 +17,7 @@ from ..body.cyberglove import USED, Calibration, common_joints, raw_joints
 from ..body.layout import murakami160
 from ..errors import SceneError
 from ..pipeline.batch import Batch, Integers
-from ..pipeline.effect import at_a_time, hold_frame
+from ..pipeline.effect import at_a_time
 from ..pipeline.taxels import IDEAL, Converter, taxel_places
 from ..planning.postures import Postures
 from ..scenes.scene import Scene, Subject
@@ -179,11 +179,10 @@ _pipeline = lru_cache(maxsize=1)(compile_pipeline)
 
 def _run(scene: Scene, without: str | None, keep_unsettled: bool, batches: _Batches) -> _Done:
     pipeline, done = _pipeline(scene, without), _Done()
-    every_frame, held = scene.recording.rows == "all", hold_frame(pipeline.setting)
     pipeline.run([batch for _, batch in batches], done.ledger)
     for number, batch in batches:
         kept = np.flatnonzero(batch.settled | keep_unsettled)
-        done.rows.append(rows_of(batch, kept, number, _codes(scene, batch), held, every_frame=every_frame))
+        done.rows.append(rows_of(batch, kept, number, _codes(scene, batch), pipeline.setting))
         done.notes.append(notes_of(batch))
     return done
 
@@ -217,7 +216,8 @@ def _set_of(scene: Scene, plan: Sequence[Session], rows: Rows, taxels: tuple[Joi
     conditions = [condition for session in plan for condition in session.conditions]
     places = tuple(patch.name for patch in murakami160())
     joints = raw_joints() if scene.glove.codes == "raw" else common_joints()
-    return grasp_set(rows, conditions, places, taxels, joints, published(scene.taxonomy), scene.origin)
+    timed = scene.recording.rows == "all"
+    return grasp_set(rows, conditions, places, taxels, joints, published(scene.taxonomy), scene.origin, timed=timed)
 
 
 def _report(scene: Scene, rows: Rows, found: GraspSet, made: _Done, seconds: float, *, keep_unsettled: bool) -> Report:

@@ -32,6 +32,7 @@ HAND_BREADTHS_MM = (55.0, 115.0)
 # An object that is broader than this wherever it is held fits no hand; whether a smaller one fits is planned.
 SPAN_MM = 200.0
 
+Rest = Literal["relaxed", "flat"]
 _Milliseconds = Annotated[float, msgspec.Meta(ge=0.0, le=60_000.0)]
 
 
@@ -67,6 +68,8 @@ class SceneObject(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 class Recording(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How a grasp is recorded: frames at `rate_hz`, from `lead_ms` before contact through `hold_ms` of holding and
     `release_ms` more. A row of the set is the frame at the end of holding ("last"), or every frame ("all").
+
+    With `rest` (True: "relaxed"), the hand opens after each release and rests for `rest_ms`.
     """
 
     rate_hz: Annotated[float, msgspec.Meta(ge=1.0, le=10_000.0)] = 100.0
@@ -74,6 +77,8 @@ class Recording(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     hold_ms: Annotated[float, msgspec.Meta(ge=1.0, le=60_000.0)] = 500.0
     release_ms: _Milliseconds = 0.0
     rows: Literal["last", "all"] = "last"
+    rest: bool | Rest = False
+    rest_ms: _Milliseconds = 500.0
 
 
 class Glove(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -127,8 +132,9 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         seed: int | None = None,
         subjects: Sequence[str] = (),
         more: int | None = None,
+        rest: Rest | None = None,
     ) -> "Scene":
-        """Return the scene with other repetitions, another seed, or only the `subjects` of these names.
+        """Return the scene with other repetitions, another seed, only the `subjects` of these names, or such a `rest`.
 
         With `more`, it makes so many fresh repetitions instead, by the same hands: those that follow its own. Another
         seed draws everything anew but the sizes of the hands. Raises SceneError if it has no such subject.
@@ -144,6 +150,7 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             done=self.done if more is None else self.done + own,
             seed=self.seed if seed is None else seed,
             subjects=tuple(known[name] for name in known if not subjects or name in subjects),
+            recording=msgspec.structs.replace(self.recording, rest=rest or self.recording.rest),
         )
 
     def setting(self, effects: Iterable[Effect]) -> Setting:
@@ -161,6 +168,9 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             timed=recording.rows == "all" or any(effect.timed for effect in effects),
             on_wire=any(effect.on_wire for effect in effects),
             taxels=taxel_places(self.glove.taxels),
+            every_frame=recording.rows == "all",
+            rest=("relaxed" if recording.rest is True else recording.rest) or None,
+            rest_us=round(recording.rest_ms * 1000),
         )
 
     @property

@@ -69,6 +69,7 @@ def test_a_build_says_what_it_obeys_and_its_report_how_to_make_it_again(
     options = manifest_from_bytes((build / "build.json").read_bytes()).options
     assert (options.never, options.keep_these, options.at_most_taxels) == (("s2",), ("s5", "s0"), 4)
     assert options.robust
+    assert "--budget-us limits the scan of switches and taxels alone" in done.stderr
     assert {"s5", "s0"} <= {each.name for each in manifest_from_bytes((build / "build.json").read_bytes()).switches}
     page = html.unescape((build / "report.html").read_text())
     line = next(each for each in re.findall(r"thenar compile SET.grasps -o build/ .*", page) if "--prune" in each)

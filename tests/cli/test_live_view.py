@@ -61,12 +61,18 @@ def picture(grasp: LiveGrasp, devices: Sequence[DeviceHealth] = (), lines: Seque
     return [" ".join(line.split()) for line in console.export_text().splitlines()]
 
 
+def test_the_picture_says_which_segment_it_is_and_since_when() -> None:
+    held = replace(grasp("Tripod"), time_us=3_000_000, state="held", segment=7, segment_type="Tripod")
+    assert "segment 7, Tripod: held, 1.5 s" in picture(replace(held, segment_us=1_500_000))
+
+
 def test_the_picture_says_what_is_held_how_sure_that_is_and_how_every_device_fares() -> None:
     devices = DeviceHealth("glove", False, "no such port"), DeviceHealth("bus 1", True, "")
     assert picture(grasp("Tripod"), devices, ("120 frames", "drifting: none")) == [
         "grasp Tripod",
         "█" * 27 + "░" * 3 + " 90.0%",
         "this frame Tripod, ahead by 12 steps",
+        "segment none, 0 so far",
         "health ok",
         "age switches 0.9 ms, glove none yet",
         "frame 0",

@@ -1,6 +1,7 @@
 """Small sets of grasps that can be learnt, with switches and joints."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -47,3 +48,22 @@ def make_set() -> Callable[..., GraspSet]:
 @pytest.fixture(scope="session")
 def grasp_set() -> GraspSet:
     return _make_set()
+
+
+def _with_none(grasp_set: GraspSet) -> GraspSet:
+    """Return the rows with others among them in which nothing is held, of the same trials and with other readings."""
+    rows = np.sort(np.concatenate([np.arange(len(grasp_set)), np.arange(0, len(grasp_set), 3)]))
+    more, nothing = grasp_set.rows(rows), np.diff(rows, prepend=-1) == 0
+    return replace(
+        more,
+        switches=more.switches & ~nothing[:, np.newaxis],
+        codes=np.where(nothing[:, np.newaxis], 1, more.codes).astype(np.uint16),
+        grasps=np.where(nothing, "none", more.grasps),
+        times_us=10_000 * np.arange(len(rows)),
+    )
+
+
+@pytest.fixture(scope="session")
+def with_none() -> Callable[[GraspSet], GraspSet]:
+    """Return what adds rows in which nothing is held."""
+    return _with_none

@@ -17,6 +17,8 @@ from thenar.runtime.manifest import (
     manifest_from_bytes,
     manifest_to_bytes,
 )
+from thenar.runtime.published import NONE
+from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -219,3 +221,20 @@ def test_json_that_is_deep_or_long_is_refused(part: bytes) -> None:
         manifest_from_bytes(b'{"schema": ' + part)
     with pytest.raises(BuildError, match=r"build\.json is not a build's"):
         manifest_from_bytes(b'{"schema": 1, "checksum": ' + part)
+
+
+def test_costs_of_segments_are_read_again_and_are_of_the_tables_classes(manifest: Manifest) -> None:
+    n_types, scale = len(manifest.grasps), manifest.proof.scale
+    usual = SegmentModel.usual(n_types, False, scale)
+    assert manifest.segmenting == usual
+    learnt = replace(usual, least=(3,) * n_types + (2,))
+    read = manifest_from_bytes(manifest_to_bytes(replace(manifest, segments=learnt)))
+    assert read.segments == read.segmenting == learnt
+    detecting = replace(manifest, grasps=(*manifest.grasps[:-1], NONE))
+    assert detecting.segmenting == SegmentModel.usual(n_types - 1, True, scale)
+    for wrong in (replace(manifest, segments=detecting.segmenting), replace(detecting, segments=learnt)):
+        with pytest.raises(BuildError, match="has costs of segments of other classes than its tables"):
+            manifest_from_bytes(manifest_to_bytes(wrong))
+    beyond = manifest_to_bytes(replace(manifest, segments=learnt)).replace(b'"most": 48', b'"most": 255')
+    with pytest.raises(BuildError, match="most"):
+        manifest_from_bytes(beyond)

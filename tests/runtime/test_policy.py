@@ -21,6 +21,8 @@ from thenar.runtime.policy import Policy
         ({"error_rate": 1e-320}, "between 0 and 1, from 1e-100 on"),
         ({"error_rate": 1.0}, "between 0 and 1"),
         ({"spacing_us": -1}, "-1 us apart"),
+        ({"lag_us": -1}, "a lag of -1 us: it is 0 to 10000000"),
+        ({"lag_us": 10_000_001}, "it is 0 to 10000000"),
     ],
 )
 def test_what_makes_no_sense_is_refused(values: dict[str, Any], reason: str) -> None:
@@ -30,7 +32,9 @@ def test_what_makes_no_sense_is_refused(values: dict[str, Any], reason: str) -> 
 
 def test_the_ends_of_the_ranges_are_allowed() -> None:
     Policy(lead=0, dwell_us=0, hold_us=0, max_lost=0.0)
-    Policy(dwell_us=7, hold_us=7, max_lost=1.0, error_rate=0.5)
+    Policy(dwell_us=7, hold_us=7, max_lost=1.0, error_rate=0.5, lag_us=0)
+    Policy(lag_us=10_000_000)
+    Policy(lag_us=None)
 
 
 @pytest.mark.parametrize(("lead", "scale", "steps"), [(0.0, 300.0, 0), (0.5, 300.0, 150), (0.5, 301.0, 151)])

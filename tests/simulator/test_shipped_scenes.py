@@ -27,6 +27,7 @@ IN_TIME = {"hand.transition", "contact.ramp", "frame.jitter", "bus.latency"}
 ONSET = {*PADS, "contact.ramp", "frame.at_force"}
 ADDED = {"quick": set(), "faulty-glove": FAULTS, "continuous": IN_TIME, "kamakura-analog": PADS}
 ADDED["initial-contact"] = ONSET
+ADDED |= {"continuous-def": IN_TIME, "continuous-rest": IN_TIME}
 
 
 def effects(scene: Scene) -> dict[str, EffectParameters]:
@@ -40,6 +41,8 @@ def sizes(scene: Scene) -> dict[str, tuple[float, float]]:
 def test_these_scenes_are_shipped() -> None:
     assert list(shipped()) == [
         "continuous",
+        "continuous-def",
+        "continuous-rest",
         "crowd",
         "cutkosky",
         "cutkosky-def",
@@ -106,6 +109,15 @@ def test_the_continuous_scene_keeps_every_frame_of_the_movement() -> None:
     assert (recording.rows, recording.rate_hz) == ("all", 100.0)
     assert recording.lead_ms > 0.0
     assert recording.release_ms > 0.0
+    assert not recording.rest
+
+
+def test_the_other_continuous_scenes_differ_in_people_or_in_rests_alone() -> None:
+    scene, check, rested = (load_scene(f"continuous{each}") for each in ("", "-def", "-rest"))
+    assert sizes(check) == {subject: MEN[subject] for subject in "DEF"}
+    assert replace(check, name=scene.name, seed=scene.seed, subjects=scene.subjects) == scene
+    recording = replace(scene.recording, rest=True, rest_ms=500.0)
+    assert rested == replace(scene, name="continuous-rest", recording=recording)
 
 
 def test_the_crowd_is_200_hands_of_both_sexes() -> None:

@@ -22,10 +22,9 @@ from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring
 from thenar.runtime.scanning.decided import Decided
 from thenar.runtime.scanning.plan import Costs, plan_scan
 from thenar.runtime.scanning.scanmap import ScanMap
-from thenar.runtime.scanning.timing import analog_us, glove_us, reading_of, scanner_us
+from thenar.runtime.scanning.timing import analog_us, conversions_us, glove_us, reading_of, scanner_us
 from thenar.runtime.tables import IntegerTables
 
-from ...firmware.board_inputs import CONVERSION_CYCLES, prescaler_of
 from ...firmware.targets import TARGETS
 from ..points import How, Time
 from .wirings import Wiring
@@ -190,9 +189,9 @@ def scan_times(
     harness = wiring.harness_of(names)
     rows = np.linspace(0, len(bits) - 1, min(_ORDERING, len(bits))).astype(np.intp)
     scan = plan_scan(names, tables, harness, bits[rows], codes[rows])
-    wanted = zip(harness.scanners, scan.scanners, scan.taxels or ((),) * len(harness.scanners), strict=True)
-    boards = [(board, {channel for channel, *_ in levels}) for board, keys, levels in wanted if keys or levels]
-    board_us = max((_board_us(board, len(channels)) for board, channels in boards), default=0.0)
+    wanted = zip(harness.scanners, scan.scanners, scan.board_channels, strict=True)
+    boards = [(board, channels) for board, keys, channels in wanted if keys or channels]
+    board_us = max((_board_us(*board) for board in boards), default=0.0)
     ports = [port.elements for port in scan.ports]
     known = Decided(tables, ports, bits, codes)
     full_us, early_us, early_ports = _bus_us(scan, harness, known, beside) if ports else (0.0, 0.0, 0.0)
@@ -217,16 +216,13 @@ def scan_times(
 
 def _board_us(board: ScannerWiring, channels: int) -> float:
     """Return what a board takes that is asked for so many of its taxels: their codes come in frames of their own, as
-    soon as all are converted. Behind a multiplexer each first conversion is thrown away.
+    soon as all are converted.
     """
     own = board_beside()
     keys_us = own.scan_us + own.key_us * len(board.switches) + scanner_us(board)
     if not channels:
         return keys_us
-    clock_hz = TARGETS[_BOARD].clock_hz
-    assert clock_hz is not None
-    conversion_us = (CONVERSION_CYCLES + 1) * (1 << prescaler_of(clock_hz)) * 1e6 / clock_hz
-    return max(keys_us, analog_us(channels, board.baud), channels * conversion_us * (1 if board.mux is None else 2))
+    return max(keys_us, analog_us(channels, board.baud), conversions_us(board, channels))
 
 
 def _bus_us(scan: ScanMap, harness: Harness, frames: Decided, beside: Beside) -> tuple[float, float, float]:

@@ -148,6 +148,16 @@ def test_the_same_set_and_options_give_the_same_result_on_any_number_of_workers(
     assert msgspec.json.encode(again) == msgspec.json.encode(study)
 
 
+def test_rows_in_which_nothing_is_held_change_no_table(
+    make_grasps: Make, with_none: Callable[[GraspSet], GraspSet]
+) -> None:
+    quick = replace(QUICK, rounds=2, repeats=1, folds=2, learning=True, permute=2, tables=("compositions", "trainers"))
+    grasps = make_grasps(noise=0.2, per_type=8)
+    without, among = (evaluate(found, quick, jobs=1) for found in (grasps, with_none(grasps)))
+    assert among.fingerprint == with_none(grasps).fingerprint() != without.fingerprint
+    assert replace(among, fingerprint=without.fingerprint) == without
+
+
 def test_choosing_from_test_rows_flatters_where_there_is_nothing_to_learn(make_grasps: Make) -> None:
     # Coin flips say nothing about the grasp: a nested rate is about 1 in 4, and the paper's protocol is above it.
     grasps = make_grasps(n_switches=200, n_joints=0, subjects="A", noise=0.5, per_type=10)

@@ -76,6 +76,15 @@ def test_a_frame_is_reading_on_lines_of_their_own_and_classifying(first: tuple[R
             assert point.frame.us == pytest.approx(max(point.scan.us, point.transfer.us) + point.classify.us)
 
 
+def test_rows_in_which_nothing_is_held_change_no_rate(
+    tmp_path: Path, first: tuple[Request, Frontier], with_none: Callable[[GraspSet], GraspSet]
+) -> None:
+    more = with_none(first[0]["grasp_set"])
+    found = found_of(first[0] | {"grasp_set": more, "output": tmp_path / "out"})
+    assert found.fingerprint == more.fingerprint()
+    assert [(one.way, one.rate) for one in found.tried] == [(one.way, one.rate) for one in first[1].tried]
+
+
 def test_points_are_numbered_from_the_fastest_frame_on(first: tuple[Request, Frontier]) -> None:
     points = first[1].points
     assert [point.number for point in points] == list(range(1, len(points) + 1))

@@ -1,5 +1,6 @@
 """Which rows make a movement, and while which of them its grasp is complete."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -131,3 +132,16 @@ def test_another_object_or_trial_begins_another_movement() -> None:
     switches, codes = np.zeros((6, 1)), np.zeros((6, 1))
     trials, objects = [0, 0, 1, 1, 1, 1], ["a", "a", "a", "a", "b", "b"]
     assert movement_numbers(set_of(switches, codes, [0] * 6, trials, objects)).tolist() == [0, 0, 1, 1, 2, 2]
+
+
+def test_rows_in_which_nothing_is_held_belong_to_their_movement_and_say_while_when_it_is_complete() -> None:
+    whole = recorded(3)
+    frame = np.arange(len(whole)) % 100
+    grasps = np.where((frame >= 42) & (frame < 77) & (frame != 50), whole.grasps, "none")
+    grasps[500:] = "none"
+    found = movements_of(replace(whole, grasps=grasps))
+    assert found.first.tolist() == [0, 100, 200, 300, 400]
+    assert found.beyond.tolist() == [100, 200, 300, 400, 500]
+    assert (found.complete - found.first).tolist() == [42] * 5
+    assert (found.released - found.first).tolist() == [77] * 5
+    assert holds_movements(replace(whole, grasps=grasps))

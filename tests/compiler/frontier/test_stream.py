@@ -1,6 +1,7 @@
 """Streams of recorded movements, streams composed of single trials, and which of them a set gets."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -136,6 +137,26 @@ def test_rows_are_a_period_apart_and_movements_out_of_step_with_it() -> None:
     assert ((steps[:-1, -1] > 8_000) & (steps[:-1, -1] < 16_000)).all()
     phases = np.sort(stream.at_us[:-1:FRAMES] % 8_000)
     assert np.diff(phases).max() < 800
+
+
+def test_rows_with_times_come_when_they_were_recorded_and_a_gap_between_movements_is_no_time() -> None:
+    grasp_set = whole_movements([0, 1, 2])
+    random, rows = np.random.default_rng(1), np.arange(len(grasp_set))
+    times_us = 6_000 * rows + random.integers(0, 900, len(rows)) + 10_000_000 * (rows // FRAMES)
+    none = (rows % FRAMES < 9) | (rows % FRAMES >= 32)
+    timed = replace(grasp_set, times_us=times_us, grasps=np.where(none, "none", grasp_set.grasps))
+    stream = recorded_stream(timed, np.where(none, -1, grasp_set.labels), period_us=8_000)
+    check(stream)
+    steps = np.diff(stream.at_us[:-1]).tolist()
+    for movement in range(3):
+        own = slice(FRAMES * movement, FRAMES * (movement + 1))
+        assert steps[own][: FRAMES - 1] == np.diff(times_us[own]).tolist()
+    assert set(steps[FRAMES - 1 :: FRAMES]) == {8_000 + round(0.618034 * 8_000)}
+    # The labels say while when a grasp is complete, whatever the switches do.
+    assert (stream.arrivals % FRAMES).tolist() == [9] * 3
+    assert (stream.ends % FRAMES).tolist() == [32] * 3
+    assert stream.types[stream.arrivals].tolist() == [0, 1, 2]
+    assert "frames when they were recorded" in stream.what
 
 
 def test_of_many_movements_some_are_taken_from_all_over_the_set() -> None:

@@ -1,5 +1,6 @@
 """Limits: every method obeys them, contradictions are refused, and the bound on the best subset holds under them."""
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -14,8 +15,10 @@ from thenar.compiler.placement.joints import kept_joints
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.placement.optimum import Pairs, best_subset
 from thenar.compiler.placement.placement import choose
-from thenar.compiler.placement.ports import PortCosts
-from thenar.compiler.samples import Samples
+from thenar.compiler.placement.ports import PortCosts, record_times_us
+from thenar.compiler.samples import Columns, Samples
+from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
+from thenar.runtime.harness.wiring import GloveWiring
 
 # Three switches, then two taxels of three and two levels.
 NAMES = ("a", "b", "c", "p", "q")
@@ -161,3 +164,38 @@ def test_joints_are_kept_and_left_out_by_name_as_switches_are() -> None:
     with pytest.raises(PlacementError, match="--keep-these names a, and --inputs leaves that out"):
         Limits(**own, keep=("a",)).on((), None)  # type: ignore[arg-type]
     limits.on((), None)
+
+
+@pytest.mark.parametrize("mask", [True, False])
+@pytest.mark.parametrize("budget_us", [300.0, 900.0, 1290.0, 1500.0, 7000.0])
+def test_no_more_joints_are_kept_than_a_record_within_the_budget_has(budget_us: float, mask: bool) -> None:
+    """A record is 3 bytes and one a sensor, at 86.8 us, and 250 us to digitise each: of all sets, the largest fit."""
+    joints = SENSORS_18[:4]
+    glove = GloveWiring(port="p", mask=mask)
+    times = record_times_us(joints, glove)
+
+    def fits(kept: Columns) -> bool:
+        sensors = len(kept) if mask else 18
+        return not kept or (sensors + 3) * 10 / 0.1152 + sensors * 250 <= budget_us
+
+    random = np.random.default_rng(7)
+    labels = np.arange(60) % 3
+    codes = (labels[:, None] * 40 + random.integers(0, 60, (60, 4))).astype(np.uint16)
+    samples = Samples(np.zeros((60, 0), bool), codes, labels, ("x", "y", "z"))
+    limits = Limits(names=(), n_switches=0, joints=joints, budget_us=budget_us, records_us=times)
+    limits.on((), None)
+    kept = kept_joints(samples, None, limits)
+    allowed = [subset for size in range(5) for subset in combinations(range(4), size) if fits(subset)]
+    assert kept in allowed
+    assert len(kept) == max(map(len, allowed))
+    assert len(kept_joints(samples, 2, limits)) == min(2, len(kept))
+    if len(kept) < 3:
+        with pytest.raises(PlacementError, match=r"--keep-these names 3 joints, whose record takes \d+\.\d us"):
+            kept_joints(samples, None, replace(limits, keep=joints[:3]))
+
+
+def test_records_are_known_of_a_cyberglove_however_its_joints_are_called() -> None:
+    named = tuple(f"g{sensor}" for sensor in range(18))
+    assert record_times_us(named[:2]) == record_times_us(()) == ()
+    assert record_times_us(named[:2], GloveWiring(port="p", joints=named)) == record_times_us(SENSORS_18[:2])
+    assert record_times_us(SENSORS_22[:1], GloveWiring(port="p", record_us=9e3, sensors=22))[0] > 400

@@ -36,7 +36,13 @@ def remaining(codes: list[int], labels: list[int], threshold: int) -> float:
     return sum(len(side) * entropy(side) for side in sides if side)
 
 
-ROWS = st.lists(st.tuples(st.sampled_from([0, 1, 2, 7, 8, 300, 65535]), st.integers(0, 2)), min_size=1, max_size=14)
+# Of so few rows of each type nobody knows the noise at rest.
+CODES = st.lists(st.sampled_from([0, 1, 2, 7, 8, 300, 65535]), max_size=7)
+ROWS = (
+    st.tuples(CODES, CODES, CODES)
+    .map(lambda own: [(code, label) for label in range(3) for code in own[label]])
+    .filter(bool)
+)
 
 
 @given(ROWS)
@@ -70,6 +76,33 @@ def test_of_exact_ties_the_lowest_is_taken_where_floating_point_sees_none() -> N
     codes, labels = [0, 10, 20, 30], [0, 1, 1, 0]
     assert levels_of(codes, labels, 1) == (5,)
     assert levels_of(codes, labels, 9) == (5, 25)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1), rest=st.integers(0, 60), noise=st.floats(3.0, 12.0), pressed=st.integers(900, 3000)
+)
+def test_no_level_lies_in_the_noise_of_rest_on_whichever_side_that_is(
+    seed: int, rest: int, noise: float, pressed: int
+) -> None:
+    """Type 0 rests, type 1 presses in a third of its rows, type 2 in all; noise is cut off at 0."""
+    random = np.random.default_rng(seed)
+    labels = np.repeat(np.arange(3), 60)
+    share = random.random(180) < np.array([0.0, 1 / 3, 1.0])[labels]
+    quiet = np.clip(np.rint(random.normal(rest, noise, 180)), 0, None)
+    codes = np.where(share, np.rint(random.uniform(pressed, 4000, 180)), quiet).astype(int)
+    quiet = quiet.astype(int)
+    found = levels_of(codes.tolist(), labels.tolist(), 7)
+    assert quiet[~share].mean() + 1.5 * noise < found[0]
+    assert found[-1] < codes.max()
+    falling = levels_of((4095 - codes).tolist(), labels.tolist(), 7)
+    assert max(falling) < 4095 - quiet[~share].mean() - 1.5 * noise
+
+
+def test_a_taxel_of_which_nobody_knows_whether_it_rests_keeps_all_levels() -> None:
+    random = np.random.default_rng(5)
+    codes = np.rint(random.uniform(100, 4000, 300)).astype(int).tolist()
+    lowest, second, *_ = sorted(set(codes))
+    assert min(levels_of(codes, [row % 3 for row in range(300)], 65535)) == (lowest + second) // 2
 
 
 def test_thresholds_of_the_training_rows_make_switches_of_all_rows() -> None:

@@ -2,6 +2,7 @@
 
 import doctest
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 from thenar.compiler import GraspSet, grow_id3
 from thenar.compiler.placement import selectors
 from thenar.compiler.placement.placement import place
+from thenar.compiler.placement.population import place_for_crowd
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.placement.selectors import ID3Selector, SwitchSelector
 from thenar.drivers.members import MemberError
@@ -45,6 +47,19 @@ def test_a_selector_keeps_what_thenar_place_keeps(make_set: Make, name: str) -> 
     placement = place(grasps, 6 if name == "id3" else 4, method=name)
     assert selector.order_.tolist() == [kept.number for kept in placement.switches]
     assert selector.get_support(indices=True).tolist() == sorted(selector.order_)
+
+
+def test_rows_in_which_nothing_is_held_place_no_switch(
+    make_set: Make, with_none: Callable[[GraspSet], GraspSet]
+) -> None:
+    grasps = make_set(subjects=8, types=2)
+    more = with_none(grasps)
+    for found, other in (
+        (place(grasps, 4.0, exact=True, keep_joints=1), place(more, 4.0, exact=True, keep_joints=1)),
+        (place_for_crowd(grasps, 2, jobs=1), place_for_crowd(more, 2, jobs=1)),
+    ):
+        assert other.fingerprint == more.fingerprint()
+        assert replace(other, fingerprint=found.fingerprint) == found
 
 
 def test_id3_keeps_its_tree_and_what_each_switch_brought(data: tuple[Any, Any]) -> None:

@@ -4,6 +4,7 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.runtime.errors import McapError
+from thenar.runtime.policy import Policy
 from thenar.runtime.recording.session import Session, from_metadata, to_metadata
 
 PLAN = (
@@ -34,6 +35,14 @@ def test_what_has_a_default_may_be_missing(session: Session) -> None:
     texts = to_metadata(replace(session, build="", harness="", calibration=None, collection=None, clock_ns=0))
     needed = {key: texts[key] for key in ("version", "thenar", "switches", "sensors")}
     assert from_metadata(needed) == from_metadata(texts)
+
+
+def test_a_session_of_before_there_were_segments_is_one_without(session: Session) -> None:
+    texts = to_metadata(replace(session, policy=Policy(lead=0.25)))
+    assert from_metadata(texts).policy == Policy(lead=0.25, lag_us=150_000)
+    older = json.loads(texts["policy"])
+    del older["lag_us"]
+    assert from_metadata({**texts, "policy": json.dumps(older)}).policy == Policy(lead=0.25, lag_us=None)
 
 
 @pytest.mark.parametrize(

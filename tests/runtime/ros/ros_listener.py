@@ -1,6 +1,7 @@
 """A process that listens to ROS 2 topics, and knows their types from ROS's .msg files, not from thenar.
 
-Run as `python ros_listener.py NAMESPACE RELIABILITY DOMAIN`: one JSON line a sample, and one a writer that is found.
+Run as `python ros_listener.py NAMESPACE KIND DOMAIN`: one JSON line a sample, and one a writer that is found. Of KIND
+"kept" it asks for what was published before it came.
 """
 
 import json
@@ -12,7 +13,7 @@ from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
 from cyclonedds.core import ReadCondition, WaitSet
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import float64, int32, uint32
+from cyclonedds.idl.types import byte, float64, int32, uint32
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 else:
     from cyclonedds.idl.types import sequence
 
+KEPT = ("grasp", "segment", "preshape")
 ANY = 0xFFFFFFFF  # samples, views and instances of all states
 
 
@@ -73,8 +75,30 @@ class TrajectoryMsgsJointTrajectory(IdlStruct, typename="trajectory_msgs::msg::d
     points: sequence[TrajectoryMsgsJointTrajectoryPoint]
 
 
+@dataclass
+class DiagnosticMsgsKeyValue(IdlStruct, typename="diagnostic_msgs::msg::dds_::KeyValue_"):
+    key: str
+    value: str
+
+
+@dataclass
+class DiagnosticMsgsDiagnosticStatus(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticStatus_"):
+    level: byte
+    name: str
+    message: str
+    hardware_id: str
+    values: sequence[DiagnosticMsgsKeyValue]
+
+
+@dataclass
+class DiagnosticMsgsDiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticArray_"):
+    header: StdMsgsHeader
+    status: sequence[DiagnosticMsgsDiagnosticStatus]
+
+
 TYPES: dict[str, Any] = {
     "grasp": StdMsgsString,
+    "segment": DiagnosticMsgsDiagnosticArray,
     "preshape": TrajectoryMsgsJointTrajectory,
     "angles": SensorMsgsJointState,
     "health": StdMsgsString,
@@ -101,11 +125,11 @@ def say_writer(found: Any) -> None:
     )
 
 
-def main(namespace: str, reliability: str, domain: int) -> None:
+def main(namespace: str, kind: str, domain: int) -> None:
     participant = DomainParticipant(domain)
     reliable = Policy.Reliability.Reliable(max_blocking_time=0)
     qos = Qos(
-        reliable if reliability == "reliable" else Policy.Reliability.BestEffort,
+        Policy.Reliability.BestEffort if kind == "best effort" else reliable,
         Policy.Durability.Volatile,
         Policy.History.KeepLast(100),
         Policy.DataRepresentation(
@@ -113,9 +137,11 @@ def main(namespace: str, reliability: str, domain: int) -> None:
         ),  # all that ROS 2 reads
     )
     writers: Any = BuiltinDataReader(participant, BuiltinTopicDcpsPublication)
+    later = Qos(*(one for one in qos if one != Policy.Durability.Volatile), Policy.Durability.TransientLocal)
+    asked = {name: later if kind == "kept" and name in KEPT else qos for name in TYPES}
     readers: dict[str, Any] = {
-        name: DataReader(participant, Topic(participant, f"rt{namespace}/{name}", kind), qos=qos)
-        for name, kind in TYPES.items()
+        name: DataReader(participant, Topic(participant, f"rt{namespace}/{name}", type_), qos=asked[name])
+        for name, type_ in TYPES.items()
     }
     waiting = WaitSet(participant)
     for reader in (writers, *readers.values()):

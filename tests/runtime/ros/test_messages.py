@@ -6,7 +6,7 @@ The layout is CDR (OMG, plain XCDR1, little-endian), the hashes are REP-2011's: 
 import hashlib
 import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -14,10 +14,13 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from thenar.runtime.preshape import Preshape
+from thenar.runtime.published import Health, LiveGrasp
 
-# As they stand in builtin_interfaces, std_msgs, sensor_msgs and trajectory_msgs, without their comments.
+# As they stand in builtin_interfaces, std_msgs, sensor_msgs, trajectory_msgs and diagnostic_msgs, without comments and
+# constants, which are no part of a type's description.
 MSG = {
     "builtin_interfaces/msg/Time": "int32 sec\nuint32 nanosec",
     "builtin_interfaces/msg/Duration": "int32 sec\nuint32 nanosec",
@@ -33,10 +36,20 @@ MSG = {
     "trajectory_msgs/msg/JointTrajectory": (
         "std_msgs/Header header\nstring[] joint_names\ntrajectory_msgs/JointTrajectoryPoint[] points"
     ),
+    "diagnostic_msgs/msg/KeyValue": "string key\nstring value",
+    "diagnostic_msgs/msg/DiagnosticStatus": (
+        "byte level\nstring name\nstring message\nstring hardware_id\ndiagnostic_msgs/KeyValue[] values"
+    ),
+    "diagnostic_msgs/msg/DiagnosticArray": "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status",
 }
-PUBLISHED = ("std_msgs/msg/String", "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory")
+PUBLISHED = (
+    "std_msgs/msg/String",
+    "sensor_msgs/msg/JointState",
+    "trajectory_msgs/msg/JointTrajectory",
+    "diagnostic_msgs/msg/DiagnosticArray",
+)
 # type_description_interfaces/msg/FieldType: 48 more is an array, 144 more an unbounded sequence.
-FIELD_TYPES = {"int32": 6, "uint32": 7, "float64": 11, "string": 17}
+FIELD_TYPES = {"int32": 6, "uint32": 7, "float64": 11, "byte": 16, "string": 17}
 NESTED, SEQUENCE = 1, 144
 
 strings = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)
@@ -131,6 +144,9 @@ def test_a_types_hash_is_that_of_its_description(ros: ModuleType, name: str) -> 
             "trajectory_msgs/msg/JointTrajectoryPoint",
             "de8907036d8bd45aac6f30cc9044a3d4a329c42cbf719aff7d95a584cfa532d7",
         ),
+        ("diagnostic_msgs/msg/KeyValue", "d68081eaa540288c5440753baecef0c4e16e81a5f78ad68902ded5100413bb42"),
+        ("diagnostic_msgs/msg/DiagnosticStatus", "b0e3e692ea2d54a8af2f4ef1930e81556a2db55216b771f8a7d2724ed47bf0e4"),
+        ("diagnostic_msgs/msg/DiagnosticArray", "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"),
     ],
 )
 def test_the_way_hashes_are_worked_out_here_is_that_of_ross_own_packages(name: str, known: str) -> None:
@@ -191,26 +207,26 @@ def test_a_trajectory_has_ross_layout(
     assert written(message) == cdr.message()
 
 
-@given(st.lists(strings, max_size=6), st.integers(0, 2**31 * 10**6 - 1), st.data())
-def test_angles_that_are_packed_are_the_joint_state_that_cyclone_writes(
-    ros: ModuleType, names: list[str], unix_us: int, data: st.DataObject
+statuses = st.tuples(st.integers(0, 255), strings, strings, strings, st.lists(st.tuples(strings, strings), max_size=3))
+
+
+@given(int32s, uint32s, strings, st.lists(statuses, max_size=3))
+def test_a_diagnostic_array_has_ross_layout(
+    ros: ModuleType, sec: int, nanosec: int, frame: str, found: list[tuple[int, str, str, str, list[tuple[str, str]]]]
 ) -> None:
-    from thenar.runtime.ros.messages import PackedAngles
-    from thenar.runtime.sinks import JointAngles
-
-    packed = PackedAngles(tuple(names))
-    for _ in range(2):
-        positions = data.draw(st.tuples(*[st.floats(allow_nan=False)] * len(names)))
-        packed.set(unix_us, JointAngles(tuple(names), positions))
-        stamp = ros.Time(unix_us // 10**6, unix_us % 10**6 * 1000)
-        assert packed.serialize() == written(ros.JointState(ros.Header(stamp, ""), names, list(positions), [], []))
-
-
-@given(text=strings)
-def test_a_string_that_is_packed_is_the_one_that_cyclone_writes(ros: ModuleType, text: str) -> None:
-    from thenar.runtime.ros.messages import PackedString
-
-    assert PackedString(text).serialize(use_version_2=False) == written(ros.String(text))
+    cdr = Cdr()
+    cdr.header(sec, nanosec, frame)
+    cdr.number("I", len(found))
+    for level, *texts, values in found:
+        cdr.number("B", level)
+        for text in texts:
+            cdr.string(text)
+        cdr.number("I", len(values))
+        for pair in values:
+            for text in pair:
+                cdr.string(text)
+    made = [ros.DiagnosticStatus(*one[:4], [ros.KeyValue(*pair) for pair in one[4]]) for one in found]
+    assert written(ros.DiagnosticArray(ros.Header(ros.Time(sec, nanosec), frame), made)) == cdr.message()
 
 
 def test_a_preshape_is_a_trajectory_of_one_point_that_starts_at_once(ros: ModuleType, preshape: Preshape) -> None:
@@ -221,20 +237,52 @@ def test_a_preshape_is_a_trajectory_of_one_point_that_starts_at_once(ros: Module
     assert trajectory(preshape) == ros.JointTrajectory(ros.Header(ros.Time(0, 0), ""), names, [point])
 
 
-@pytest.fixture(scope="module")
-def decoders() -> dict[str, Any]:
-    """Return decoders of another hand, made from the .msg files: those of the MCAP tools for ROS 2."""
+def decoded(name: str, message: Any) -> SimpleNamespace:
+    """Return what decoders of another hand, made from the .msg files, read: those of the MCAP tools for ROS 2."""
     dynamic = import_module("mcap_ros2._dynamic")
-    name = "trajectory_msgs/msg/JointTrajectory"
     inner = [f"{'=' * 80}\nMSG: {one.replace('/msg/', '/')}\n{MSG[one]}" for one in sorted(nested_in(name))]
-    found: dict[str, Any] = dynamic.generate_dynamic(name, "\n".join([MSG[name], *inner]))
+    decoders: dict[str, Any] = dynamic.generate_dynamic(name, "\n".join([MSG[name], *inner]))
+    found: SimpleNamespace = decoders[name](written(message))
     return found
 
 
-def test_the_tools_of_ros_2_read_a_preshape(ros: ModuleType, decoders: dict[str, Any], preshape: Preshape) -> None:
-    from thenar.runtime.ros.messages import trajectory
-
-    read: SimpleNamespace = decoders["trajectory_msgs/msg/JointTrajectory"](written(trajectory(preshape)))
+def test_the_tools_of_ros_2_read_a_preshape(ros: ModuleType, preshape: Preshape) -> None:
+    read = decoded("trajectory_msgs/msg/JointTrajectory", ros.trajectory(preshape))
     assert tuple(read.joint_names) == preshape.joint_names
     assert tuple(read.points[0].positions) == preshape.positions
     assert (read.points[0].time_from_start.sec, read.points[0].time_from_start.nanosec) == (1, 250_000_000)
+
+
+@pytest.mark.parametrize(("health", "level"), [("ok", 0), ("changing", 0), ("degraded", 1), ("unknown", 2)])
+def test_the_tools_of_ros_2_read_a_segment(
+    ros: ModuleType, make_grasp: Callable[..., LiveGrasp], health: Health, level: int
+) -> None:
+    of_frame = make_grasp(0, "PoS", ("s001", "index_mpj"))
+    grasp = replace(
+        of_frame, time_us=70_000, health=health, state="held", segment=3, segment_type="PMF", segment_us=50_000
+    )
+    grasp = replace(grasp, segment_probability=0.25)
+    read = decoded("diagnostic_msgs/msg/DiagnosticArray", ros.segment("/thenar", grasp))
+    assert (read.header.stamp.sec, read.header.stamp.nanosec) == (1_700_000_000, 123_456_000)
+    (status,) = read.status
+    assert (status.level, status.name, status.message) == (level, "/thenar", "PoS")
+    assert {pair.key: pair.value for pair in status.values} == {
+        "grasp": "PoS",
+        "probability": "0.937500",
+        "health": health,
+        "state": "held",
+        "segment": "3",
+        "segment_type": "PMF",
+        "segment_probability": "0.250000",
+        "segment_stamp": "1700000000.103456",
+        "candidate": "PoS",
+        "margin": "120",
+        "lost": "s001, index_mpj",
+    }
+
+
+def test_before_the_first_segment_there_is_no_time_at_which_it_began(
+    ros: ModuleType, make_grasp: Callable[..., LiveGrasp]
+) -> None:
+    (status,) = ros.segment("/thenar", make_grasp(0)).status
+    assert {pair.key: pair.value for pair in status.values}["segment_stamp"] == ""

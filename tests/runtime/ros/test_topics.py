@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime.preshape import Preshape
@@ -62,8 +63,8 @@ def sink(name: str) -> Iterator[Sink]:
 class Listener:
     """The other process; what it says comes out of a queue."""
 
-    def __init__(self, name: str, reliability: str = "reliable") -> None:
-        command = [sys.executable, str(LISTENER), name, reliability, str(DOMAIN)]
+    def __init__(self, name: str, kind: str) -> None:
+        command = [sys.executable, str(LISTENER), name, kind, str(DOMAIN)]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE)
         self.said: queue.Queue[Message] = queue.Queue()
         self.thread = threading.Thread(target=self._read, daemon=True)
@@ -100,8 +101,8 @@ class Listener:
 def listen(name: str) -> Iterator[Callable[..., Listener]]:
     listeners: list[Listener] = []
 
-    def listen(reliability: str = "reliable") -> Listener:
-        listeners.append(Listener(name, reliability))
+    def listen(kind: str = "reliable") -> Listener:
+        listeners.append(Listener(name, kind))
         return listeners[-1]
 
     yield listen
@@ -112,18 +113,32 @@ def listen(name: str) -> Iterator[Callable[..., Listener]]:
 Listen = Callable[..., Listener]
 
 
+@pytest.fixture
+def again(make_grasp: MakeGrasp) -> Callable[..., LiveGrasp]:
+    """Return what makes grasps that are more than a period apart."""
+    numbers = count(step=6)
+    return lambda *of: make_grasp(next(numbers), *of)
+
+
 @pytest.mark.parametrize("reliability", ["reliable", "best effort"])
 def test_every_topic_is_read_back_as_it_was_published(
-    sink: Sink, listen: Listen, reliability: str, make_grasp: MakeGrasp, preshape: Preshape, angles: JointAngles
+    sink: Sink, listen: Listen, reliability: str, again: MakeGrasp, preshape: Preshape, angles: JointAngles
 ) -> None:
     listener = listen(reliability)
 
     def publish() -> None:
-        sink.publish(make_grasp(0), preshape, angles)
+        now = replace(again(), unix_us=1_700_000_000_123_456)
+        sink.publish(now, preshape, angles)
 
+    stamped = {"stamp": {"sec": 1_700_000_000, "nanosec": 123_456_000}, "frame_id": ""}
     assert listener.hear("topic", "grasp", publish)["message"] == {"data": "PoS"}
+    segment = listener.hear("topic", "segment", publish)["message"]
+    assert segment["header"] == stamped
+    (status,) = segment["status"]
+    assert {pair["key"]: pair["value"] for pair in status.pop("values")}["probability"] == "0.937500"
+    assert status == {"level": 0, "name": sink.report().where[4:], "message": "PoS", "hardware_id": ""}
     assert listener.hear("topic", "angles", publish)["message"] == {
-        "header": {"stamp": {"sec": 1_700_000_000, "nanosec": 123_456_000}, "frame_id": ""},
+        "header": stamped,
         "name": list(angles.names),
         "position": list(angles.positions_rad),
         "velocity": [],
@@ -134,10 +149,10 @@ def test_every_topic_is_read_back_as_it_was_published(
 
 
 def test_a_preshape_is_read_back_as_a_trajectory(
-    sink: Sink, listen: Listen, make_grasp: MakeGrasp, preshape: Preshape
+    sink: Sink, listen: Listen, again: MakeGrasp, preshape: Preshape
 ) -> None:
     listener = listen()
-    heard = listener.hear("topic", "preshape", lambda: sink.publish(make_grasp(0), preshape, None))
+    heard = listener.hear("topic", "preshape", lambda: sink.publish(again(), preshape, None))
     assert heard["message"] == {
         "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
         "joint_names": ["finger_1/prox_joint", "finger_1/med_joint"],
@@ -154,49 +169,108 @@ def test_a_preshape_is_read_back_as_a_trajectory(
 
 
 @pytest.mark.parametrize(
-    ("topic", "kind"),
+    ("topic", "kind", "durability"),
     [
-        ("grasp", "std_msgs::msg::dds_::String_"),
-        ("preshape", "trajectory_msgs::msg::dds_::JointTrajectory_"),
-        ("angles", "sensor_msgs::msg::dds_::JointState_"),
-        ("health", "std_msgs::msg::dds_::String_"),
+        ("grasp", "std_msgs::msg::dds_::String_", "TransientLocal"),
+        ("segment", "diagnostic_msgs::msg::dds_::DiagnosticArray_", "TransientLocal"),
+        ("preshape", "trajectory_msgs::msg::dds_::JointTrajectory_", "TransientLocal"),
+        ("angles", "sensor_msgs::msg::dds_::JointState_", "Volatile"),
+        ("health", "std_msgs::msg::dds_::String_", "Volatile"),
     ],
 )
 def test_writers_are_found_under_ros_2s_names_with_its_qos(
-    sink: Sink, listen: Listen, name: str, ros: ModuleType, topic: str, kind: str
+    sink: Sink, listen: Listen, name: str, ros: ModuleType, topic: str, kind: str, durability: str
 ) -> None:
     found = listen().hear("found", f"rt{name}/{topic}")
     assert found["type"] == kind
     assert found["user_data"] == f"typehash={ros.TYPE_HASHES[kind]};"
     assert found["reliability"] == "Policy.Reliability.Reliable"
-    assert found["durability"] == "Policy.Durability.Volatile"
+    assert found["durability"] == f"Policy.Durability.{durability}"
 
 
 def test_a_preshape_is_told_when_it_changes_and_to_whoever_comes_later(
-    sink: Sink, listen: Listen, make_grasp: MakeGrasp, preshape: Preshape
+    sink: Sink, listen: Listen, again: MakeGrasp, preshape: Preshape
 ) -> None:
     def publish() -> None:
-        sink.publish(make_grasp(0), preshape, None)
+        sink.publish(again(), preshape, None)
+
+    def told_by(grasp: str) -> list[Message]:
+        sink.publish(again(grasp), preshape, None)
+        between = [first.said.get(timeout=20)]
+        while between[-1].get("message") != {"data": grasp}:
+            between.append(first.said.get(timeout=20))
+        return [said for said in between if said.get("topic") == "preshape"]
 
     first = listen()
     first.hear("topic", "preshape", publish)
-    # Many frames later the hand has not been told again.
-    for number in range(50):
-        sink.publish(make_grasp(number), preshape, None)
-    sink.publish(make_grasp(0, "the last"), preshape, None)
-    between = [first.said.get(timeout=20)]
-    while between[-1].get("message") != {"data": "the last"}:
-        between.append(first.said.get(timeout=20))
-    assert not [said for said in between if said.get("topic") == "preshape"]
+    # Many frames later the hand has not been told again, and one that asks for what is kept is told without it.
+    for _ in range(50):
+        publish()
+    assert not told_by("many")
+    listen("kept").hear("topic", "preshape")
+    assert not told_by("kept")
+    # A volatile reader is, and so are all.
     listen().hear("topic", "preshape", publish)
+    assert told_by("volatile")
     other = Preshape("other", preshape.joint_names, (1.0, 1.0), 0.5)
-    heard = first.hear("topic", "preshape", lambda: sink.publish(make_grasp(0), other, None))
+    heard = first.hear("topic", "preshape", lambda: sink.publish(again(), other, None))
     while heard["message"]["points"][0]["positions"] != [1.0, 1.0]:
         heard = first.hear("topic", "preshape")
 
 
-def test_unknown_is_published_as_such(sink: Sink, listen: Listen, make_grasp: MakeGrasp) -> None:
-    heard = listen().hear("topic", "grasp", lambda: sink.publish(make_grasp(0, UNKNOWN), None, None))
+def test_a_node_that_comes_late_has_the_newest_at_once(
+    sink: Sink, listen: Listen, make_grasp: MakeGrasp, preshape: Preshape
+) -> None:
+    for number in (1, 2):
+        sink.publish(replace(make_grasp(number), segment=number), preshape, None)
+    late = listen("kept")
+    heard: dict[str, list[Message]] = {"grasp": [], "segment": [], "preshape": []}
+    while not all(heard.values()):
+        said = late.said.get(timeout=20)
+        heard.get(said.get("topic", ""), []).append(said)
+    (segment,) = heard["segment"]
+    assert {"key": "segment", "value": "2"} in segment["message"]["status"][0]["values"]
+    assert len(heard["preshape"]) == 1
+
+
+@pytest.mark.parametrize(("options", "rate"), [("", 20), ("?rate=50", 50), ("?rate=1", 1)])
+def test_what_stays_is_published_at_the_rate_and_what_changes_at_once(
+    name: str, make_grasp: MakeGrasp, angles: JointAngles, options: str, rate: int
+) -> None:
+    sink = open_sink(f"ros:{name}{options}")
+    states = ("none", "forming", "held", "releasing")
+    for number in range(2000):
+        sink.publish(replace(make_grasp(), time_us=number * 500), None, angles)
+    assert sink.report().sent == rate
+    for number, state in enumerate(states[1:], start=1):
+        for _ in range(2):
+            sink.publish(replace(make_grasp(), time_us=1_000_000 - number, state=state, segment=1), None, angles)
+    # The clock stepped back by less than the last period began before: that is a moment of its own.
+    assert sink.report().sent - rate in (3, 4)
+    sink.close()
+
+
+@pytest.mark.parametrize("rate", ["", "0", "1001", "fast", "1.5", "-1", "9" * 30])
+def test_a_rate_that_cannot_be_is_refused(name: str, rate: str) -> None:
+    with pytest.raises(SettingError, match="1 to 1000 a second"):
+        open_sink(f"ros:{name}?rate={rate}")
+
+
+def test_every_change_is_heard(sink: Sink, listen: Listen, again: MakeGrasp) -> None:
+    listener = listen()
+    listener.hear("topic", "segment", lambda: sink.publish(again(), None, None))
+    now = again()
+    for number in range(1, 9):
+        sink.publish(replace(now, segment=number), None, None)
+    heard = [0]
+    while heard[-1] < 8:
+        said = listener.hear("topic", "segment")
+        heard.append(next(int(p["value"]) for p in said["message"]["status"][0]["values"] if p["key"] == "segment"))
+    assert heard[heard.index(1) :] == list(range(1, 9))
+
+
+def test_unknown_is_published_as_such(sink: Sink, listen: Listen, again: MakeGrasp) -> None:
+    heard = listen().hear("topic", "grasp", lambda: sink.publish(again(UNKNOWN), None, None))
     assert heard["message"] == {"data": "unknown"}
 
 
@@ -210,19 +284,19 @@ def resident_kb() -> int:
 
 
 def test_a_reader_that_hangs_holds_up_nobody(
-    sink: Sink, listen: Listen, make_grasp: MakeGrasp, preshape: Preshape, angles: JointAngles
+    sink: Sink, listen: Listen, again: MakeGrasp, preshape: Preshape, angles: JointAngles
 ) -> None:
     hangs = listen()
-    hangs.hear("topic", "grasp", lambda: sink.publish(make_grasp(0), preshape, angles))
+    hangs.hear("topic", "grasp", lambda: sink.publish(again(), preshape, angles))
     hangs.process.send_signal(signal.SIGSTOP)
     before, begun = resident_kb(), time.monotonic()
-    for number in range(20_000):
-        sink.publish(make_grasp(number), preshape, angles)
+    for _ in range(20_000):
+        sink.publish(again(), preshape, angles)
     took = time.monotonic() - begun
     assert sink.report().lost == 0
     assert took < 10
     assert resident_kb() - before < 4_000
-    listen().hear("topic", "grasp", lambda: sink.publish(make_grasp(0), None, None))
+    listen().hear("topic", "grasp", lambda: sink.publish(again(), None, None))
     begun = time.monotonic()
     sink.close()
     assert time.monotonic() - begun < 2
@@ -231,8 +305,9 @@ def test_a_reader_that_hangs_holds_up_nobody(
 def test_what_cannot_be_sent_is_counted_and_raises_nothing(
     sink: Sink, make_grasp: MakeGrasp, angles: JointAngles
 ) -> None:
-    sink.publish(make_grasp(0), None, JointAngles(("a", "b"), (1.0,)))
-    sink.publish(make_grasp(1), None, angles)
+    far: Any = "far"
+    sink.publish(make_grasp(0), None, JointAngles(("a",), (far,)))
+    sink.publish(make_grasp(6), None, angles)
     report = sink.report()
     assert (report.sent, report.lost) == (1, 1)
     assert report.error
@@ -277,7 +352,7 @@ def devices() -> set[bytes]:
 
 
 def test_unless_it_is_asked_for_no_other_machine_can_read(
-    monkeypatch: pytest.MonkeyPatch, name: str, listen: Listen, make_grasp: MakeGrasp
+    monkeypatch: pytest.MonkeyPatch, name: str, listen: Listen, again: MakeGrasp
 ) -> None:
     listener = listen()
     monkeypatch.delenv("CYCLONEDDS_URI")
@@ -285,7 +360,7 @@ def test_unless_it_is_asked_for_no_other_machine_can_read(
     assert devices() == {b"lo"}
     memberships = Path("/proc/net/igmp").read_text()
     assert "0100FFEF" not in memberships  # 239.255.0.1, where participants call for each other
-    heard = listener.hear("topic", "grasp", lambda: sink.publish(make_grasp(0), None, None))
+    heard = listener.hear("topic", "grasp", lambda: sink.publish(again(), None, None))
     assert heard["message"] == {"data": "PoS"}
     sink.close()
     sink = open_sink(f"ros:{name}?public")

@@ -133,7 +133,7 @@ def test_every_step_reads_and_writes_what_it_says(make_scene: SceneMaker, make_b
     for name in OTHERS:
         assert {*EFFECTS[name].reads, *EFFECTS[name].writes} <= FIELDS
     pipeline = compile_pipeline(make_scene([contact, *light()]))
-    written = {"trials", "previous_deg", "delay_us", "lost", "ramp", "taxels"}
+    written = {"trials", "previous_deg", "rest_deg", "delay_us", "lost", "ramp", "taxels"}
     for stop in pipeline.stops:
         single = type(pipeline)(pipeline.setting, (stop,))
         single.run([batch], Ledger())

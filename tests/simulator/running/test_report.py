@@ -23,6 +23,8 @@ def rows_with(closed: list[list[int]], read_out: list[bool] | None = None) -> Ro
         condition=np.zeros(len(closed), dtype=np.uint32),
         trial=numbers,
         read_out=np.array(read_out or [True] * len(closed), dtype=bool),
+        held=np.ones(len(closed), dtype=bool),
+        time_us=np.zeros(len(closed), dtype=np.int64),
     )
 
 

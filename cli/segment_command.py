@@ -1,0 +1,133 @@
+"""`thenar segment`: when which grasp began and ended."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from msgspec import Struct
+from rich.text import Text
+
+from .common import (
+    Number,
+    OutputFile,
+    existing_file,
+    existing_folder,
+    json_flag,
+    keep_apart,
+    out,
+    overwrite_flag,
+    progress,
+    show,
+    table,
+    warning,
+)
+from .lines import echo
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from thenar.compiler.segmenting.timeline import FoundSegment, Timeline
+
+_ENDINGS = (".csv", ".eaf", ".mcap")
+_SHOWN = 20
+
+
+class Segmented(Struct, frozen=True):
+    """What was found: the segments, in how many seconds of how many streams; and where truth is known, F1 at 10, 25 and
+    50 % of overlap.
+    """
+
+    segments: "tuple[FoundSegment, ...]"
+    streams: int
+    seconds: float
+    f1: tuple[float, ...] | None
+
+
+@click.command("segment")
+@click.argument("recordings", metavar="FILE", type=existing_file)
+@click.option("-b", "--build", type=existing_folder, required=True, help="The build that recognises.")
+@click.option(
+    "-o",
+    "--output",
+    type=OutputFile(*_ENDINGS),
+    help="Write the segments there: a table (.csv), a document of ELAN (.eaf), or annotations (.mcap).",
+)
+@click.option(
+    "--lag-ms",
+    type=Number(min=0, max=10_000),
+    help="Decide live, with this lag. [default: from the whole recording, which is exact]",
+)
+@click.option("--picture", type=OutputFile(".svg", ".png"), help="Draw the segments there, with the true ones above.")
+@click.option("--transitions", type=OutputFile(".json"), help="Count there which type follows which.")
+@overwrite_flag
+@json_flag
+def command(
+    recordings: Path,
+    build: Path,
+    output: Path | None,
+    lag_ms: float | None,
+    picture: Path | None,
+    transitions: Path | None,
+) -> None:
+    """Find when each grasp of FILE begins and ends: whole movements (.grasps), or a recorded run of BUILD (.mcap).
+
+    A segment is one row: start and end in seconds, grasp type, and the mean probability of that type in its frames.
+    Between segments nothing is held. Where FILE says what was held, the truth is drawn above, and F1 is printed.
+
+    \b
+    Example:
+        thenar segment movements.grasps -b build/ -o segments.csv
+        thenar segment run.mcap -b build/ -o segments.eaf --lag-ms 150
+        thenar segment movements.grasps -b build/ --picture timeline.svg --transitions graph.json
+    """
+    from thenar.compiler.artifact.segments import segment
+    from thenar.compiler.segmenting.files import write
+    from thenar.compiler.segmenting.picture import draw
+    from thenar.compiler.segmenting.transitions import Transitions
+    from thenar.runtime.files import write_atomically
+
+    keep_apart(recordings, output, picture, transitions)
+    with progress("finding segments") as report:
+        found = segment(build, recordings, None if lag_ms is None else round(1000 * lag_ms), report, warning)
+    if picture is not None:
+        write_atomically(picture, draw(found, picture.suffix.lower().removeprefix(".")))
+    if transitions is not None:
+        write_atomically(transitions, Transitions.of_timelines(found).to_json())
+    if output is not None:
+        write(output, found)
+    show(_summary(found), _print)
+
+
+def _summary(timelines: "Sequence[Timeline]") -> Segmented:
+    from thenar.compiler.segmenting.scores import OVERLAPS, Score, score
+
+    truths = [each.truth for each in timelines if each.truth is not None]
+    f1 = None
+    if len(truths) == len(timelines) and any((each < len(timelines[0].types)).any() for each in truths):
+        pairs = zip(truths, timelines, strict=True)
+        total = Score.total(score(truth, each.states, len(each.types)) for truth, each in pairs)
+        f1 = tuple(total.f1(place) for place in range(len(OVERLAPS)))
+    return Segmented(
+        segments=tuple(one for each in timelines for one in each.segments()),
+        streams=len(timelines),
+        seconds=sum(len(each.states) * each.tick_us for each in timelines) / 1e6,
+        f1=f1,
+    )
+
+
+def _print(found: Segmented) -> None:
+    from thenar.compiler.text import counted
+
+    grid = table(("start s", "end s", "type", "confidence", "stream"), ("start s", "end s", "confidence"))
+    for one in found.segments[:_SHOWN]:
+        stream = one.subject if one.session == "1" else f"{one.subject} {one.session}"
+        grid.add_row(f"{one.start_s:.2f}", f"{one.end_s:.2f}", Text(one.type), f"{one.confidence:.3f}", Text(stream))
+    if found.segments:
+        out().print(grid)
+    more = len(found.segments) - _SHOWN
+    if more > 0:
+        echo(f"and {more:,} more, which -o FILE.csv and --json have")
+    streams = counted(found.streams, "stream")
+    echo(f"{counted(len(found.segments), 'segment')} in {found.seconds:,.1f} s of {streams}")
+    if found.f1 is not None:
+        echo("F1 at overlaps of 10, 25 and 50 %: " + ", ".join(f"{100 * each:.1f}" for each in found.f1))

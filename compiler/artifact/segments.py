@@ -1,0 +1,137 @@
+"""`segment`: the segments that a build finds in whole movements, or in a recording of a live glove."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.drivers.errors import SettingError
+from thenar.runtime.build import Build
+from thenar.runtime.live.replay import moments
+from thenar.runtime.segmenting.decoder import decode
+from thenar.runtime.segmenting.model import emissions
+
+from ..recordings.graspset import GraspSet
+from ..segmenting.learning import live_states
+from ..segmenting.streams import PAUSE_US, SegmentingError, streams_of
+from ..segmenting.timeline import Timeline, probabilities
+from ..tables.quantise import integer_scores
+from .documents import Progress
+from .verify_firmware import select_inputs
+
+_LONGEST_LAG_US = 10_000_000
+MCAP = ".mcap"
+
+
+def segment(
+    folder: str | Path,
+    recordings: GraspSet | str | Path,
+    lag_us: int | None = None,
+    progress: Progress | None = None,
+    warn: Callable[[str], None] = lambda _: None,
+) -> tuple[Timeline, ...]:
+    """Find the segments of recordings.
+
+    Parameters
+    ----------
+    folder : path
+        The build.
+    recordings : GraspSet or path
+        Whole movements, as a set or its file; or the file (.mcap) of a live run of this build.
+    lag_us : int, optional
+        Decide live, so long after each moment. None: from the whole stream, which is exact.
+    progress : callable, optional
+        Called with (done, total) as streams are done.
+    warn : callable, optional
+        Takes a sentence on each fault of a recording.
+
+    Returns
+    -------
+    tuple of Timeline
+        One for each subject, session and stretch without a pause.
+
+    Raises
+    ------
+    SegmentingError
+        If the recordings are no whole movements, or hold nothing.
+    SettingError
+        If the lag makes no sense, or a live run was of another build.
+    BuildError, SealError, McapError, CompileError
+        If a file is not sound, or the recordings lack inputs of the build.
+
+    Examples
+    --------
+    >>> from thenar.compiler.artifact.segments import segment
+    >>> timelines = segment("build", "movements.grasps")  # doctest: +SKIP
+    >>> [(one.type, one.start_s, one.end_s) for one in timelines[0].segments()]  # doctest: +SKIP
+    """
+    if lag_us is not None and not 0 <= lag_us <= _LONGEST_LAG_US:
+        raise SettingError(f"a lag of {lag_us} us: it is 0 to {_LONGEST_LAG_US}")
+    build = Build.load(folder)
+    if not isinstance(recordings, GraspSet) and Path(recordings).suffix.lower() == MCAP:
+        return _of_run(build, Path(recordings), lag_us, warn)
+    grasp_set = recordings if isinstance(recordings, GraspSet) else GraspSet.load(recordings)
+    if not len(grasp_set):
+        raise SegmentingError("the set has no rows: there is nothing to find segments in")
+    streams = streams_of(grasp_set, build.manifest.segmenting.tick_us)
+    bits, codes = select_inputs(grasp_set, build.manifest)
+    types = build.grasps[: build.manifest.segmenting.n_types]
+    number = {name: place for place, name in enumerate(types)}
+    known = np.array([number.get(name, len(types)) for name in grasp_set.taxonomy.names], np.intp)
+    found = []
+    for done, stream in enumerate(streams, 1):
+        scores = integer_scores(build.tables, bits[stream.rows], codes[stream.rows])
+        states, likely = _decoded(build, scores, lag_us)
+        truth, tick_us = known[grasp_set.labels[stream.rows]], build.manifest.segmenting.tick_us
+        found.append(Timeline(stream.subject, stream.session, stream.start_us, tick_us, types, states, likely, truth))
+        if progress is not None:
+            progress(done, len(streams))
+    return tuple(found)
+
+
+def _decoded(
+    build: Build, scores: NDArray[np.integer], lag_us: int | None
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Return the state of each tick of scores (T, n_lanes), and its probability."""
+    model = build.manifest.segmenting
+    if lag_us is None:
+        states = decode(model, emissions(scores, model))
+    else:
+        states = live_states(model, scores, min(lag_us // model.tick_us, len(scores)))
+    return states, probabilities(scores, states, build.tables.scale)
+
+
+def _of_run(build: Build, path: Path, lag_us: int | None, warn: Callable[[str], None]) -> tuple[Timeline, ...]:
+    """Return the timelines of a live run, cut where too little could be read; the tick takes the newest scores."""
+    tick_us, types = build.manifest.segmenting.tick_us, build.grasps[: build.manifest.segmenting.n_types]
+    parts: list[tuple[int, list[Sequence[int]]]] = []
+    zero_us: int | None = None
+    before: Sequence[int] | None = None
+    due_us = 0
+    for entry, moment in moments(build, path, None, warn):
+        now_us, scores = entry.unix_us, moment.scores
+        zero_us = now_us if zero_us is None else zero_us
+        if scores is not None and (before is None or not 0 <= now_us - due_us + tick_us < PAUSE_US):
+            parts.append((now_us, []))
+            due_us = now_us
+        while scores is not None and due_us <= now_us:
+            late = before is not None and due_us + tick_us <= now_us
+            parts[-1][1].append(before if late and before is not None else scores)
+            due_us += tick_us
+        before = scores
+    if not parts:
+        raise SegmentingError(f"{path.name} holds no moment in which the build could read enough")
+    return tuple(
+        Timeline(
+            path.stem,
+            str(number),
+            start_us,
+            tick_us,
+            types,
+            *_decoded(build, np.array(rows), lag_us),
+            None,
+            zero_us or 0,
+        )
+        for number, (start_us, rows) in enumerate(parts, 1)
+    )

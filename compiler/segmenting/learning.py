@@ -1,0 +1,176 @@
+"""A build's `SegmentModel`, learnt from the streams of a set: durations and changes counted, the rest by trying.
+
+Counted, of the true segments: how long each state lasts (a shortest duration, and a geometric law beyond it), and which
+follows which. Tried, on scores of rows that the tables were not made of: how much a frame weighs (the temperature of
+its emission), what each tick of nothing held costs besides, and what a change costs besides. What gives the highest
+F1@50 of the live answer is taken, ties by the smaller median error of onsets, then the first tried.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.segmenting.decoder import Decoder
+from thenar.runtime.segmenting.model import STEPS, SegmentModel, gain_of
+
+from .scores import OVERLAPS, Score, score
+from .streams import Stream
+
+Labels = NDArray[np.intp]
+
+LAG_TICKS = 15  # of the live answer: 150 ms
+_SCALE = 256.0  # steps per unit of the scores that are tried
+_MOST_NATS = 6.0  # a frame tells no more, before its temperature
+# The shortest duration is a half of the shortest seen, and no more than so many ticks.
+_SHORTEST, _LONGEST_LEAST = 0.5, 30
+# Temperatures; nats of a score by which nothing held must lead; nats that a change costs besides.
+TEMPERATURES, LEADS, CHANGES = (0.25, 0.1, 0.5), (1.0, 0.0, 2.0, -1.0, 3.0), (2.0, 0.0, 5.0)
+# Ticks that are decoded to try a model: of longer streams, the first.
+_TRIED_TICKS = 20_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Counts:
+    """Of the true segments of streams, without those that a stream cuts off: durations in ticks by state, and how often
+    a state follows another, (K + 1, K + 1), nothing held last.
+    """
+
+    durations: tuple[tuple[int, ...], ...]
+    changes: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, truths: Iterable[Labels], n_types: int) -> "Counts":
+        """Count in the states (T,) of each stream."""
+        durations: list[list[int]] = [[] for _ in range(n_types + 1)]
+        changes = np.zeros((n_types + 1, n_types + 1), np.intp)
+        for truth in truths:
+            starts = np.flatnonzero(np.diff(truth, prepend=-1))
+            states = truth[starts]
+            np.add.at(changes, (states[:-1], states[1:]), 1)
+            for state, ticks in zip(states[1:-1].tolist(), np.diff(starts)[1:].tolist(), strict=True):
+                durations[state].append(ticks)
+        return cls(tuple(map(tuple, durations)), changes)
+
+
+def learnt(
+    streams: Sequence[Stream],
+    labels: Labels,
+    scores: NDArray[np.float64] | None,
+    n_types: int,
+    scale: float,
+    tick_us: int,
+) -> SegmentModel:
+    """Return the model of a build that detects nothing held.
+
+    Parameters
+    ----------
+    streams : sequence of Stream
+        The rows in time.
+    labels : array of int, shape (n,)
+        The class of each row, nothing held the last.
+    scores : array of float, shape (n, K + 1), or None
+        The scores of each row, of tables that were not made of rows of its movement (or subject). None: nothing is
+        tried, and the first values are taken.
+    n_types : int
+        K.
+    scale : float
+        Steps per unit of the build's own integer tables.
+    tick_us : int
+        The time of a tick.
+
+    Returns
+    -------
+    SegmentModel
+        The same for the same arguments on any machine.
+    """
+    counts = Counts.of((labels[stream.rows] for stream in streams), n_types)
+    chosen = TEMPERATURES[0], LEADS[0], CHANGES[0]
+    if scores is not None:
+        share = max(1, _TRIED_TICKS // len(streams))
+        lanes = np.rint(scores * _SCALE).astype(np.int64)
+        tests = [(lanes[rows], labels[rows]) for rows in (stream.rows[:share] for stream in streams)]
+        chosen = _best(counts, tests, tick_us)
+    return model_of(counts, *chosen, scale, tick_us)
+
+
+def _best(
+    counts: Counts, tests: Sequence[tuple[NDArray[np.int64], Labels]], tick_us: int
+) -> tuple[float, float, float]:
+    """Return temperature, lead and change with which scores (T, K + 1) are best decoded to their states (T,)."""
+
+    def rank(one: tuple[float, float, float]) -> tuple[float, float]:
+        model = model_of(counts, *one, _SCALE, tick_us)
+        found = (score(truth, live_states(model, lanes, LAG_TICKS), model.n_types) for lanes, truth in tests)
+        total = Score.total(found)
+        return -total.f1(len(OVERLAPS) - 1), total.onset
+
+    best = min(product(TEMPERATURES, LEADS, CHANGES[:1]), key=rank)
+    return min(((*best[:2], change) for change in CHANGES), key=rank)
+
+
+def model_of(
+    counts: Counts, temperature: float, lead: float, change: float, scale: float, tick_us: int
+) -> SegmentModel:
+    """Return the model of what was counted, with a temperature, the nats by which nothing held must lead in a frame,
+    and those that a change costs besides.
+    """
+    K = len(counts.durations) - 1
+    shift, gain = gain_of(scale, temperature)
+    most = min(254, max(1, round(STEPS * _MOST_NATS * temperature)), 255 * gain >> 8)
+    pooled = [ticks for own in counts.durations[:K] for ticks in own]
+    least = [_shortest(pooled)] * K + [_shortest(counts.durations[K])]
+    stay = [_staying(pooled, least[0])] * K + [_staying(counts.durations[K], least[K])]
+    bias = round(STEPS * temperature * lead)
+    stay = [cost + max(-bias, 0) for cost in stay[:K]] + [stay[K] + max(bias, 0)]
+    extra = STEPS * change
+    changes = counts.changes.astype(np.float64) + 0.5
+    into = changes[K, :K] / changes[K, :K].sum()
+    away = changes[:K].sum(axis=1) - np.diag(changes)[:K]
+    none, other = changes[:K, K] / away, (changes[:K, :K].sum() - np.trace(changes[:K, :K])) / away.sum()
+    # A type that follows another does so with its share of those that begin.
+    direct = [_cost(other * share, extra) for share in into]
+    return SegmentModel(
+        shift=shift,
+        gain=gain,
+        most=most,
+        least=tuple(least),
+        stay=tuple(stay),
+        enter=tuple(_cost(share, extra) for share in into),
+        leave=tuple(_cost(share, extra) for share in none),
+        direct=tuple(direct),
+        tick_us=tick_us,
+    )
+
+
+def live_states(
+    model: SegmentModel, lanes: NDArray[np.integer], lag_ticks: int, refused: NDArray[np.bool_] | None = None
+) -> Labels:
+    """Return the state (T,) that a live decoder gives each tick of the scores (T, n_lanes), `lag_ticks` after it."""
+    decoder = Decoder(model, lag_ticks)
+    no = [False] * len(lanes) if refused is None else refused.tolist()
+    states = [decoder.push(*tick).state for tick in zip(lanes.tolist(), no, strict=True)][lag_ticks:]
+    return np.array(states + decoder.finish(), np.intp)
+
+
+def _shortest(durations: Sequence[int]) -> int:
+    """Return the shortest duration to allow where these were seen, without the shortest twentieth."""
+    if not durations:
+        return 1
+    seen = sorted(durations)[len(durations) // 20]
+    return min(max(1, int(_SHORTEST * seen)), _LONGEST_LEAST)
+
+
+def _staying(durations: Sequence[int], least: int) -> int:
+    """Return the cost of a tick such that durations beyond the shortest are geometric with the mean that was seen."""
+    if not durations:
+        return 0
+    mean = sum(durations) / len(durations) - least
+    return round(-STEPS * math.log(mean / (mean + 1))) if mean > 0 else STEPS
+
+
+def _cost(probability: float, extra: float) -> int:
+    return min(round(-STEPS * math.log(probability) + extra), 4095)

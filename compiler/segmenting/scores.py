@@ -1,0 +1,193 @@
+"""How well a segmentation agrees with the truth: F1 at overlaps, edit score, onset, end, latency, false preshapes.
+
+F1 is that of Lea, Flynn, Vidal, Reiter and Hager (Temporal convolutional networks for action segmentation and
+detection, CVPR 2017): a found segment is right if a true one of its type overlaps it by at least a share of their union
+and no earlier one has been counted for it. Nothing held is background: it is no segment. The edit score is one less
+the Levenshtein distance of the two sequences of types over the length of the longer one.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from statistics import median
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Labels = NDArray[np.intp]
+# Shares of overlap, in percent: a found segment is right from there on.
+OVERLAPS = (10, 25, 50)
+
+
+class Segment(NamedTuple):
+    """Ticks `start` to `end`, exclusive, in one state."""
+
+    start: int
+    end: int
+    state: int
+
+
+def segments_of(states: ArrayLike, none: int) -> list[Segment]:
+    """Return the segments of types in `states` (T,): runs of one state other than `none`."""
+    given = np.asarray(states, np.intp)
+    starts = np.flatnonzero(np.diff(given, prepend=-1))
+    ends = np.append(starts[1:], len(given))
+    runs = zip(starts.tolist(), ends.tolist(), given[starts].tolist(), strict=True)
+    return [Segment(*run) for run in runs if run[2] != none]
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """What was counted over one stream, or the sum of several.
+
+    true, found   segments; right: those found at each of OVERLAPS; recognised: true ones most of whose ticks have
+                  their type
+    distance      of Levenshtein, and the length of the longer sequence, summed over streams
+    onsets, ends  by how many ticks the segments that are right at the least overlap begin and end too late
+    latencies     ticks from the beginning of true segments until their type is announced, of those for which it is
+    false         announced segments that begin while nothing is held
+    """
+
+    true: int = 0
+    found: int = 0
+    right: tuple[int, ...] = (0,) * len(OVERLAPS)
+    recognised: int = 0
+    distance: int = 0
+    longer: int = 0
+    onsets: tuple[int, ...] = ()
+    ends: tuple[int, ...] = ()
+    latencies: tuple[int, ...] = ()
+    false: int = 0
+
+    @classmethod
+    def total(cls, scores: Iterable[Self]) -> Self:
+        """Return the sum of several."""
+        every = list(scores)
+
+        def added(name: str) -> int:
+            return sum(getattr(one, name) for one in every)
+
+        def joined(name: str) -> tuple[int, ...]:
+            return tuple(tick for one in every for tick in getattr(one, name))
+
+        return cls(
+            true=added("true"),
+            found=added("found"),
+            right=tuple(sum(one.right[place] for one in every) for place in range(len(OVERLAPS))),
+            recognised=added("recognised"),
+            distance=added("distance"),
+            longer=added("longer"),
+            onsets=joined("onsets"),
+            ends=joined("ends"),
+            latencies=joined("latencies"),
+            false=added("false"),
+        )
+
+    def f1(self, place: int) -> float:
+        """Return F1 at an overlap, by its place among OVERLAPS; 1 where nothing is, and nothing was found."""
+        counted = self.true + self.found
+        return 2 * self.right[place] / counted if counted else 1.0
+
+    @property
+    def edit(self) -> float:
+        """The edit score; 1 where nothing is, and nothing was found."""
+        return 1 - self.distance / self.longer if self.longer else 1.0
+
+    @property
+    def recognition(self) -> float:
+        """The share of true segments most of whose ticks have their type."""
+        return self.recognised / self.true if self.true else 1.0
+
+    @property
+    def onset(self) -> float:
+        """The median of by how many ticks segments begin too early or too late; of none, infinite."""
+        return median(map(abs, self.onsets)) if self.onsets else float("inf")
+
+
+def score(truth: ArrayLike, found: ArrayLike, none: int, announced: ArrayLike | None = None) -> Score:
+    """Score the states found in a stream.
+
+    Parameters
+    ----------
+    truth, found : array of int, shape (T,)
+        The state of each tick.
+    none : int
+        The state in which nothing is held.
+    announced : array of int, shape (T,), optional
+        The state that is published at each tick, which may be that of an earlier one. None: nothing is published.
+
+    Returns
+    -------
+    Score
+        The counts.
+    """
+    right, given = np.asarray(truth, np.intp), np.asarray(found, np.intp)
+    true, segments = segments_of(right, none), segments_of(given, none)
+    hits, pairs = _matched(true, segments)
+    latencies, false = ([], 0) if announced is None else _announced(true, right, np.asarray(announced, np.intp), none)
+    return Score(
+        true=len(true),
+        found=len(segments),
+        right=hits,
+        recognised=sum(2 * int((given[one.start : one.end] == one.state).sum()) > one.end - one.start for one in true),
+        distance=levenshtein([one.state for one in true], [one.state for one in segments]),
+        longer=max(len(true), len(segments)),
+        onsets=tuple(segments[at].start - one.start for one, at in pairs),
+        ends=tuple(segments[at].end - one.end for one, at in pairs),
+        latencies=tuple(latencies),
+        false=false,
+    )
+
+
+def _matched(true: list[Segment], found: list[Segment]) -> tuple[tuple[int, ...], list[tuple[Segment, int]]]:
+    """Return how many of `found` are right at each of OVERLAPS; and, at the least of them, the true segments with the
+    places of those that are right.
+    """
+    counts, pairs, first = [0] * len(OVERLAPS), list[tuple[Segment, int]](), 0
+    taken: list[set[int]] = [set() for _ in OVERLAPS]
+    for place, one in enumerate(found):
+        while first < len(true) and true[first].end <= one.start:
+            first += 1
+        # Of equal overlaps, the earlier.
+        best, common, union, at = -1, 0, 1, first
+        while at < len(true) and true[at].start < one.end:
+            other = true[at]
+            shared = min(one.end, other.end) - max(one.start, other.start)
+            joined = max(one.end, other.end) - min(one.start, other.start)
+            if other.state == one.state and shared * union > common * joined:
+                best, common, union = at, shared, joined
+            at += 1
+        for number, least in enumerate(OVERLAPS):
+            if best >= 0 and 100 * common >= least * union and best not in taken[number]:
+                taken[number].add(best)
+                counts[number] += 1
+                if not number:
+                    pairs.append((true[best], place))
+    return tuple(counts), pairs
+
+
+def _announced(true: list[Segment], truth: Labels, announced: Labels, none: int) -> tuple[list[int], int]:
+    """Return after how many ticks each true segment is announced, before the next one begins, of those that are; and
+    how many announced segments begin while nothing is held. One that is announced too early has a negative latency.
+    """
+    latencies = []
+    for place, one in enumerate(true):
+        before = true[place - 1].end if place else 0
+        after = true[place + 1].start if place + 1 < len(true) else len(truth)
+        late = np.flatnonzero(announced[one.start : after] == one.state)
+        if len(late) and late[0]:
+            latencies.append(int(late[0]))
+        elif len(late):
+            other = np.flatnonzero(announced[before : one.start] != one.state)
+            latencies.append((before + int(other[-1]) + 1 if len(other) else before) - one.start)
+    return latencies, sum(bool(truth[each.start] == none) for each in segments_of(announced, none))
+
+
+def levenshtein(one: list[int], other: list[int]) -> int:
+    """Return the fewest insertions, deletions and replacements that make one sequence of the other."""
+    columns, numbers = np.array(other, np.intp), np.arange(len(other) + 1)
+    row = numbers.copy()
+    for done, state in enumerate(one, 1):
+        cheapest = np.minimum(row[1:] + 1, row[:-1] + (columns != state))
+        row = np.minimum.accumulate(np.concatenate([[done], cheapest]) - numbers) + numbers
+    return int(row[-1])

@@ -1,0 +1,175 @@
+"""The explicit-duration hidden Markov model of a build: small integer costs, and what a frame costs each state.
+
+States are the grasp types, 0 to K - 1, and "none", the last, K. Costs are steps of negative logarithms, usually
+`STEPS` to a nat, and the best segmentation of a stream is the cheapest one:
+
+    a frame costs state k   min(((best - score_k) >> shift) * gain >> 8, most)
+    each of its ticks       stay[k] more; it lasts least[k] ticks or more, unless the stream begins or ends in it
+    a type k begins         enter[k] after none, direct[k] after another type
+    none begins             leave[k] after type k
+
+The first segment begins for nothing.
+"""
+
+from collections.abc import Sequence
+from typing import Annotated, Self
+
+import numpy as np
+from msgspec import Meta, Struct
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import BuildError
+
+STEPS = 16
+# Differences of path costs fit a signed 16-bit integer: firmware keeps the costs modulo 2^16.
+LARGEST = 32767
+_MOST = 254
+
+Cost = Annotated[int, Meta(ge=0, le=4095)]
+Ticks = Annotated[int, Meta(ge=1, le=255)]
+
+
+class SegmentModel(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
+    """Costs of segments. Raises BuildError if they do not fit together, or if paths could differ by more than int16.
+
+    Parameters
+    ----------
+    shift, gain, most : int
+        What a frame costs a state (see the module); `gain_of` makes the first two.
+    least : tuple of int, length K + 1
+        The shortest duration of each state, in ticks.
+    stay : tuple of int, length K + 1
+        The cost of each tick of a segment, so that durations beyond the shortest fall off geometrically.
+    enter, leave, direct : tuple of int, length K
+        The cost of a type after none, of none after a type, of a type after another type.
+    refusal : int or None
+        None: the tables have a class "none". Otherwise none costs nothing in a refused frame, in which every type costs
+        so much more; in all other frames none costs so much.
+    tick_us : int
+        The time of a tick.
+    """
+
+    shift: Annotated[int, Meta(ge=0, le=8)]
+    gain: Annotated[int, Meta(ge=1, le=65535)]
+    most: Annotated[int, Meta(ge=1, le=_MOST)]
+    least: tuple[Ticks, ...]
+    stay: tuple[Cost, ...]
+    enter: Annotated[tuple[Cost, ...], Meta(min_length=1)]
+    leave: tuple[Cost, ...]
+    direct: tuple[Cost, ...]
+    refusal: Cost | None = None
+    tick_us: Annotated[int, Meta(ge=100, le=1_000_000)] = 10_000
+
+    def __post_init__(self) -> None:
+        n_types = len(self.enter)
+        held = len(self.leave), len(self.direct), len(self.least) - 1, len(self.stay) - 1
+        if n_types < 1 or set(held) != {n_types}:
+            raise BuildError(
+                f"a segment model enters {n_types} types, and leaves {held[0]}, directly {held[1]}; "
+                f"its durations are of {held[2]} types and none"
+            )
+        costs = (*self.stay, *self.enter, *self.leave, *self.direct, self.refusal or 0)
+        if min(costs) < 0 or not 1 <= min(self.least) <= max(self.least) <= 255:
+            raise BuildError("a segment model has a cost below 0, or a shortest duration that is not 1 to 255 ticks")
+        if not (0 <= self.shift <= 8 and 1 <= self.gain <= 65535 and 1 <= self.most <= _MOST):
+            raise BuildError(f"a frame's cost of (difference >> {self.shift}) * {self.gain} >> 8, at most {self.most}")
+        if self.shift < 8 and 255 * self.gain >> 8 < self.most:
+            raise BuildError(
+                f"a gain of {self.gain} takes a byte to {255 * self.gain >> 8}, below {self.most}, "
+                f"the most that a frame costs"
+            )
+        if self.spread > LARGEST:
+            raise BuildError(
+                f"paths through this segment model may differ by {self.spread} steps, at most {LARGEST} fit: "
+                f"take shorter durations than {max(self.least)} ticks, or longer ticks"
+            )
+
+    @classmethod
+    def usual(cls, n_types: int, has_none: bool, scale: float) -> Self:
+        """Return a model for tables of `scale` steps per unit whose streams nobody has learnt from.
+
+        Holds of at least 100 ms, none of at least 50 ms; three frames that are certain begin a grasp.
+        """
+        shift, gain = gain_of(scale, 0.25)
+        return cls(
+            shift=shift,
+            gain=gain,
+            most=48,
+            least=(10,) * n_types + (5,),
+            stay=(0,) * (n_types + 1),
+            enter=(80,) * n_types,
+            leave=(48,) * n_types,
+            direct=(160,) * n_types,
+            refusal=None if has_none else 24,
+        )
+
+    @property
+    def n_types(self) -> int:
+        """K, and the number of the state none."""
+        return len(self.enter)
+
+    @property
+    def n_lanes(self) -> int:
+        """How many scores a frame has: K, and one more where the tables have a class "none"."""
+        return self.n_types + (self.refusal is None)
+
+    @property
+    def spread(self) -> int:
+        """The largest difference that the decoder compares.
+
+        Let P be the most that a tick costs, L the longest of the shortest durations, X the dearest change, V(t) the
+        cheapest path to tick t: a path's beginning is a path, so V never falls. Where the cheapest path is in a segment
+        that is not whole yet, the state before it could have gone on, for (L - 1) P at most: so a state that may be
+        left at t costs V(t) + (L - 1) P at most, the cheapest of them. From there any state can be had whole L ticks
+        later, for X + L P. So all states lie within X + (2 L - 1) P of each other, and what enters is X away from
+        them.
+        """
+        tick = self.most + max(self.stay) + (self.refusal or 0)
+        change = max(*self.enter, *self.leave, *self.direct)
+        return 2 * change + (2 * max(self.least) - 1) * tick
+
+    def costs(self, lanes: Sequence[int], refused: bool = False) -> list[int]:
+        """Return what a frame costs each of the K + 1 states; `lanes` are its `n_lanes` scores, from any zero."""
+        best, shift, gain, most, extra = max(lanes), self.shift, self.gain, self.most, self.refusal
+        found = [cost if (cost := (best - lane >> shift) * gain >> 8) < most else most for lane in lanes]
+        if extra is None:
+            return found
+        return [*(cost + extra for cost in found), 0] if refused else [*found, extra]
+
+
+def gain_of(scale: float, temperature: float, steps: int = STEPS) -> tuple[int, int]:
+    """Return `shift` and `gain` for tables of `scale` steps per unit: score differences times `temperature`, in steps
+    of 1 / `steps`.
+    """
+    factor = steps * temperature / scale
+    shift = max((shift for shift in range(9) if round(factor * 2.0 ** (8 + shift)) <= 255), default=0)
+    return shift, min(max(round(factor * 2.0 ** (8 + shift)), 1), 65535)
+
+
+def emissions(scores: ArrayLike, model: SegmentModel, refused: ArrayLike | None = None) -> NDArray[np.int64]:
+    """Return what frames cost the states, (T, K + 1), as `SegmentModel.costs` does frame by frame.
+
+    Parameters
+    ----------
+    scores : array of int, shape (T, n_lanes)
+        The frames' scores.
+    model : SegmentModel
+        Its `shift`, `gain`, `most` and `refusal` are used.
+    refused : array of bool, shape (T,), optional
+        Frames that the build's rejection refuses; of a model with a refusal.
+
+    Raises
+    ------
+    BuildError
+        If the scores are of another number of classes.
+    """
+    lanes = np.asarray(scores, np.int64)
+    if lanes.ndim != 2 or lanes.shape[1] != model.n_lanes:
+        raise BuildError(f"scores of shape {lanes.shape}, the segment model takes {model.n_lanes} a frame")
+    behind = lanes.max(axis=1, initial=np.iinfo(np.int64).min, keepdims=True) - lanes
+    found: NDArray[np.int64] = np.minimum((behind >> model.shift) * model.gain >> 8, model.most)
+    if model.refusal is None:
+        return found
+    no = np.zeros(len(lanes), bool) if refused is None else np.asarray(refused, bool)
+    more = np.where(no, model.refusal, 0)[:, np.newaxis]
+    return np.hstack([found + more, model.refusal - more])

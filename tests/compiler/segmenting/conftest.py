@@ -1,0 +1,45 @@
+"""Movements whose switches and joint say at once what is held, if anything."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.taxonomy import own
+from thenar.runtime.published import NONE
+
+TYPES = ("pinch", "hook", "fist")
+BEFORE, HELD, AFTER = 15, 30, 10
+
+
+def movements(subjects: str = "AB", repetitions: int = 3, seed: int = 1, noise: float = 0.02) -> GraspSet:
+    """Return whole movements of each type by each subject, in a random order: open, held, open again."""
+    random = np.random.default_rng(seed)
+    parts = []
+    for subject in subjects:
+        for trial, label in enumerate(random.permutation(np.repeat(np.arange(len(TYPES)), repetitions)).tolist()):
+            held = int(HELD + random.integers(-5, 6))
+            parts.append((subject, trial, np.repeat([len(TYPES), label, len(TYPES)], [BEFORE, held, AFTER])))
+    labels = np.concatenate([states for *_, states in parts])
+    sizes = [len(states) for *_, states in parts]
+    switches = (labels[:, None] == np.arange(len(TYPES))) ^ (random.random((len(labels), len(TYPES))) < noise)
+    codes = np.clip(np.where(labels < len(TYPES), 60 * labels + 60, 10) + random.integers(-8, 9, len(labels)), 0, 255)
+    subject = np.repeat([subject for subject, *_ in parts], sizes)
+    return GraspSet(
+        switches=switches,
+        switch_names=("tip", "palm", "side"),
+        codes=codes[:, None].astype(np.uint16),
+        joints=(Joint("bend", "deg", 0, 0.0, 255, 90.0),),
+        grasps=np.array([*TYPES, NONE])[labels],
+        taxonomy=own(TYPES),
+        subjects=subject,
+        objects=np.full(len(labels), "thing"),
+        trials=np.repeat([trial for _, trial, _ in parts], sizes),
+        times_us=np.concatenate([10_000 * np.arange(np.count_nonzero(subject == each)) for each in subjects]),
+    )
+
+
+@pytest.fixture(scope="session")
+def make_movements() -> Callable[..., GraspSet]:
+    return movements
