@@ -9,6 +9,7 @@ from importlib.metadata import version
 from typing import Protocol
 
 from thenar.runtime.manifest import Calibration, Switch
+from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from . import FirmwareError
@@ -44,6 +45,11 @@ class Names(Protocol):
         """The version of thenar that made them."""
         ...
 
+    @property
+    def segments(self) -> SegmentModel | None:
+        """The costs of segments, where it has learnt any."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class Numbered:
@@ -54,6 +60,7 @@ class Numbered:
     joints: tuple[Calibration, ...]
     tables_sha256: str
     thenar: str
+    segments: None = None
 
 
 @lru_cache(maxsize=4)
