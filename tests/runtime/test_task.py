@@ -1,6 +1,7 @@
 """A hand in a task: steps, detours, what is skipped, unexpected or held too long."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -16,8 +17,9 @@ TYPES = ("a", "b", "c", "d")
 def task_of(types: str, also: dict[int, tuple[str, ...]] | None = None) -> Task:
     """Return a task of these types; after step n may follow also[n] besides, before the first also[0]."""
     then = [((types[at],) if at < len(types) else ()) + (also or {}).get(at, ()) for at in range(len(types) + 1)]
-    common = {"shown": 1, "preshape": None, "joints": {}, "median_s": 1.0, "spread_s": 0.1, "limit_s": 2.0}
-    steps = tuple(Step(grasp=each, then=then[at], **common) for at, each in enumerate(types, 1))  # type: ignore[arg-type]
+    common: dict[str, Any] = {"shown": 1, "preshape": None, "joints": {}}
+    common |= {"median_s": 1.0, "spread_s": 0.1, "limit_s": 2.0}
+    steps = tuple(Step(grasp=each, then=then[at], **common) for at, each in enumerate(types, 1))
     return Task(name="t", build="", demonstrations=("x",), preshapes=None, units={}, first=then[0], steps=steps)
 
 
