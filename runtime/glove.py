@@ -13,7 +13,7 @@ from typing import Protocol, Self
 
 from .build import Build
 from .calibration import AngleReader
-from .frames import PERIODS, GloveFrame, SwitchFrame
+from .frames import PERIODS, GloveFrame
 from .harness.loading import load_harness
 from .harness.wiring import Harness
 from .harness.writing import harness_to_toml
@@ -188,23 +188,13 @@ class Glove:
         taken = self._with_record(self.feed.take())
         now = taken.time_us
         moment = self._recognizer.step(now, time_ns() // 1000, taken.switches, taken.glove)
-        grasp, measured = moment.grasp, taken.measured
+        grasp = moment.grasp
         if self.recorder is not None:
-            for frame in taken.arrived:
-                if isinstance(frame, SwitchFrame):
-                    self.recorder.switches(frame)
-                else:
-                    self.recorder.glove(frame)
-            self.recorder.grasp(grasp)
+            self.recorder.moment(taken.arrived, grasp)
         if self._selector is not None:
             moment.preshape = self._selector.update(grasp)
         progress = None if self.follower is None else self.follower.update(grasp)
-        if self._angles is not None:
-            if measured is not self._measured:
-                self._measured = measured
-                there = measured is not None and measured.plugged
-                self._newest_angles = self._angles.angles(measured.sensors) if measured and there else None
-            moment.angles = self._newest_angles
+        moment.angles = self._angles_of(taken.measured)
         self._fanout.publish(grasp, moment.preshape, moment.angles)
         if progress is not None:
             self._fanout.task(progress)
@@ -238,6 +228,13 @@ class Glove:
             more = self.sources.take(end_us - taken.time_us)
             taken = replace(more, arrived=(*taken.arrived, *more.arrived))
         return taken
+
+    def _angles_of(self, measured: GloveFrame | None) -> JointAngles | None:
+        if measured is not self._measured:
+            self._measured = measured
+            there = measured is not None and measured.plugged
+            self._newest_angles = self._angles.angles(measured.sensors) if self._angles and measured and there else None
+        return self._newest_angles
 
     def _look(self, now: int) -> None:
         self._due_us, self.sources.changed = now + _REPORT_US, False

@@ -153,7 +153,7 @@ class LiveRecognizer:
             decided = None
         else:
             decided = self._decider.update(max(seen_us, 0), standing, whole=not missing.names)
-        segment = Segment()
+        segment, scores = Segment(), None
         if self._segments is not None:
             scores = None if missing.too_much else self._whole_scores(now_us, frame, standing, self._segments.tick_us)
             segment = self._segments.update(now_us, scores)
