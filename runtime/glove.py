@@ -199,10 +199,7 @@ class Glove:
         if progress is not None:
             self._fanout.task(progress)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None, moment.codes)
-        if self._recognizer.quarantine.found != self._quarantined:
-            self._quarantined = self._recognizer.quarantine.found
-            self.sources.leave_out(*self._recognizer.quarantine.out)
-            self._due_us = now
+        self._leave_out(now)
         if now >= self._due_us or self.sources.changed:
             self._look(now)
         self.frames += 1
@@ -228,6 +225,13 @@ class Glove:
             more = self.sources.take(end_us - taken.time_us)
             taken = replace(more, arrived=(*taken.arrived, *more.arrived))
         return taken
+
+    def _leave_out(self, now: int) -> None:
+        """Let no scan end early by what is quarantined, and say so at once."""
+        quarantine = self._recognizer.quarantine
+        if quarantine.found != self._quarantined:
+            self._quarantined, self._due_us = quarantine.found, now
+            self.sources.leave_out(*quarantine.out)
 
     def _angles_of(self, measured: GloveFrame | None) -> JointAngles | None:
         if measured is not self._measured:

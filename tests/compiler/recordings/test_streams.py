@@ -14,7 +14,7 @@ from thenar.compiler.recordings.errors import ColumnsError, TableError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_table
 from thenar.compiler.recordings.propose import Proposal, propose, propose_file
-from thenar.compiler.recordings.table import Table
+from thenar.compiler.recordings.table import Column, Table
 from thenar.compiler.recordings.trials import unit_of_time
 
 JOINTS = 18
