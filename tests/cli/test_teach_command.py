@@ -139,6 +139,19 @@ def test_a_demonstration_follows_its_own_task_to_the_end(
     assert all(0.35 <= step["median_s"] <= 0.45 for step in found["steps"])
     assert [step["then"] for step in found["steps"]] == [["pen", "rod"], ["rod"], []]
     assert (tmp_path / "task.xml").read_bytes().count(b'<Action ID="Grasp" name=') == 3
+    assert thenar("segment", demos[0], "-b", build, "--transitions", tmp_path / "graph.json").returncode == 0
+    graph = json.loads((tmp_path / "graph.json").read_bytes())
+    assert (graph["types"], graph["counts"]) == (list(TYPES), [[0, 1, 0], [0, 0, 1], [0, 0, 0]])
+    again = thenar(
+        "teach", demos[2], "-b", build, "-o", tmp_path / "two.json", "--transitions", tmp_path / "graph.json"
+    )
+    assert again.returncode == 0, again.stderr
+    assert [step["then"] for step in json.loads((tmp_path / "two.json").read_bytes())["steps"]] == [
+        ["rod", "pen"],
+        ["pen"],
+        ["rod"],
+        [],
+    ]
     done = thenar("run", build, "--replay", demos[0], "--task", task)
     news = progress_of(done)
     assert [(each.step, each.grasp, each.done) for each in news] == [
