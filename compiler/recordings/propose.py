@@ -51,6 +51,8 @@ _LISTS = {
 _WORDS = {role: frozenset(word.removesuffix("s") or word for word in words.split()) for role, words in _LISTS.items()}
 # In so many of the changes of a stream's label what means that nothing is held is left or reached.
 _BETWEEN = 0.9
+# Before a grasp and after it nothing is held; a number that more runs than those share is not that of a movement.
+_SHARED = 3
 # More distinct values than these are no grasp types.
 _TYPES = 200
 # An unknown analog column is at rest in so many of its cells, in the lowest tenth of its range: then it is a pad.
@@ -306,14 +308,15 @@ def _told(
 
 
 def _is_stream(table: Table, chosen: dict[str, tuple[str, ...]], held: NDArray[np.bool_]) -> bool:
-    """Return whether runs of labels tell trials apart, and better than a number of trials: one that most rows in which
-    nothing is held share with a grasp is theirs.
+    """Return whether runs of labels tell trials apart, and better than a number of trials: one that many runs share in
+    which nothing is held is no movement's.
     """
-    texts = [_texts(table, [name]) for key in ("subject", "session", "trial") for name in chosen.get(key, ())]
-    if not in_runs(_texts(table, chosen["label"]), *texts):
-        return False
-    movement = groups(*texts) if "trial" in chosen else np.arange(len(held))
-    return bool(np.isin(movement[~held], movement[held]).mean() < 0.5)
+    who = [_texts(table, [name]) for key in ("label", "subject", "session", "trial") for name in chosen.get(key, ())]
+    if "trial" not in chosen or not in_runs(*who):
+        return in_runs(*who)
+    ids = groups(*who)
+    runs = np.count_nonzero((np.diff(ids, prepend=-1) != 0) & ~held)
+    return runs > _SHARED * len(np.unique(ids[~held]))
 
 
 def _time(table: Table, chosen: dict[str, tuple[str, ...]]) -> NDArray[np.float64] | None:

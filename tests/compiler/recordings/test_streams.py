@@ -110,12 +110,13 @@ def test_a_stream_is_imported_without_knowledge(tmp_path: Path, rest: str, hz: i
     assert (grasp_set.grasps[found.complete] != "none").all()
 
 
-def test_numbers_of_repetitions_that_rest_does_not_share_are_left_out(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [lambda label, n: 0 if label == "0" else n, lambda _, n: n])
+def test_numbers_of_repetitions_that_many_rests_share_are_left_out(number: Any, tmp_path: Path) -> None:
     repetition: dict[str, Any] = {
         "restimulus": lambda label, _: label,
-        "rerepetition": lambda label, n: 0 if label == "0" else n,
+        "rerepetition": number,
     }
-    made = stream("0", ("1", "2", "10"), stimulus=lambda label, _: label, **repetition)
+    made = stream("0", ("1", "2", "3", "7", "10"), stimulus=lambda label, _: label, **repetition)
     named = made._replace(header=["time", "subject", "ignored", *made.header[3:]])
     proposal, grasp_set, _ = imported(named._replace(rows=[[*row[:2], "x", *row[3:]] for row in made.rows]), tmp_path)
     assert (proposal.columns.label, proposal.columns.trial, proposal.columns.frames) == ("restimulus", None, "restart")
