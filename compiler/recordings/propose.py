@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from thenar.runtime.names import printable, shortened
 from thenar.runtime.published import NONE
 
-from .cells import bits, names, numbers
+from .cells import bits, names, numbers, times
 from .coding import sound_grid
 from .columns import KEYS, PLAIN, Columns, JointColumns, TaxelColumns, TextFormat, TimeUnit
 from .errors import TableError
@@ -138,7 +138,7 @@ def _look(table: Table, name: str) -> _Column:
     column = table.columns[name]
     found = re.findall(r"[A-Z]{2,}(?![^\W\dA-Z_])|[^\W\d_][^\W\dA-Z_]*", name)
     words = frozenset(word.casefold().removesuffix("s") or word for word in found)
-    parsed = numbers(column, table.decimal)
+    parsed = (times if _is_time(words) else numbers)(column, table.decimal)
     if parsed.wrong.any():
         switch = bits(column, table.decimal)
         if not switch.wrong.any():
@@ -320,7 +320,7 @@ def _is_stream(table: Table, chosen: dict[str, tuple[str, ...]], held: NDArray[n
 
 
 def _time(table: Table, chosen: dict[str, tuple[str, ...]]) -> NDArray[np.float64] | None:
-    return numbers(table.columns[chosen["time"][0]], table.decimal).values if "time" in chosen else None
+    return times(table.columns[chosen["time"][0]], table.decimal).values if "time" in chosen else None
 
 
 def _add_parts(

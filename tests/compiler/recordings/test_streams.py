@@ -238,6 +238,24 @@ def test_the_unit_of_a_time_is_told_by_its_name_or_its_steps(name: str, step: fl
     assert unit_of_time(name, np.tile(step * np.arange(20.0), 2)) == unit
 
 
+def test_dates_are_times(tmp_path: Path) -> None:
+    made = stream()
+    start = np.datetime64("2024-03-01T23:59:59.9", "us")
+    stamps = [start + np.timedelta64(10_000 * number, "us") for number in range(len(made.rows))]
+    rows = [[str(stamp).replace("T", " "), *row[1:]] for stamp, row in zip(stamps, made.rows, strict=True)]
+    proposal, grasp_set, _ = imported(made._replace(header=["Timestamp", *made.header[1:]], rows=rows), tmp_path)
+    assert (proposal.columns.time, proposal.columns.time_unit) == ("Timestamp", "us")
+    assert np.diff(grasp_set.times_us).tolist() == [10_000] * (len(rows) - 1)
+    check(made, grasp_set, "rest")
+
+
+@pytest.mark.parametrize("wrong", ["2024-13-01 10:00:00", "yesterday", "2024-03-01 10:00:00+01:00", "inf"])
+def test_what_is_no_time_is_named(wrong: str) -> None:
+    table = Table("t.csv", {"g": ["a", "b"], "t": ["2024-03-01 10:00:00", wrong], "s": ["0", "1"]}, np.arange(2))
+    with pytest.raises(TableError, match="not finite numbers, or dates with times: 2 cells"):
+        import_table(table, Columns("g", time="t", switches=("s",)))
+
+
 def test_times_of_no_known_unit_order_frames_and_are_not_kept() -> None:
     columns = {"g": ["a", "a", "b"], "n": ["1", "1", "1"], "s": ["0", "1", "0"]}
     table = Table("t.csv", columns | {"frame": ["2", "1", "3"]}, np.arange(3))
