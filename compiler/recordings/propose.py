@@ -316,7 +316,7 @@ def _is_stream(table: Table, chosen: dict[str, tuple[str, ...]], held: NDArray[n
         return in_runs(*who)
     ids = groups(*who)
     runs = np.count_nonzero((np.diff(ids, prepend=-1) != 0) & ~held)
-    return runs > _SHARED * len(np.unique(ids[~held]))
+    return bool(runs > _SHARED * len(np.unique(ids[~held])))
 
 
 def _time(table: Table, chosen: dict[str, tuple[str, ...]]) -> NDArray[np.float64] | None:
