@@ -7,7 +7,6 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import replace
 from pathlib import Path
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Literal
@@ -74,6 +73,11 @@ class Played(msgspec.Struct, frozen=True):
 )
 @click.option("--subject", metavar="NAME", help="Subject of the scene to play.  [default: the first]")
 @click.option("--period-ms", type=Number(1, 60_000), help="Time from one frame to the next.  [default: the scene's]")
+@click.option(
+    "--rest-ms",
+    type=Number(1, 60_000),
+    help="Rest between grasps for so long, with an open hand.  [default: the scene's rest, or none]",
+)
 @click.option("--repeat", is_flag=True, help="Play again and again, until Ctrl-C or the command ends.")
 @click.option(
     "--adapter", type=click.Choice(_ADAPTERS), default="any", show_default=True, help="What the I2C bus can batch."
@@ -87,6 +91,7 @@ def command(
     folder: Path,
     subject: str | None,
     period_ms: float | None,
+    rest_ms: float | None,
     repeat: bool,
     adapter: Literal["any", "bcm2835", "designware", "i2c-gpio", "smbus-only"],
     log: Path | None,
@@ -102,7 +107,7 @@ def command(
     \b
     Example:
         thenar emulate quick --glove glove.toml --repeat
-        thenar emulate continuous --glove glove.toml -- thenar run build/ --glove {glove} --sink jsonl:-
+        thenar emulate continuous-rest --glove glove.toml -- thenar run build/ --glove {glove} --sink jsonl:-
     """
     from thenar.runtime.harness.loading import load_harness
     from thenar.runtime.names import list_names
@@ -115,7 +120,7 @@ def command(
     ours = (folder / name for name in (_HARNESS, _CALIBRATION, _TAXELS))
     keep_apart(glove, Path(source), calibration, *ours, log)
     _check_folder(folder)
-    performance, cable = _performance(source, subject, period_ms)
+    performance, cable = _performance(source, subject, period_ms, rest_ms)
     if missing := [name for name in harness.switches if name not in performance.switch_names]:
         warning(f"{source} has no switch {list_names(missing)}: open all the time")
     if missing := [name for name in harness.taxel_names if name not in performance.taxel_names]:
@@ -152,11 +157,13 @@ def _check_folder(folder: Path) -> None:
         raise click.UsageError(f"{folder / min(ours)} is there already: add --overwrite, or name another --dir")
 
 
-def _performance(source: str, subject: str | None, period_ms: float | None) -> tuple["Performance", "CableOf"]:
+def _performance(
+    source: str, subject: str | None, period_ms: float | None, rest_ms: float | None
+) -> tuple["Performance", "CableOf"]:
     """Return what to play, and what happens on serial line n."""
     from thenar.simulator.playing import performance
 
-    given_us = None if period_ms is None else round(period_ms * 1000)
+    given_us, rest_us = (None if given is None else round(given * 1000) for given in (period_ms, rest_ms))
     path = Path(source)
     if path.suffix in (".grasps", ".mcap"):
         if not path.exists():
@@ -164,17 +171,18 @@ def _performance(source: str, subject: str | None, period_ms: float | None) -> t
         if subject is not None:
             raise click.UsageError("--subject picks one of a scene's subjects: a recording has its own")
         if path.suffix == ".mcap":
+            if rest_ms is not None:
+                raise click.UsageError("--rest-ms is for scenes and sets of grasps: a recording has its own rests")
             return performance.of_recording(path, given_us or _FRAME_US, warning), lambda _line: None
         from thenar.compiler.recordings.graspset import GraspSet
 
-        return performance.of_set(GraspSet.load(path), given_us or _FRAME_US), lambda _line: None
+        return performance.of_set(GraspSet.load(path), given_us or _FRAME_US, rest_us=rest_us), lambda _line: None
     from thenar.simulator.playing.bench import cable_of
     from thenar.simulator.scenes.decode import load_scene
 
     scene = load_scene(source)
     with progress("simulating") as report:
-        played = performance.of_scene(scene, subject, progress=report)
-    played = played if given_us is None else replace(played, period_us=given_us)
+        played = performance.of_scene(scene, subject, progress=report, period_us=given_us, rest_us=rest_us)
     return played, lambda line: cable_of(scene, line)
 
 

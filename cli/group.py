@@ -20,7 +20,7 @@ from .lines import echo
 
 COMMANDS = (
     *("simulate", "plan", "import", "export", "merge", "split", "info", "place", "draw"),
-    *("evaluate", "frontier", "compile", "verify", "segment"),
+    *("evaluate", "frontier", "compile", "verify", "segment", "teach"),
     *("firmware", "spec", "run", "calibrate", "record", "emulate", "doctor", "stability"),
 )
 

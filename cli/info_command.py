@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from thenar.compiler.text import INDEPENDENT, inputs_read
+from thenar.compiler.text import INDEPENDENT, inputs_read, none_words
+from thenar.runtime.published import NONE
 
 from .common import existing_file, json_flag, keep_apart, out, overwrite_flag, picture_file, progress, show, table
 from .lines import echo
@@ -25,9 +26,9 @@ if TYPE_CHECKING:
 def command(grasps: Path, plot: Path | None) -> None:
     """Tell what GRASPS, a .grasps file, holds: counts, balance, odd columns and rows, and how separable it is.
 
-    The ceiling is the rate of the best possible memory: no classifier that sees only these inputs is right more often
-    on these rows. The neighbour rate is that of frames by the nearest frame of another trial, with joints in standard
-    deviations.
+    Rows in which nothing is held count in no rate. The ceiling is the rate of the best possible memory: no classifier
+    that sees only these inputs is right more often on these rows. The neighbour rate is that of frames by the nearest
+    frame of another trial, with joints in standard deviations.
 
     \b
     Example:
@@ -56,10 +57,13 @@ def _draw(grasp_set: "GraspSet", path: Path) -> None:
 
 def _print(summary: "Summary", path: Path) -> None:
     echo(
-        f"{path}: {summary.rows} grasps of {len(summary.grasps)} types ({summary.taxonomy}); "
+        f"{path}: {summary.rows} grasps of {len(summary.grasps)} types ({summary.taxonomy})"
+        f"{none_words(summary.none)}; "
         f"subjects {len(summary.subjects)}, objects {len(summary.objects)}, "
         f"{inputs_read(len(summary.switches), len(summary.taxels), len(summary.joints))}"
     )
+    if summary.none or summary.seconds is not None:
+        echo(f"movements {summary.movements}{'' if summary.seconds is None else f', {summary.seconds:.1f} s'}")
     if summary.simulated:
         echo(f"simulated: {summary.simulated}")
     if summary.independent:
@@ -76,6 +80,8 @@ def _print_counts(summary: "Summary") -> None:
     grasps = table(("grasp type", "rows", "share"), ("rows", "share"), "Grasp types")
     for grasp in summary.grasps:
         grasps.add_row(grasp.name, str(grasp.rows), f"{grasp.rows / summary.rows:.1%}")
+    if summary.none:
+        grasps.add_row(NONE, str(summary.none), f"{summary.none / summary.rows:.1%}")
     out().print(grasps)
     echo(f"balance (rarest type over commonest): {summary.balance:.2f}")
     for what, counts in (("subjects", summary.subjects), ("objects", summary.objects)):

@@ -11,10 +11,11 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp
+from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp, Quarantined
+from thenar.runtime.task import Progress
 
 Devices = Callable[[], Sequence[DeviceHealth]]
-_Shown = tuple[LiveGrasp, Devices, HealthReport | None]
+_Shown = tuple[LiveGrasp, Devices, HealthReport | None, Progress | None]
 
 _REDRAW_S = 0.1
 _STYLES = {"ok": "bold green", "changing": "bold cyan", "degraded": "bold yellow", "unknown": "bold red"}
@@ -49,9 +50,15 @@ class LiveView:
         with suppress(OSError):
             self._live.stop()
 
-    def show(self, grasp: LiveGrasp, devices: Devices, health: HealthReport | None = None) -> None:
+    def show(
+        self,
+        grasp: LiveGrasp,
+        devices: Devices,
+        health: HealthReport | None = None,
+        progress: Progress | None = None,
+    ) -> None:
         """Draw this next, unless something newer comes first; the devices are asked for then."""
-        self._newest = grasp, devices, health
+        self._newest = grasp, devices, health, progress
 
     def _draw(self) -> None:
         shown = None
@@ -60,22 +67,33 @@ class LiveView:
             while not self._closing.wait(_REDRAW_S):
                 newest = self._newest
                 if newest is not None and newest is not shown:
-                    grasp, devices, health = shown = newest
+                    grasp, devices, health, progress = shown = newest
                     lines = health_lines(health) if self._status else ()
-                    self._live.update(drawn(grasp, devices(), lines), refresh=True)
+                    wrong = () if health is None else health.quarantined
+                    self._live.update(drawn(grasp, devices(), lines, wrong, progress), refresh=True)
 
 
-def drawn(grasp: LiveGrasp, devices: Sequence[DeviceHealth], lines: Sequence[str] = ()) -> RenderableType:
+def drawn(
+    grasp: LiveGrasp,
+    devices: Sequence[DeviceHealth],
+    lines: Sequence[str] = (),
+    wrong: Sequence[Quarantined] = (),
+    progress: Progress | None = None,
+) -> RenderableType:
     """Return the picture of one moment."""
     table = Table.grid(padding=(0, 2))
     table.add_row("grasp", Text(grasp.grasp, style=_STYLES[grasp.health]))
     table.add_row("", f"{_bar(grasp.probability)} {grasp.probability:5.1%}")
     table.add_row("this frame", f"{grasp.candidate}, ahead by {grasp.margin} steps")
     table.add_row("segment", _segment(grasp))
+    if progress is not None:
+        table.add_row("task", Text(progress.text, style="bold yellow" if progress.deviation else ""))
     table.add_row("health", Text(grasp.health, style=_STYLES[grasp.health]))
     if grasp.lost:
         more = f" and {len(grasp.lost) - _SHOWN} more" if len(grasp.lost) > _SHOWN else ""
         table.add_row("missing", ", ".join(grasp.lost[:_SHOWN]) + more)
+    for one in wrong:
+        table.add_row(one.name, Text(one.what, style="yellow"))
     table.add_row("age", f"switches {_ms(grasp.switch_age_us)}, glove {_ms(grasp.glove_age_us)}")
     table.add_row("frame", str(grasp.number))
     for device in devices:

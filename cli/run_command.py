@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from thenar.runtime.preshape import Preshape, PreshapeSelector
     from thenar.runtime.published import HealthReport, LiveGrasp
     from thenar.runtime.sinks import SinkReport
+    from thenar.runtime.task import TaskFollower
 
     from .live_view import LiveView
 
@@ -68,6 +69,9 @@ class _SinkOption(click.Option):
     help="Let the preshape change while something is held, and not only after nothing was.",
 )
 @click.option(
+    "--task", metavar="task.json", type=existing_file, help="Follow a task of thenar teach: its steps, and deviations."
+)
+@click.option(
     "--record", metavar="FILE.mcap", type=OutputFile(".mcap"), help="Record the raw frames, and what came of them."
 )
 @overwrite_flag
@@ -77,6 +81,7 @@ class _SinkOption(click.Option):
 @click.option("--lead", type=Number(0), help="Lead in score units that a new grasp type needs.")
 @click.option("--dwell-ms", type=Number(0, 10_000), help="Time for which it has to keep the lead.")
 @click.option("--max-lost", type=Number(0, 1), help="Share of the build's weight that may be missing.")
+@click.option("--no-quarantine", is_flag=True, help="Use inputs that are stuck, chatter or drift all the same.")
 @click.option("--error-rate", type=Number(0, 1), help="Decide by a sequential test of this error rate instead.")
 @click.option("--spacing-ms", type=Number(0, 10_000), help="Minimum spacing of frames in the sequential test.")
 @click.option(
@@ -90,6 +95,7 @@ def command(
     sinks: tuple[str, ...],
     preshape: str | None,
     change_while_held: bool,
+    task: Path | None,
     record: Path | None,
     full_scan: bool,
     status: bool,
@@ -97,6 +103,7 @@ def command(
     lead: float | None,
     dwell_ms: float | None,
     max_lost: float | None,
+    no_quarantine: bool,
     error_rate: float | None,
     spacing_ms: float | None,
     lag_ms: float | None,
@@ -112,11 +119,13 @@ def command(
         thenar run build/ --glove glove.toml --status
         thenar run build/ --glove glove.toml --sink unix:/run/grasps --preshape barrett_bh8 --record run.mcap
         thenar run build/ --replay run.mcap | head -3
+        thenar run build/ --glove glove.toml --task task.json
         thenar run build/ --replay set.grasps --sink jsonl:grasps.jsonl --preshape parallel_gripper
     """
     if (glove is None) == (replay is None):
         raise click.UsageError("name a glove to run on (--glove) or frames to run through (--replay), one of them")
     from thenar.runtime import Build
+    from thenar.runtime.task import TaskFollower
 
     _refuse_idle(glove, replay)
     loaded = Build.load(build)
@@ -125,6 +134,7 @@ def command(
             "lead": lead,
             "dwell_us": _us(dwell_ms),
             "max_lost": max_lost,
+            "quarantine": False if no_quarantine else None,
             "error_rate": error_rate,
             "spacing_us": _us(spacing_ms),
             "lag_us": _us(lag_ms),
@@ -135,19 +145,20 @@ def command(
             raise click.UsageError("stdout is closed: name a --sink to send grasps to")
         viewed = sys.stdout is not None and sys.stdout.isatty() and "jsonl:-" not in sinks
         asked: dict[str, Any] = {"preshapes": preshape, "record": record, "full_scan": full_scan, "status": status}
-        asked["change_while_held"] = change_while_held
+        asked |= {"change_while_held": change_while_held, "task": task}
         _run_live(
             loaded, glove, viewed, frames, sinks=sinks or (() if viewed else ("jsonl:-",)), policy=policy, **asked
         )
     elif replay.suffix == ".mcap":
         selecting = _selecting(loaded, preshape, segments=True, change_while_held=change_while_held)
-        _replay_recording(loaded, replay, sinks, selecting, frames, policy)
+        follower = None if task is None else TaskFollower.of(task, loaded.grasps)
+        _replay_recording(loaded, replay, sinks, selecting, frames, policy, follower)
     else:
         _replay_set(loaded, replay, sinks, _selecting(loaded, preshape, segments=False), frames, period_us)
 
 
 _LIVE = ("record", "full_scan", "status")
-_POLICY = ("lead", "dwell_ms", "max_lost", "error_rate", "spacing_ms", "lag_ms")
+_POLICY = ("lead", "dwell_ms", "max_lost", "no_quarantine", "error_rate", "spacing_ms", "lag_ms")
 
 
 def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
@@ -159,7 +170,8 @@ def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
     elif replay is not None and replay.suffix == ".mcap":
         _refuse("for a recording, which says when its frames came", "period_us", *_LIVE)
     else:
-        _refuse("for a set of grasps, each row of which is recognised by itself", "change_while_held", *_LIVE, *_POLICY)
+        held = ("change_while_held", "task")
+        _refuse("for a set of grasps, each row of which is recognised by itself", *held, *_LIVE, *_POLICY)
     if click.get_current_context().params["error_rate"] is not None:
         _refuse("beside --error-rate, whose test decides by itself", "lead", "dwell_ms")
     else:
@@ -226,16 +238,19 @@ def _look_on(glove: "Glove", view: "LiveView | None", frames: int | None) -> Non
                 if glove.recorder is None and _nobody_listens(glove.reports()):
                     return
         if view is not None:
-            view.show(moment.grasp, glove.devices, health)
+            view.show(moment.grasp, glove.devices, health, None if glove.follower is None else glove.follower.progress)
 
 
 def _say_news(glove: "Glove", health: "HealthReport", said: dict[str, str]) -> None:
-    """Say on stderr how devices and recording fare, once each time that it changes."""
+    """Say on stderr how devices, recording and inputs in quarantine fare, once each time that it changes."""
     from thenar.runtime.live.sources import NOT_YET
 
     news = {device.name: device.error or "connected" for device in health.devices}
     if glove.recorder is not None and glove.recorder.failure:
         news["recording"] = glove.recorder.failure
+    news |= {wrong.name: wrong.what for wrong in health.quarantined}
+    # Devices stay in the news.
+    news |= {name: "behaves again" for name in said if name not in news}
     for name, state in news.items():
         if said.get(name) != state and state != NOT_YET:
             _say(of_device(name, state))
@@ -285,6 +300,7 @@ def _replay_recording(
     selector: "PreshapeSelector | None",
     frames: int | None,
     policy: "Policy | None",
+    follower: "TaskFollower | None",
 ) -> None:
     """Recognise the frames of a live recording again, at the times at which they were recognised then.
 
@@ -295,12 +311,14 @@ def _replay_recording(
     from thenar.runtime.sinks.jsonl import encode
 
     same = count = 0
-    with _published(sinks, selector, lambda grasp, shape: encode(grasp, shape, None)) as publish:
+    with _published(sinks, selector, lambda grasp, shape: encode(grasp, shape, None), follower) as publish:
         for then, now in islice(replayed(build, replay, policy, warning), frames):
             same += then == now
             count += 1
             publish(now)
     echo(f"{same} of {count} frames recognised as they were recorded", err=True)
+    if follower is not None:
+        echo(follower.progress.text, err=True)
 
 
 def _replay_set(
@@ -379,12 +397,16 @@ def _rows(build: "Build", grasp_set: "GraspSet", period_us: int) -> "Iterator[Li
 
 @contextmanager
 def _published(
-    sinks: Sequence[str], selector: "PreshapeSelector | None", line: "Callable[[LiveGrasp, Preshape | None], bytes]"
+    sinks: Sequence[str],
+    selector: "PreshapeSelector | None",
+    line: "Callable[[LiveGrasp, Preshape | None], bytes]",
+    follower: "TaskFollower | None" = None,
 ) -> "Iterator[Callable[[LiveGrasp], None]]":
-    """Yield what publishes a replayed grasp with its preshape: to sinks, which wait for their readers, or without any
-    as a `line` on stdout. At the end say what was lost, with exit code 1.
+    """Yield what publishes a replayed grasp with its preshape, and news of a task: to sinks, which wait for their
+    readers, or without any as a `line` on stdout. At the end say what was lost, with exit code 1.
     """
     from thenar.runtime.sinks import Fanout, open_sink
+    from thenar.runtime.sinks.jsonl import encode_task
 
     with ExitStack() as stack:
         opened = []
@@ -399,6 +421,11 @@ def _published(
                 fanout.publish(grasp, shape, None)
             else:
                 sys.stdout.buffer.write(line(grasp, shape))
+            progress = None if follower is None else follower.update(grasp)
+            if progress is not None and opened:
+                fanout.task(progress)
+            elif progress is not None:
+                sys.stdout.buffer.write(encode_task(progress))
 
         yield publish
     sys.stdout.flush()

@@ -58,9 +58,17 @@ class Segmented(Struct, frozen=True):
     help="Decide live, with this lag. [default: from the whole recording, which is exact]",
 )
 @click.option("--picture", type=OutputFile(".svg", ".png"), help="Draw the segments there, with the true ones above.")
+@click.option("--transitions", type=OutputFile(".json"), help="Count there which type follows which.")
 @overwrite_flag
 @json_flag
-def command(recordings: Path, build: Path, output: Path | None, lag_ms: float | None, picture: Path | None) -> None:
+def command(
+    recordings: Path,
+    build: Path,
+    output: Path | None,
+    lag_ms: float | None,
+    picture: Path | None,
+    transitions: Path | None,
+) -> None:
     """Find when each grasp of FILE begins and ends: whole movements (.grasps), or a recorded run of BUILD (.mcap).
 
     A segment is one row: start and end in seconds, grasp type, and the mean probability of that type in its frames.
@@ -70,18 +78,21 @@ def command(recordings: Path, build: Path, output: Path | None, lag_ms: float | 
     Example:
         thenar segment movements.grasps -b build/ -o segments.csv
         thenar segment run.mcap -b build/ -o segments.eaf --lag-ms 150
-        thenar segment movements.grasps -b build/ --picture timeline.svg
+        thenar segment movements.grasps -b build/ --picture timeline.svg --transitions graph.json
     """
     from thenar.compiler.artifact.segments import segment
     from thenar.compiler.segmenting.files import write
     from thenar.compiler.segmenting.picture import draw
+    from thenar.compiler.segmenting.transitions import Transitions
     from thenar.runtime.files import write_atomically
 
-    keep_apart(recordings, output, picture)
+    keep_apart(recordings, output, picture, transitions)
     with progress("finding segments") as report:
         found = segment(build, recordings, None if lag_ms is None else round(1000 * lag_ms), report, warning)
     if picture is not None:
         write_atomically(picture, draw(found, picture.suffix.lower().removeprefix(".")))
+    if transitions is not None:
+        write_atomically(transitions, Transitions.of_timelines(found).to_json())
     if output is not None:
         write(output, found)
     show(_summary(found), _print)

@@ -13,7 +13,7 @@ from typing import Protocol, Self
 
 from .build import Build
 from .calibration import AngleReader
-from .frames import PERIODS, GloveFrame, SwitchFrame
+from .frames import PERIODS, GloveFrame
 from .harness.loading import load_harness
 from .harness.wiring import Harness
 from .harness.writing import harness_to_toml
@@ -23,10 +23,11 @@ from .live.sources import Taken
 from .live.system import System
 from .policy import Policy
 from .preshape.loading import preshape_selector
-from .published import DeviceHealth, HealthReport, JointAngles
+from .published import DeviceHealth, HealthReport, JointAngles, Quarantined
 from .recording.session import Session
 from .recording.writer import Recorder
 from .sinks.base import Fanout, Sink, SinkReport, open_sink
+from .task import TaskFollower
 from .taxels import calibration_of
 
 _REPORT_US = 1_000_000
@@ -64,6 +65,8 @@ class Glove:
         A new .mcap file for the raw frames and what came of them.
     full_scan : bool
         Whether every scan reads all ports, even when the rest cannot matter.
+    task : str or path, optional
+        A task of `thenar teach`: sinks get how far the hand has come in it, whenever that changes.
     status : bool
         Whether sinks get a report of the glove's health once a second, and whenever a device comes or goes.
     stop : threading.Event, optional
@@ -81,8 +84,11 @@ class Glove:
         The devices.
     recorder : Recorder or None
         What writes the recording.
+    follower : TaskFollower or None
+        What follows the hand through `task`: its `progress` says where it is.
     health : HealthReport or None
-        How the glove fares, worked out anew once a second, and whenever a device comes or goes.
+        How the glove fares, worked out anew once a second, and whenever a device comes or goes, or an input is
+        quarantined or taken back.
     lacking : str
         A sentence on grasp types for which `preshapes` names none; "" if there are none.
 
@@ -118,6 +124,7 @@ class Glove:
         record: str | PathLike[str] | None = None,
         full_scan: bool = False,
         status: bool = False,
+        task: str | PathLike[str] | None = None,
         stop: Event | None = None,
         feed: Feed | None = None,
     ) -> None:
@@ -144,7 +151,9 @@ class Glove:
         self._measured: GloveFrame | None = None
         self._newest_angles: JointAngles | None = None
         self._sinks, self._record, self._status = tuple(sinks), record, status
+        self.follower = None if task is None else TaskFollower.of(Path(task), loaded.grasps)
         self._health, self._due_us = Health(loaded), 0
+        self._quarantined: tuple[Quarantined, ...] = ()
         self._fanout = Fanout(())
         self._open = ExitStack()
 
@@ -179,24 +188,18 @@ class Glove:
         taken = self._with_record(self.feed.take())
         now = taken.time_us
         moment = self._recognizer.step(now, time_ns() // 1000, taken.switches, taken.glove)
-        grasp, measured = moment.grasp, taken.measured
+        grasp = moment.grasp
         if self.recorder is not None:
-            for frame in taken.arrived:
-                if isinstance(frame, SwitchFrame):
-                    self.recorder.switches(frame)
-                else:
-                    self.recorder.glove(frame)
-            self.recorder.grasp(grasp)
+            self.recorder.moment(taken.arrived, grasp)
         if self._selector is not None:
             moment.preshape = self._selector.update(grasp)
-        if self._angles is not None:
-            if measured is not self._measured:
-                self._measured = measured
-                there = measured is not None and measured.plugged
-                self._newest_angles = self._angles.angles(measured.sensors) if measured and there else None
-            moment.angles = self._newest_angles
+        progress = None if self.follower is None else self.follower.update(grasp)
+        moment.angles = self._angles_of(taken.measured)
         self._fanout.publish(grasp, moment.preshape, moment.angles)
+        if progress is not None:
+            self._fanout.task(progress)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None, moment.codes)
+        self._leave_out(now)
         if now >= self._due_us or self.sources.changed:
             self._look(now)
         self.frames += 1
@@ -223,9 +226,24 @@ class Glove:
             taken = replace(more, arrived=(*taken.arrived, *more.arrived))
         return taken
 
+    def _leave_out(self, now: int) -> None:
+        """Let no scan end early by what is quarantined, and say so at once."""
+        quarantine = self._recognizer.quarantine
+        if quarantine.found != self._quarantined:
+            self._quarantined, self._due_us = quarantine.found, now
+            self.sources.leave_out(*quarantine.out)
+
+    def _angles_of(self, measured: GloveFrame | None) -> JointAngles | None:
+        if measured is not self._measured:
+            self._measured = measured
+            there = measured is not None and measured.plugged
+            self._newest_angles = self._angles.angles(measured.sensors) if self._angles and measured and there else None
+        return self._newest_angles
+
     def _look(self, now: int) -> None:
         self._due_us, self.sources.changed = now + _REPORT_US, False
-        self.health = self._health.report(now, self.sources.health(), self.sources.overflowed)
+        devices, overflowed = self.sources.health(), self.sources.overflowed
+        self.health = self._health.report(now, devices, overflowed, self._quarantined)
         if self._status:
             self._fanout.health(self.health)
         self.sources.raise_settings()

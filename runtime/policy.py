@@ -26,6 +26,7 @@ class Policy:
                 ends wrong no more often, under the assumptions that it states; `dwell_us` is not used then, and
                 `hold_us` is the longest that one test may take and that its answer holds
     spacing_us  sequential test: frames count only if they are so far apart
+    quarantine  whether inputs that are read and yet wrong (quarantine.py) are treated as lost
     lag_us      segments: how long after a moment its state is said for good; None: no segments are sought
     """
 
@@ -35,6 +36,7 @@ class Policy:
     max_lost: float = 0.5
     error_rate: float | None = None
     spacing_us: int = 0
+    quarantine: bool = True
     lag_us: int | None = 150_000
 
     def __post_init__(self) -> None:

@@ -85,6 +85,21 @@ class Drift(msgspec.Struct, frozen=True):
     codes: int
 
 
+class Quarantined(msgspec.Struct, frozen=True):
+    """An input that is read and yet wrong, why ("stuck closed", "stuck open", "chattering", "drifting"), and whether it
+    is `used` all the same: because too much would be lost without it, or because the policy says so.
+    """
+
+    name: str
+    reason: str
+    used: bool = False
+
+    @property
+    def what(self) -> str:
+        """Both in words: "stuck closed, treated as lost"."""
+        return f"{self.reason}, {'used all the same' if self.used else 'treated as lost'}"
+
+
 class HealthReport(msgspec.Struct, frozen=True):
     """State at `time_us` of the host's monotonic clock.
 
@@ -95,6 +110,7 @@ class HealthReport(msgspec.Struct, frozen=True):
     frames, changing, degraded, unknown  how many grasps were published so far, and how many of them with that health
     overflowed                 frames that came in and were not taken in time: a recording lacks them
     devices                    as their drivers have it
+    quarantined                inputs that are treated as lost, because they are read and yet wrong
     """
 
     time_us: int
@@ -110,3 +126,4 @@ class HealthReport(msgspec.Struct, frozen=True):
     unknown: int
     overflowed: int = 0
     devices: tuple[DeviceHealth, ...] = ()
+    quarantined: tuple[Quarantined, ...] = ()

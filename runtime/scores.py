@@ -10,7 +10,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
 from itertools import compress, repeat
-from operator import getitem, sub, truediv
+from operator import getitem, not_, sub, truediv
 from struct import Struct
 
 import numpy as np
@@ -81,8 +81,13 @@ class Scorer:
         total = sum(compress(self.switch_rows, switches), self.start) + self.joint_sum(self._codes(codes))
         return self.unpack(total.to_bytes(self.size, "little"))
 
-    def joint_sum(self, codes: Sequence[int]) -> int:
-        """Return the sum of what all joints' codes add."""
+    def joint_sum(self, codes: Sequence[int], lost: Mask = 0) -> int:
+        """Return the sum of what all joints' codes add, of those that are lost the mean."""
+        if lost:
+            there = [not lost >> joint & 1 for joint in range(len(codes))]
+            rows = map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes))
+            known = sum(compress(rows, there), sum(compress(self.joint_means, map(not_, there))))
+            return known + self._pair_sum([code * own for code, own in zip(codes, there, strict=True)])
         return sum(map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes))) + self._pair_sum(codes)
 
     def _pair_sum(self, codes: Sequence[int]) -> int:
@@ -100,10 +105,7 @@ class Scorer:
         lost_codes = _flags(lost_joints, len(self.thresholds), "lost joints")
         there = [bit and not lost for bit, lost in zip(switches, lost_bits, strict=True)]
         total = sum(compress(self.switch_rows, there), sum(compress(self.switch_means, lost_bits), self.start))
-        for joint, (code, lost) in enumerate(zip(joints, lost_codes, strict=True)):
-            row = self.joint_rows[joint][bisect_left(self.thresholds[joint], code)]
-            total += self.joint_means[joint] if lost else row
-        total += self._pair_sum([0 if lost else code for code, lost in zip(joints, lost_codes, strict=True)])
+        total += self.joint_sum(joints, sum(lost << joint for joint, lost in enumerate(lost_codes)))
         return self.unpack(total.to_bytes(self.size, "little"))
 
     def _codes(self, codes: ArrayLike) -> list[int]:
@@ -163,7 +165,7 @@ class LiveScores:
     code's bin, its mean row while it is lost. So `lanes` are exactly `Scorer.lanes_without` of the same state.
     """
 
-    __slots__ = ("_closed", "_codes", "_joints", "_lost", "_scorer", "_silent", "_there")
+    __slots__ = ("_closed", "_codes", "_dull", "_joints", "_lost", "_scorer", "_silent", "_there")
 
     def __init__(self, scorer: Scorer) -> None:
         self._scorer = scorer
@@ -171,12 +173,13 @@ class LiveScores:
         self._lost: Mask = 0
         self._closed, self._silent = scorer.start, 0
         self._codes: tuple[int, ...] | None = None
+        self._dull: Mask = 0
         self._joints = scorer.joints_lost
 
-    def joints(self, codes: Sequence[int] | None) -> None:
-        """Take the codes of all joints; None: all are lost. Raises FrameError."""
+    def joints(self, codes: Sequence[int] | None, lost: Mask = 0) -> None:
+        """Take the codes of all joints, and which of them are lost; None: all are. Raises FrameError."""
         taken = None if codes is None else tuple(codes)
-        if taken == self._codes:
+        if taken == self._codes and lost == self._dull:
             return
         scorer = self._scorer
         if taken is None:
@@ -184,8 +187,8 @@ class LiveScores:
         elif len(taken) != len(scorer.thresholds):
             raise FrameError(f"{len(taken)} codes, the build has {len(scorer.thresholds)} joints")
         else:
-            self._joints = scorer.joint_sum(taken)
-        self._codes = taken
+            self._joints = scorer.joint_sum(taken, lost)
+        self._codes, self._dull = taken, lost
 
     def lanes(self, closed: Mask, lost: Mask = 0) -> tuple[int, ...]:
         """Return the K scores, each 2^15 too high, of a state of all switches; bits of `closed` that are lost mean

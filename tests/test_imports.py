@@ -40,6 +40,7 @@ ALLOWED = {
     "compiler.samples": ("runtime", "drivers.errors", "compiler.limits", "compiler.recordings"),
     "compiler.placement": (
         "runtime",
+        "drivers.cyberglove_protocol",
         "drivers.errors",
         "drivers.members",
         "compiler.additive",

@@ -106,6 +106,7 @@ class Documents:
     def _report(self, made: BuildReport, jobs: int, progress: Progress | None) -> bytes:
         from ..report.content import ReportContent
         from ..report.page import report_html
+        from ..segmenting.transitions import Transitions
 
         study, no_study = _study(made, jobs, progress)
         names = [switch.name for switch in made.manifest.switches]
@@ -126,6 +127,7 @@ class Documents:
                 hand=None if self.hand is None else self.hand.fitted(made.grasp_set.element_names),
                 scan=made.scan,
                 harness=made.harness,
+                transitions=Transitions.of_set(made.grasp_set) if made.grasp_set.is_none.any() else None,
                 comparison=made.comparison,
                 faults=made.faults,
                 worst=worst_case(made.trained.model, made.tables, made.comparison, made.manifest.grasps, names),

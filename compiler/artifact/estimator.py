@@ -37,7 +37,10 @@ from . import CompileError
 from .compile import Making, Wired, check_target
 from .documents import BuildReport, Documents, Progress
 from .ensemble import model_fault
-from .training import Answers, Trained, cross_validated, cuts_of, integers_of
+from .training import Scores, Trained, cross_validated, cuts_of, integers_of
+
+# The score of a class that a fold's training rows do not have.
+_UNSEEN = -1e6
 
 
 class Build(LoadedBuild):
@@ -172,7 +175,7 @@ def compile(  # noqa: A001
     options, gains = _placed_by(estimator, _trained_by(classifier, options))
     trained = replace(trained, gains=gains or information_alone(samples.without_none(), trained.columns))
     made = Making(grasp_set, samples, options, trained, harness)
-    test = partial(_answers_of, estimator, samples, options)
+    test = partial(_scores_of, estimator, samples, options)
     tested = cross_validated(samples, cuts, options, test, jobs, progress or _silent)
     return made.publish(target, tested, documents, jobs, progress)
 
@@ -281,12 +284,14 @@ def _trained_by(classifier: Any, options: Options) -> Options:
     )
 
 
-def _answers_of(estimator: Any, samples: Samples, options: Options, fold: Fold) -> Answers:
-    """Fit a clone on the fold's training rows alone; return the classes that its integers give the test rows."""
+def _scores_of(estimator: Any, samples: Samples, options: Options, fold: Fold) -> Scores:
+    """Fit a clone on the fold's training rows alone; return the scores (m, K) that its integers give the test rows."""
     learnt, classes = samples.rows(fold.train), estimator.classes_
     fitted = clone(estimator).fit(learnt.inputs, classes[learnt.labels])
     trained = _trained(fitted, learnt)
     tables = integers_of(trained, learnt, options)
     test = trained.read(samples.rows(fold.test))
-    found = _classifier(fitted).classes_[integer_scores(tables, test.switches, test.codes).argmax(axis=1)]
-    return np.asarray((found[:, np.newaxis] == classes).argmax(axis=1))
+    scores = np.full((len(fold.test), len(classes)), _UNSEEN)
+    known = (_classifier(fitted).classes_[:, np.newaxis] == classes).argmax(axis=1)
+    scores[:, known] = integer_scores(tables, test.switches, test.codes) / tables.scale
+    return scores

@@ -138,7 +138,7 @@ class Rate:
         ends = [mean, *bounds]
         starts = range(0, len(correct), repeats_a_draw)
         if len(starts) > 1:
-            ends += _student([fmean(correct[i : i + repeats_a_draw]) / total for i in starts])
+            ends += student([fmean(correct[i : i + repeats_a_draw]) / total for i in starts])
         return cls(of, unit, correct, total, over, mean, max(0.0, min(ends)), min(1.0, max(ends)))
 
     @property
@@ -235,7 +235,8 @@ def _wilson(p: float, n: float, z: float) -> tuple[float, float]:
     return (centre - reach) / shrink, (centre + reach) / shrink
 
 
-def _student(rates: list[float]) -> tuple[float, float]:
+def student(rates: list[float]) -> tuple[float, float]:
+    """Return Student's 95 % interval of the mean of two numbers or more."""
     reach = _quantile(len(rates) - 1) * stdev(rates) / sqrt(len(rates))
     return fmean(rates) - reach, fmean(rates) + reach
 

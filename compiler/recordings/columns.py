@@ -104,6 +104,9 @@ class TaxelColumns(JointColumns, frozen=True, forbid_unknown_fields=True, omit_d
         return self.is_counts or not (self.grid is None and self.origin is None and self.calibration is None)
 
 
+TimeUnit = Literal["s", "ms", "us", "ns"]
+
+
 class TextFormat(NamedTuple):
     """How a table of text is written: `delimiter` None is the suffix's, a tab in .tsv and a comma elsewhere."""
 
@@ -122,7 +125,8 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
 
     A label, subject, object, session or trial may be spread over several columns: what they say together counts.
     `frames` says how trials are told apart otherwise: "independent" states that each row is one; after "restart" one
-    begins where `time` does not rise, or another label, subject, object or session comes.
+    begins where `time` does not rise, or another label, subject, object or session comes. Labels in `none` mean that
+    nothing is held, as "none" always does; with "" among them, so does an empty cell.
     """
 
     label: str | tuple[str, ...]
@@ -131,6 +135,8 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
     session: str | tuple[str, ...] | None = None
     trial: str | tuple[str, ...] | None = None
     time: str | None = None
+    time_unit: TimeUnit | None = None
+    none: str | tuple[str, ...] = ()
     frames: Literal["independent", "restart"] | None = None
     taxonomy: str | tuple[str, ...] | dict[str, tuple[str, ...]] = "own"
     simulated: str = ""
@@ -155,8 +161,10 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
             raise ValueError(f"`delimiter` must be one character that is not the `quote`, not {self.delimiter!r}")
         if not _is_encoding(self.encoding):
             raise ValueError(f"`encoding` must be one that Python knows, not {shortened(repr(self.encoding))}")
-        if self.frames == "restart" and (self.time is None or self.trial is not None):
-            raise ValueError("`frames` = 'restart' takes `time`, and no `trial`")
+        if self.frames == "restart" and self.trial is not None:
+            raise ValueError("`frames` = 'restart' takes no `trial`")
+        if self.time_unit is not None and self.time is None:
+            raise ValueError("`time_unit` is that of `time`, which names no column")
         if isinstance(self.taxonomy, dict) and len(self.taxonomy) != 1:
             raise ValueError("`taxonomy` as a table holds one name and its list of types")
         if not self.parts("label"):

@@ -34,20 +34,30 @@ class Heads(NamedTuple):
     object: str
     session: str
     trial: str
+    time: str
 
 
 def heads_of(grasp_set: GraspSet) -> Heads:
-    """Return "grasp", "subject", "object", "session", "trial", with an underline where an input has that name."""
+    """Return "grasp", "subject", "object", "session", "trial", "time_us", with an underline where an input has that
+    name.
+    """
     taken = {*grasp_set.element_names, *grasp_set.joint_names}
-    return Heads(*(_free(name, taken) for name in ("grasp", "subject", "object", "session", "trial")))
+    return Heads(*(_free(name, taken) for name in ("grasp", "subject", "object", "session", "trial", "time_us")))
 
 
 def meta_of(grasp_set: GraspSet) -> dict[str, NDArray[np.generic]]:
     """Return the columns of a table that are neither inputs nor the label, by their keys in a columns.toml; a session
-    only where the set has several.
+    only where the set has several, a time where it is known.
     """
-    found = {key: getattr(grasp_set, f"{key}s") for key in Heads._fields[1:]}
-    return {key: column for key, column in found.items() if key != "session" or (column != "1").any()}
+    found = {key: getattr(grasp_set, f"{key}s" if key != "time" else "times_us") for key in Heads._fields[1:]}
+    absent = {"time"} if not grasp_set.times_us.size else set()
+    absent |= {"session"} if not (grasp_set.sessions != "1").any() else set()
+    return {key: column for key, column in found.items() if key not in absent}
+
+
+def types_of(grasp_set: GraspSet) -> tuple[str, ...]:
+    """Return the grasp types that there may be, and "none", last, where it occurs."""
+    return grasp_set.taxonomy.names if grasp_set.is_none.any() else grasp_set.taxonomy.types
 
 
 def columns_of(grasp_set: GraspSet, codes: bool = False) -> str:
@@ -55,6 +65,8 @@ def columns_of(grasp_set: GraspSet, codes: bool = False) -> str:
     heads, taxonomy = heads_of(grasp_set), grasp_set.taxonomy
     lines = [f"label = {_text(heads.label)}"]
     lines += [f"{key} = {_text(getattr(heads, key))}" for key in meta_of(grasp_set)]
+    if grasp_set.times_us.size:
+        lines.append('time_unit = "us"')
     if grasp_set.independent:
         lines.append('frames = "independent"')
     if grasp_set.simulated:
@@ -140,7 +152,7 @@ def export(
 
 
 def to_csv(grasp_set: GraspSet, codes: bool = False, delimiter: str = ",") -> str:
-    """Return grasp type, subject, object, trial, switches and joints as CSV with one header row.
+    """Return grasp type, subject, object, trial, time, switches and joints as CSV with one header row.
 
     A name that a spreadsheet would take for a formula has an apostrophe before it, which importing takes away.
     """
@@ -159,7 +171,7 @@ def to_dataframe(grasp_set: GraspSet, codes: bool = False) -> "pd.DataFrame":
 
     heads = heads_of(grasp_set)
     columns: dict[str, object] = {
-        heads.label: pd.Categorical.from_codes(grasp_set.labels, categories=list(grasp_set.taxonomy.types)),
+        heads.label: pd.Categorical.from_codes(grasp_set.labels, categories=list(types_of(grasp_set))),
         **{getattr(heads, key): column for key, column in meta_of(grasp_set).items()},
         **dict(zip(grasp_set.switch_names, grasp_set.switches.T, strict=True)),
     }
@@ -176,7 +188,7 @@ def to_arff(grasp_set: GraspSet, codes: bool = False, meta: bool = False) -> str
     attributes = [f"{_quote(getattr(heads, key))} {_kind(column)}" for key, column in who.items()]
     attributes += [f"{_quote(name)} {{0,1}}" for name in grasp_set.switch_names]
     attributes += [f"{_quote(joint.name)} numeric" for joint, _ in _coded(grasp_set)]
-    attributes.append(f"{_quote(heads.label)} {_nominal(grasp_set.taxonomy.types)}")
+    attributes.append(f"{_quote(heads.label)} {_nominal(types_of(grasp_set))}")
     first = ([_quote(str(value)) for value in column.tolist()] for column in who.values())
     rows = zip(*first, *_inputs(grasp_set, codes), map(_quote, grasp_set.grasps.tolist()), strict=True)
     lines = ["@relation grasps", "", *(f"@attribute {attribute}" for attribute in attributes), "", "@data"]

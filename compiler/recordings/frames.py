@@ -41,8 +41,9 @@ def looks_like_frames(grasp_set: GraspSet) -> str | None:
     third of the group away or more; repetitions do so by chance, and drift makes them do so a little more often.
     Chance is taken from two rows that both are far away. Frames whose noise is about as large as what differs between
     trials are not found, nor is a single trial of each group; but copies are, where joints differ between groups and
-    nothing simulated them.
+    nothing simulated them. Rows in which nothing is held are not looked at: no rate counts them.
     """
+    grasp_set = grasp_set.without_none()
     order, group = _units(grasp_set)
     sizes = np.bincount(group) if len(group) else group
     starts = np.cumsum(sizes) - sizes

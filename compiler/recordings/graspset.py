@@ -29,6 +29,7 @@ from thenar.runtime.names import shortened
 from thenar.runtime.nesting import check_json
 from thenar.runtime.sealed import seal, unseal
 
+from ..text import none_words
 from .arrays import AnyArray, pack, unpack
 from .errors import LARGEST, RecordingError, check_names, check_room, check_simulated
 from .taxonomy import Taxonomy
@@ -252,7 +253,7 @@ class GraspSet:
         types, subjects, objects = (len(np.unique(each)) for each in (self.grasps, self.subjects, self.objects))
         none = int(np.count_nonzero(self.is_none))
         what = f"{len(self)} grasps of {types - (none > 0)} types ({shortened(self.taxonomy.name)})"
-        what += f", in {none} of which nothing is held" if none else ""
+        what += none_words(none)
         taxels = f"{len(self.taxel_columns)} taxels, " if self.taxel_columns else ""
         read = f"{len(self.switch_names)} switches, {taxels}{len(self.joints)} joints"
         who = f"{read}, {subjects} subjects, {objects} objects"
@@ -412,9 +413,10 @@ class GraspSet:
         Returns
         -------
         pandas.DataFrame
-            One row a frame: "grasp" (a category of the taxonomy's types, in their order), "subject" and "object" (str),
-            "session" (str; only where there are several), "trial" (int64), the switches (bool), taxels and joints, in
-            the set's order. Where an input has one of these names, the column has an underline behind it.
+            One row a frame: "grasp" (a category of the taxonomy's types, in their order, and of "none" where it
+            occurs), "subject" and "object" (str), "session" (str; only where there are several), "trial" (int64),
+            "time_us" (int64; where it is known), the switches (bool), taxels and joints, in the set's order. Where an
+            input has one of these names, the column has an underline behind it.
             `attrs["thenar"]` is the text of a columns.toml: roles, calibrations, taxonomy, what simulated the grasps.
             Parquet keeps it.
 

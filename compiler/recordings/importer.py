@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.names import SHOWN, list_names, shortened
+from thenar.runtime.published import NONE
 
 from .cells import Parsed, Value, bits, codes, integers, names, numbers
 from .coding import CodingCost, coarse, code_joint
@@ -22,13 +23,15 @@ from .frames import check_trials
 from .graspset import GraspSet
 from .summary import Finding, find_oddities
 from .table import Table, read_table
-from .taxonomy import Taxonomy, own, published
-from .trials import Frames, fill, groups, in_time, numbered, otsu, restarts
+from .taxonomy import Taxonomy, own, plain, published
+from .trials import Frames, fill, groups, in_runs, in_time, numbered, otsu, restarts, unit_of_time
 
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """What a table holds for a GraspSet: n rows by the numbers the user knows; (n, j) values or codes of the joints."""
+    """What a table holds for a GraspSet: n rows by the numbers the user knows; (n, j) values or codes of the joints;
+    `time` in the table's unit, 0 throughout where it has none.
+    """
 
     rows: NDArray[np.int64]
     labels: NDArray[np.str_]
@@ -36,6 +39,7 @@ class Readings:
     objects: NDArray[np.str_]
     sessions: NDArray[np.str_]
     trials: NDArray[np.int64]
+    time: NDArray[np.float64]
     switches: NDArray[np.bool_]
     joints: NDArray[np.float64]
 
@@ -49,9 +53,12 @@ class Readings:
 
 
 class Read(NamedTuple):
-    """What was read of a table: `warnings` of what is odd, `notes` on what was made of it."""
+    """What was read of a table: `times_us`, none where it does not tell; `warnings` of what is odd, `notes` on what was
+    made of it.
+    """
 
     readings: Readings
+    times_us: NDArray[np.int64]
     warnings: list[Finding]
     notes: list[str]
 
@@ -64,35 +71,99 @@ def read_cells(table: Table, columns: Columns, selection: Selection) -> Read:
     """
     reader = _Reader(table, columns)
     notes: list[str] = []
-    time = np.zeros(len(table.rows))
-    if columns.time is not None:
-        time = reader.read(columns.time, numbers, "finite numbers")
+    labels = reader.names(columns.parts("label"))
     readings = Readings(
         rows=table.rows,
-        labels=reader.names(columns.parts("label")),
+        labels=labels,
         subjects=reader.names(columns.parts("subject")),
         objects=reader.names(columns.parts("object")),
         sessions=reader.names(columns.parts("session")),
         trials=reader.trials(columns.parts("trial"), notes),
+        time=np.zeros(len(labels)) if columns.time is None else reader.read(columns.time, numbers, "finite numbers"),
         switches=_switches(reader, selection, notes),
         joints=_joints(reader, selection),
     )
+    none = nothing_held(columns, labels)
+    _lend(readings, none, columns, reader)
     keep = reader.complete(columns.missing)
     warnings = _dropped(readings, keep, reader.missing)
     missing = {name: _kept(mask, keep) for name, mask in reader.missing.items()}
-    readings, time = readings.kept(keep), _kept(time, keep)
+    readings, none = readings.kept(keep), none[keep]
+    untold = columns.frames is None and not columns.parts("trial")
+    if untold and none.any() and in_runs(readings.labels, readings.subjects, readings.objects, readings.sessions):
+        notes.append('a run of rows of one label was taken for a trial: frames = "restart" says so')
+        untold, columns = False, msgspec.structs.replace(columns, frames="restart")
     if columns.frames == "restart":
-        readings = replace(readings, trials=restarts(readings.trial_ids(), time))
+        readings = replace(readings, trials=_runs(readings, none, columns.time is None))
     independent = columns.frames == "independent"
     trial_ids = np.arange(len(readings.rows)) if independent else readings.trial_ids()
-    if columns.frames is None and not columns.parts("trial"):
+    if untold:
         _check_told(table.what, trial_ids)
     if columns.time is not None:
-        order = in_time(trial_ids, time)
+        order = in_time(trial_ids, readings.time)
         readings = readings.kept(order)
         missing = {name: mask[order] for name, mask in missing.items()}
     warnings += _filled(table.what, readings, selection, missing, trial_ids)
-    return Read(_reduced(readings, columns.reduce, trial_ids, notes), warnings, notes)
+    micros = _micros(table.what, columns, readings.time, notes)
+    readings = _reduced(readings, columns.reduce, trial_ids, notes)
+    times_us = np.rint(readings.time * micros).astype(np.int64) if micros else np.empty(0, np.int64)
+    return Read(readings, times_us, warnings, notes)
+
+
+def _micros(what: str, columns: Columns, time: NDArray[np.float64], notes: list[str]) -> float:
+    """Return how many microseconds the unit of `time` has, 0.0 where there is no time, or its unit is not known.
+
+    Raises TableError where a time is too large.
+    """
+    if columns.time is None:
+        return 0.0
+    unit = columns.time_unit or unit_of_time(columns.time, time)
+    if unit is None or not np.isfinite(time).all():
+        why = "its unit is not known (`time_unit`)" if unit is None else "some of its cells are missing"
+        notes.append(f"{shortened(columns.time)} orders frames, but does not say when they were recorded: {why}")
+        return 0.0
+    micros = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}[unit]
+    if np.abs(time).max(initial=0) * micros > 2**62:
+        raise TableError(f"{what}: column {shortened(repr(columns.time))} holds times of more than 100,000 years")
+    return micros
+
+
+def nothing_held(columns: Columns, labels: NDArray[np.str_]) -> NDArray[np.bool_]:
+    """Return which rows (n,) have a label that means, by itself or by `columns`, that nothing is held."""
+    types = next(iter(columns.taxonomy.values())) if isinstance(columns.taxonomy, dict) else columns.taxonomy
+    meant = {*map(plain, columns.parts("none")), *((NONE,) if isinstance(types, str) or NONE not in types else ())}
+    found, where = np.unique(labels, return_inverse=True)
+    none = [not meant.isdisjoint(map(plain, (label, columns.labels.get(label, label)))) for label in found.tolist()]
+    return np.array(none, np.bool_)[where]
+
+
+def _lend(readings: Readings, none: NDArray[np.bool_], columns: Columns, reader: "_Reader") -> None:
+    """Let cells be empty that say nothing where nothing is held: of the label, if that means none, and of the object,
+    session and trial, which are those of the next row, or the last, in which something is.
+    """
+    if "" in columns.parts("none"):
+        reader.excuse(columns.parts("label"), none)
+    held = np.flatnonzero(~none)
+    if not held.size:
+        return
+    nearest = held[np.minimum(np.searchsorted(held, np.arange(len(none))), len(held) - 1)]
+    for key in ("object", "session", "trial"):
+        if (lacking := reader.excuse(columns.parts(key), none)).any():
+            column = getattr(readings, f"{key}s")
+            column[lacking] = column[nearest[lacking]]
+
+
+def _runs(readings: Readings, none: NDArray[np.bool_], timeless: bool) -> NDArray[np.int64]:
+    """Return the number (n,) of each row's trial, which begins where time does not rise or anything else changes; rows
+    in which nothing is held have the number of the trial that they lead to.
+    """
+    time = np.arange(len(none), dtype=np.float64) if timeless else readings.time
+    number = restarts(readings.trial_ids(), time)
+    last = np.flatnonzero(np.diff(number))
+    leads = none[last] & ~none[last + 1] & (time[last] < time[last + 1])
+    for column in (readings.subjects, readings.sessions):
+        leads &= column[last] == column[last + 1]
+    return np.unique(number + np.append(leads, False)[number - 1], return_inverse=True)[1] + 1
 
 
 # Read into place, and in columns, so that a large table is in memory only once.
@@ -265,6 +336,17 @@ class _Reader:
         notes.append(f"the texts of {what} were numbered as trials in natural order: {list_names(shown, len(texts))}")
         return trials
 
+    def excuse(self, columns: tuple[str, ...], rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Take no cell of `columns` in `rows` (n,) for missing; return in which rows (n,) some were."""
+        lacking = np.zeros(len(rows), np.bool_)
+        for name in columns:
+            if name in self.missing:
+                lacking |= self.missing[name] & rows
+                self.missing[name] &= ~rows
+                if not self.missing[name].any():
+                    del self.missing[name]
+        return lacking
+
     def complete(self, missing: str) -> NDArray[np.bool_]:
         """Return which rows stay; raises TableError on wrong cells, and on missing ones where they are refused."""
         faults = [f"not {expected}: {self._list(columns)}" for expected, columns in self.wrong.items()]
@@ -291,10 +373,14 @@ class _Reader:
 
 
 class ImportReport(msgspec.Struct, frozen=True):
-    """What `thenar import` says: what is in the set, what coding cost per joint, what was made of it, what is odd."""
+    """What `thenar import` says: what is in the set, what coding cost per joint, what was made of it, what is odd.
+
+    none  in how many of the rows nothing is held
+    """
 
     table: str
     rows: int
+    none: int
     trials: int
     subjects: int
     objects: int
@@ -320,7 +406,7 @@ def import_file(table: Path, columns: Path) -> tuple[GraspSet, ImportReport]:
 def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport]:
     """Import `table` as `columns` says; raises TableError, ColumnsError or RecordingError."""
     selection = select(columns, list(table.columns))
-    readings, warnings, notes = read_cells(table, columns, selection)
+    readings, times_us, warnings, notes = read_cells(table, columns, selection)
     grasps, taxonomy, aliases = _labels(table, columns, readings)
     coded = [
         code_joint(name, entry, readings.joints[:, column], readings.rows)
@@ -346,6 +432,7 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         trials=readings.trials,
         sessions=readings.sessions,
         independent=columns.frames == "independent",
+        times_us=times_us,
         simulated=columns.simulated,
     )
     check_trials(grasp_set, ColumnsError)
@@ -373,10 +460,11 @@ def report_of(
     return ImportReport(
         table=what,
         rows=len(grasp_set),
+        none=int(grasp_set.is_none.sum()),
         trials=int(grasp_set.trial_ids.max(initial=-1)) + 1,
         subjects=len(np.unique(grasp_set.subjects)),
         objects=len(np.unique(grasp_set.objects)),
-        grasp_types=len(np.unique(grasp_set.labels)),
+        grasp_types=len(np.unique(grasp_set.labels[~grasp_set.is_none])),
         taxonomy=grasp_set.taxonomy.name,
         switches=len(grasp_set.switch_names),
         taxels=len(grasp_set.taxel_columns),
@@ -396,9 +484,10 @@ def _labels(table: Table, columns: Columns, readings: Readings) -> tuple[NDArray
             f"more than {TYPES}: is it the label?"
         )
     aliased = [columns.labels.get(label, label) for label in found.tolist()]
-    taxonomy = _taxonomy(columns, aliased)
+    none = nothing_held(columns, found).tolist()
+    taxonomy = _taxonomy(columns, [label for label, nothing in zip(aliased, none, strict=True) if not nothing])
     find = taxonomy.finder()
-    types = [find(label) for label in aliased]
+    types = [NONE if nothing else find(label) for label, nothing in zip(aliased, none, strict=True)]
     unknown = np.array([name is None for name in types])[where]
     if unknown.any():
         strange = [label for label, name in zip(aliased, types, strict=True) if name is None]
@@ -408,7 +497,9 @@ def _labels(table: Table, columns: Columns, readings: Readings) -> tuple[NDArray
             f"{list_rows(readings.rows[unknown])}; [labels] can translate them"
         )
     unused = sorted(columns.labels.keys() - set(found.tolist()))
-    message = f"{len(unused)} entries of [labels] occur in no row: {list_names(unused)}"
+    there = {*map(plain, (*found.tolist(), *aliased))}
+    unused += [label for label in columns.parts("none") if plain(label) not in there]
+    message = f"{len(unused)} entries of [labels] and `none` occur in no row: {list_names(unused)}"
     check_room(len(where), max(map(len, filter(None, types))), table.size)
     return (
         np.array(types, np.str_)[where],

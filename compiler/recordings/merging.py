@@ -29,6 +29,7 @@ def merge(sets: Mapping[str, GraspSet], each: By | None = None) -> GraspSet:
 
     They have the same switches and joints, in any order; the first set's order counts. Codes are shifted where two
     calibrations differ by whole codes, as those of two imports on one grid do. Taxonomies of the user's own are united.
+    Times are kept where all sets have them.
 
     Parameters
     ----------
@@ -58,6 +59,7 @@ def merge(sets: Mapping[str, GraspSet], each: By | None = None) -> GraspSet:
         _check_columns(names[0], first, name, other)
     taxonomy = _united(names, own)
     _check_trials(names, own)
+    timed = all(found.times_us.size or not len(found) for found in own)
     joints, codes = _coded(names, [(found.joints, found.codes) for found in own])
     taxel_columns, taxels = _coded(names, [(found.taxel_columns, found.taxels) for found in own])
     return GraspSet(
@@ -75,6 +77,7 @@ def merge(sets: Mapping[str, GraspSet], each: By | None = None) -> GraspSet:
         independent=first.independent,
         taxels=taxels,
         taxel_columns=taxel_columns,
+        times_us=np.concatenate([found.times_us if timed else found.times_us[:0] for found in own]),
     )
 
 

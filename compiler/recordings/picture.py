@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pictures import painting, rendered
+from ..text import none_words
 from .errors import RecordingError
 from .graspset import GraspSet, Joint
 from .summary import contacts
@@ -72,7 +73,7 @@ def _present(grasp_set: GraspSet) -> NDArray[np.intp]:
 
 
 def _types(grasp_set: GraspSet) -> list[str]:
-    return [_short(grasp_set.taxonomy.types[label]) for label in _present(grasp_set)]
+    return [_short(grasp_set.taxonomy.names[label]) for label in _present(grasp_set)]
 
 
 def _short(name: str) -> str:
@@ -87,7 +88,7 @@ def _draw_balance(axes: "Axes", grasp_set: GraspSet) -> None:
     axes.set_yticks(np.arange(len(present)), _types(grasp_set))
     axes.set_ylim(len(present) - 0.5, -0.5)
     axes.margins(x=0.1)
-    axes.set_title(f"{len(grasp_set)} grasps")
+    axes.set_title(f"{len(grasp_set)} grasps{none_words(int(grasp_set.is_none.sum()))}")
     axes.set_xlabel("rows")
 
 

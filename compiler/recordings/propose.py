@@ -14,33 +14,43 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.runtime.names import printable, shortened
+from thenar.runtime.published import NONE
 
 from .cells import bits, names, numbers
 from .coding import sound_grid
-from .columns import KEYS, PLAIN, Columns, JointColumns, TaxelColumns, TextFormat
+from .columns import KEYS, PLAIN, Columns, JointColumns, TaxelColumns, TextFormat, TimeUnit
 from .errors import TableError
 from .graspset import CODES
 from .sniff import sniff
 from .table import Table, is_text, read_table
-from .taxonomy import published_for
-from .trials import groups, restarts
+from .taxonomy import plain, published_for
+from .trials import groups, in_runs, restarts, unit_of_time
 
 # Words in the names of columns, as people write them in several languages.
 _LISTS = {
     "label": "grasp grip label class gesture posture pose category target action griff griffart greifart "
-    "klasse geste prise classe agarre clase presa y",
+    "klasse geste prise classe agarre clase presa restimulus y",
     "subject": "subject subj who wer participant person user wearer proband teilnehmer sujet participante sujeto",
     "object": "object obj item thing objekt gegenstand objet objeto oggetto",
     "session": "session day visit sitzung tag jour séance sesión sessione",
-    "trial": "trial rep repetition repeat attempt take run versuch wiederholung durchgang essai répétition ensayo",
-    "time": "time timestamp stamp frame t zeit zeitstempel bild temps tiempo tempo",
-    "unit": "ms s us sec second millisecond no nr number",
-    "note": "n num id idx duration age date gender sex row",
+    "trial": "trial rep repetition rerepetition repeat attempt take run versuch wiederholung durchgang essai "
+    "répétition ensayo",
+    "time": "time timestamp stamp elapsed clock frame t zeit zeitstempel bild temps tiempo tempo",
+    "unit": "ms s us sec second millisecond microsecond no nr number",
+    "note": "n num id idx duration age date gender sex row stimulus emg acc accel gyro inclin",
     "pad": "pad taxel fsr pressure force tactile touch press contact druck kraft pression presión",
-    "joint": "flex bend joint angle enc encoder mcp pip dip cmc abduction winkel biegung",
+    # Labels that mean that nothing is held, in plain spelling.
+    "none": "none nothing null nograsp nogrip nograsping noobject nomovement nomotion nogesture rest resting restpose "
+    "restposition idle idling idlemovement relax relaxed neutral neutralposition open openhand handopen openpalm "
+    "empty emptyhand free freehand background pause wait waiting approach approaching release releasing released ruhe "
+    "ruhelage ruheposition leerlauf offen offenehand leer leerehand keine keingriff entspannt repos aucun aucune rien "
+    "mainouverte vide reposo descanso ninguno ninguna nada manoabierta riposo nessuno nessuna manoaperta",
+    "joint": "flex bend joint angle glove cyberglove enc encoder mcp pip dip cmc abduction winkel biegung",
 }
 # Without the s of a plural, as the words of names are looked up.
 _WORDS = {role: frozenset(word.removesuffix("s") or word for word in words.split()) for role, words in _LISTS.items()}
+# In so many of the changes of a stream's label what means that nothing is held is left or reached.
+_BETWEEN = 0.9
 # More distinct values than these are no grasp types.
 _TYPES = 200
 # An unknown analog column is at rest in so many of its cells, in the lowest tenth of its range: then it is a pad.
@@ -90,15 +100,21 @@ def listed(columns: Sequence[str]) -> str:
 
 
 class _Column(NamedTuple):
-    """What is known of a column: its words; its numbers, None of text; how many values differ, how many are missing."""
+    """What is known of a column: its words; its numbers, None of text; how many values differ, and in which rows there
+    is one.
+    """
 
     name: str
     words: frozenset[str]
     values: NDArray[np.float64] | None
     bits: bool
     distinct: int
-    missing: int
-    rows: int
+    there: NDArray[np.bool_]
+
+    @property
+    def rows(self) -> int:
+        """How many rows it has."""
+        return len(self.there)
 
     @property
     def whole(self) -> bool:
@@ -117,22 +133,21 @@ class _Column(NamedTuple):
 
 
 def _look(table: Table, name: str) -> _Column:
-    column, rows = table.columns[name], len(table.rows)
+    column = table.columns[name]
     found = re.findall(r"[A-Z]{2,}(?![^\W\dA-Z_])|[^\W\d_][^\W\dA-Z_]*", name)
     words = frozenset(word.casefold().removesuffix("s") or word for word in found)
     parsed = numbers(column, table.decimal)
     if parsed.wrong.any():
         switch = bits(column, table.decimal)
         if not switch.wrong.any():
-            there = switch.values[~switch.missing].astype(np.float64)
-            return _Column(name, words, there, True, 2, int(switch.missing.sum()), rows)
+            closed = switch.values[~switch.missing].astype(np.float64)
+            return _Column(name, words, closed, True, 2, ~switch.missing)
         read = names(column, table.cells, table.size)
-        texts = np.unique(read.values[~read.missing])
-        return _Column(name, words, None, False, len(texts), int(read.missing.sum()), rows)
+        return _Column(name, words, None, False, len(np.unique(read.values[~read.missing])), ~read.missing)
     values = parsed.values[~parsed.missing]
     distinct = np.unique(values)
     two = bool(len(distinct)) and bool(np.isin(distinct, (0, 1)).all())
-    return _Column(name, words, values, two, len(distinct), rows - len(values), rows)
+    return _Column(name, words, values, two, len(distinct), ~parsed.missing)
 
 
 def propose_file(path: Path) -> tuple[Table, Proposal]:
@@ -148,17 +163,26 @@ def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ())
     chosen, why = _named(found)
     if "label" not in chosen:
         chosen["label"], why["label"] = _label(table.what, found, chosen)
-    frames, lacks = _told(table, found, chosen, why)
+    labels = _texts(table, chosen["label"])
+    none = _none(labels)
+    held = ~np.isin(labels, none)
+    frames, lacks = _told(table, found, chosen, why, held)
+    if (unit := _unit(table, chosen)) is not None:
+        why["time"] += f"; in {unit}"
     taken = {name for columns in chosen.values() for name in columns}
-    inputs = _inputs([column for column in found if column.name not in taken])
+    inputs = _inputs([column for column in found if column.name not in taken], held)
     if not any(role.role in ("switches", "taxels", "joints") for role in inputs):
         raise TableError(f"{table.what}: no column holds numbers that change: it has no inputs")
     used = taken | {name for role in inputs if role.role != "left out" for name in role.columns}
-    missing = sum(bool(column.missing) for column in found if column.name in used)
-    labels = set(_texts(table, chosen["label"]).tolist()) - {""}
-    taxonomy = published_for(labels) or "own"
+    excused = {name for key in ("label", "object", "session", "trial") for name in chosen.get(key, ())}
+    missing = sum(
+        bool((~column.there & (held | (column.name not in excused))).any()) for column in found if column.name in used
+    )
+    taxonomy = published_for({*labels[held].tolist()} - {""}) or "own"
     columns = Columns(
         **{key: those[0] if len(those) == 1 else those for key, those in chosen.items()},  # type: ignore[arg-type]
+        time_unit=unit,
+        none=none[0] if len(none) == 1 else none,
         frames=frames,
         taxonomy=taxonomy,
         missing="keep" if missing else "refuse",
@@ -173,6 +197,9 @@ def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ())
     )
     notes = [f"{missing} columns miss cells, which are filled: see `missing`"] if missing else []
     notes += [f"the labels are grasp types of {taxonomy}"] if taxonomy != "own" else []
+    if none:
+        shown = ", ".join(shortened(repr(label)) for label in none)
+        notes += [f"nothing is held where the label is {shown} ({np.mean(~held):.0%} of the rows): see `none`"]
     roles = [Role(chosen[key], key, why[key]) for key in KEYS if key in chosen]
     return Proposal(columns, (*roles, *inputs), (*remarks, *notes), lacks)
 
@@ -204,6 +231,26 @@ def _is_time(words: frozenset[str]) -> bool:
     return bool(words & _WORDS["time"]) and words <= _WORDS["time"] | _WORDS["unit"]
 
 
+def _none(labels: NDArray[np.str_]) -> tuple[str, ...]:
+    """Return the labels that mean that nothing is held: by their words; or, of a stream, an empty one, 0 or -1, if
+    nearly all runs of others lie between runs of it. Two others are left, or "none" alone is taken.
+    """
+    found = np.unique(labels).tolist()
+    none = {label for label in found if plain(label).removesuffix("s") in _WORDS["none"]}
+    changes = np.flatnonzero(labels[1:] != labels[:-1])
+    for label in {"", "0", "-1"}.intersection(found) if in_runs(labels) else ():
+        if np.mean((labels[changes] == label) | (labels[changes + 1] == label)) >= _BETWEEN:
+            none.add(label)
+    if len({*found} - none - {""}) < 2:
+        none = {label for label in none if plain(label) == NONE}
+    return tuple(sorted(none))
+
+
+def _unit(table: Table, chosen: dict[str, tuple[str, ...]]) -> TimeUnit | None:
+    time = _time(table, chosen)
+    return None if time is None else unit_of_time(chosen["time"][0], time[~np.isnan(time)])
+
+
 def _label(what: str, found: Sequence[_Column], chosen: dict[str, tuple[str, ...]]) -> tuple[tuple[str, ...], str]:
     """Return the column that is most likely the label where none is called so."""
     if "object" in chosen:
@@ -223,9 +270,21 @@ def _texts(table: Table, columns: Iterable[str]) -> NDArray[np.str_]:
 
 
 def _told(
-    table: Table, found: Sequence[_Column], chosen: dict[str, tuple[str, ...]], why: dict[str, str]
+    table: Table,
+    found: Sequence[_Column],
+    chosen: dict[str, tuple[str, ...]],
+    why: dict[str, str],
+    held: NDArray[np.bool_],
 ) -> tuple[Literal["restart"] | None, str]:
-    """Find how trials are told apart; return what `frames` says of it, and what only the user can say."""
+    """Find how trials are told apart; return what `frames` says of it, and what only the user can say.
+
+    held  (n,) where the label does not mean that nothing is held
+    """
+    if not held.all() and _is_stream(table, chosen, held):
+        if chosen.pop("trial", None):
+            del why["trial"]
+        why["label"] += "; a run of rows of one label is a trial (frames = restart)"
+        return "restart", ""
     who = [name for key in ("label", "subject", "object", "session", "trial") for name in chosen.get(key, ())]
     ids = groups(*(_texts(table, [name]) for name in who))
     time = _time(table, chosen)
@@ -244,6 +303,17 @@ def _told(
         "no column tells which rows are frames of one trial: name it (trial = ...), or state that each row is a trial "
         'of its own (frames = "independent")'
     )
+
+
+def _is_stream(table: Table, chosen: dict[str, tuple[str, ...]], held: NDArray[np.bool_]) -> bool:
+    """Return whether runs of labels tell trials apart, and better than a number of trials: one that most rows in which
+    nothing is held share with a grasp is theirs.
+    """
+    texts = [_texts(table, [name]) for key in ("subject", "session", "trial") for name in chosen.get(key, ())]
+    if not in_runs(_texts(table, chosen["label"]), *texts):
+        return False
+    movement = groups(*texts) if "trial" in chosen else np.arange(len(held))
+    return bool(np.isin(movement[~held], movement[held]).mean() < 0.5)
 
 
 def _time(table: Table, chosen: dict[str, tuple[str, ...]]) -> NDArray[np.float64] | None:
@@ -274,8 +344,8 @@ def _add_parts(
         why["trial"] += f"; {int(ids.max()) + 1} trials"
 
 
-def _inputs(columns: Sequence[_Column]) -> list[Role]:
-    """Return what the other columns are taken for, those alike together."""
+def _inputs(columns: Sequence[_Column], held: NDArray[np.bool_]) -> list[Role]:
+    """Return what the other columns are taken for, those alike together; held (n,) are rows of grasps."""
     found: dict[tuple[str, str], list[str]] = {}
     stems: dict[str, list[_Column]] = {}
     for column in columns:
@@ -285,7 +355,7 @@ def _inputs(columns: Sequence[_Column]) -> list[Role]:
             stems.setdefault("" if column.bits else _stem(column.name), []).append(column)
     # Columns that are numbered alike are of one kind, whatever the range of each.
     for several in stems.values():
-        found.setdefault(_input(several), []).extend(column.name for column in several)
+        found.setdefault(_input(several, held), []).extend(column.name for column in several)
     if len(found.get(("joints", _CODES), ())) > _MOST_JOINTS:
         found[("taxels", f"whole numbers in more columns than a hand has joints{_PADS}")] = found.pop(
             ("joints", _CODES)
@@ -298,19 +368,19 @@ def _stem(name: str) -> str:
     return name.rstrip("0123456789")
 
 
-def _input(columns: Sequence[_Column]) -> tuple[str, str]:
-    """Return the role of inputs that are alike, and why."""
+def _input(columns: Sequence[_Column], held: NDArray[np.bool_]) -> tuple[str, str]:
+    """Return the role of inputs that are alike, and why; held (n,) are rows of grasps."""
     words = frozenset[str]().union(*(column.words for column in columns))
-    each = [column.values for column in columns if column.values is not None]
-    values = np.concatenate(each)
+    values = np.concatenate([column.values for column in columns if column.values is not None])
     if all(column.bits for column in columns):
         return "switches", "0 and 1 only"
     if words & _WORDS["pad"]:
         return "taxels", f"pads by their names{_PADS}"
     if not all(column.whole for column in columns) or values.min() < 0 or values.max() >= CODES:
         return "joints", f"{_NUMBERS}{sound_grid(values):g}"
-    # A pad rests at the lower end of its range; between supply and converter, at the upper one.
-    places = [(part - part.min()) / max(float(np.ptp(part)), 1.0) for part in each]
+    # A pad rests at the lower end of its range while others are touched; between supply and converter, at the upper.
+    each = [column.values[held[column.there]] for column in columns if column.values is not None]
+    places = [(part - part.min()) / max(float(np.ptp(part)), 1.0) for part in each if part.size]
     rest = max(np.mean([np.mean(place <= _REST) for place in of]) for of in (places, [1 - place for place in places]))
     if not words & _WORDS["joint"] and rest > _AT_REST:
         return "taxels", f"at rest in most rows, as a pad is{_PADS}"
@@ -341,6 +411,8 @@ def _no_input(column: _Column) -> str:
         return "it never changes"
     if column.words & _WORDS["note"] or _is_time(column.words):
         return "by its name a note on the row"
+    if column.words and any(column.words <= _WORDS[key] - {"y"} for key in ("label", "trial")) and column.nominal:
+        return "by its name another label, or number of a trial"
     return ""
 
 

@@ -10,7 +10,7 @@ from thenar.runtime.names import SHOWN, list_names
 
 from .errors import list_rows
 from .graspset import GraspSet, Joint
-from .trials import otsu
+from .trials import groups, otsu
 
 
 def contacts(grasp_set: GraspSet) -> NDArray[np.bool_]:
@@ -38,8 +38,11 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 def find_oddities(grasp_set: GraspSet, rows: NDArray[np.int64]) -> tuple[Finding, ...]:
-    """Return everything odd about `grasp_set`, whose rows the user knows by the numbers `rows` (n,)."""
-    return (*_odd_columns(grasp_set), *_odd_frames(grasp_set, rows), *_gaps(grasp_set))
+    """Return everything odd about `grasp_set`, whose rows the user knows by the numbers `rows` (n,). Rows in which
+    nothing is held are alike everywhere, and so not compared.
+    """
+    held = grasp_set.without_none()
+    return (*_odd_columns(grasp_set), *_odd_frames(held, rows[~grasp_set.is_none]), *_gaps(held))
 
 
 def constant_columns(columns: NDArray[np.generic], names: Sequence[str]) -> tuple[str, ...]:
@@ -141,7 +144,10 @@ class Separability(msgspec.Struct, frozen=True):
 
 
 def separabilities(grasp_set: GraspSet) -> tuple[Separability, ...]:
-    """Return the separability by switches, by taxels, by joints, and by all of them, as far as the set has them."""
+    """Return the separability by switches, by taxels, by joints, and by all of them, as far as the set has them, of the
+    rows in which something is held.
+    """
+    grasp_set = grasp_set.without_none()
     there = (("switches", grasp_set.switch_names), ("taxels", grasp_set.taxel_columns), ("joints", grasp_set.joints))
     kinds = [name for name, columns in there if columns]
     inputs = [*kinds, "both" if len(kinds) == 2 else "all"] if len(kinds) > 1 else kinds
@@ -217,12 +223,18 @@ class JointRange(msgspec.Struct, frozen=True):
 class Summary(msgspec.Struct, frozen=True):
     """A set in numbers.
 
+    none         in how many rows nothing is held: they count in no rate
+    movements    how many trials there are, with the rows around them in which nothing is held
+    seconds      how long the recordings last together; None where times are not known
     simulated    what simulated the grasps; empty: they were recorded
     independent  each row is stated to be a trial of its own
     balance      the rarest grasp type's count over the commonest one's
     """
 
     rows: int
+    none: int
+    movements: int
+    seconds: float | None
     simulated: str
     independent: bool
     fingerprint: str
@@ -241,11 +253,14 @@ class Summary(msgspec.Struct, frozen=True):
 
 def summarise(grasp_set: GraspSet) -> Summary:
     """Return the summary of `grasp_set`, whose rows count from 1. A set without rows has no separability."""
-    counts = np.bincount(grasp_set.labels, minlength=len(grasp_set.taxonomy.types))
+    counts = np.bincount(grasp_set.labels[~grasp_set.is_none], minlength=len(grasp_set.taxonomy.types))
     grasps = [Count(name, int(rows)) for name, rows in zip(grasp_set.taxonomy.types, counts, strict=True)]
     present = counts[counts > 0]
     return Summary(
         rows=len(grasp_set),
+        none=int(grasp_set.is_none.sum()),
+        movements=int(grasp_set.movement_ids.max(initial=-1)) + 1,
+        seconds=_seconds(grasp_set),
         simulated=grasp_set.simulated,
         independent=grasp_set.independent,
         fingerprint=grasp_set.fingerprint(),
@@ -261,6 +276,15 @@ def summarise(grasp_set: GraspSet) -> Summary:
         separability=separabilities(grasp_set),
         warnings=find_oddities(grasp_set, np.arange(1, len(grasp_set) + 1)),
     )
+
+
+def _seconds(grasp_set: GraspSet) -> float | None:
+    """Return how long the recordings of all subjects and sessions last together."""
+    if not grasp_set.times_us.size:
+        return None
+    recording = groups(grasp_set.subjects, grasp_set.sessions)
+    steps = np.diff(grasp_set.times_us)[np.diff(recording) == 0]
+    return float(steps[steps > 0].sum() / 1e6)
 
 
 def _counts(names: NDArray[np.str_]) -> tuple[Count, ...]:

@@ -6,6 +6,8 @@ gave each two of different volume); a key a grasp type, its value a list of obje
 
     PoS = ["bottle", "broom"]
     Tip = ["pin", "bead"]
+
+Of "none" it lists movements of the empty hand, in place of MOVEMENTS.
 """
 
 import difflib
@@ -97,7 +99,7 @@ class Taxonomy:
     def finder(self) -> Callable[[str], str | None]:
         """Return a function from a label to the type that it means, or None; made once for many labels."""
         types, aliases = frozenset(self.names), self._aliases()
-        return lambda label: label if label in types else aliases.get(_plain(label))
+        return lambda label: label if label in types else aliases.get(plain(label))
 
     def find(self, label: str) -> str | None:
         """Return the type that `label` means, or None."""
@@ -118,8 +120,8 @@ class Taxonomy:
         """Return " (did you mean ...?)" with the nearest types, or the types to choose from when none is near."""
         aliases = self._aliases()
         # Comparing takes the time of the label's length times a type's, for every type.
-        plain, compared = _plain(label[:LONGEST_SHOWN]), list(aliases)[:MOST_COMPARED]
-        near = {aliases[alias]: None for alias in difflib.get_close_matches(plain, compared, n=3)}
+        written, compared = plain(label[:LONGEST_SHOWN]), list(aliases)[:MOST_COMPARED]
+        near = {aliases[alias]: None for alias in difflib.get_close_matches(written, compared, n=3)}
         if near:
             return f" (did you mean {' or '.join(map(repr, near))}?)"
         shown = ", ".join(map(shortened, self.types[:5])) + (", ..." if len(self.types) > 5 else "")
@@ -130,13 +132,13 @@ class Taxonomy:
         found: dict[str, str | None] = {}
         for number, (name, full) in enumerate(zip(self.types, self.full_names, strict=True), start=1):
             spellings = {name, full, str(number)} if self.name in _PUBLISHED else {name}
-            for plain in {_plain(spelling) for spelling in spellings}:
-                found[plain] = None if plain in found else name
+            for written in map(plain, spellings):
+                found[written] = None if found.get(written, name) != name else name
         found[NONE] = NONE
-        return {plain: name for plain, name in found.items() if name is not None}
+        return {written: name for written, name in found.items() if name is not None}
 
 
-def _plain(label: str) -> str:
+def plain(label: str) -> str:
     """Return `label` without case, blanks, underscores and punctuation: "Sphere_4-Finger" -> "sphere4finger"."""
     words = re.sub(r"[\W_]+", "", label.casefold())
     # Without int(), which takes no more than 4,300 digits; other scripts' digits count as ours.
@@ -161,7 +163,7 @@ def published(name: str) -> Taxonomy:
 
 def published_for(labels: Iterable[str]) -> str | None:
     """Return the name of the one published taxonomy whose types all `labels` name, None where none or several have."""
-    written = [label for label in labels if not _plain(label).isdecimal()]
+    written = [label for label in labels if not plain(label).isdecimal()]
     fitting = [name for name in _PUBLISHED if written and all(map(published(name).finder(), labels))]
     return fitting[0] if len(fitting) == 1 and written else None
 
@@ -178,19 +180,29 @@ FEIX_33 = published("feix33")
 
 # What a grasp type is collected with where no object is named.
 ANY = "any"
+# What an empty hand does, and how the wearer is asked for it.
+MOVEMENTS = {
+    "open hand": "hold the hand open, flat or relaxed, and touch nothing",
+    "approach": "reach for an object and shape the hand for it, without touching it",
+    "release": "draw back from an object that was just let go, and open the hand",
+    "idle movement": "move the hand as between two tasks: point, turn, wave, touch nothing",
+}
 
 
-def collected(taxonomy: str, objects: Path | None) -> tuple[Taxonomy, tuple[Task, ...]]:
-    """Return the taxonomy of this name and what is to be collected of it: what `objects` lists, or every type.
+def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[Taxonomy, tuple[Task, ...]]:
+    """Return the taxonomy of this name and what is to be collected of it: what `objects` lists, or every type; with
+    `none`, movements of the empty hand as well.
 
     "own" is the user's own taxonomy: the types that `objects` lists, in its order. Raises RecordingError, or
     ColumnsError naming file, line and key.
     """
     if objects is None:
         types = published(taxonomy)
-        return types, tuple(Task(grasp, (ANY,)) for grasp in types.types)
+        return types, (*(Task(grasp, (ANY,)) for grasp in types.types), *_nothing(tuple(MOVEMENTS), none))
     source = read_source(objects, ColumnsError)
     tables = source.tables()
+    listed = [key for key in tables if plain(key) == NONE]
+    movements = _objects(source, listed[0], tables.pop(listed[0])) if listed else tuple(MOVEMENTS)
     if len(tables) < 2:
         raise ColumnsError(f"{objects.name} names {len(tables)} grasp types: a collection takes two at least")
     types = own(tables) if taxonomy == "own" else published(taxonomy)
@@ -203,7 +215,11 @@ def collected(taxonomy: str, objects: Path | None) -> tuple[Taxonomy, tuple[Task
         if grasp in tasks:
             raise source.error((key,), f"is {grasp}, which is there already: list it once")
         tasks[grasp] = Task(grasp, _objects(source, key, value))
-    return types, tuple(tasks.values())
+    return types, (*tasks.values(), *_nothing(movements, none))
+
+
+def _nothing(movements: tuple[str, ...], none: bool) -> tuple[Task, ...]:
+    return (Task(NONE, movements),) if none else ()
 
 
 def _objects(source: TomlText, key: str, value: object) -> tuple[str, ...]:

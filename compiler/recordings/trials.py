@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,9 +41,41 @@ def groups(*columns: NDArray[np.generic]) -> NDArray[np.intp]:
     return np.argsort(np.argsort(first))[ids]
 
 
+# A stream has so many rows a run at least.
+_RUN = 5
+
+
+def in_runs(*columns: NDArray[np.generic]) -> bool:
+    """Return whether rows lie in runs in which all `columns` (n,) stay, as those of a stream do."""
+    changes = np.logical_or.reduce([column[1:] != column[:-1] for column in columns])
+    return _RUN * (int(np.count_nonzero(changes)) + 1) <= len(columns[0])
+
+
 def restarts(ids: NDArray[np.intp], time: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return numbers (n,) from 1 that rise by one where `ids` (n,) changes, or `time` (n,) does not rise."""
     return np.cumsum((np.diff(ids, prepend=-1) != 0) | ~(np.diff(time, prepend=-np.inf) > 0)).astype(np.int64)
+
+
+# Units of time by the words that name them, and from which step between two frames on it is theirs: frames come 2 to
+# 2000 times a second.
+_UNITS = {
+    "s": ({"s", "sec", "secs", "second", "seconds", "sekunde", "sekunden"}, 0.0005, 0.5),
+    "ms": ({"ms", "msec", "milli", "millis", "millisecond", "milliseconds"}, 2.0, 500.0),
+    "us": ({"us", "usec", "µs", "μs", "micro", "micros", "microsecond", "microseconds"}, 500.0, 5e5),
+    "ns": ({"ns", "nsec", "nano", "nanos", "nanosecond", "nanoseconds"}, 5e5, 5e8),
+}
+
+
+def unit_of_time(name: str, time: NDArray[np.float64]) -> Literal["s", "ms", "us", "ns"] | None:
+    """Return the unit of times (n,) in a column called `name`, by its name or by how far apart frames are; None where
+    neither tells, as of frames that are counted.
+    """
+    words = {*re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())}
+    steps = np.diff(time)
+    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    named = [unit for unit, (those, _, _) in _UNITS.items() if words & those]
+    found = named or [unit for unit, (_, least, most) in _UNITS.items() if least <= step < most]
+    return found[0] if len(found) == 1 else None  # type: ignore[return-value]
 
 
 def in_time(trials: NDArray[np.intp], time: NDArray[np.float64]) -> NDArray[np.intp]:

@@ -15,6 +15,7 @@ from ..evaluation.study import Study
 from ..frontier.points import Frontier
 from ..hand import HandShape
 from ..placement.tree import Tree
+from ..segmenting.transitions import Transitions
 from ..tables.compare import Comparison, WorstCase
 from ..tables.faults import FaultCounts
 
@@ -32,13 +33,14 @@ class ReportContent:
     firmware      a sentence: what the firmware in the build is laid out for, or why there is none
     only_answer   the one grasp type that every row gets, where there is but one
     tree          the tree that chose the switches, over the recordings' switches; classes index manifest.grasps
-    confusion     (K, K) counts of frames in the headline's folds, row: true, column: recognised, as in manifest.grasps
+    confusion     (K, K) counts of frames in the headline's folds, row: true, column: recognised, as in manifest.answers
     study         the paper's tables for these recordings; no_study: a sentence, why there are none
     frontier      of which the report tells; point: the number of the one that the build is, None if it is none of them
     hand          where the recordings' switches lie
     scan, harness the scan map and the harness that it was made for
     comparison    the rows trained on, through the model, its tables and the integers
     faults        what each fault of an input leaves of the rows trained on
+    transitions   which type follows which, where the recordings are whole movements
     worst         the worst that integers can do, over every frame there is
 
     Raises ReportError where parts do not belong together.
@@ -62,12 +64,13 @@ class ReportContent:
     comparison: Comparison | None = None
     faults: FaultCounts | None = None
     worst: WorstCase | None = None
+    transitions: Transitions | None = None
 
     def __post_init__(self) -> None:
-        grasps = len(self.manifest.grasps)
+        grasps, answers = len(self.manifest.grasps), len(self.manifest.answers)
         if self.tables.n_classes != grasps or self.tables.n_switches != len(self.manifest.switches):
             raise ReportError("the tables are of another build than build.json: compile the build again")
-        if self.confusion is not None and self.confusion.shape != (grasps, grasps):
+        if self.confusion is not None and self.confusion.shape not in ((grasps, grasps), (answers, answers)):
             raise ReportError(f"a confusion matrix of {grasps} grasp types is not {self.confusion.shape}")
         if self.tree is not None and len(self.tree.classes) > grasps:
             raise ReportError("the tree knows more grasp types than the build: it is of other recordings")

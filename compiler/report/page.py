@@ -10,6 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from ..pictures import PALETTE
+from ..segmenting.transitions import graph_of
 from ..text import sentence
 from . import results, sections
 from .content import ReportContent
@@ -38,6 +39,7 @@ def report_html(content: ReportContent) -> bytes:
         icicle_size=(STEP, LINE, WORDS),
         confusions=tuple(results.confusions(content)),
         frontier=frontier,
+        graph=None if content.transitions is None else graph_of(content.transitions),
         style=_colours() + _file(environment, "report.css"),
         script=script,
         script_sha256=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..evaluation.populations import PROTOCOLS
 from ..evaluation.study import Study
 from ..evaluation.tables import RateTable, both
+from ..segmenting.transitions import Transitions
 from ..text import NBSP, counted, percent, sentence
 from .content import PlainTable, ReportContent
 
@@ -46,6 +47,16 @@ def _table(table: RateTable) -> PlainTable:
     return PlainTable(table.title, columns, rows, words=(0, 1), note=table.note)
 
 
+def transition_table(found: Transitions) -> PlainTable:
+    """Return the changes from type to type, the most frequent first."""
+    counts, shares = found.counts, found.probabilities
+    changes = sorted(np.argwhere(counts).tolist(), key=lambda each: (-counts[tuple(each)], each))
+    rows = tuple(
+        (found.types[a], found.types[b], str(counts[a, b]), percent(float(shares[a, b]), NBSP)) for a, b in changes
+    )
+    return PlainTable("Changes of grasp type", ("From", "To", "Count", "Of its changes"), rows, words=(0, 1))
+
+
 @dataclass(frozen=True, slots=True)
 class ConfusionView:
     """Counts as a table: where they are from, the grasp types, a row for each of these, and what is mistaken most.
@@ -76,7 +87,9 @@ def confusions(content: ReportContent) -> Iterator[ConfusionView]:
     if content.confusion is not None:
         rate = content.manifest.headline
         folds = "" if rate is None else f", {rate.title}, {counted(rate.folds, 'nested fold')}"
-        yield confusion_view(f"This build's own recipe{folds}", content.manifest.grasps, content.confusion)
+        yield confusion_view(
+            f"This build's own recipe{folds}", content.manifest.answers[: len(content.confusion)], content.confusion
+        )
     if content.study is None:
         return
     for table in content.study.tables:

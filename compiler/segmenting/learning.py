@@ -9,6 +9,7 @@ F1@50 of the live answer is taken, ties by the smaller median error of onsets, t
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,7 +57,12 @@ class Counts:
 
 
 def learnt(
-    streams: Sequence[Stream], labels: Labels, scores: NDArray[np.float64], scale: float, tick_us: int
+    streams: Sequence[Stream],
+    labels: Labels,
+    scores: NDArray[np.float64] | None,
+    n_types: int,
+    scale: float,
+    tick_us: int,
 ) -> SegmentModel:
     """Return the model of a build that detects nothing held.
 
@@ -66,8 +72,11 @@ def learnt(
         The rows in time.
     labels : array of int, shape (n,)
         The class of each row, nothing held the last.
-    scores : array of float, shape (n, K + 1)
-        The scores of each row, of tables that were not made of rows of its movement (or subject).
+    scores : array of float, shape (n, K + 1), or None
+        The scores of each row, of tables that were not made of rows of its movement (or subject). None: nothing is
+        tried, and the first values are taken.
+    n_types : int
+        K.
     scale : float
         Steps per unit of the build's own integer tables.
     tick_us : int
@@ -78,36 +87,29 @@ def learnt(
     SegmentModel
         The same for the same arguments on any machine.
     """
-    lanes = np.rint(scores * _SCALE).astype(np.int64)
-    n_types = lanes.shape[1] - 1
     counts = Counts.of((labels[stream.rows] for stream in streams), n_types)
-    share = max(1, _TRIED_TICKS // len(streams))
-    tried = [stream.rows[:share] for stream in streams]
-    tests = [(lanes[rows], labels[rows]) for rows in tried]
-    best: tuple[float, float, int] | None = None
-    chosen, number = (TEMPERATURES[0], LEADS[0], CHANGES[0]), 0
-
-    def better(one: tuple[float, float, float]) -> bool:
-        nonlocal best, number
-        total = Score.total(
-            score(truth, live_states(model_of(counts, *one, _SCALE, tick_us), own, LAG_TICKS), n_types)
-            for own, truth in tests
-        )
-        number += 1
-        found = -total.f1(len(OVERLAPS) - 1), total.onset, number
-        if best is not None and found >= best:
-            return False
-        best = found
-        return True
-
-    pairs = [(temperature, lead) for temperature in TEMPERATURES for lead in LEADS]
-    for temperature, lead in pairs:
-        if better((temperature, lead, CHANGES[0])):
-            chosen = temperature, lead, CHANGES[0]
-    for change in CHANGES[1:]:
-        if better((*chosen[:2], change)):
-            chosen = *chosen[:2], change
+    chosen = TEMPERATURES[0], LEADS[0], CHANGES[0]
+    if scores is not None:
+        share = max(1, _TRIED_TICKS // len(streams))
+        lanes = np.rint(scores * _SCALE).astype(np.int64)
+        tests = [(lanes[rows], labels[rows]) for rows in (stream.rows[:share] for stream in streams)]
+        chosen = _best(counts, tests, tick_us)
     return model_of(counts, *chosen, scale, tick_us)
+
+
+def _best(
+    counts: Counts, tests: Sequence[tuple[NDArray[np.int64], Labels]], tick_us: int
+) -> tuple[float, float, float]:
+    """Return temperature, lead and change with which scores (T, K + 1) are best decoded to their states (T,)."""
+
+    def rank(one: tuple[float, float, float]) -> tuple[float, float]:
+        model = model_of(counts, *one, _SCALE, tick_us)
+        found = (score(truth, live_states(model, lanes, LAG_TICKS), model.n_types) for lanes, truth in tests)
+        total = Score.total(found)
+        return -total.f1(len(OVERLAPS) - 1), total.onset
+
+    best = min(product(TEMPERATURES, LEADS, CHANGES[:1]), key=rank)
+    return min(((*best[:2], change) for change in CHANGES), key=rank)
 
 
 def model_of(

@@ -9,31 +9,22 @@ off throughout n of them with a probability of at most (1 - p)^n, and on with at
 they did in the recordings. Because people also repeat one grasp for long, a switch is only suspected once half of the
 grasp types were seen since it was last found otherwise.
 
-A joint's codes wander off when a glove slips or a sensor ages. The hand opens and closes again and again, so a joint's
-lowest and highest code come back. When both have moved the same way since the first minute, the sensor's zero has moved
-by at least the smaller of both; grasps that merely use less of the range move them towards each other.
+What is found against all other inputs, and left out of the answer, is the quarantine's matter (quarantine.py).
 """
 
 import math
 from collections import Counter
 from collections.abc import Sequence
-from operator import gt, lt
 
 import numpy as np
 
 from ..build import Build
 from ..frames import Mask, SwitchFrame
-from ..published import UNKNOWN, DeviceHealth, Drift, HealthReport, LiveGrasp
+from ..published import UNKNOWN, DeviceHealth, Drift, HealthReport, LiveGrasp, Quarantined
 from ..tables import IntegerTables
+from .quarantine import Chattering, JointDrift, numbers
 
 RATE_US = 1_000_000
-# Nobody presses and releases a switch ten times a second; a contact that is loose does.
-MOST_CHANGES = 20
-DRIFT_US = 60_000_000
-# Share of a joint's range in the first window by which both ends must have moved.
-LARGEST = 0.2
-
-Ends = list[tuple[int, int]]
 # How improbable what was seen must be of a switch that works.
 ALARM = 1e-4
 _SURE = 1 - 1e-12
@@ -47,7 +38,7 @@ class Health:
         self._joint_names = tuple(joint.name for joint in build.manifest.joints)
         self._numbers = {grasp: number for number, grasp in enumerate(build.grasps)}
         self._all = (1 << len(self._switch_names)) - 1
-        self._stuck, self._drift = StuckSwitches(build.tables), JointDrift()
+        self._stuck, self._drift = StuckSwitches(build.tables), JointDrift(build.tables)
         self._chattering = Chattering(len(self._switch_names))
         self._switch_rate, self._glove_rate = FrameRate(), FrameRate()
         self._grasp = UNKNOWN
@@ -81,14 +72,20 @@ class Health:
             if codes:
                 self._drift.frame(glove_us, codes)
 
-    def report(self, now_us: int, devices: Sequence[DeviceHealth] = (), overflowed: int = 0) -> HealthReport:
+    def report(
+        self,
+        now_us: int,
+        devices: Sequence[DeviceHealth] = (),
+        overflowed: int = 0,
+        quarantined: tuple[Quarantined, ...] = (),
+    ) -> HealthReport:
         """Return how things stand."""
         drifts = zip(self._joint_names, self._drift.codes, strict=False)
         return HealthReport(
             time_us=now_us,
             stuck_open=self._named(self._stuck.open()),
             stuck_closed=self._named(self._stuck.closed()),
-            chattering=self._named(self._chattering.switches),
+            chattering=self._named(numbers(self._chattering.switches)),
             drifting=tuple(Drift(joint, codes) for joint, codes in drifts if codes),
             switch_hz=self._switch_rate.hz(now_us),
             glove_hz=self._glove_rate.hz(now_us),
@@ -98,6 +95,7 @@ class Health:
             unknown=self._published["unknown"],
             overflowed=overflowed,
             devices=tuple(devices),
+            quarantined=quarantined,
         )
 
     def _named(self, switches: Sequence[int]) -> tuple[str, ...]:
@@ -130,90 +128,6 @@ class FrameRate:
 
     def _over(self, now_us: int) -> float:
         return self._frames * 1e6 / (now_us - (self._began_us or 0))
-
-
-class Tally:
-    """Counts how often each of `bits` bits was set, of all at once: bit k of plane p is bit p of the count of bit k."""
-
-    def __init__(self, bits: int) -> None:
-        self._bits = bits
-        self._planes: list[Mask] = []
-
-    def add(self, mask: Mask) -> None:
-        """Count the bits of `mask`, one each."""
-        for place, plane in enumerate(self._planes):
-            if not mask:
-                return
-            self._planes[place], mask = plane ^ mask, plane & mask
-        if mask:
-            self._planes.append(mask)
-
-    def end(self) -> list[int]:
-        """Return the counts, and begin again at 0."""
-        planes, self._planes = self._planes, []
-        counts = [0] * self._bits
-        for place, plane in enumerate(planes):
-            for bit in range(self._bits):
-                counts[bit] += (plane >> bit & 1) << place
-        return counts
-
-
-class Chattering:
-    """Counts changes of every switch, a second at a time."""
-
-    def __init__(self, switches: int) -> None:
-        self._closed: Mask = 0
-        self._began_us: int | None = None
-        self._changes = Tally(switches)
-        self.switches: tuple[int, ...] = ()
-
-    def frame(self, time_us: int, closed: Mask, read: Mask) -> None:
-        """Take a frame in which the switches `read` were read; `switches` are then those of the last whole second."""
-        if self._began_us is None:
-            self._began_us = time_us
-        if time_us - self._began_us >= RATE_US:
-            self.switches = tuple(number for number, n in enumerate(self._changes.end()) if n > MOST_CHANGES)
-            self._began_us = time_us
-        self._changes.add((closed ^ self._closed) & read)
-        self._closed = (self._closed & ~read) | (closed & read)
-
-
-class JointDrift:
-    """Compares the lowest and highest code of every joint in the last whole window with those in the first one."""
-
-    def __init__(self) -> None:
-        self._first: Ends | None = None
-        self._began_us: int | None = None
-        self._low: list[int] = []
-        self._high: list[int] = []
-        self.codes: tuple[int, ...] = ()
-
-    def frame(self, time_us: int, codes: Sequence[int]) -> None:
-        """Take the codes of all joints; `codes` is then by how much each has drifted, 0 where it is within bounds."""
-        if self._began_us is not None and time_us - self._began_us >= DRIFT_US:
-            self._end()
-            self._began_us = None
-        if self._began_us is None:
-            self._began_us, self._low, self._high = time_us, list(codes), list(codes)
-        # Seldom so: after a few grasps a joint has been where it goes.
-        if any(map(lt, codes, self._low)):
-            self._low = list(map(min, self._low, codes))
-        if any(map(gt, codes, self._high)):
-            self._high = list(map(max, self._high, codes))
-
-    def _end(self) -> None:
-        ends = list(zip(self._low, self._high, strict=True))
-        if self._first is None:
-            self._first = ends
-        self.codes = tuple(_drift(first, last) for first, last in zip(self._first, ends, strict=True))
-
-
-def _drift(first: tuple[int, int], last: tuple[int, int]) -> int:
-    low, high = last[0] - first[0], last[1] - first[1]
-    if low * high <= 0:
-        return 0
-    shift = min(low, high, key=abs)
-    return shift if abs(shift) > LARGEST * (first[1] - first[0]) else 0
 
 
 def on_shares(tables: IntegerTables) -> list[float]:

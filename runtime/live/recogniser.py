@@ -1,7 +1,7 @@
 """The live recogniser: the newest frame of each device, joined, scored, decided upon."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
@@ -18,6 +18,7 @@ from ..scores import LiveScores
 from ..segmenting.live import LiveSegments, Segment
 from ..tables import IntegerTables
 from .decision import Decision, SequentialTest, Standing
+from .quarantine import Quarantine
 
 
 class Moment(msgspec.Struct):
@@ -47,9 +48,9 @@ class LiveRecognizer:
 
     A frame counts for two of its periods. What is older, or lost, or of a glove that is not plugged into its box, is
     replaced by its mean contribution, and the answer is degraded; it is unknown when the share of the tables' weight
-    that is lost exceeds `policy.max_lost`, and when nothing is left that the build uses. A device whose kind the build
-    does not use is left aside. The answer depends on nothing but the frames handed over and their times, so a replay of
-    the same calls gives the same answers.
+    that is lost exceeds `policy.max_lost`, and when nothing is left that the build uses. An input that is read and yet
+    wrong is treated as lost (`quarantine`). A device whose kind the build does not use is left aside. The answer
+    depends on nothing but the frames handed over and their times, so a replay of the same calls gives the same answers.
     """
 
     def __init__(
@@ -78,8 +79,10 @@ class LiveRecognizer:
         self._switches = Newest[SwitchFrame]()
         self._joints = Joints(build.manifest.joints, sensor_names, calibration, glove_period_us)
         self._scores = LiveScores(build.scorer)
-        self._scored: Sequence[int] | None = None
+        self._scored: tuple[Sequence[int] | None, Mask] = None, 0
         self._missing = MissingInputs(build, self._policy.max_lost)
+        self.quarantine = Quarantine(build, self._missing.may_be_lost, active=self._policy.quarantine)
+        self._all_joints = (1 << tables.n_joints) - 1
         self._decider, self._lead = _decider(build, self._policy), self._policy.lead_steps(tables.scale)
         lag_us, model = self._policy.lag_us, build.manifest.segmenting
         self._segments = None if lag_us is None else LiveSegments(model, build.grasps, lag_us)
@@ -101,11 +104,16 @@ class LiveRecognizer:
         since_us = now_us - self._longest_us if silent or switches is None else min(switches.time_us, now_us)
         if glove is not None and glove.time_us >= since_us:
             return False
-        return switches is None or self._without_joints(switches) is None
+        return self._without_joints(self._trusted(switches, 0)) is None
 
-    def _without_joints(self, frame: SwitchFrame) -> Standing | None:
+    def _trusted(self, frame: SwitchFrame | None, joints_lost: Mask) -> SwitchFrame | None:
+        """Return the frame with the switches lost that are in quarantine."""
+        out = self.quarantine.left_out(self._all_switches if frame is None else frame.lost, joints_lost)[0]
+        return replace(frame, lost=frame.lost | out) if out and frame is not None else frame
+
+    def _without_joints(self, frame: SwitchFrame | None) -> Standing | None:
         """Return who leads in a frame whatever the joints are, None where they matter, or may not be left unread."""
-        if self._alone is None:
+        if self._alone is None or frame is None:
             return None
         lost, unread = frame.lost, frame.unread & ~frame.lost
         lanes = self._alone.lanes(frame.closed & ~unread & ~lost, lost)
@@ -124,19 +132,28 @@ class LiveRecognizer:
         # Ports that were left unread are certain only with the joints by which their scan ended; and a frame that was
         # handed over once stays the newest, so every scan that can end early brings the joints' frame along.
         codes = self._joints.codes(now_us, glove if frame is None or frame.glove is None else frame.glove)
-        if codes is not self._scored:
-            self._scores.joints(codes)
-            self._scored = codes
-        known = None if codes is not None or frame is None else self._without_joints(frame)
+        if codes:
+            self.quarantine.look_at_joints(self._joints.newest.time_us, codes)
+        read, joints_lost, known = frame, self._all_joints if codes is None else 0, None
+        if self._alone is not None and codes is None:
+            known = self._without_joints(frame := self._trusted(read, 0))
+        if known is None:
+            frame = self._trusted(read, joints_lost)
+        dull = self.quarantine.out[1]
+        if codes is not self._scored[0] or dull != self._scored[1]:
+            self._scores.joints(codes, dull)
+            self._scored = codes, dull
         standing, lost = self._standing(frame) if known is None or frame is None else (known, frame.lost)
-        missing = self._missing.of(lost, codes is None and known is None)
+        missing = self._missing.of(lost, dull | joints_lost * (known is None))
+        if read is not None:
+            self.quarantine.look(read, standing.lanes, lost)
         seen_us = max(newest.time_us, self._joints.newest.time_us)
         if missing.too_much:
             self._decider.forget()
             decided = None
         else:
             decided = self._decider.update(max(seen_us, 0), standing, whole=not missing.names)
-        segment = Segment()
+        segment, scores = Segment(), None
         if self._segments is not None:
             scores = None if missing.too_much else self._whole_scores(now_us, frame, standing, self._segments.tick_us)
             segment = self._segments.update(now_us, scores)
@@ -242,34 +259,35 @@ class MissingInputs:
     """
 
     def __init__(self, build: Build, max_lost: float) -> None:
-        self._switch_names = tuple(switch.name for switch in build.manifest.switches)
-        self._joint_names = tuple(joint.name for joint in build.manifest.joints)
-        self._switches, self._joints = weights(build.tables)
-        self._total = sum(self._switches) + self._joints
-        self._all: Mask = (1 << len(self._switches)) - 1
+        switches, joints = build.manifest.switches, build.manifest.joints
+        self._names = [*(switch.name for switch in switches), *(joint.name for joint in joints)]
+        self._weights, self._n_switches = weights(build.tables), len(switches)
+        self._total = sum(self._weights)
         self._max_lost = max_lost
-        self._state: tuple[Mask, bool] = 0, False
+        self._state: Mask = 0
         self._last = Missing()
 
-    def of(self, lost: Mask, joints_lost: bool) -> Missing:
-        """Return what is missing when the switches `lost` are, and the joints or not."""
-        if (lost, joints_lost) != self._state:
-            self._state = lost, joints_lost
-            self._last = self._work_out(lost, joints_lost)
+    def of(self, switches: Mask, joints: Mask) -> Missing:
+        """Return what is missing when these switches and joints are lost."""
+        lost = switches | joints << self._n_switches
+        if lost != self._state:
+            self._state, self._last = lost, self._work_out(lost)
         return self._last
 
-    def _work_out(self, lost: Mask, joints_lost: bool) -> Missing:
-        numbers = [number for number in range(len(self._switches)) if lost >> number & 1]
-        weight = sum(map(self._switches.__getitem__, numbers)) + self._joints * joints_lost
-        nothing_left = lost == self._all and (joints_lost or not self._joint_names)
-        share = 1.0 if nothing_left else weight / max(self._total, 1)
-        names = (*map(self._switch_names.__getitem__, numbers), *self._joint_names * joints_lost)
+    def may_be_lost(self, switches: Mask, joints: Mask) -> bool:
+        """Return whether an answer can do without these."""
+        return not self._work_out(switches | joints << self._n_switches).too_much
+
+    def _work_out(self, lost: Mask) -> Missing:
+        numbers = [number for number in range(len(self._names)) if lost >> number & 1]
+        nothing_left = len(numbers) == len(self._names)
+        share = 1.0 if nothing_left else sum(map(self._weights.__getitem__, numbers)) / max(self._total, 1)
+        names = tuple(map(self._names.__getitem__, numbers))
         return Missing(names, share, nothing_left or share > self._max_lost)
 
 
-def weights(tables: IntegerTables) -> tuple[list[int], int]:
-    """Return the weight of each switch, and of all joints together, in steps."""
+def weights(tables: IntegerTables) -> list[int]:
+    """Return the weight of each switch, and of each joint after them, in steps."""
     switches: list[int] = np.abs(tables.switch_rows.astype(np.int64)).sum(axis=1).tolist()
     terms = (tables.choices(joint)[1].sum(axis=0) for joint in range(tables.n_joints))
-    joints = sum(int(np.ptp(rows, axis=0).sum()) for rows in terms)
-    return switches, joints
+    return [*switches, *(int(np.ptp(rows, axis=0).sum()) for rows in terms)]

@@ -324,6 +324,11 @@ class Sources:
         for glove in self._gloves:
             glove.ask()
 
+    def leave_out(self, switches: Mask, joints: Mask) -> None:
+        """Say which switches and joints are scored as lost, though they are read."""
+        for reader in self._readers:
+            reader.leave_out(switches, joints)
+
     def _change(self) -> None:
         self.changed = True
 

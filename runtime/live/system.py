@@ -18,6 +18,7 @@ from ..scanning.propose import own_joints
 from ..scanning.scanmap import ScanMap
 from ..sources.base import slowest_us
 from ..taxels import calibration_of, in_counts
+from .quarantine import WHOLE_US
 from .recogniser import LiveRecognizer
 from .sources import Sources
 
@@ -116,8 +117,10 @@ class System:
 
         Hand `start` the codes of the glove's record that the recogniser will be given with the scan.
         """
-        lead = self.policy.lead_steps(self.build.tables.scale)
-        whole_us = None if self.policy.lag_us is None else self.build.manifest.segmenting.tick_us // 2
+        policy = self.policy
+        lead = policy.lead_steps(self.build.tables.scale)
+        every_us = self.build.manifest.segmenting.tick_us // 2 if policy.lag_us is not None else WHOLE_US
+        whole_us = every_us if policy.lag_us is not None or policy.quarantine else None
         return EarlyExit(self.build.scorer, ports, lead=lead, on_demand=self.on_demand, whole_us=whole_us)
 
     def joints(self) -> Joints:

@@ -2,6 +2,7 @@
 
 import os
 import time
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from struct import Struct
@@ -156,6 +157,15 @@ class Recorder:
         if grasp.grasp != self._grasp:
             self._grasp = grasp.grasp
             self._message(GRASP, grasp.time_us, encode_text(grasp.grasp.encode()))
+
+    def moment(self, arrived: Iterable[SwitchFrame | GloveFrame], grasp: LiveGrasp) -> None:
+        """Record the frames that came in since the last moment, and then what was recognised in the newest of them."""
+        for frame in arrived:
+            if isinstance(frame, SwitchFrame):
+                self.switches(frame)
+            else:
+                self.glove(frame)
+        self.grasp(grasp)
 
     def label(self, label: Label) -> None:
         """Record what became of a trial."""

@@ -31,6 +31,8 @@ class EarlyExit:
     such a lead (`Policy.lead`) is then the same as after the whole scan. `on_demand`: the joints are read after the
     switches, and only where these do not decide; until then nothing is known of them. `whole_us`: after so long without
     one, a scan is to go to its end whatever is decided, for those who need all scores; None: nobody does.
+
+    left_out  switches and joints that are scored as lost, though they are read
     """
 
     def __init__(
@@ -49,6 +51,7 @@ class EarlyExit:
         self._lead, self.on_demand, self.whole_us = lead, on_demand, whole_us
         if on_demand:
             self._later = [later | scorer.joints_bit for later in self._later]
+        self.left_out: tuple[Mask, Mask] = 0, 0
         self._all: Mask = (1 << tables.n_switches) - 1
         self._scores = LiveScores(scorer)
         self._reach = scorer.reach
@@ -62,9 +65,10 @@ class EarlyExit:
 
         With lost=None all of those are lost. Raises FrameError.
         """
+        out, joints = self.left_out
         self._closed = closed & self._elsewhere
-        self._lost = self._elsewhere if lost is None else lost & self._elsewhere
-        self._scores.joints(None if self.on_demand else codes)
+        self._lost = (self._elsewhere if lost is None else lost & self._elsewhere) | out
+        self._scores.joints(None if self.on_demand else codes, joints)
 
     def after(self, port: int, closed: Mask, lost: Mask = 0) -> bool:
         """Take what port number `port` read, of its own switches; return whether the ports after it can be left out.

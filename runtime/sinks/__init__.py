@@ -1,6 +1,7 @@
 """Where recognised grasps go: one file for each kind of sink, found by the registry `SINKS`."""
 
 from ..published import JointAngles
+from ..task import ProgressLine
 from .base import SINKS, Fanout, Sink, SinkError, SinkKind, SinkPlace, SinkReport, open_sink
 from .jsonl import HealthLine, JsonLines, Line
 from .sockets import SocketLines
@@ -12,6 +13,7 @@ __all__ = [
     "JointAngles",
     "JsonLines",
     "Line",
+    "ProgressLine",
     "Sink",
     "SinkError",
     "SinkKind",

@@ -13,6 +13,7 @@ from thenar.drivers.members import Members
 from ..names import shortened
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
+from ..task import Progress
 
 _log = logging.getLogger("thenar")
 
@@ -59,6 +60,9 @@ class Sink(ABC):
 
     def health(self, report: HealthReport) -> None:  # noqa: B027
         """Send on how the glove fares, once a second or so."""
+
+    def task(self, progress: Progress) -> None:  # noqa: B027
+        """Send on how far the hand has come in a task, whenever that changes."""
 
     def report(self) -> SinkReport:
         """Return how the sink itself is doing."""
@@ -160,25 +164,15 @@ class Fanout:
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Publish to all sinks that work."""
-        for number, sink in enumerate(self._sinks):
-            if self._errors[number]:
-                self._lost[number] += 1
-                continue
-            try:
-                sink.publish(grasp, preshape, angles)
-            except Exception as reason:
-                self._leave_out(number, reason)
+        self._all(lambda sink: sink.publish(grasp, preshape, angles))
 
     def health(self, report: HealthReport) -> None:
         """Send on to all sinks that work how the glove fares."""
-        for number, sink in enumerate(self._sinks):
-            if self._errors[number]:
-                self._lost[number] += 1
-                continue
-            try:
-                sink.health(report)
-            except Exception as reason:
-                self._leave_out(number, reason)
+        self._all(lambda sink: sink.health(report))
+
+    def task(self, progress: Progress) -> None:
+        """Send on to all sinks that work how far the hand has come."""
+        self._all(lambda sink: sink.task(progress))
 
     def reports(self) -> tuple[SinkReport, ...]:
         """Return how every sink is doing, in their order."""
@@ -191,6 +185,16 @@ class Fanout:
                 sink.close()
             except Exception as reason:
                 self._blame(number, reason)
+
+    def _all(self, send: Callable[[Sink], None]) -> None:
+        for number, sink in enumerate(self._sinks):
+            if self._errors[number]:
+                self._lost[number] += 1
+                continue
+            try:
+                send(sink)
+            except Exception as reason:
+                self._leave_out(number, reason)
 
     def _report(self, number: int, sink: Sink) -> SinkReport:
         if not self._errors[number]:

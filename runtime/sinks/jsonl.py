@@ -1,7 +1,7 @@
 """JSON lines into a file: stdout, a pipe, a file on disk, anything that takes bytes.
 
-Lines are of grasps, and now and then of how the glove fares. A reader tells them apart by `kind`; msgspec does so by
-itself: `msgspec.json.decode(line, type=Line | HealthLine)`.
+Lines are of grasps, and now and then of how the glove fares, and of how far the hand has come in a task. A reader tells
+them apart by `kind`; msgspec does so by itself: `msgspec.json.decode(line, type=Line | HealthLine | ProgressLine)`.
 
 A line goes out entirely or not at all, and nobody waits for a descriptor that is slow.
 """
@@ -16,10 +16,11 @@ from io import UnsupportedOperation
 from pathlib import Path
 from typing import BinaryIO
 
-from msgspec import json
+from msgspec import json, structs
 
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
+from ..task import Progress, ProgressLine
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
 
@@ -50,6 +51,11 @@ def encode(grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | No
 def encode_health(report: HealthReport) -> bytes:
     """Return a report's line, its newline included."""
     return _encode(HealthLine(**{name: getattr(report, name) for name in report.__struct_fields__})) + b"\n"
+
+
+def encode_task(progress: Progress) -> bytes:
+    """Return the line of a task's progress, its newline included."""
+    return _encode(ProgressLine(**structs.asdict(progress))) + b"\n"
 
 
 # What a descriptor that is writable takes at once without blocking, even where it is set to block (POSIX: PIPE_BUF).
@@ -138,6 +144,10 @@ class JsonLines(Sink):
     def health(self, report: HealthReport) -> None:
         """Write one line, or lose it."""
         self._send(encode_health(report))
+
+    def task(self, progress: Progress) -> None:
+        """Write one line, or lose it."""
+        self._send(encode_task(progress))
 
     def _send(self, line: bytes) -> None:
         sent = False

@@ -25,8 +25,9 @@ from thenar.drivers.errors import SettingError
 
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
+from ..task import Progress
 from .base import Sink, SinkError, SinkKind, SinkReport
-from .jsonl import Outlet, encode, encode_health
+from .jsonl import Outlet, encode, encode_health, encode_task
 
 _BACKLOG = 16
 MAX_READERS = 32
@@ -94,6 +95,11 @@ class SocketLines(Sink):
         """Give every reader the report's line."""
         if self._readers:
             self._send_all(encode_health(report))
+
+    def task(self, progress: Progress) -> None:
+        """Give every reader the progress's line."""
+        if self._readers:
+            self._send_all(encode_task(progress))
 
     def _let_in(self) -> None:
         if self._listener.fileno() < 0 or not self._knocks.poll(0):

@@ -80,6 +80,9 @@ class Source(ABC):
         of the newest record of the `glove`. A source that reads everything at once has no use for it.
         """
 
+    def leave_out(self, switches: Mask, joints: Mask) -> None:  # noqa: B027
+        """Hear which switches and joints are scored as lost, though they are read: where scans end early."""
+
 
 @dataclass(frozen=True, slots=True)
 class SourceKind:

@@ -120,6 +120,11 @@ class I2cDevice(Source):
         """Scan no further than until the ports not yet read cannot change the answer any more."""
         self._early = exit_of([port.targets for port in self._ports]), joints, glove
 
+    def leave_out(self, switches: Mask, joints: Mask) -> None:
+        """Score these as lost where scans end early."""
+        if self._early is not None:
+            self._early[0].left_out = switches, joints
+
     def open(self) -> None:
         """Open the bus and set up its chips."""
         self.bus.open()

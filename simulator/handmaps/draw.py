@@ -91,13 +91,14 @@ def all_switches(glove: HandShape, numbered: bool) -> Picture:
 
 def contacts(glove: HandShape, grasp_set: GraspSet, per_grasp: bool) -> Picture:
     """Return how often each switch closed, and each taxel was pressed (above Otsu's threshold of all readings),
-    over all rows or, one hand each, in each grasp type that has rows.
+    over all rows in which something is held or, one hand each, in each grasp type that has rows.
 
     All hands share one scale, up to the largest share. Raises MapError if the set has no rows, no switches or taxels,
     or one that the glove does not have.
     """
     if not grasp_set.element_names:
         raise MapError("the set has no switches to draw: it holds joints only")
+    grasp_set = grasp_set.without_none()
     if not len(grasp_set):
         raise MapError("a set without rows has no contacts to draw")
     numbers = glove.numbers_of(grasp_set.element_names)

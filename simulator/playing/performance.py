@@ -1,7 +1,7 @@
 """What an emulated glove plays of a scene, a set of grasps or a recording, and the playing of it."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from threading import Event
 from time import monotonic_ns
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from thenar.compiler.recordings.graspset import CODES, GraspSet, Joint
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.published import UNKNOWN, LiveGrasp
+from thenar.runtime.published import NONE, UNKNOWN, LiveGrasp
 from thenar.runtime.recording.messages import switch_matrix
 from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Label
@@ -28,7 +28,7 @@ Bits = NDArray[np.bool_]
 Bytes = NDArray[np.uint8]
 Codes = NDArray[np.uint16]
 
-_WIRE = "wire."
+_WIRE, _TRANSITION = "wire.", "hand.transition"
 # Takes of every frame that is shown its number, its grasp type, and the monotonic clock in microseconds.
 Log = Callable[[int, str, int], None]
 
@@ -39,7 +39,7 @@ class Performance:
 
     switches     (F, s) bool       switch_names  s names
     sensors      (F, 18) uint8     the CyberGlove's bytes, in wire order
-    grasps       (F,) str          the grasp types that are being made
+    grasps       (F,) str          the grasp types that are held, "none" where nothing is
     period_us                      from one frame to the next
     calibration  what the bytes mean on this subject's hand
     taxels       (F, t) uint16     taxel_names  t names
@@ -63,6 +63,20 @@ class Performance:
     def __len__(self) -> int:
         return len(self.switches)
 
+    def with_rests(self, ends: NDArray[np.intp], rest_us: int) -> "Performance":
+        """Return it with a straight hand that holds nothing after each of the frames `ends`, for `rest_us` rounded up
+        to whole frames.
+        """
+        at = np.repeat(ends + 1, max(-(-rest_us // self.period_us), 1))
+        lines = {} if self.taxel_calibration is None else {one.name: one.rest for one in self.taxel_calibration.taxels}
+        return replace(
+            self,
+            switches=np.insert(self.switches, at, False, axis=0),
+            sensors=np.insert(self.sensors, at, resting(self.calibration), axis=0),
+            grasps=np.insert(self.grasps.astype(np.object_), at, NONE).astype(np.str_),
+            taxels=np.insert(self.taxels, at, [lines.get(name, 0) for name in self.taxel_names], axis=0),
+        )
+
     def play(self, show: Callable[[list[bool], bytes, list[int]], None], log: Log, stop: Event) -> bool:
         """Show all frames once, each `period_us` after the one before, whatever showing them takes: lateness does not
         add up. Returns False if `stop` was set before the last one had its time.
@@ -77,27 +91,42 @@ class Performance:
         return not stop.wait(self.period_us / 1e6)
 
 
-def of_scene(scene: Scene, subject: str | None = None, jobs: int = -1, progress: Progress | None = None) -> Performance:
+def of_scene(
+    scene: Scene,
+    subject: str | None = None,
+    jobs: int = -1,
+    progress: Progress | None = None,
+    *,
+    period_us: int | None = None,
+    rest_us: int | None = None,
+) -> Performance:
     """Return one subject's session of `scene`, the first one's by default, without what happens on its wires.
 
     A scene that keeps every frame is played frame by frame; one that keeps a row of each grasp shows each row as long
-    as the grasp is held. Raises SceneError.
+    as the grasp is held; period_us plays it faster or slower. With rest_us the hand rests between grasps for so long:
+    it goes there where the scene moves it, and is there at once where it does not. Raises SceneError.
     """
     names = [each.name for each in scene.subjects]
     if subject is not None and subject not in names:
         raise SceneError(f"scene {scene.name} has no subject {subject!r}: its subjects are {', '.join(names)}")
     one = next(each for each in scene.subjects if each.name == (subject or names[0]))
+    recording = scene.recording
+    own_us = round(1e6 / recording.rate_hz if recording.rows == "all" else recording.hold_ms * 1000)
+    period_us = period_us or own_us
+    moves = recording.rows == "all" and any(listed.name == _TRANSITION for listed in scene.effects)
+    if moves and rest_us is not None:
+        rest = recording.rest or True
+        recording = msgspec.structs.replace(recording, rest=rest, rest_ms=rest_us / 1000 * own_us / period_us)
     played = msgspec.structs.replace(
         scene,
+        recording=recording,
         subjects=(one,),
         glove=msgspec.structs.replace(scene.glove, codes="raw"),
         effects=tuple(listed for listed in scene.effects if not listed.name.startswith(_WIRE)),
     )
     grasp_set = simulate(played, jobs, progress).grasp_set
     calibration = Calibration.of_subject(scene.seed, one.name)
-    recording = scene.recording
-    period_us = round(1e6 / recording.rate_hz if recording.rows == "all" else recording.hold_ms * 1000)
-    return Performance(
+    found = Performance(
         switches=grasp_set.switches,
         switch_names=grasp_set.switch_names,
         sensors=_with_wrist(grasp_set.codes.astype(np.uint8), calibration),
@@ -108,10 +137,20 @@ def of_scene(scene: Scene, subject: str | None = None, jobs: int = -1, progress:
         taxel_names=tuple(taxel.name for taxel in grasp_set.taxel_columns),
         taxel_calibration=_taxel_calibration(grasp_set.taxel_columns),
     )
+    return found if moves or rest_us is None else found.with_rests(_ends(grasp_set), rest_us)
 
 
-def of_set(grasp_set: GraspSet, period_us: int, calibration: GloveCalibration | None = None) -> Performance:
-    """Return the rows of `grasp_set`, one after the other, as a glove of this calibration would send them.
+def _ends(grasp_set: GraspSet) -> NDArray[np.intp]:
+    """Return the last row of each movement."""
+    movements = grasp_set.movement_ids
+    return np.flatnonzero(np.append(movements[1:] != movements[:-1], True))
+
+
+def of_set(
+    grasp_set: GraspSet, period_us: int, calibration: GloveCalibration | None = None, rest_us: int | None = None
+) -> Performance:
+    """Return the rows of `grasp_set`, one after the other, as a glove of this calibration would send them; with
+    rest_us, a straight hand after each movement for so long.
 
     A code that no byte of a sensor gives is played as the byte that comes nearest. Sensors that the set does not have
     rest. Without a calibration: of a typical hand. Raises SceneError where none of its joints is a sensor's.
@@ -129,7 +168,7 @@ def of_set(grasp_set: GraspSet, period_us: int, calibration: GloveCalibration | 
         codes = grasp_set.codes[:, grasp_set.joint_names.index(joint.name)].astype(np.float64)
         order = np.argsort(given, kind="stable")
         sensors[:, SENSORS.index(joint.name)] = raw[order][_nearest(given[order], codes)]
-    return Performance(
+    found = Performance(
         grasp_set.switches,
         grasp_set.switch_names,
         sensors,
@@ -140,6 +179,7 @@ def of_set(grasp_set: GraspSet, period_us: int, calibration: GloveCalibration | 
         taxel_names=tuple(taxel.name for taxel in grasp_set.taxel_columns),
         taxel_calibration=_taxel_calibration(grasp_set.taxel_columns),
     )
+    return found if rest_us is None else found.with_rests(_ends(grasp_set), rest_us)
 
 
 def _taxel_calibration(columns: tuple[Joint, ...]) -> TaxelCalibration | None:
@@ -251,7 +291,7 @@ def _ticks(reader: Reader, rest: bytes, period_us: int) -> Iterator[Moment]:
                 codes = tuple(old if code is None else code for old, code in zip(before, entry.taxels, strict=True))
         elif isinstance(entry, GloveFrame):
             sensors = entry.sensors
-        elif isinstance(entry, LiveGrasp | Label):
+        elif isinstance(entry, LiveGrasp) or (isinstance(entry, Label) and entry.event != "begun"):
             grasp = entry.grasp
         else:
             continue

@@ -92,6 +92,19 @@ def test_a_set_of_grasps_is_played_row_by_row(thenar: Thenar, scene: Path, tmp_p
     assert [json.loads(line)["grasp"] for line in log.read_text().splitlines()] == grasp_set.grasps.tolist()
 
 
+def test_between_grasps_the_hand_rests_and_the_log_says_none(
+    thenar: Thenar, scene: Path, glove: Path, tmp_path: Path
+) -> None:
+    log = tmp_path / "log.jsonl"
+    arguments = ("emulate", scene, "--glove", glove, "--dir", tmp_path / "em", "--period-ms", 4, "--rest-ms", 8)
+    done = thenar(*arguments, "--log", log)
+    assert done.returncode == 0, done.stderr
+    grasps = [json.loads(line)["grasp"] for line in log.read_text().splitlines()]
+    assert len(grasps) == 3 * 14
+    assert "none" not in grasps[::3]
+    assert set(grasps[1::3] + grasps[2::3]) == {"none"}
+
+
 def test_ctrl_c_takes_the_ports_away_and_leaves_no_traceback(scene: Path, glove: Path, tmp_path: Path) -> None:
     folder = tmp_path / "em"
     arguments = ["emulate", scene, "--glove", glove, "--dir", folder, "--repeat"]
@@ -108,7 +121,9 @@ def test_ctrl_c_takes_the_ports_away_and_leaves_no_traceback(scene: Path, glove:
 
 
 def test_what_cannot_be_played_is_said(thenar: Thenar, glove: Path, tmp_path: Path) -> None:
+    (tmp_path / "run.mcap").touch()
     for arguments, reason in (
+        ((tmp_path / "run.mcap", "--rest-ms", 8), "a recording has its own rests"),
         (("nosuch",), "no shipped scene is called 'nosuch'"),
         (("no.grasps",), "there is no file no.grasps"),
         (("quick", "--subject", "Z"), "has no subject 'Z'"),

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import FrameType
 
 import click
+import numpy as np
 import pytest
 
 from thenar.cli import collecting, run
@@ -31,6 +32,7 @@ LINES: dict[str, tuple[str, str]] = {
     "place": ("set.grasps", ""),
     "draw": ("", "-o new.svg"),
     "evaluate": ("set.grasps", "--repeats 1 --folds 2 --rounds 2 --tables compositions --jobs 1"),
+    "segment": ("movements.grasps", "-b build -o new.csv"),
     "frontier": (
         "set.grasps",
         "-o new --methods elimination --rivals none --rounds 2 --repeats 1 --finalists 1 --jobs 1",
@@ -40,6 +42,7 @@ LINES: dict[str, tuple[str, str]] = {
     "firmware": ("build", "--target host -o new"),
     "spec": ("build", "-o new"),
     "run": ("build", "--replay set.grasps"),
+    "teach": ("set.grasps", "-b build -o new.json"),
     "calibrate": ("missing/port", "-o new.toml"),
     "record": ("", "--glove glove.toml --subject A --objects objects.toml --taxonomy own -o new.grasps"),
     "emulate": ("set.grasps", "--glove glove.toml --dir new --period-ms 1"),
@@ -61,6 +64,7 @@ def material(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> P
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         small_set.save("set.grasps")
+        small_set.rows(np.repeat(np.arange(len(small_set)), 3)).save("movements.grasps")
         shutil.copy("set.grasps", "other.grasps")
         assert run(["export", "set.grasps", "-o", "table.csv", "--columns", "columns.toml"]) == 0
         assert run(["compile", "set.grasps", "-o", "build", "--rounds", "2", "--folds", "0", "--no-report"]) == 0

@@ -18,6 +18,7 @@ from thenar.simulator.scenes import shipped
     [
         ("evalute", "evaluate"),
         ("imprt", "import"),
+        ("teech", "teach"),
         ("compile {set} -o new --preset smalest", "smallest"),
         ("compile {set} -o new --trainer logitbost", "logitboost"),
         ("compile {set} -o new --metod id3", "--method"),
@@ -85,6 +86,8 @@ def completed(*words: str) -> list[str]:
         (("firmware", "--target", "cortex"), ["cortex-m0plus", "cortex-m4"]),
         (("verify", "build", "set.grasps", "--firmware", "host,a"), ["host,avr"]),
         (("stability", "weig"), ["weights"]),
+        (("segm",), ["segment"]),
+        (("segment", "--la"), ["--lag-ms"]),
     ],
 )
 def test_a_shell_completes_what_is_half_typed(words: tuple[str, ...], expected: list[str]) -> None:

@@ -72,6 +72,18 @@ def test_a_scene_can_be_changed_on_the_way(tmp_path: Path, capsys: Captured) -> 
     assert json.loads(capsys.readouterr().out)["subjects"] == ["C"]
 
 
+def test_whole_movements_may_have_a_rest_between_them_and_the_summary_says_how_many_rows_are_none(
+    tmp_path: Path, capsys: Captured
+) -> None:
+    path = tmp_path / "set.grasps"
+    assert run(["simulate", "continuous", *SMALL, "--subject", "C", "--rest", "flat", "-o", str(path)]) == 0
+    made = GraspSet.load(path)
+    scene = load_scene("continuous-rest").varied(repetitions=1, subjects=["C"], rest="flat")
+    again = simulate(msgspec.structs.replace(scene, name="continuous"), jobs=1).grasp_set
+    assert made.fingerprint() == again.fingerprint()
+    assert f"{path}: {len(made)} rows (in {made.is_none.sum()} nothing is held), simulated" in capsys.readouterr().out
+
+
 def test_fresh_grasps_are_asked_for_with_more_and_the_help_says_what_a_seed_draws(
     tmp_path: Path, capsys: Captured
 ) -> None:
@@ -175,6 +187,10 @@ def test_shipped_scenes_are_listed_with_what_they_are(capsys: Captured) -> None:
         (["quick", "--explain", "--subject", "Q"], "scene quick has no subject 'Q'"),
         (["quick", "--explain", "--repetitions", "0"], "repetitions"),
         (["quick", "-o", "no/such/folder/set.grasps"], "There is no folder"),
+        (
+            ["quick", "--explain", "--rest", "flat"],
+            "recording.rest: for the hand to return to an open rest the scene needs",
+        ),
     ],
 )
 def test_what_cannot_be_done_is_one_sentence(arguments: list[str], reason: str, capsys: Captured) -> None:

@@ -14,7 +14,7 @@ from msgspec import structs
 
 from thenar.compiler import TRAINERS, GraspSet, compile_build, grow_id3
 from thenar.compiler.artifact import CompileError, training
-from thenar.compiler.artifact.training import answers_of, cuts_of
+from thenar.compiler.artifact.training import cuts_of, scores_of
 from thenar.compiler.artifact.verify import verify
 from thenar.compiler.evaluation.choosing import choose_training
 from thenar.compiler.evaluation.folds import EvaluationError
@@ -393,7 +393,7 @@ def test_an_outer_fold_chooses_by_the_subjects_of_its_training_rows(
     monkeypatch.setattr(training, "choose_training", chosen)
     (cut, *_) = cuts_of(grasp_set, structs.replace(options, by="subject"))
     for fold in cut.folds:
-        answers_of(Samples.of(grasp_set), options, None, cut.groups, None, fold)
+        scores_of(Samples.of(grasp_set), options, None, cut.groups, None, fold)
     for (groups, of), fold in zip(seen, cut.folds, strict=True):
         assert of == "new subject"
         assert np.array_equal(groups, grasp_set.subjects[fold.train])

@@ -46,13 +46,15 @@ def _grasp_sets(draw: st.DrawFn) -> GraspSet:
     )
     taxonomy: Taxonomy = draw(st.one_of(st.sampled_from([KAMAKURA_14, CUTKOSKY_16, FEIX_33]), types))
     random = np.random.default_rng(draw(st.integers(0, 2**32)))
+    names = draw(st.sampled_from([taxonomy.types, taxonomy.names]))
+    times = draw(st.sampled_from([0, 10_000, 2**40])) * np.cumsum(random.integers(0, 9, rows))
     people, things, visits = (draw(st.lists(NAMES, min_size=1, max_size=3)) for _ in range(3))
     return GraspSet(
         switches=random.random((rows, split)) < 0.5,
         switch_names=tuple(columns[:split]),
         codes=random.integers(0, 65536, (rows, len(joints)), dtype=np.uint16),
         joints=joints,
-        grasps=random.choice(taxonomy.types, rows),
+        grasps=random.choice(names, rows),
         taxonomy=taxonomy,
         subjects=random.choice(people, rows),
         objects=random.choice(things, rows),
@@ -62,6 +64,7 @@ def _grasp_sets(draw: st.DrawFn) -> GraspSet:
         independent=draw(st.booleans()),
         taxels=random.integers(0, 65536, (rows, len(taxels)), dtype=np.uint16),
         taxel_columns=taxels,
+        times_us=times if times.any() else np.empty(0, np.int64),
     )
 
 

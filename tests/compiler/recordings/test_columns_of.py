@@ -38,7 +38,7 @@ def test_heads_are_never_names_of_inputs(data: st.DataObject, grasp_sets: st.Sea
     grasp_set = data.draw(grasp_sets)
     heads = heads_of(grasp_set)
     inputs = (*grasp_set.element_names, *grasp_set.joint_names)
-    assert len({*heads, *inputs}) == 5 + len(inputs)
+    assert len({*heads, *inputs}) == 6 + len(inputs)
 
 
 def test_neighbours_of_one_calibration_share_an_entry(small: GraspSet, tmp_path: Path) -> None:

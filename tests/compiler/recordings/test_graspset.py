@@ -28,7 +28,12 @@ def test_labels_are_the_grasps_numbers_in_the_taxonomy(
     data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]
 ) -> None:
     grasp_set = data.draw(grasp_sets)
-    assert [grasp_set.taxonomy.types[label] for label in grasp_set.labels] == grasp_set.grasps.tolist()
+    assert [grasp_set.taxonomy.names[label] for label in grasp_set.labels] == grasp_set.grasps.tolist()
+    none = (grasp_set.grasps == "none") & ("none" not in grasp_set.taxonomy.types)
+    assert grasp_set.is_none.tolist() == none.tolist()
+    held = grasp_set.without_none()
+    assert (held is grasp_set) == (not none.any())
+    assert held.fingerprint() == grasp_set.rows(~none).fingerprint()
     assert len(grasp_set) == len(grasp_set.labels)
 
 

@@ -25,7 +25,7 @@ DROP = Columns("g", subject="who", trial="n", switches=("s",), joints=(JointColu
 
 
 def test_cells_become_arrays() -> None:
-    readings, found, _ = read(ALL)
+    readings, _, found, _ = read(ALL)
     assert readings.labels.tolist() == ["a", "b", "c"]
     assert readings.subjects.tolist() == ["x", "y", "y"]
     assert readings.trials.tolist() == [1, 2, 3]
@@ -64,7 +64,7 @@ def test_missing_cells_are_an_error_unless_their_rows_may_be_dropped() -> None:
 
 
 def test_dropped_rows_are_counted_and_named() -> None:
-    readings, (finding,), _ = read(DROP, j=["", "2", "3"], who=["x", "y", "?"])
+    readings, _, (finding,), _ = read(DROP, j=["", "2", "3"], who=["x", "y", "?"])
     assert readings.rows.tolist() == [3]
     assert readings.labels.tolist() == ["b"]
     assert (finding.kind, finding.count, finding.rows, finding.columns) == ("dropped rows", 2, (2, 5), ("who", "j"))

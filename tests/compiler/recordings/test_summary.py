@@ -32,13 +32,29 @@ def test_a_set_is_counted(small: GraspSet) -> None:
 def test_counts_add_up_for_any_set(data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]) -> None:
     grasp_set = data.draw(grasp_sets)
     summary = summarise(grasp_set)
-    for counts in (summary.grasps, summary.subjects, summary.objects):
+    for counts in ((*summary.grasps, Count("none", summary.none)), summary.subjects, summary.objects):
         assert sum(count.rows for count in counts) == len(grasp_set)
     assert len(summary.grasps) + len(summary.absent) == len(grasp_set.taxonomy.types)
-    assert 0 < summary.balance <= 1
+    assert (summary.balance > 0) == (summary.none < len(grasp_set))
+    assert (summary.seconds is None) == (not grasp_set.times_us.size)
+    assert summary.movements == len(np.unique(grasp_set.movement_ids))
     for joint, told, codes in zip(grasp_set.joints, summary.joints, grasp_set.codes.T, strict=True):
         assert told.codes == len(np.unique(codes))
         assert (told.least, told.largest) == (joint.value(codes).min(), joint.value(codes).max())
+
+
+def test_rows_in_which_nothing_is_held_count_apart_and_clash_with_none(small: GraspSet) -> None:
+    nothing = np.array([False, True, True, False, False, True])
+    found = replace(small, grasps=np.where(nothing, "none", small.grasps), times_us=10_000 * np.arange(6))
+    summary = summarise(found)
+    assert (summary.rows, summary.none, summary.movements, summary.seconds) == (6, 3, 6, 0.03)
+    assert summary.grasps == (Count("PoS", 2), Count("Tip", 1))
+    assert (summary.balance, len(summary.absent)) == (0.5, 12)
+    kinds = {finding.kind: finding for finding in summary.warnings}
+    assert "contradictory frames" not in kinds
+    assert kinds["frames shared by subjects"].rows == (1, 4)
+    assert kinds["grasp types that a subject lacks"].message == "subject A has no Tip"
+    assert summary.separability == summarise(found.without_none()).separability
 
 
 def test_a_set_without_rows_has_a_summary(small: GraspSet) -> None:

@@ -54,13 +54,13 @@ def unsure(labels: np.ndarray, seed: int) -> np.ndarray:
 def test_a_model_that_was_learnt_finds_segments_in_unsure_scores(make_movements: Make) -> None:
     grasp_set, other = make_movements(), make_movements("C", seed=2)
     streams = streams_of(grasp_set)
-    model = learnt(streams, grasp_set.labels, unsure(grasp_set.labels, 1), 100.0, 10_000)
+    model = learnt(streams, grasp_set.labels, unsure(grasp_set.labels, 1), 3, 100.0, 10_000)
     lanes = np.rint(100 * unsure(other.labels, 2)).astype(np.int64)
     raw, found = (score(other.labels, states, 3) for states in (lanes.argmax(axis=1), live_states(model, lanes, 15)))
     assert raw.f1(2) < 0.3
     assert found.f1(2) > 0.95
     assert found.onset <= 3
-    again = learnt(streams, grasp_set.labels, unsure(grasp_set.labels, 1), 100.0, 10_000)
+    again = learnt(streams, grasp_set.labels, unsure(grasp_set.labels, 1), 3, 100.0, 10_000)
     assert again == model
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
 from thenar.drivers.errors import SettingError
@@ -230,11 +230,81 @@ def test_early_exit_changes_no_decision_and_promises_no_more_than_the_whole_scan
         assert found.probability <= full.probability * (1 + 1e-12)
 
 
+@settings(max_examples=15)
+@given(seed=st.integers(0, 20), hand=st.lists(st.tuples(masks, st.binary(min_size=4, max_size=4)), max_size=6))
+def test_early_exit_changes_no_segment_where_whole_scans_follow_the_hand(
+    make_build: MakeBuild, seed: int, hand: list[tuple[int, bytes]]
+) -> None:
+    """Every half tick a scan goes to its end, and the hand moves no more often than that."""
+    build, policy = make_build(seed), Policy(max_lost=1.0, lag_us=50_000)
+    half = build.manifest.segmenting.tick_us // 2
+    whole, early = recognizer(build, policy), recognizer(build, policy)
+    exit_ = EarlyExit(build.scorer, PORTS)
+    joints, states, ended = Joints(build.manifest.joints, SENSORS, None, GLOVE_PERIOD), set(), 0
+    for now in range(0, half * 40 * len(hand), 1000):
+        closed, sensors = hand[now // (40 * half)]
+        glove = GloveFrame(now, sensors)
+        exit_.start(joints.codes(now, glove))
+        last = next((port for port in range(3) if now % half and exit_.after(port, closed)), 2)
+        unread = exit_.unread(last)
+        ended += unread > 0
+        found = early.step(now, 0, SwitchFrame(now, closed & ~unread, 0, unread), glove).grasp
+        full = whole.step(now, 0, SwitchFrame(now, closed), glove).grasp
+        of = [(one.state, one.segment, one.segment_type, one.segment_us) for one in (found, full)]
+        assert of[0] == of[1]
+        states.add(of[0][0])
+    event(f"{sorted(states)}, {ended > 0}")
+
+
+def test_without_whole_scans_what_is_unread_counts_as_lost_for_segments(make_build: MakeBuild) -> None:
+    build, found, ended = make_build(), set(), 0
+    seen, lost = (recognizer(build, Policy(max_lost=1.0, lag_us=0)) for _ in range(2))
+    exit_, joints = EarlyExit(build.scorer, PORTS), Joints(build.manifest.joints, SENSORS, None, GLOVE_PERIOD)
+    for now in range(0, 24 * 400_000, 1000):
+        closed = now // 400_000
+        glove = GloveFrame(now, bytes(1 + closed * step % 255 for step in (31, 77, 101, 151)))
+        exit_.start(joints.codes(now, glove))
+        last = next((port for port in range(3) if exit_.after(port, closed)), 2)
+        unread = exit_.unread(last)
+        one = seen.step(now, 0, SwitchFrame(now, closed & ~unread, 0, unread), glove).grasp
+        other = lost.step(now, 0, SwitchFrame(now, closed & ~unread, unread), glove).grasp
+        # Once the last whole scan is two ticks old.
+        if now % 400_000 == 399_000:
+            assert one.segment_type == other.segment_type
+            found.add(one.segment_type)
+            ended += unread > 0
+    assert len(found) > 1 < ended
+
+
+def test_without_a_lag_there_are_no_segments(make_build: MakeBuild) -> None:
+    live = recognizer(make_build(), Policy(lag_us=None))
+    for now in range(0, 300_000, 1000):
+        found = live.step(now, 0, SwitchFrame(now, 5), GloveFrame(now, b"\x05\x06\x07\x08")).grasp
+        assert (found.state, found.segment, found.segment_us, found.segment_probability) == ("none", 0, None, 0.0)
+
+
+def test_a_segment_has_the_probability_of_its_type_in_this_frame(make_build: MakeBuild) -> None:
+    build, random = make_build(), np.random.default_rng(5)
+    live, seen = recognizer(build, Policy(lag_us=30_000)), 0
+    for now in range(0, 600_000, 1000):
+        closed, sensors = (int(random.integers(64)), bytes(random.integers(1, 256, 4, np.uint8)))
+        found = live.step(now, 0, SwitchFrame(now, closed), GloveFrame(now, sensors)).grasp
+        if found.segment_us is not None:
+            codes = np.array([sensors[SENSORS.index(f"j{number}")] for number in range(JOINTS)], np.uint16)
+            odds = np.exp((build.scores(flags(closed), codes) - 0.0) / build.tables.scale)
+            expected = odds[build.grasps.index(found.segment_type)] / odds.sum()
+            assert math.isclose(found.segment_probability, expected, rel_tol=1e-9)
+            seen += found.segment_type != found.grasp
+    assert seen
+
+
 def test_a_scan_ends_only_when_the_lead_that_the_decision_asks_for_is_sure(make_build: MakeBuild) -> None:
     build, ends = make_build(), []
     for lead in (0.0, 0.4):
         system = System.of(
-            build, Harness(name="any", scanners=(ScannerWiring(port="p", switches=NAMES),)), Policy(lead)
+            build,
+            Harness(name="any", scanners=(ScannerWiring(port="p", switches=NAMES),)),
+            Policy(lead, quarantine=False),
         )
         made = system.early_exit(PORTS)
         expected = EarlyExit(build.scorer, PORTS, lead=round(lead * build.tables.scale))

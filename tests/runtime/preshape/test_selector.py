@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import groupby
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -105,7 +106,7 @@ def test_a_break_begins_the_settling_anew() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"min_probability": 1.5}, {"min_probability": float("nan")}, {"settle_ms": -1}])
-def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
+def test_settings_that_make_no_sense_are_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(PreshapeError):
         PreshapeSelector(TABLE, **wrong)
 

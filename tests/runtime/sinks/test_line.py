@@ -44,6 +44,13 @@ def test_any_json_parser_reads_it(make_grasp: Callable[..., LiveGrasp], preshape
     }
 
 
+def test_a_line_of_before_there_were_segments_is_read_as_one_without(make_grasp: Callable[..., LiveGrasp]) -> None:
+    told = json.loads(encode(make_grasp(7), None, None))
+    older = {name: value for name, value in told.items() if not name.startswith(("state", "segment"))}
+    assert len(told) - len(older) == 5
+    assert typed_json.decode(json.dumps(older), type=Line) == Line(**asdict(make_grasp(7)))
+
+
 def test_a_reader_tells_grasps_and_health_apart(make_grasp: Callable[..., LiveGrasp], health: HealthReport) -> None:
     lines = [encode(make_grasp(7), None, None), encode_health(health)]
     grasp, report = (typed_json.decode(line, type=Line | HealthLine) for line in lines)

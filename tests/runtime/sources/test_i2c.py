@@ -26,10 +26,12 @@ class Bench:
         self.answers: list[list[int | None]] = []
         self.slept: list[float] = []
         self.takes_us = 100
+        self.groups = 1
 
     def __iter__(self) -> Iterator[list[int | None]]:
-        self.now += self.takes_us
-        yield self.answers.pop(0)
+        for _ in range(self.groups):
+            self.now += self.takes_us
+            yield self.answers.pop(0)
 
 
 class Bus:
@@ -110,6 +112,19 @@ def test_nor_is_one_whose_first_chip_is_gone_and_whose_others_do_not_matter(
     found = frame(made)
     assert (found.lost, found.unread) == (0b000_111, 0b111_000)
     assert bench.slept
+
+
+def test_every_so_often_a_scan_goes_to_its_end_whatever_is_decided(bench: Bench, make_build: MakeBuild) -> None:
+    build = make_build(joints=3)
+    joints, glove = Joints(build.manifest.joints, ("j0", "j1", "j2"), None, 10_000), Newest[GloveFrame]()
+    made = device(OFF)
+    made.end_early(lambda ports: AtOnce(build.scorer, ports, whole_us=450), joints, glove)
+    bench.groups, found = 2, []
+    for _ in range(12):
+        bench.answers = [[HIGH], [HIGH]]
+        found.append(not frame(made).unread)
+    # A port takes 100 us: after a whole scan, five begin within 450.
+    assert found == [True, *[False] * 5] * 2
 
 
 def test_what_was_read_before_a_chip_held_the_bus_up_is_no_news(bench: Bench) -> None:

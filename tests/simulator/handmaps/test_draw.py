@@ -105,7 +105,11 @@ def test_each_grasp_type_that_has_rows_gets_a_hand_on_one_scale(two_types: Grasp
 
 
 def test_a_set_in_which_nothing_ever_closed_is_all_hollow(two_types: GraspSet) -> None:
-    picture = contacts(HAND, grasp_set(np.zeros((2, 1), bool), (NAMES[0],), ["Tip", "Tip"]), per_grasp=False)
+    held = grasp_set(np.zeros((2, 1), bool), (NAMES[0],), ["Tip", "Tip"])
+    picture = contacts(HAND, held, per_grasp=False)
+    more = grasp_set(np.array([[0], [1], [0]], bool), (NAMES[0],), ["Tip", "none", "Tip"])
+    assert contacts(HAND, more, per_grasp=False) == picture
+    assert [panel.title for panel in contacts(HAND, more, per_grasp=True).panels] == ["Tip: Tip grip"]
     assert all(dot.shade is None for dot in picture.panels[0].dots)
     assert draw(picture, "png").startswith(b"\x89PNG")
 

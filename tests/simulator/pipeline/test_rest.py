@@ -2,13 +2,17 @@
 
 import re
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler import GraspSet, compile_build
+from thenar.runtime import Build
+from thenar.runtime.published import NONE
 from thenar.simulator.body.cyberglove import USED, sensors_deg
 from thenar.simulator.body.hand import LIMITS_DEG, RESTS_DEG
 from thenar.simulator.effects import hand_posture, hand_style, joint_noise
@@ -35,8 +39,9 @@ def run(scene: Scene, batch: Batch) -> Batch:
     return batch
 
 
-def whole(name: str, **changes: Any) -> GraspSet:
-    scene = load_scene(name)
+@cache
+def whole(name: str, seed: int = 1, **changes: Any) -> GraspSet:
+    scene = load_scene(name).varied(seed=seed)
     objects = tuple(item for item in scene.objects if item.grasp in ("PoS", "Tip", "Lat"))
     recording = replace(scene.recording, **changes)
     return simulate(replace(scene, objects=objects, repetitions=2, recording=recording), jobs=1).grasp_set
@@ -129,6 +134,19 @@ def test_a_flat_hand_reads_nought_and_closes_nothing() -> None:
     assert np.abs(away).max() < noise.trial_sd_deg
     assert not flat.switches.any()
     assert flat.is_none.all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("inputs", ["switches", "joints", "both"])
+@pytest.mark.parametrize("trained", ["continuous", "continuous-rest"])
+def test_a_flat_hand_that_no_build_has_seen_is_none(trained: str, inputs: str, tmp_path: Path) -> None:
+    compile_build(whole(trained), tmp_path / "build", rounds=40, folds=0, jobs=1, inputs=inputs)
+    build, made = Build.load(tmp_path / "build"), whole("continuous-rest", rest="flat", seed=2)
+    flat = made.rows(np.arange(len(made)) % 181 >= 131)
+    switches = flat.switches[:, [flat.switch_names.index(switch.name) for switch in build.manifest.switches]]
+    codes = flat.codes[:, [flat.joint_names.index(joint.name) for joint in build.manifest.joints]]
+    found = [build.classify(*frame) for frame in zip(switches, codes, strict=True)]
+    assert found.count(NONE) >= 0.99 * len(flat)
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,13 @@ import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet
+from thenar.compiler.recordings.graspset import Joint
 from thenar.runtime.calibration import CodeTables
 from thenar.runtime.manifest import Calibration
+from thenar.runtime.published import NONE
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.errors import SceneError
-from thenar.simulator.playing.performance import Performance, of_scene, of_set
+from thenar.simulator.playing.performance import Performance, of_scene, of_set, resting
 from thenar.simulator.scenes.scene import Scene
 
 
@@ -43,6 +45,53 @@ def test_a_scene_is_played_as_it_is_simulated(rows: str, subject: str) -> None:
     assert np.array_equal(codes_of(played, simulated), simulated.codes)
     assert played.calibration.subject == subject
     assert played.period_us == (60_000 if rows == "last" else 10_000)
+
+
+def test_a_scene_that_moves_the_hand_plays_rests_for_as_long_as_is_said() -> None:
+    scene = load_scene("continuous")
+    objects = tuple(item for item in scene.objects if item.grasp in ("PoS", "Tip"))
+    scene = msgspec.structs.replace(scene, repetitions=1, objects=objects)
+    played, faster = (of_scene(scene, jobs=1, period_us=us, rest_us=200_000) for us in (None, 5_000))
+    movement = 101 + 30
+    assert len(played) % (movement + 20) == 0
+    resting = np.arange(len(played)) % (movement + 20) >= movement
+    assert (played.grasps[resting] == NONE).all()
+    assert not played.switches[resting].any()
+    assert faster.period_us == 5_000
+    assert len(faster) % (movement + 40) == 0
+    own = of_scene(load_scene("continuous-rest").varied(repetitions=1), jobs=1)
+    assert {"none", "PoS", "Tip"} < set(own.grasps.tolist())
+
+
+@pytest.mark.parametrize(("period_us", "frames"), [(None, 4), (100_000, 2), (7_000, 29)])
+def test_single_grasps_are_played_with_a_straight_hand_between_them(period_us: int | None, frames: int) -> None:
+    plain, rested = of_scene(small(), jobs=1), of_scene(small(), jobs=1, period_us=period_us, rest_us=200_000)
+    shape = (len(plain), 1 + frames)
+    assert rested.grasps.reshape(shape)[:, 0].tolist() == plain.grasps.tolist()
+    assert (rested.grasps.reshape(shape)[:, 1:] == NONE).all()
+    assert np.array_equal(rested.switches.reshape(*shape, -1)[:, 0], plain.switches)
+    assert not rested.switches.reshape(*shape, -1)[:, 1:].any()
+    assert (rested.sensors.reshape(*shape, 18)[:, 1:] == resting(rested.calibration)).all()
+
+
+def test_a_set_of_whole_movements_rests_after_each_and_not_among_its_rows() -> None:
+    grasp_set = simulate(small("all"), 1).grasp_set
+    played = of_set(grasp_set, 10_000, rest_us=30_000)
+    lengths = np.bincount(grasp_set.movement_ids)
+    assert len(played) == len(grasp_set) + 3 * len(lengths)
+    assert grasp_set.is_none.any()
+    for end in np.cumsum(lengths + 3):
+        assert (played.grasps[end - 3 : end] == NONE).all()
+        assert not played.switches[end - 3 : end].any()
+    assert played.grasps[: lengths[0]].tolist() == grasp_set.grasps[: lengths[0]].tolist()
+
+
+def test_taxels_of_a_hand_at_rest_read_what_means_nothing_on_them() -> None:
+    taxel = Joint("t", "N", 100, 0.0, 900, 8.0)
+    taxels = np.full((3, 1), 500, np.uint16)
+    grasp_set = simulate(small(), 1).grasp_set.rows([0, 1, 2])
+    played = of_set(replace(grasp_set, taxels=taxels, taxel_columns=(taxel,)), 10_000, rest_us=10_000)
+    assert played.taxels[:, 0].tolist() == [500, 100] * 3
 
 
 def test_the_first_subject_is_played_by_default_and_another_must_be_there() -> None:

@@ -1,0 +1,98 @@
+"""`thenar teach`: the task that several demonstrations have in common."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from rich.text import Text
+
+from .common import (
+    OutputFile,
+    existing_file,
+    existing_folder,
+    json_flag,
+    keep_apart,
+    out,
+    overwrite_flag,
+    overwrites,
+    progress,
+    show,
+    table,
+    warning,
+)
+from .lines import echo
+
+if TYPE_CHECKING:
+    from thenar.runtime.task import Task
+
+
+@click.command("teach")
+@click.argument("demonstrations", metavar="DEMO...", nargs=-1, required=True, type=existing_file)
+@click.option("-b", "--build", type=existing_folder, required=True, help="The build that recognises.")
+@click.option(
+    "-o",
+    "--output",
+    type=OutputFile(".json"),
+    required=True,
+    help="The task to write; a behaviour tree of the same name (.xml) is written with it.",
+)
+@click.option(
+    "--preshape", metavar="NAME", help="The preshapes of the steps: barrett_bh8, parallel_gripper or a .toml file."
+)
+@click.option(
+    "--transitions", type=existing_file, help="Which type follows which elsewhere, as thenar segment counts it."
+)
+@overwrite_flag
+@json_flag
+def command(
+    demonstrations: tuple[Path, ...], build: Path, output: Path, preshape: str | None, transitions: Path | None
+) -> None:
+    """Find the sequence of grasps that demonstrations have in common: recorded runs of BUILD (.mcap), or sets of whole
+    movements (.grasps), each stream of which is one.
+
+    A grasp is a step if most of the demonstrations have it there. A step has its preshape, the median of each joint,
+    for how long it was held, and which types may follow. `thenar run --task` follows it.
+
+    \b
+    Example:
+        thenar teach demo1.mcap demo2.mcap demo3.mcap -b build/ -o task.json --preshape barrett_bh8
+        thenar run build/ --glove glove.toml --task task.json
+    """
+    from thenar.compiler.artifact.demonstrations import demonstrations as shown_in
+    from thenar.compiler.segmenting.teaching import Demonstration, behaviour_tree, task_json, taught
+    from thenar.compiler.segmenting.transitions import Transitions
+    from thenar.runtime import Build
+    from thenar.runtime.files import write_atomically
+    from thenar.runtime.preshape import load_preshapes
+
+    tree = output.with_suffix(".xml")
+    if tree.exists() and not overwrites(click.get_current_context()):
+        raise click.UsageError(f"{tree} is there already: --overwrite replaces it")
+    keep_apart(*demonstrations, transitions, output, tree)
+    loaded = Build.load(build)
+    preshapes = None if preshape is None else load_preshapes(preshape)
+    if preshapes is not None and (lacking := preshapes.check(loaded.grasps)):
+        warning(lacking)
+    graph = None if transitions is None else Transitions.load(transitions)
+    shown = list[Demonstration]()
+    with progress("finding segments") as report:
+        for done, path in enumerate(demonstrations):
+            report(done, len(demonstrations))
+            shown += shown_in(build, [path])
+    task = taught(loaded, shown, output.stem, preshapes, graph)
+    write_atomically(output, task_json(task))
+    write_atomically(tree, behaviour_tree(task))
+    show(task, lambda _: _print(task, output, tree))
+
+
+def _print(task: "Task", output: Path, tree: Path) -> None:
+    from thenar.compiler.text import counted
+
+    total = len(task.demonstrations)
+    grid = table(("step", "grasp", "shown", "preshape", "held s", "then"), ("step", "held s"), title=task.name)
+    for number, step in enumerate(task.steps, 1):
+        held = f"{step.median_s:.2f} +- {step.spread_s:.2f}"
+        words = (Text(step.grasp), f"{step.shown} of {total}", Text(step.preshape or ""), held)
+        grid.add_row(str(number), *words, Text(", ".join(step.then)))
+    out().print(grid)
+    echo(f"{counted(len(task.steps), 'step')} of {counted(total, 'demonstration')}: {output} and {tree}")

@@ -1,0 +1,255 @@
+"""`evaluate --streams`: how well whole movements of new subjects are cut into grasps, live and afterwards.
+
+Each subject is left out in turn. Placement, model, tables and costs of segments are learnt from the others; what is
+tried for the costs is tried on inner folds of them. Every row of the result decodes the same scores of the same tables.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from statistics import fmean
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.live.decision import Decision, SequentialTest, Standing
+from thenar.runtime.manifest import Inputs, Options
+from thenar.runtime.policy import Policy
+from thenar.runtime.scores import LANE_OFFSET, Scorer
+from thenar.runtime.segmenting.decoder import decode
+from thenar.runtime.segmenting.model import SegmentModel, emissions
+
+from ..evaluation.folds import Fold, leave_groups_out, trial_folds
+from ..evaluation.rates import student
+from ..recordings.graspset import GraspSet
+from ..samples import Samples
+from ..segmenting.learning import LAG_TICKS, Counts, live_states
+from ..segmenting.scores import OVERLAPS, Score, score
+from ..segmenting.streams import TICK_US, SegmentingError, streams_of
+from ..tables.quantise import integer_scores
+from ..workers import in_workers
+from .documents import Progress
+from .training import integers_of, scores_of, segments_for, train
+
+Labels = NDArray[np.intp]
+_INNER = 4
+_ERROR_RATE = 0.01  # of the sequential test
+# What is compared, in the order of the table; the first is what a live glove does.
+METHODS = {
+    "decoder, live": f"lag {LAG_TICKS * TICK_US // 1000} ms",
+    "decoder, afterwards": "exact",
+    "dwell 50 ms": "today's rule",
+    "dwell 200 ms": "",
+    "sequential test": f"error rate {_ERROR_RATE:g}",
+    "plain HMM": "a state a frame, afterwards",
+}
+SHARES = (*(f"F1@{overlap}" for overlap in OVERLAPS), "edit", "recognised")
+TIMES = ("onset ms", "onset 90 % ms", "end ms", "end 90 % ms", "latency ms")
+FALSE = "false per 100"
+
+
+class Measured(msgspec.Struct, frozen=True):
+    """A mean over subjects and its 95 % interval (Student's t; None of one subject); None: nothing was measured."""
+
+    mean: float | None
+    low: float | None
+    high: float | None
+    subjects: tuple[float | None, ...]
+
+
+class MethodRow(msgspec.Struct, frozen=True):
+    """What one method reaches with some inputs; `values` by column: shares in 0..1, times in ms, false ones a hundred
+    movements.
+    """
+
+    inputs: Inputs
+    method: str
+    what: str
+    values: dict[str, Measured]
+
+
+class StreamStudy(msgspec.Struct, frozen=True):
+    """The result: whose streams, how many movements, and the rows."""
+
+    fingerprint: str
+    subjects: tuple[str, ...]
+    movements: int
+    seconds: float
+    rows: tuple[MethodRow, ...]
+
+
+def study_streams(
+    grasp_set: GraspSet, options: Options, jobs: int = -1, progress: Progress | None = None
+) -> StreamStudy:
+    """Evaluate segments of subjects that were left out.
+
+    Parameters
+    ----------
+    grasp_set : GraspSet
+        Whole movements of two subjects or more, with rows in which nothing is held.
+    options : Options
+        How to place and train.
+    jobs : int
+        Worker processes; the result is the same for any number.
+    progress : callable, optional
+        Called with (done, total) after each subject.
+
+    Returns
+    -------
+    StreamStudy
+        A row for each method and kind of inputs.
+
+    Raises
+    ------
+    SegmentingError
+        If the set holds no whole movements, no rows of nothing held, or a single subject.
+    """
+    streams = streams_of(grasp_set)
+    if not grasp_set.is_none.any():
+        raise SegmentingError(
+            "the set has no rows in which nothing is held: record them (thenar record), or simulate a scene that keeps "
+            'every frame (rows = "all")'
+        )
+    subjects = tuple(np.unique(grasp_set.subjects).tolist())
+    if len(subjects) < 2:
+        raise SegmentingError(f"the set holds streams of {subjects[0]} alone: a subject is left out, so it takes two")
+    there: dict[Inputs, bool] = {"switches": bool(grasp_set.element_names), "joints": bool(grasp_set.joints)}
+    kinds = [kind for kind, some in {"both": all(there.values()), **there}.items() if some]
+    tasks = [(kind, subject) for kind in kinds for subject in subjects]
+    found: dict[tuple[Inputs, str], dict[str, Score]] = {}
+    work = partial(_of_subject, grasp_set, options)
+    for done, (task, scores) in enumerate(in_workers(work, tasks, jobs), 1):
+        found[task] = scores
+        if progress is not None:
+            progress(done, len(tasks))
+    return StreamStudy(
+        fingerprint=grasp_set.fingerprint(),
+        subjects=subjects,
+        movements=len(np.unique(grasp_set.without_none().trial_ids)),
+        seconds=sum(len(stream.rows) for stream in streams) * TICK_US / 1e6,
+        rows=tuple(
+            MethodRow(kind, name, what, _row([found[kind, subject][name] for subject in subjects]))
+            for kind in kinds
+            for name, what in METHODS.items()
+        ),
+    )
+
+
+def _of_subject(
+    grasp_set: GraspSet, options: Options, task: tuple[Inputs, str]
+) -> tuple[tuple[Inputs, str], dict[str, Score]]:
+    kind, subject = task
+    samples, new = Samples.of(grasp_set, kind), grasp_set.subjects == subject
+    learning, own = samples.rows(~new), grasp_set.rows(~new)
+    groups = own.subjects if len(np.unique(own.subjects)) > 1 else None
+    trained = train(learning, options, groups=groups)
+    tables = integers_of(trained, learning, options)
+    scores = np.zeros((len(own), samples.n_classes))
+    for fold in _inner_folds(learning, own, options):
+        scores[fold.test] = scores_of(learning, options, None, groups, None, fold)
+    model = segments_for(own, learning, scores, tables.scale)
+    assert model is not None
+    read = trained.read(samples)
+    counts = Counts.of((learning.labels[stream.rows] for stream in streams_of(own)), samples.n_types)
+    parts: dict[str, list[Score]] = {name: [] for name in METHODS}
+    for stream in streams_of(grasp_set):
+        if stream.subject == subject:
+            part = read.rows(stream.rows)
+            lanes = integer_scores(tables, part.switches, part.codes)
+            found = _Decoded(lanes, Scorer(tables), model, counts, tables.scale)
+            for name, (states, announced) in found.every().items():
+                parts[name].append(score(part.labels, states, model.n_types, announced))
+    return task, {name: Score.total(every) for name, every in parts.items()}
+
+
+def _inner_folds(learning: Samples, own: GraspSet, options: Options) -> list[Fold]:
+    several = len(np.unique(own.subjects))
+    if several > 1:
+        return leave_groups_out(own.subjects, "subject", min(several, _INNER))
+    return trial_folds(learning.labels, learning.movements, 2, options.seed)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Decoded:
+    """Scores (T, K + 1) of a stream, and what each method makes of them: states, and what is announced when."""
+
+    lanes: NDArray[np.int32]
+    scorer: Scorer
+    model: SegmentModel
+    counts: Counts
+    scale: float
+
+    def every(self) -> Mapping[str, tuple[Labels, Labels | None]]:
+        none, policy = self.model.n_types, Policy()
+        live = live_states(self.model, self.lanes, LAG_TICKS)
+        announced = np.concatenate([np.full(LAG_TICKS, none, np.intp), live])[: len(live)]
+        lead = policy.lead_steps(self.scale)
+        rules: dict[str, Decision | SequentialTest] = {
+            f"dwell {ms} ms": Decision(lead, 1000 * ms, policy.hold_us) for ms in (50, 200)
+        }
+        rules["sequential test"] = SequentialTest(none + 1, self.scale, _ERROR_RATE, policy.hold_us)
+        ruled = {name: self._ruled(rule.update, none) for name, rule in rules.items()}
+        return {
+            "decoder, live": (live, announced),
+            "decoder, afterwards": (decode(self.model, emissions(self.lanes, self.model)), None),
+            **{name: (states, states) for name, states in ruled.items()},
+            "plain HMM": (self._hidden_markov(), None),
+        }
+
+    def _ruled(self, update: Callable[..., int | None], none: int) -> Labels:
+        states = []
+        for tick, row in enumerate((self.lanes + LANE_OFFSET).tolist()):
+            decided = update(tick * TICK_US, Standing(tuple(row), self.scorer))
+            states.append(none if decided is None else decided)
+        return np.array(states, np.intp)
+
+    def _hidden_markov(self) -> Labels:
+        """Return the most probable states of a chain with the changes a tick that were counted, and softmax scores."""
+        ticks = np.array([sum(own) for own in self.counts.durations]) + 1.0
+        changes = self.counts.changes + 0.5 * (1 - np.eye(len(ticks)))
+        changes = changes * (1 - np.eye(len(ticks)))
+        chain = changes / (ticks + changes.sum(axis=1))[:, np.newaxis]
+        logs = np.log(chain + np.diag(1 - chain.sum(axis=1)))
+        scores = self.lanes / self.scale
+        best, back = scores[0], np.zeros((len(scores), len(ticks)), np.intp)
+        for tick in range(1, len(scores)):
+            ways = best[:, np.newaxis] + logs
+            back[tick] = ways.argmax(axis=0)
+            best = ways.max(axis=0) + scores[tick]
+        states = [int(best.argmax())]
+        for tick in range(len(scores) - 1, 0, -1):
+            states.append(int(back[tick, states[-1]]))
+        return np.array(states[::-1], np.intp)
+
+
+def _row(scores: list[Score]) -> dict[str, Measured]:
+    def ticks(values: tuple[int, ...], percent: float, *, signed: bool = False) -> float | None:
+        size = values if signed else tuple(map(abs, values))
+        return float(np.percentile(size, percent)) * TICK_US / 1000 if values else None
+
+    columns: dict[str, list[float | None]] = {
+        name: [one.f1(place) for one in scores] for place, name in enumerate(SHARES[: len(OVERLAPS)])
+    }
+    columns["edit"] = [one.edit for one in scores]
+    columns["recognised"] = [one.recognition for one in scores]
+    columns["onset ms"] = [ticks(one.onsets, 50) for one in scores]
+    columns["onset 90 % ms"] = [ticks(one.onsets, 90) for one in scores]
+    columns["end ms"] = [ticks(one.ends, 50) for one in scores]
+    columns["end 90 % ms"] = [ticks(one.ends, 90) for one in scores]
+    columns["latency ms"] = [ticks(one.latencies, 50, signed=True) for one in scores]
+    columns[FALSE] = [100 * one.false / max(one.true, 1) for one in scores]
+    return {name: _measured(values, most=1.0 if name in SHARES else None) for name, values in columns.items()}
+
+
+def _measured(values: list[float | None], most: float | None) -> Measured:
+    there = [value for value in values if value is not None]
+    if not there:
+        return Measured(None, None, None, tuple(values))
+    rounded: list[Any] = [None if value is None else round(value, 6) for value in values]
+    if len(there) < 2:
+        return Measured(round(there[0], 6), None, None, tuple(rounded))
+    low, high = student(there)
+    low, high = max(low, 0.0) if min(there) >= 0 else low, high if most is None else min(high, most)
+    return Measured(round(fmean(there), 6), round(low, 6), round(high, 6), tuple(rounded))

@@ -1,0 +1,227 @@
+"""What several demonstrations have in common: the consensus of their grasps, as a task and as a behaviour tree.
+
+The demonstrations' sequences of types are aligned with one another, one after another: the one that is nearest to all
+others first (the centre of a star), then the others by their distance from it. Each is placed into the columns that
+there are by dynamic programming, such that the sum over all pairs of demonstrations of what differs is least: two
+types, or a type and a gap, count 1 (edit distance). A column is a step where most of the demonstrations have one type.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from itertools import chain
+from statistics import median
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import msgspec
+import numpy as np
+
+from thenar.runtime.build import Build
+from thenar.runtime.preshape.selector import PreshapeTable
+from thenar.runtime.task import Step, Task
+
+from .scores import levenshtein
+from .streams import SegmentingError
+from .transitions import Transitions
+
+# What is held so much longer than the longest that was shown deviates.
+LIMIT = 2.0
+Column = tuple[int | None, ...]
+
+
+class Shown(NamedTuple):
+    """A grasp of a demonstration: its type, how long it was held, and what the joints read meanwhile (the median of
+    each, in the build's units; none where they were not read).
+    """
+
+    grasp: str
+    held_s: float
+    joints: tuple[float, ...]
+
+
+class Demonstration(NamedTuple):
+    """A demonstration: its name, and its grasps in their order."""
+
+    name: str
+    grasps: tuple[Shown, ...]
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """The types of its grasps."""
+        return tuple(one.grasp for one in self.grasps)
+
+
+def aligned(sequences: Sequence[Sequence[str]]) -> list[Column]:
+    """Return the columns of an alignment: of each sequence, in their order, which of its items is there; None: a gap.
+
+    The same for the same sequences; of equal alignments, that which puts items into earlier columns.
+    """
+    number_of = {name: number for number, name in enumerate(dict.fromkeys(chain(*sequences)))}
+    numbers = [[number_of[name] for name in sequence] for sequence in sequences]
+    apart = [[levenshtein(one, other) for other in numbers] for one in numbers]
+    centre = min(range(len(sequences)), key=lambda one: (sum(apart[one]), one))
+    order = sorted(range(len(sequences)), key=lambda one: (apart[centre][one], one != centre, one))
+    columns = list[list[int | None]]()
+    for done, number in enumerate(order):
+        columns = _joined(columns, [sequences[one] for one in order[:done]], sequences[number])
+    back = [order.index(number) for number in range(len(order))]
+    return [tuple(column[place] for place in back) for column in columns]
+
+
+def _joined(
+    columns: list[list[int | None]], before: Sequence[Sequence[str]], sequence: Sequence[str]
+) -> list[list[int | None]]:
+    """Return the columns with one more sequence: the cheapest alignment, found from the end."""
+    rows, width, others = len(sequence), len(columns), len(before)
+    filled = [sum(item is not None for item in column) for column in columns]
+
+    def differ(column: int, item: str) -> int:
+        there = zip(before, columns[column], strict=True)
+        return sum(at is None or own[at] != item for own, at in there)
+
+    cost = [[0] * (width + 1) for _ in range(rows + 1)]
+    for row in range(rows, -1, -1):
+        for column in range(width, -1, -1):
+            ways = [cost[row + 1][column] + others] if row < rows else []
+            ways += [cost[row][column + 1] + filled[column]] if column < width else []
+            if row < rows and column < width:
+                ways.append(cost[row + 1][column + 1] + differ(column, sequence[row]))
+            cost[row][column] = min(ways, default=0)
+    found, row, column = list[list[int | None]](), 0, 0
+    while row < rows or column < width:
+        here = cost[row][column]
+        if row < rows and column < width and here == cost[row + 1][column + 1] + differ(column, sequence[row]):
+            found.append([*columns[column], row])
+            row, column = row + 1, column + 1
+        elif column < width and here == cost[row][column + 1] + filled[column]:
+            found.append([*columns[column], None])
+            column += 1
+        else:
+            found.append([None] * others + [row])
+            row += 1
+    return found
+
+
+def taught(
+    build: Build,
+    shown: Sequence[Demonstration],
+    name: str,
+    preshapes: PreshapeTable | None = None,
+    transitions: Transitions | None = None,
+) -> Task:
+    """Return the task that demonstrations have in common.
+
+    Parameters
+    ----------
+    build : Build
+        What recognised them.
+    shown : sequence of Demonstration
+        One at least.
+    name : str
+        What the task is called.
+    preshapes : PreshapeTable, optional
+        What the robot's hand takes for each type.
+    transitions : Transitions, optional
+        Of other recordings: what often follows there may follow here.
+
+    Raises
+    ------
+    SegmentingError
+        If most of them have no grasp in common.
+    """
+    columns = aligned([one.types for one in shown])
+    steps = [found for column in columns if (found := _majority(shown, column)) is not None]
+    if not steps:
+        raise SegmentingError(
+            f"the {len(shown)} demonstrations have no grasp in common that most of them show: "
+            f"{'; '.join(f'{one.name}: ' + ' '.join(one.types[:8]) for one in shown[:4])}"
+        )
+    next_types = [grasp for grasp, _ in steps[1:]] + [None]
+    return Task(
+        name=name,
+        build=build.manifest.checksum,
+        demonstrations=tuple(one.name for one in shown),
+        preshapes=None if preshapes is None else preshapes.name,
+        units={joint.name: joint.unit for joint in build.manifest.joints},
+        first=_ordered(steps[0][0], Counter(one.types[0] for one in shown)),
+        steps=tuple(
+            _step(build, shown, grasp, own, following, preshapes, transitions)
+            for (grasp, own), following in zip(steps, next_types, strict=True)
+        ),
+    )
+
+
+def _majority(shown: Sequence[Demonstration], column: Column) -> tuple[str, dict[int, int]] | None:
+    """Return the type that most demonstrations have in a column, and the place of it in each that does."""
+    there = {number: at for number, at in enumerate(column) if at is not None}
+    counts = Counter(shown[number].types[at] for number, at in there.items())
+    grasp, count = counts.most_common(1)[0]
+    own = {number: at for number, at in there.items() if shown[number].types[at] == grasp}
+    return (grasp, own) if 2 * count > len(shown) else None
+
+
+def _ordered(first: str | None, counts: Counter[str]) -> tuple[str, ...]:
+    """Return `first`, and then the others, the most frequent first and those of equal counts by name."""
+    others = sorted(counts.keys() - {first}, key=lambda grasp: (-counts[grasp], grasp))
+    return (*(() if first is None else (first,)), *others)
+
+
+def _step(
+    build: Build,
+    shown: Sequence[Demonstration],
+    grasp: str,
+    own: dict[int, int],
+    following: str | None,
+    preshapes: PreshapeTable | None,
+    transitions: Transitions | None,
+) -> Step:
+    grasps = [shown[number].grasps[at] for number, at in own.items()]
+    after = Counter(shown[number].types[at + 1] for number, at in own.items() if at + 1 < len(shown[number].types))
+    then = _ordered(following, after)
+    if transitions is not None and following is not None:
+        then += tuple(each for each in transitions.frequent(grasp) if each not in then)
+    held = [one.held_s for one in grasps]
+    read = [one.joints for one in grasps if one.joints]
+    values = np.median(np.array(read), axis=0).round(2).tolist() if read else []
+    joints = {joint.name: value for joint, value in zip(build.manifest.joints, values, strict=False)}
+    preshape = None if preshapes is None else preshapes.chosen.get(grasp)
+    return Step(
+        grasp=grasp,
+        shown=len(own),
+        preshape=None if preshape is None else preshape.name,
+        joints=joints,
+        median_s=round(median(held), 3),
+        spread_s=round(median(abs(one - median(held)) for one in held), 3),
+        limit_s=round(LIMIT * max(held), 3),
+        then=then,
+    )
+
+
+def task_json(task: Task) -> bytes:
+    """Return the content of a task.json."""
+    text: bytes = msgspec.json.format(msgspec.json.encode(task), indent=2)
+    return text + b"\n"
+
+
+_PORTS = ("grasp", "preshape", "joints", "median_s", "limit_s")
+
+
+def behaviour_tree(task: Task) -> bytes:
+    """Return the task as a tree of BehaviorTree.CPP 4: a Sequence of actions Grasp, with the ports _PORTS.
+
+    `joints` are name=value, parted by semicolons; an empty `preshape` is none.
+    """
+    root = ElementTree.Element("root", {"BTCPP_format": "4", "main_tree_to_execute": "task"})
+    tree = ElementTree.SubElement(root, "BehaviorTree", {"ID": "task"})
+    sequence = ElementTree.SubElement(tree, "Sequence", {"name": task.name})
+    for number, step in enumerate(task.steps, 1):
+        joints = ";".join(f"{name}={value:g}" for name, value in step.joints.items())
+        values = (step.grasp, step.preshape or "", joints, f"{step.median_s:g}", f"{step.limit_s:g}")
+        ports = dict(zip(_PORTS, values, strict=True))
+        ElementTree.SubElement(sequence, "Action", {"ID": "Grasp", "name": f"{number} {step.grasp}"} | ports)
+    action = ElementTree.SubElement(ElementTree.SubElement(root, "TreeNodesModel"), "Action", {"ID": "Grasp"})
+    for port in _PORTS:
+        ElementTree.SubElement(action, "input_port", {"name": port})
+    ElementTree.indent(root)
+    tree_text: bytes = ElementTree.tostring(root, "utf-8")
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tree_text + b"\n"

@@ -1,0 +1,205 @@
+"""Which grasp type follows which: counts of changes from segment to segment, and a graph of them.
+
+Nothing held between two grasps is passed over: PoS, nothing, PMF is a change from PoS to PMF.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import cos, hypot, pi, sin
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from msgspec import Struct
+from numpy.typing import NDArray
+
+from thenar.runtime.files import read_file
+
+from ..recordings.graspset import GraspSet
+from .scores import segments_of
+from .streams import SegmentingError, streams_of
+from .timeline import Timeline
+
+# What follows less often than that is not admissible, and is drawn faintly.
+FREQUENT = 0.1
+_LARGEST = 1 << 24
+
+
+class TransitionFile(Struct, frozen=True, forbid_unknown_fields=True):
+    """What a graph is as JSON: counts[i][j] segments of types[i] were followed by one of types[j]; `probabilities` are
+    the same over the sum of their row, 0 where that is.
+    """
+
+    types: tuple[str, ...]
+    counts: tuple[tuple[int, ...], ...]
+    probabilities: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Transitions:
+    """Changes between types: `counts` (K, K), from the row's type to the column's."""
+
+    types: tuple[str, ...]
+    counts: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, sequences: Iterable[Sequence[str]], types: Sequence[str]) -> "Transitions":
+        """Count in sequences of types."""
+        counts, place = np.zeros((len(types), len(types)), np.intp), {name: at for at, name in enumerate(types)}
+        for sequence in sequences:
+            for one, other in pairwise(sequence):
+                counts[place[one], place[other]] += 1
+        return cls(tuple(types), counts)
+
+    @classmethod
+    def of_set(cls, grasp_set: GraspSet) -> "Transitions":
+        """Count in the true segments of a set's streams. Raises SegmentingError where rows are no movements."""
+        names, labels = grasp_set.taxonomy.types, grasp_set.labels
+        there = sorted(set(labels[~grasp_set.is_none].tolist()))
+        streams = [segments_of(labels[stream.rows], len(names)) for stream in streams_of(grasp_set)]
+        return cls.of(([names[one.state] for one in stream] for stream in streams), [names[one] for one in there])
+
+    @classmethod
+    def of_timelines(cls, timelines: Sequence[Timeline]) -> "Transitions":
+        """Count in what was found in streams of the same types."""
+        every = ([one.type for one in each.segments()] for each in timelines)
+        return cls.of(every, timelines[0].types if timelines else ())
+
+    @classmethod
+    def load(cls, path: Path) -> "Transitions":
+        """Return what `save` wrote. Raises SegmentingError that names the file, OSError."""
+        try:
+            found = msgspec.json.decode(read_file(path, _LARGEST, SegmentingError), type=TransitionFile)
+            counts = np.array(found.counts, np.intp).reshape(len(found.types), len(found.types))
+        except (msgspec.DecodeError, UnicodeDecodeError, ValueError, OverflowError) as wrong:
+            raise SegmentingError(f"{path} is no graph of transitions: {wrong}") from None
+        return cls(found.types, counts)
+
+    @property
+    def probabilities(self) -> NDArray[np.float64]:
+        """How often each type follows a type, (K, K); rows of zeros where nothing does."""
+        counts = self.counts.astype(np.float64)
+        return np.asarray(counts / np.maximum(counts.sum(axis=1, keepdims=True), 1))
+
+    def frequent(self, grasp: str) -> tuple[str, ...]:
+        """Return the types that follow `grasp` in FREQUENT of its changes or more, the most frequent first."""
+        if grasp not in self.types:
+            return ()
+        row = self.probabilities[self.types.index(grasp)]
+        return tuple(self.types[at] for at in np.argsort(-row, kind="stable").tolist() if row[at] >= FREQUENT)
+
+    def to_json(self) -> bytes:
+        """Return the content of its file."""
+        rounded = self.probabilities.round(6).tolist()
+        found = TransitionFile(self.types, tuple(map(tuple, self.counts.tolist())), tuple(map(tuple, rounded)))
+        return msgspec.json.encode(found) + b"\n"
+
+
+# Of the picture: its side, the radius of the circle of types and of a type's own.
+SIZE, _CIRCLE, _DOT = 720, 262.0, 21.0
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A type: its place, and of its name that on the outside, which `anchor` says how to align."""
+
+    name: str
+    x: float
+    y: float
+    label: tuple[float, float]
+    anchor: str
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A change: `path` is a value of `d`, `tip` of the arrow's `points`; how wide and how opaque; what it says."""
+
+    path: str
+    tip: str
+    width: float
+    opacity: float
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """Types on a circle, and changes as arrows between them, the rarest first so that frequent ones lie above."""
+
+    nodes: tuple[Node, ...]
+    edges: tuple[Edge, ...]
+    size: int = SIZE
+    radius: float = _DOT
+
+
+def graph_of(found: Transitions) -> Graph:
+    """Return the graph as shapes, in a square of SIZE."""
+    shares, K = found.probabilities, len(found.types)
+    angles = [2 * pi * number / K - pi / 2 for number in range(K)]
+    places = [(SIZE / 2 + _CIRCLE * cos(angle), SIZE / 2 + _CIRCLE * sin(angle)) for angle in angles]
+    nodes = []
+    for name, angle, (x, y), own in zip(found.types, angles, places, found.counts, strict=True):
+        reach = _CIRCLE + _DOT + 10
+        label = SIZE / 2 + reach * cos(angle), SIZE / 2 + reach * sin(angle) + 5
+        anchor = "middle" if abs(cos(angle)) < 0.2 else "start" if cos(angle) > 0 else "end"
+        nodes.append(
+            Node(
+                name,
+                round(x, 1),
+                round(y, 1),
+                (round(label[0], 1), round(label[1], 1)),
+                anchor,
+                f"{name}: followed {int(own.sum())} times",
+            )
+        )
+    changes = [(float(shares[a, b]), a, b) for a, b in np.argwhere(found.counts).tolist()]
+    edges = [
+        _edge(
+            places[a],
+            places[b],
+            angles[a],
+            share,
+            f"{found.types[a]} to {found.types[b]}: {found.counts[a, b]} of {found.counts[a].sum()} ({share:.0%})",
+        )
+        for share, a, b in sorted(changes)
+    ]
+    return Graph(tuple(nodes), tuple(edges))
+
+
+def _edge(start: tuple[float, float], end: tuple[float, float], angle: float, share: float, words: str) -> Edge:
+    """Return the arrow from a type to another, bent towards the middle, so that both directions are apart; or a loop
+    outside.
+    """
+    width, opacity = 1 + 6 * share, 0.12 if share < FREQUENT else min(1.0, 0.35 + share)
+    if start == end:
+        angle += 1.2  # past the name
+        x, y = start[0] + _DOT * cos(angle), start[1] + _DOT * sin(angle)
+        turned = [(x + 26 * cos(angle + turn), y + 26 * sin(angle + turn)) for turn in (-1.0, 1.0)]
+        points = [(x, y), *turned, (x, y)]
+        path = "M{} C{} {} {}".format(*map(_point, points))
+        return Edge(path, "", round(width, 2), round(opacity, 2), words)
+    middle = SIZE / 2
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    # To the right of the straight line, and towards the middle.
+    bend = (
+        (start[0] + end[0]) / 2 * 0.6 + middle * 0.4 - dy * 0.12,
+        (start[1] + end[1]) / 2 * 0.6 + middle * 0.4 + dx * 0.12,
+    )
+    first, last = _towards(start, bend, _DOT), _towards(end, bend, _DOT + 9)
+    ux, uy = (end[0] - bend[0]), (end[1] - bend[1])
+    length = hypot(ux, uy) or 1.0
+    ux, uy, half = ux / length, uy / length, 3 + width / 2
+    point = _towards(end, bend, _DOT)
+    tip = [point, (last[0] - uy * half, last[1] + ux * half), (last[0] + uy * half, last[1] - ux * half)]
+    path = f"M{_point(first)} Q{_point(bend)} {_point(last)}"
+    return Edge(path, " ".join(map(_point, tip)), round(width, 2), round(opacity, 2), words)
+
+
+def _towards(place: tuple[float, float], other: tuple[float, float], far: float) -> tuple[float, float]:
+    length = hypot(other[0] - place[0], other[1] - place[1]) or 1.0
+    return (place[0] + far * (other[0] - place[0]) / length, place[1] + far * (other[1] - place[1]) / length)
+
+
+def _point(place: tuple[float, float]) -> str:
+    return f"{place[0]:.1f},{place[1]:.1f}"

@@ -1,0 +1,354 @@
+"""Inputs that are read and yet wrong: found live, treated as lost while they are, and used again when they behave.
+
+**Stuck switches.** Each switch has two cumulative sums (E. S. Page, Biometrika 41, 1954), one for "stuck closed", one
+for "stuck open". A grasp adds to each the logarithm of
+
+    P(what the switch shows | stuck) / P(what the switch shows | it works, and what all other inputs show)
+
+and no sum falls below 0. The scores without the switch, whose mean row stands in, give the probabilities of the grasp
+types; the build says in what share of a subject's trials of each type the switch was closed. Of the subjects trained on
+the one that explains best what is seen counts (P. J. Huber, Ann. Math. Stat. 36, 1965, tests the least favourable pair
+in the same way), and nothing is taken to be less probable than 1/20: people do what no recording holds. The share of a
+switch that is stuck and nevertheless moves in a grasp is taken to be 1/32.
+
+If the model holds, the mean of the ratio is at most 1 while the switch works. Then a sum needs, in the mean, at least
+e^h grasps to reach h (G. Lorden, Ann. Math. Stat. 42, 1971). All sums together shall do so once in GRASPS grasps; so
+h is ln(2 * switches * GRASPS).
+
+A hand that never closes a switch looks like a switch that never closes. So a switch is called stuck open only after it
+was seen to close: the share of grasps in which it did when it should have, in this run, multiplies the build's share.
+
+A fault makes other inputs look wrong. So of several sums that reach h together only the largest counts; then the last
+grasps are weighed again without the switch that it is of.
+
+**A grasp** is one observation, however many frames it lasts: contacts that have not changed by half for SETTLED_US. An
+open hand between grasps is one, too.
+
+**Chatter.** A change of a switch costs 1/20 s. A switch that is a second in debt changes faster than a hand, which is
+what a loose contact does; it behaves again once the debt is paid, at the latest 2 s after the last change.
+
+**Drift.** A joint's codes wander off when a glove slips or a sensor ages. The hand opens and closes again and again, so
+a joint's lowest and highest code come back. When both have moved the same way since the first minute, the sensor's zero
+has moved by at least the smaller of both; grasps that merely use less of the range move them towards each other.
+"""
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from operator import gt, lt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..build import Build
+from ..frames import Mask, SwitchFrame
+from ..published import Quarantined
+from ..tables import HIGHEST_CODE, IntegerTables
+
+# How long contacts have to stay for a grasp to be looked at.
+SETTLED_US = 100_000
+# So often all switches must be read, where scans may end early.
+WHOLE_US = 50_000
+# Grasps from one false alarm to the next, in the mean.
+GRASPS = 1_000
+# Evidence is counted in sixteenths of a nat.
+_NAT = 16
+_SLIPS, _LEAST = 1 / 32, 1 / 20
+# Grasps that are weighed again without a switch once it is found to be stuck.
+_KEPT = 64
+# A switch begins with one grasp in which it closed as it should and one in which it did not (Laplace's rule).
+_DOUBT = 255
+
+# Nobody presses and releases a switch ten times a second; a contact that is loose does.
+MOST_CHANGES = 20
+DRIFT_US = 60_000_000
+# Share of a joint's range in the first window by which both ends must have moved.
+LARGEST = 0.2
+
+STUCK_CLOSED, STUCK_OPEN, CHATTERING, DRIFTING = "stuck closed", "stuck open", "chattering", "drifting"
+Flags = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+
+# exp(-i / 16), in 65535ths; the last is 0.
+_WEIGHTS = np.array([round(65535 * math.exp(-i / _NAT)) for i in range(200)])
+# Evidence of being stuck where a switch shows what a stuck one does, and where it does not, by the share of grasps, in
+# 255ths, in which one that works would show the former.
+_SHOWN = np.array([max(round(_NAT * math.log((1 - _SLIPS) / max(q / 255, _LEAST))), 0) for q in range(256)])
+_MOVED = np.array([min(round(_NAT * math.log(_SLIPS / max(1 - q / 255, _SLIPS))), 0) for q in range(256)])
+
+
+class StuckTest:
+    """The sums of all switches, and what is found by them.
+
+    stuck  the switches that are, and the row of `sums` that says so, in the order in which they were found
+    sums   evidence (2, s) of being stuck closed and open, in sixteenths of a nat
+    limit  the h that it takes
+    """
+
+    def __init__(self, build: Build) -> None:
+        """Find nothing in a build of an older version, which does not say how often its switches are closed."""
+        tables, switches = build.tables, build.manifest.switches
+        least, most = (
+            np.array([list(bytes.fromhex(text)) for text in texts], np.int64)
+            for texts in zip(*((switch.closed_least, switch.closed_most) for switch in switches), strict=True)
+        )
+        self._shares = np.stack([most, 255 - (least + most) // 2])
+        # Twice the number of contacts of a grasp type, in 255ths.
+        self._contacts: Ints = (least + most).sum(axis=0)
+        self._rows, self._means = (rows.astype(np.int64) for rows in (tables.switch_rows, tables.switch_means))
+        self._gain = round(65536 * _NAT / tables.scale)
+        self.limit = math.ceil(_NAT * math.log(2 * len(switches) * GRASPS))
+        self.sums = np.zeros((2, len(switches)), np.int64)
+        self.stuck: dict[int, int] = {}
+        self._due, self._seen = np.zeros(len(switches), np.int64), np.zeros(len(switches), np.int64)
+        self._last: deque[_Grasp] = deque(maxlen=_KEPT)
+
+    def weigh(self, lanes: Sequence[int], closed: Mask, read: Mask, lost: Mask) -> None:
+        """Take a grasp: the scores of a frame, which switches are closed and read, and which are scored as lost."""
+        flags = (_flags(mask, len(self._rows)) for mask in (closed, read, lost))
+        grasp = _Grasp(np.array(lanes, np.int64), *flags)
+        shares, held = self._shares_of(grasp), self._held(grasp)
+        self.sums = np.maximum(self.sums + self._evidence(grasp, shares, held), 0)
+        due = np.where(grasp.read & held, 255 - shares[1], 0)
+        self._due, self._seen = self._due + due, self._seen + due * grasp.closed
+        self._last.append(grasp)
+        self._judge()
+
+    def _judge(self) -> None:
+        for switch, kind in tuple(self.stuck.items()):
+            if not self.sums[kind, switch]:
+                del self.stuck[switch]
+                self.sums[:, switch] = 0
+        self.sums[:, list(self.stuck)] = np.minimum(self.sums[:, list(self.stuck)], self.limit)
+        while (fresh := np.where(self._known(), -1, self.sums)).max(initial=-1) >= self.limit:
+            kind, switch = divmod(int(fresh.argmax()), len(self._rows))
+            self.stuck[switch] = kind
+            self._weigh_again(switch)
+
+    def _weigh_again(self, switch: int) -> None:
+        """Work out the sums of switches that are not found to be stuck, from the last grasps without this one."""
+        sums = np.zeros_like(self.sums)
+        for number, grasp in enumerate(self._last):
+            grasp = self._last[number] = grasp.without(switch, self._rows, self._means)
+            evidence = self._evidence(grasp, self._shares_of(grasp), self._held(grasp))
+            sums = np.maximum(sums + evidence, 0)
+        self.sums = np.where(self._known(), np.minimum(self.sums, self.limit), sums)
+
+    def _known(self) -> Flags:
+        known = np.zeros(len(self._rows), bool)
+        known[list(self.stuck)] = True
+        return known
+
+    def _shares_of(self, grasp: "_Grasp") -> Ints:
+        """Return by what share of grasps, in 255ths (2, s), training explains that a switch is closed, and open, as far
+        as all other inputs tell the type.
+        """
+        own = np.where(grasp.lost[:, np.newaxis], 0, self._means - self._rows * grasp.closed[:, np.newaxis])
+        scores = grasp.lanes + own
+        behind = (scores.max(axis=1, keepdims=True) - scores) * self._gain >> 16
+        weights = _WEIGHTS[np.minimum(behind, len(_WEIGHTS) - 1)]
+        found: Ints = (self._shares * weights).sum(axis=2) // weights.sum(axis=1)
+        return found
+
+    def _held(self, grasp: "_Grasp") -> bool:
+        """Whether at least half of the contacts are there that the likeliest type has: less says nothing of a switch
+        that is open.
+        """
+        contacts = int(self._contacts[int(grasp.lanes.argmax())])
+        return 4 * 255 * int(np.count_nonzero(grasp.closed & ~grasp.lost)) >= contacts
+
+    def _evidence(self, grasp: "_Grasp", shares: Ints, held: bool) -> Ints:
+        # Doubts whether this hand closes a switch at all go with it as it is seen to do so.
+        closes = (255 - shares[1]) * (self._seen + _DOUBT) // (self._due + 2 * _DOUBT)
+        shares = np.stack([shares[0], 255 - closes])
+        shown = np.stack([grasp.closed, ~grasp.closed])
+        evidence = np.where(shown, _SHOWN[shares], _MOVED[shares])
+        evidence[1] *= held | grasp.closed
+        return evidence * grasp.read
+
+
+@dataclass(frozen=True, slots=True)
+class _Grasp:
+    """What was seen of a grasp: scores (K,), and which switches were closed, read, and scored as lost (s,)."""
+
+    lanes: Ints
+    closed: Flags
+    read: Flags
+    lost: Flags
+
+    def without(self, switch: int, rows: Ints, means: Ints) -> "_Grasp":
+        """Return the same with a switch scored as lost."""
+        if self.lost[switch]:
+            return self
+        lost = self.lost.copy()
+        lost[switch] = True
+        return replace(self, lanes=self.lanes + means[switch] - rows[switch] * self.closed[switch], lost=lost)
+
+
+class Chattering:
+    """Finds switches that change faster than a hand."""
+
+    def __init__(self, switches: int) -> None:
+        self._closed: Mask = 0
+        self._paid_us = [0] * switches
+        self.switches: Mask = 0
+
+    def frame(self, time_us: int, closed: Mask, read: Mask) -> None:
+        """Take a frame in which the switches `read` were read; `switches` are then those that chatter."""
+        changed = (closed ^ self._closed) & read
+        self._closed ^= changed
+        for number in numbers(changed | self.switches):
+            paid_us = max(self._paid_us[number], time_us)
+            if changed >> number & 1:
+                paid_us = min(paid_us + 1_000_000 // MOST_CHANGES, time_us + 2_000_000)
+            self._paid_us[number] = paid_us
+            if paid_us - time_us > 1_000_000:
+                self.switches |= 1 << number
+            elif paid_us == time_us:
+                self.switches &= ~(1 << number)
+
+
+class JointDrift:
+    """Compares the lowest and highest code of every joint in the last whole window with those of the first window in
+    which it moved over a third of the codes that the tables tell apart.
+    """
+
+    def __init__(self, tables: IntegerTables) -> None:
+        self._least = [_span(tables, joint) / 3 for joint in range(tables.n_joints)]
+        self._first: list[tuple[int, int] | None] = [None] * tables.n_joints
+        self._began_us: int | None = None
+        self._low: list[int] = []
+        self._high: list[int] = []
+        self.codes: tuple[int, ...] = ()
+
+    def frame(self, time_us: int, codes: Sequence[int]) -> None:
+        """Take the codes of all joints; `codes` is then by how much each has drifted, 0 where it is within bounds."""
+        if self._began_us is not None and time_us - self._began_us >= DRIFT_US:
+            self._end()
+            self._began_us = None
+        if self._began_us is None:
+            self._began_us, self._low, self._high = time_us, list(codes), list(codes)
+        # Seldom so: after a few grasps a joint has been where it goes.
+        if any(map(lt, codes, self._low)):
+            self._low = list(map(min, self._low, codes))
+        if any(map(gt, codes, self._high)):
+            self._high = list(map(max, self._high, codes))
+
+    def _end(self) -> None:
+        ends = list(zip(self._low, self._high, strict=True))
+        self._first = [
+            last if first is None and last[1] - last[0] >= least else first
+            for first, last, least in zip(self._first, ends, self._least, strict=True)
+        ]
+        self.codes = tuple(_drift(first or last, last) for first, last in zip(self._first, ends, strict=True))
+
+
+def _drift(first: tuple[int, int], last: tuple[int, int]) -> int:
+    low, high = last[0] - first[0], last[1] - first[1]
+    if low * high <= 0:
+        return 0
+    shift = min(low, high, key=abs)
+    return shift if abs(shift) > LARGEST * (first[1] - first[0]) else 0
+
+
+def _span(tables: IntegerTables, joint: int) -> int:
+    codes = tables.choices(joint)[0]
+    inner = codes[(codes > 0) & (codes < HIGHEST_CODE)]
+    return int(np.ptp(inner)) if inner.size else 0
+
+
+class Quarantine:
+    """What is left out of the scores, though it is read.
+
+    found  every input that is wrong, and whether it is used all the same
+    out    the switches and joints that are left out now
+    """
+
+    def __init__(self, build: Build, fits: Callable[[Mask, Mask], bool], *, active: bool = True) -> None:
+        """Take what says whether these switches and joints may be lost together; not `active`: leave nothing out."""
+        switches, joints = build.manifest.switches, build.manifest.joints
+        self._names = {False: [switch.name for switch in switches], True: [joint.name for joint in joints]}
+        self._fits, self._active, self._all = fits, active, (1 << len(switches)) - 1
+        # No field of a build of an older version says how often its switches are closed.
+        self._stuck = StuckTest(build) if switches and switches[0].closed_least else None
+        self._chattering, self._drift = Chattering(len(switches)), JointDrift(build.tables)
+        self._wrong: dict[tuple[bool, int], str] = {}
+        self._chosen: dict[tuple[Mask, Mask], tuple[tuple[Mask, Mask], tuple[Quarantined, ...]]] = {}
+        self.out: tuple[Mask, Mask] = 0, 0
+        self.found: tuple[Quarantined, ...] = ()
+        self._seen_us = self._joints_us = self._since_us = -1
+        self._contacts: Mask = 0
+        self._weighed = True
+
+    def left_out(self, lost: Mask, joints_lost: Mask) -> tuple[Mask, Mask]:
+        """Return the switches and joints to leave out, when these are lost as well: the first that were found come
+        first, as long as the answer does not become unknown by that.
+        """
+        if (chosen := self._chosen.get((lost, joints_lost))) is None:
+            chosen = self._chosen[lost, joints_lost] = self._choose(lost, joints_lost)
+        self.out, self.found = chosen
+        return self.out
+
+    def _choose(self, lost: Mask, joints_lost: Mask) -> tuple[tuple[Mask, Mask], tuple[Quarantined, ...]]:
+        if len(self._chosen) >= _KEPT:
+            self._chosen.clear()
+        out, found = [0, 0], list[Quarantined]()
+        for (is_joint, number), reason in self._wrong.items():
+            more = list(out)
+            more[is_joint] |= 1 << number
+            fits = self._active and self._fits(lost | more[0], joints_lost | more[1])
+            out = more if fits else out
+            found.append(Quarantined(self._names[is_joint][number], reason, not fits))
+        return (out[0], out[1]), tuple(found)
+
+    def look(self, frame: SwitchFrame, lanes: Sequence[int], lost: Mask) -> None:
+        """Take a frame, its scores, and the switches that are scored as lost."""
+        time_us = frame.time_us
+        if time_us <= self._seen_us:
+            return
+        self._seen_us, read = time_us, self._all & ~(frame.lost | frame.unread)
+        chattering = self._chattering.switches
+        self._chattering.frame(time_us, frame.closed, read)
+        stuck = self._stuck
+        if chattering != self._chattering.switches:
+            self._sort()
+        # A scan that ended early leaves open what the others say.
+        if stuck is None or frame.unread:
+            return
+        contacts = frame.closed & read & ~lost
+        changed, either = (contacts ^ self._contacts).bit_count(), (contacts | self._contacts).bit_count()
+        if changed and 2 * changed >= either:
+            self._contacts, self._since_us, self._weighed = contacts, time_us, False
+        elif not self._weighed and time_us - self._since_us >= SETTLED_US:
+            self._contacts, self._weighed = contacts, True
+            stuck.weigh(lanes, frame.closed & read, read & ~self._chattering.switches, lost)
+            self._sort()
+
+    def look_at_joints(self, time_us: int, codes: Sequence[int]) -> None:
+        """Take the codes of a record of the glove."""
+        if time_us > self._joints_us:
+            self._joints_us, before = time_us, self._drift.codes
+            self._drift.frame(time_us, codes)
+            if before != self._drift.codes:
+                self._sort()
+
+    def _sort(self) -> None:
+        """Bring what is wrong up to date, in the order in which it was found."""
+        stuck = {} if self._stuck is None else self._stuck.stuck
+        now = {(False, number): (STUCK_CLOSED, STUCK_OPEN)[kind] for number, kind in stuck.items()}
+        now |= {(False, number): CHATTERING for number in numbers(self._chattering.switches)}
+        now |= {(True, number): DRIFTING for number, codes in enumerate(self._drift.codes) if codes}
+        if now != self._wrong:
+            self._wrong = {which: now[which] for which in (*(each for each in self._wrong if each in now), *now)}
+            self._chosen.clear()
+
+
+def _flags(mask: Mask, bits: int) -> Flags:
+    packed = np.frombuffer(mask.to_bytes((bits + 7) // 8, "little"), np.uint8)
+    return np.unpackbits(packed, count=bits, bitorder="little").astype(bool)
+
+
+def numbers(mask: Mask) -> list[int]:
+    """Return the numbers of the bits of `mask`."""
+    return [number for number in range(mask.bit_length()) if mask >> number & 1]

@@ -1,0 +1,179 @@
+"""A task: the grasps that demonstrations have in common, in their order, and how far a hand has come in it.
+
+What follows when a segment begins, lasts or ends is a function of the task, of the step and of the segment alone, so a
+replay of a recording gives the same steps. A grasp that is no step's may be a detour: a type that was seen to follow.
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta, Struct
+
+from thenar.drivers.errors import SettingError
+
+from .files import read_file
+from .names import list_names, shortened
+from .published import NONE, LiveGrasp
+
+_LARGEST = 1 << 24
+_Name = Annotated[str, Meta(min_length=1, max_length=200)]
+_Seconds = Annotated[float, Meta(ge=0.0, le=1e9)]
+Deviation = Literal["", "unexpected", "skipped", "too long"]
+
+
+class Step(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A grasp of a task.
+
+    grasp      its type
+    shown      how many demonstrations have it here
+    preshape   what the robot's hand takes, by its name in the table of preshapes; None: the table has none, or none was
+               given
+    joints     what each joint reads, by name: the median of the demonstrations' medians
+    median_s, spread_s  for how long it was held: the median, and the median distance from it
+    limit_s    what is held longer deviates; as taught, twice the longest that was shown
+    then       types that may follow, as shown, the next step's first; none after the last
+    """
+
+    grasp: _Name
+    shown: Annotated[int, Meta(ge=1)]
+    preshape: _Name | None
+    joints: dict[_Name, float]
+    median_s: _Seconds
+    spread_s: _Seconds
+    limit_s: _Seconds
+    then: tuple[_Name, ...]
+
+
+class Task(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What `thenar teach` writes: task.json.
+
+    build           checksum of the build that recognised the demonstrations; its types are those of the steps
+    demonstrations  names of their files, or of the subjects and sessions of a set
+    preshapes       the table that the steps' preshapes are of
+    units           of the joints, by name
+    first           types with which demonstrations begin, the first step's first
+    """
+
+    schema: Literal[1] = 1
+    name: _Name
+    build: str
+    demonstrations: tuple[str, ...]
+    preshapes: str | None
+    units: dict[_Name, str]
+    first: tuple[_Name, ...]
+    steps: Annotated[tuple[Step, ...], Meta(min_length=1)]
+
+    def check(self, grasps: tuple[str, ...]) -> None:
+        """Raise SettingError if a build that recognises `grasps` can never see a step."""
+        if strange := [step.grasp for step in self.steps if step.grasp not in grasps]:
+            raise SettingError(
+                f"task {shortened(self.name)}: the build does not recognise {list_names(tuple(dict.fromkeys(strange)))}"
+                ": take the build that it was taught with"
+            )
+
+
+def load_task(path: Path) -> Task:
+    """Return the task of a task.json. Raises SettingError that names the file and what is wrong, OSError."""
+    data = read_file(path, _LARGEST, SettingError)
+    try:
+        return msgspec.json.decode(data, type=Task)
+    except (msgspec.DecodeError, UnicodeDecodeError) as wrong:
+        raise SettingError(f"{path} is no task of `thenar teach`: {wrong}") from None
+
+
+class Progress(Struct, frozen=True):
+    """How far a hand has come in a task.
+
+    step       the number of the newest step that was begun, from 1; 0 before the first; of `steps`
+    grasp      the type that is held now, "none" between grasps
+    expected   types that may come next, the next step's first; none after the last step
+    deviation  of the newest grasp. "unexpected": its type is no later step's, and was never shown here. "skipped": it
+               is a later step's than the next. "too long": it is held longer than the step's limit
+    detail     the deviation in a sentence, "" without one
+    done       whether the last step was begun and is over
+    """
+
+    step: int
+    steps: int
+    grasp: str = NONE
+    expected: tuple[str, ...] = ()
+    deviation: Deviation = ""
+    detail: str = ""
+    done: bool = False
+
+    @property
+    def text(self) -> str:
+        """In a line: where the hand is, what comes next, and what deviates."""
+        said = "task is done" if self.done else f"step {self.step} of {self.steps}"
+        said += f", {self.grasp} held" if self.grasp != NONE else ""
+        said += f"; next {self.expected[0]}" if self.expected else ""
+        said += f" (or {', '.join(self.expected[1:])})" if self.expected[1:] else ""
+        return f"{said}. {self.detail}" if self.detail else said
+
+
+class ProgressLine(Progress, frozen=True, tag_field="kind", tag="task"):
+    """The fields of `Progress`, as a line of JSON has them."""
+
+
+def _at(task: Task, step: int, grasp: str = NONE, deviation: Deviation = "", detail: str = "") -> Progress:
+    then = task.steps[step - 1].then if step else task.first
+    return Progress(step, len(task.steps), grasp, then, deviation, detail)
+
+
+def begun(task: Task, step: int, grasp: str) -> Progress:
+    """Return the progress when a segment of type `grasp` begins, `step` steps having begun before."""
+    left = [each.grasp for each in task.steps[step:]]
+    if grasp in left[:1]:
+        return _at(task, step + 1, grasp)
+    if step and grasp == task.steps[step - 1].grasp:
+        return _at(task, step, grasp)  # taken up again
+    if grasp in left:
+        skipped = left[: left.index(grasp)]
+        return _at(task, step + len(skipped) + 1, grasp, "skipped", f"skipped: {', '.join(skipped)}")
+    here = _at(task, step, grasp)
+    if grasp in here.expected:
+        return here
+    wanted = f"{' or '.join(here.expected)} was expected" if here.expected else "the task was over"
+    return _at(task, step, grasp, "unexpected", f"{grasp} is unexpected: {wanted}")
+
+
+class TaskFollower:
+    """Follows a hand through a task, by the segments that are published."""
+
+    __slots__ = ("_segment", "progress", "task")
+
+    def __init__(self, task: Task) -> None:
+        self.task, self.progress, self._segment = task, _at(task, 0), 0
+
+    @classmethod
+    def of(cls, path: Path, grasps: tuple[str, ...]) -> "TaskFollower":
+        """Load a task for a build that recognises `grasps`. Raises SettingError where it is none for it, OSError."""
+        task = load_task(path)
+        task.check(grasps)
+        return cls(task)
+
+    def update(self, grasp: LiveGrasp) -> Progress | None:
+        """Return the progress where this moment changes it."""
+        before = self.progress
+        if grasp.state in ("held", "releasing"):
+            self._hold(grasp)
+        elif grasp.state == "none" and before.grasp != NONE:
+            over = before.step == before.steps and before.grasp == self.task.steps[-1].grasp
+            self.progress = msgspec.structs.replace(before, grasp=NONE, done=before.done or over)
+        return None if self.progress is before else self.progress
+
+    def _hold(self, grasp: LiveGrasp) -> None:
+        before = self.progress
+        if grasp.segment != self._segment:
+            self._segment = grasp.segment
+            after = begun(self.task, before.step, grasp.segment_type)
+            self.progress = msgspec.structs.replace(after, done=before.done)
+            return
+        own = self.task.steps[before.step - 1] if before.step else None
+        if own is None or before.deviation or grasp.segment_type != own.grasp or grasp.segment_us is None:
+            return
+        held_s = (grasp.time_us - grasp.segment_us) / 1e6
+        if held_s > own.limit_s:
+            detail = f"{own.grasp} is held for longer than {own.limit_s:g} s"
+            self.progress = msgspec.structs.replace(before, deviation="too long", detail=detail)

@@ -1,0 +1,182 @@
+"""`thenar teach`, and `thenar run --task`: a task from recorded demonstrations, and hands that follow it or do not."""
+
+import json
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from thenar.compiler import GraspSet, Joint, compile_build
+from thenar.compiler.recordings.taxonomy import own
+from thenar.runtime import Build
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.live.system import System
+from thenar.runtime.recording.session import Session
+from thenar.runtime.recording.writer import Recorder
+from thenar.runtime.sinks import HealthLine, Line, ProgressLine
+
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
+TYPES = ("cup", "pen", "rod")
+GLOVE = """
+[cyberglove]
+port = "/dev/ttyUSB0"
+sensors = 18
+joints = ["bend", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l", "m", "n", "o", "p", "q", "r"]
+[[scanner]]
+port = "/dev/ttyACM0"
+switches = ["s0", "s1", "s2"]
+"""
+GRIPPER = """
+name = "Gripper"
+time_from_start_s = 0.5
+[[joints]]
+name = "finger"
+unit = "rad"
+range = [0, 1]
+[[preshapes]]
+name = "wide"
+positions = [0]
+grasps = ["cup", "rod"]
+[[preshapes]]
+name = "narrow"
+positions = [1]
+grasps = ["pen"]
+"""
+
+
+def readings(label: int) -> tuple[int, int]:
+    """Return the switches that are closed, and the joint's byte, where a type, or nothing (3), is held."""
+    return (1 << label, 60 + 50 * label) if label < len(TYPES) else (0, 20)
+
+
+def states(types: str, held: int = 40) -> list[int]:
+    """Return what is held frame by frame, "c", "p" and "r" one after another, with nothing in between."""
+    return [3] * 30 + [each for letter in types for each in ["cpr".index(letter)] * held + [3] * 30]
+
+
+@pytest.fixture(scope="module")
+def build(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    labels = np.array(states("cprrpcpcr" * 2))
+    read = np.array([readings(label) for label in labels.tolist()])
+    starts = np.flatnonzero(np.diff(labels, prepend=-1))
+    grasp_set = GraspSet(
+        switches=(read[:, :1] >> np.arange(3) & 1).astype(bool),
+        switch_names=("s0", "s1", "s2"),
+        codes=read[:, 1:].astype(np.uint16),
+        joints=(Joint("bend", "deg", 1, 0.5, 255, 127.5),),
+        grasps=np.array([*TYPES, "none"])[labels],
+        taxonomy=own(TYPES),
+        subjects=np.full(len(labels), "A"),
+        objects=np.full(len(labels), "thing"),
+        trials=np.searchsorted(starts, np.arange(len(labels)), side="right") // 2,
+        times_us=10_000 * np.arange(len(labels)),
+    )
+    folder = tmp_path_factory.mktemp("taught") / "build"
+    return compile_build(grasp_set, folder, rounds=10, folds=0).folder
+
+
+def record(folder: Path, path: Path, held: list[int]) -> Path:
+    """Record a live run in which this is held, 10 ms a frame."""
+    build = Build.load(folder)
+    system = System.of(build, parse_harness(GLOVE, "glove.toml"))
+    session = Session(
+        thenar="0",
+        switches=system.switch_names,
+        sensors=system.sensor_names,
+        harness=GLOVE,
+        build=build.manifest.checksum,
+    )
+    recognizer, kept = system.recognizer(), [switch.column for switch in build.manifest.switches]
+    with Recorder(path, session) as recorder:
+        for number, label in enumerate(held):
+            time_us, (closed, code) = 10_000 * number, readings(label)
+            glove = GloveFrame(time_us, bytes([code]) + bytes(17), 3)
+            switches = SwitchFrame(time_us, sum(1 << bit for bit, column in enumerate(kept) if closed >> column & 1))
+            recorder.glove(glove)
+            recorder.switches(switches)
+            recorder.grasp(recognizer.step(time_us + 1, time_us + 1, switches, glove).grasp)
+    return path
+
+
+@pytest.fixture
+def demos(build: Path, tmp_path: Path) -> list[Path]:
+    every = enumerate(("cpr", "cpr", "crpr"), 1)
+    return [record(build, tmp_path / f"demo{number}.mcap", states(types)) for number, types in every]
+
+
+def progress_of(done: subprocess.CompletedProcess[str]) -> list[ProgressLine]:
+    assert done.returncode == 0, done.stderr
+    lines = msgspec.json.Decoder(Line | HealthLine | ProgressLine).decode_lines(done.stdout.encode())
+    return [line for line in lines if isinstance(line, ProgressLine)]
+
+
+def test_a_demonstration_follows_its_own_task_to_the_end(
+    thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path
+) -> None:
+    (tmp_path / "gripper.toml").write_text(GRIPPER)
+    task = tmp_path / "task.json"
+    done = thenar("teach", *demos, "-b", build, "-o", task, "--preshape", tmp_path / "gripper.toml")
+    assert done.returncode == 0, done.stderr
+    assert "3 steps of 3 demonstrations" in done.stdout
+    found = json.loads(task.read_bytes())
+    assert [(step["grasp"], step["preshape"]) for step in found["steps"]] == [
+        ("cup", "wide"),
+        ("pen", "narrow"),
+        ("rod", "wide"),
+    ]
+    assert [step["joints"]["bend"] for step in found["steps"]] == [30.0, 55.0, 80.0]
+    assert all(0.35 <= step["median_s"] <= 0.45 for step in found["steps"])
+    assert [step["then"] for step in found["steps"]] == [["pen", "rod"], ["rod"], []]
+    assert (tmp_path / "task.xml").read_bytes().count(b'<Action ID="Grasp" name=') == 3
+    done = thenar("run", build, "--replay", demos[0], "--task", task)
+    news = progress_of(done)
+    assert [(each.step, each.grasp, each.done) for each in news] == [
+        (1, "cup", False),
+        (1, "none", False),
+        (2, "pen", False),
+        (2, "none", False),
+        (3, "rod", False),
+        (3, "none", True),
+    ]
+    assert not any(each.deviation for each in news)
+    assert "frames recognised as they were recorded\ntask is done" in done.stderr
+    sent = thenar("run", build, "--replay", demos[0], "--task", task, "--sink", f"jsonl:{tmp_path / 'lines'}")
+    assert (sent.returncode, (tmp_path / "lines").read_text()) == (0, done.stdout)
+
+
+def test_what_deviates_is_said(thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path) -> None:
+    task = tmp_path / "task.json"
+    assert thenar("teach", *demos[:2], "-b", build, "-o", task).returncode == 0
+    for types, held, deviations, last in (
+        ("cr", 40, ["", "skipped"], "task is done. skipped: pen"),
+        ("pc", 40, ["skipped", "unexpected"], "step 2 of 3; next rod. cup is unexpected: rod was expected"),
+        ("cp", 95, ["too long", "too long"], "step 2 of 3; next rod. pen is held for longer than"),
+    ):
+        path = record(build, tmp_path / f"{types}.mcap", states(types, held))
+        done = thenar("run", build, "--replay", path, "--task", task)
+        ended = [each for each in progress_of(done) if each.grasp == "none"]
+        assert [each.deviation for each in ended] == deviations
+        assert last in done.stderr
+
+
+def test_what_teaches_nothing_is_refused(thenar: Thenar, build: Path, set_file: Path, tmp_path: Path) -> None:
+    empty = record(build, tmp_path / "empty.mcap", [3] * 80)
+    task = ("-b", build, "-o", tmp_path / "task.json")
+    for asked, reason in (
+        (("teach", empty, *task), "empty.mcap shows no grasp"),
+        (("teach", set_file, *task), "each row of the set is a trial of its own"),
+        (("run", build, "--replay", set_file, "--task", set_file), "--task changes nothing for a set of grasps"),
+        (("run", build, "--replay", empty, "--task", empty), "is no task of `thenar teach`"),
+    ):
+        done = thenar(*asked)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert reason in done.stderr
+        assert "Traceback" not in done.stderr
+    (tmp_path / "task.xml").write_text("mine")
+    done = thenar("teach", empty, *task)
+    assert "task.xml is there already" in done.stderr
+    assert not (tmp_path / "task.json").exists()
