@@ -47,13 +47,13 @@ class Names(Protocol):
         ...
 
     @property
-    def segments(self) -> SegmentModel | None:
-        """The costs of segments, where it has learnt any."""
+    def rejection(self) -> Rejection | None:
+        """What is refused, if anything is."""
         ...
 
     @property
-    def rejection(self) -> Rejection | None:
-        """What is refused, if anything is."""
+    def segments(self) -> SegmentModel | None:
+        """The costs of segments, where it has learnt any."""
         ...
 
 
@@ -71,8 +71,8 @@ class Numbered:
     joints: tuple[Calibration, ...]
     tables_sha256: str
     thenar: str
-    segments: SegmentModel | None = None
     rejection: Rejection | None = None
+    segments: None = None
 
 
 @lru_cache(maxsize=4)
