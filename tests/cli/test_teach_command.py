@@ -180,3 +180,39 @@ def test_what_teaches_nothing_is_refused(thenar: Thenar, build: Path, set_file: 
     done = thenar("teach", empty, *task)
     assert "task.xml is there already" in done.stderr
     assert not (tmp_path / "task.json").exists()
+
+
+@pytest.mark.parametrize("lag", [(), ("--lag-ms", "150")])
+def test_a_recorded_run_is_cut_into_its_grasps(
+    thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path, lag: tuple[str, ...]
+) -> None:
+    done = thenar("segment", demos[0], "-b", build, "-o", tmp_path / "s.csv", "--json", *lag)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert [one["type"] for one in found["segments"]] == ["cup", "pen", "rod"]
+    assert (found["streams"], found["f1"]) == (1, None)
+    for number, one in enumerate(found["segments"]):
+        assert one["start_s"] == pytest.approx(0.3 + 0.7 * number, abs=0.02)
+        assert one["end_s"] == pytest.approx(0.7 + 0.7 * number, abs=0.02)
+    assert len((tmp_path / "s.csv").read_text().splitlines()) == 4
+    # Of another build's switches nothing can be said.
+    other = compile_build(GraspSet.load(_held(tmp_path)), tmp_path / "other", rounds=2, folds=0).folder
+    refused = thenar("segment", demos[0], "-b", other)
+    assert refused.returncode == 2
+    assert "another build" in refused.stderr
+
+
+def _held(folder: Path) -> Path:
+    labels = np.arange(30) % 3
+    GraspSet(
+        switches=labels[:, None] == np.arange(3),
+        switch_names=("s0", "s1", "s2"),
+        codes=np.zeros((30, 0), np.uint16),
+        joints=(),
+        grasps=np.array(TYPES)[labels],
+        taxonomy=own(TYPES),
+        subjects=np.full(30, "A"),
+        objects=np.full(30, "thing"),
+        trials=np.arange(30),
+    ).save(folder / "held.grasps")
+    return folder / "held.grasps"
