@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from thenar.compiler.text import INDEPENDENT, counted, duration, listed
+from thenar.compiler.text import INDEPENDENT, counted, detection_sentences, duration, listed
 from thenar.runtime.manifest import AUTO
+from thenar.runtime.published import NONE
 
 from .common import (
     Number,
@@ -62,7 +63,7 @@ PRESETS: dict[str, dict[str, str]] = {
 _GROUPS = {
     "Basics": ("output", "preset", "method", "keep", "levels", "keep_joints", "prune", "inputs"),
     "Limits": ("keep_these", "never", "apart_mm", "at_most", "budget_us"),
-    "Training": ("trainer", "robust"),
+    "Training": ("trainer", "robust", "refuse"),
     "Integer tables": ("table_bits", "width"),
     "The rates in build.json": ("folds", "seed", "by", "jobs"),
     "A point of a frontier": ("from_frontier", "point"),
@@ -135,6 +136,14 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
     help="Which inputs the build reads.",
 )
 @trainer_option(AUTO)
+@click.option(
+    "--refuse",
+    type=Number(0, 0.5),
+    default=0.01,
+    show_default=True,
+    metavar="SHARE",
+    help="Share of grasps that may be refused as nothing held, where no row of the set shows that; 0: refuse none.",
+)
 @click.option(
     "--folds",
     type=click.IntRange(0),
@@ -316,12 +325,14 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
     manifest, proof = made.manifest, made.manifest.proof
     console = out()
     console.print(
-        f"{folder}: {len(manifest.grasps)} grasp types from {_kept(manifest, made)}; "
+        f"{folder}: {len(manifest.grasps) - (manifest.grasps[-1] == NONE)} grasp types from {_kept(manifest, made)}; "
         f"tables of {made.tables_bytes} bytes"
     )
     _print_training(manifest)
     for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
         console.print(f"recognised, {rate}")
+    for sentence in detection_sentences(manifest):
+        console.print(sentence, soft_wrap=True)
     if manifest.source.independent:
         console.print(INDEPENDENT)
     console.print(

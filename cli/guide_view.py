@@ -10,8 +10,9 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from thenar.compiler.recordings.taxonomy import Taxonomy
+from thenar.compiler.recordings.taxonomy import MOVEMENTS, Taxonomy
 from thenar.runtime.live.sources import DeviceState
+from thenar.runtime.published import NONE
 from thenar.runtime.recording.guide import Guide, Stage
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ _REDRAW_US = 100_000
 _KEYS = {
     Stage.READY: "Enter: start the countdown   q: leave, and go on another time",
     Stage.COUNTDOWN: "r: begin the countdown again   q: leave",
+    Stage.MOVING: "r: begin the countdown again   q: leave",
     Stage.REVIEW: "Enter: keep it, next grasp   r: do it again   q: leave",
     Stage.OVER: "",
 }
@@ -80,15 +82,21 @@ class GuideView:
         trial = guide.trial
         if trial is None:
             return ""
+        place = f"{self._done + guide.accepted + 1} of {self._total}"
+        if trial.grasp == NONE and NONE not in self._full:
+            return f"{place}: nothing held, {trial.object}: {MOVEMENTS.get(trial.object, 'touch nothing')}"
         full = self._full[trial.grasp]
         name = trial.grasp if full == trial.grasp else f"{full} ({trial.grasp})"
-        return f"{self._done + guide.accepted + 1} of {self._total}: {name}, object {trial.object}"
+        return f"{place}: {name}, object {trial.object}"
 
     def _standing(self, now_us: int, guide: Guide) -> str:
         if guide.problem:
             return f"not captured: {guide.problem}"
         if guide.stage is Stage.COUNTDOWN:
-            return f"hold it in {guide.seconds_left(now_us):.1f} s"
+            doing = "move so" if guide.trial is not None and guide.trial.grasp == NONE else "hold it"
+            return f"{doing} in {guide.seconds_left(now_us):.1f} s"
+        if guide.stage is Stage.MOVING:
+            return f"move so for {guide.seconds_left(now_us):.1f} s more"
         if guide.stage is not Stage.REVIEW:
             return ""
         switches, glove = guide.captured

@@ -36,9 +36,10 @@ if TYPE_CHECKING:
 @click.option("-o", "--output", type=OutputFile(".grasps"), required=True, help="The .grasps file to write.")
 @overwrite_flag
 @click.option("--columns", type=existing_file, help="columns.toml: what each column of the table is.")
+@click.option("--stream", is_flag=True, help="Recordings: a row every 10 ms with its time, not one a trial.")
 @click.option("-y", "--yes", is_flag=True, help="Import what was found without --columns, and do not ask.")
 @json_flag
-def command(tables: tuple[Path, ...], output: Path, columns: Path | None, yes: bool) -> None:
+def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream: bool, yes: bool) -> None:
     """Import TABLE (.csv, .tsv, .txt, .xlsx, .parquet, .h5, .mat, .arff or .npz) as labelled grasps.
 
     Without --columns, it finds what each column is, shows that with reasons, and writes it to a columns.toml next to
@@ -48,21 +49,23 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, yes: b
     switches, rows that two subjects share, ...) is counted in warnings.
 
     Recordings of `thenar record` (.mcap) say themselves what is in them; several, of several subjects, become one set.
+    With --stream they become whole movements: a grasp is held while the hand stays as it was captured.
 
     \b
     Example:
         thenar import glove.csv -o set.grasps
         thenar import trials.csv.gz -o set.grasps --columns columns.toml
         thenar import anna.mcap ben.mcap -o set.grasps
+        thenar import anna.mcap -o movements.grasps --stream
     """
     keep_apart(*tables, columns, output)
     from thenar.compiler.recordings.mcap_recording import import_files
 
-    if columns is None and len(tables) == 1 and tables[0].suffix.lower() != ".mcap":
+    if columns is None and not stream and len(tables) == 1 and tables[0].suffix.lower() != ".mcap":
         grasp_set, report = _found(tables[0], output, yes)
     else:
         with progress(f"importing {', '.join(table.name for table in tables)}"):
-            grasp_set, report = import_files(tables, columns)
+            grasp_set, report = import_files(tables, columns, stream)
     grasp_set.save(output)
     show(report, _print, output)
 

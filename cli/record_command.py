@@ -27,6 +27,11 @@ if TYPE_CHECKING:
     show_default=True,
     help="Seconds before a grasp is captured.",
 )
+@click.option(
+    "--none/--no-none",
+    default=None,
+    help="Record the empty hand too: open, approaching, releasing, moving idly.  [default: none]",
+)
 @click.option("--seed", type=seed_range, help="Seed of the trial order.  [default: random]")
 @click.option(
     "-o", "--output", type=OutputFile(".grasps", goes_on=True), required=True, help="The .grasps file to write."
@@ -38,10 +43,14 @@ def command(
     objects: Path | None,
     repetitions: int,
     countdown: float,
+    none: bool | None,
     seed: int | None,
     output: Path,
 ) -> None:
     """Record labelled grasps: which one to take is shown, in random order, and counted down to.
+
+    As often as each grasp type the empty hand is recorded, moving for two seconds, so that a build learns when nothing
+    is held; --no-none leaves that out.
 
     Everything that the devices deliver goes into OUTPUT with the ending .mcap. Whatever ends the collection, the same
     command goes on where it stopped; each time it ends, all trials accepted so far are in OUTPUT.
@@ -53,6 +62,7 @@ def command(
     from thenar.compiler.recordings.errors import check_names
     from thenar.compiler.recordings.taxonomy import collected
     from thenar.runtime.harness.loading import load_harness
+    from thenar.runtime.published import NONE
     from thenar.runtime.recording.guide import planned, read_journal
     from thenar.runtime.recording.session import Collection
 
@@ -69,13 +79,17 @@ def command(
     harness = load_harness(glove)
     check_devices(harness, glove)
     check_names("subject", [subject])
-    types, tasks = collected(taxonomy, objects)
-    drawn = secrets.randbits(32) if seed is None else seed
-    wanted = Collection(subject, types.name, types.types, tasks, repetitions, drawn)
     journal = None
     if recording.exists():
         with progress(f"reading {recording.name}"):
             journal = read_journal(recording)
+    if none is None:
+        begun = None if journal is None else journal.session.collection
+        none = begun is None or NONE in {task.grasp for task in begun.tasks}
+    types, tasks = collected(taxonomy, objects, none)
+    drawn = secrets.randbits(32) if seed is None else seed
+    wanted = Collection(subject, types.name, types.types, tasks, repetitions, drawn)
+    if journal is not None:
         wanted = _resumed(journal, wanted, seed)
     accepted = frozenset() if journal is None else journal.accepted
     trials = planned(wanted)
@@ -112,6 +126,7 @@ def _both(begun: object, wanted: object) -> str:
 
 def _write(recording: Path, output: Path, accepted: int, planned: int) -> None:
     from thenar.compiler.recordings.mcap_recording import import_recordings
+    from thenar.compiler.text import none_words
 
     if not accepted:
         echo(f"no trial was accepted: {output} is not written; the same command goes on")
@@ -122,4 +137,4 @@ def _write(recording: Path, output: Path, accepted: int, planned: int) -> None:
     for finding in report.warnings:
         warning(finding.message)
     rest = "" if accepted == planned else "; the same command goes on"
-    echo(f"{output}: {len(grasp_set)} grasps; {accepted} of {planned} trials are done{rest}")
+    echo(f"{output}: {len(grasp_set)} grasps{none_words(report.none)}; {accepted} of {planned} trials are done{rest}")

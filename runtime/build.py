@@ -15,6 +15,7 @@ from .errors import BuildError
 from .files import read_file
 from .manifest import Manifest, manifest_from_bytes
 from .published import NONE
+from .rejection import Rejector
 from .scanning import scanmap as scan_file
 from .scanning.scanmap import ScanMap, check_switches, scanmap_from_bytes
 from .scores import LANE_OFFSET, Scorer, softmax
@@ -42,10 +43,12 @@ class Build:
 
     A frame is `bits` (s,), the kept switches in the order of `manifest.switches`, and `codes` (j,), the joints in the
     order of `manifest.joints`. Of equal scores the first grasp type wins. `scan` is how to read the kept switches, None
-    where the build was compiled for no harness. `scorer` is what all that score frames of this build share.
+    where the build was compiled for no harness. `scorer` is what all that score frames of this build share. `none` is
+    the class of frames in which nothing is held, None where no row trained on showed that; then `rejector` says which
+    frames are refused, None where none is.
     """
 
-    __slots__ = ("grasps", "manifest", "scan", "scorer", "tables")
+    __slots__ = ("grasps", "manifest", "none", "rejector", "scan", "scorer", "tables")
 
     def __init__(self, manifest: Manifest, tables: IntegerTables, scan: ScanMap | None = None) -> None:
         """Put together what belongs together. Raises BuildError if they describe different builds."""
@@ -63,6 +66,8 @@ class Build:
         self.scan = scan
         self.grasps = manifest.grasps
         self.scorer = Scorer(tables)
+        self.none = len(self.grasps) - 1 if self.grasps[-1] == NONE else None
+        self.rejector = None if manifest.rejection is None else Rejector(manifest.rejection)
 
     @property
     def knows_none(self) -> bool:

@@ -97,6 +97,9 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
         Switches and taxels that are kept in any case, and that are not.
     apart_mm, at_most_taxels, budget_us : float, int, float; or None
         The least distance of what is kept, the most taxels, and the most that a scan may take.
+    refuse : float
+        The share of grasps that may be refused where no row shows that nothing is held; 0: none is. Builds of older
+        versions leave it out, and refuse nothing either.
     """
 
     prune: Count = _written(0)
@@ -122,6 +125,7 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     apart_mm: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
     at_most_taxels: Count | None = None
     budget_us: Annotated[float, Meta(ge=0.0, le=1e12)] | None = None
+    refuse: Share = 0.01
 
 
 class Compared(Struct, frozen=True, forbid_unknown_fields=True):
@@ -323,6 +327,23 @@ class Detected(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
         return f"{self.held.title}: {'; '.join(shares)}"
 
 
+class Rejection(Struct, frozen=True, forbid_unknown_fields=True):
+    """What a build refuses that was trained on grasps alone: rejection.py says how.
+
+    share         of grasps not trained on that may be refused, as it was asked for
+    least_scores  for each grasp type the least score of a candidate, in steps
+    closed        for each type the least and the most closed switches
+    ranges        for each type, of each joint the lowest and the highest code of nearly all rows trained on
+    outside       how many joints may lie outside their ranges
+    """
+
+    share: Share
+    least_scores: tuple[Annotated[int, Meta(ge=-32768, le=32767)], ...]
+    closed: tuple[tuple[Count, Count], ...]
+    ranges: tuple[tuple[tuple[Code, Code], ...], ...]
+    outside: Count
+
+
 class Faulty(Struct, frozen=True, forbid_unknown_fields=True):
     """A fault: what happens ("lost", "stuck closed", "stuck at codes 0 to 40", "lost with chip 1 of bus 1"), the names
     of the inputs to which it does, and how many trials are recognised all the same.
@@ -373,6 +394,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     fitting          how the fit was chosen; left out where the options leave no choice
     faults           what faults of inputs leave of the rows trained on; None in builds of older versions
     detection        how surely the build says whether something is held, of the rows trained on and of folds
+    rejection        what is refused; None where NONE is one of the grasps, or nothing is refused
     segments         costs of segments that were learnt from streams; None: there were none to learn from
     """
 
@@ -394,7 +416,13 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     fitting: Fitting | None = None
     faults: Faults | None = None
     detection: tuple[Detected, ...] = ()
+    rejection: Rejection | None = None
     segments: SegmentModel | None = None
+
+    @property
+    def answers(self) -> tuple[str, ...]:
+        """What a frame may be called: the grasps, and NONE where that may be and is none of them."""
+        return self.grasps if self.rejection is None else (*self.grasps, NONE)
 
     @property
     def segmenting(self) -> SegmentModel:
@@ -481,6 +509,7 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     yield from _wrong_names("texts", texts)
     yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
     yield from _wrong_columns(manifest)
+    yield from _wrong_rejection(manifest)
     yield from _wrong_segments(manifest)
     for joint in (*manifest.joints, *taxels):
         if joint.code_a == joint.code_b or joint.value_a == joint.value_b:
@@ -488,11 +517,16 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     proof = manifest.proof
     if proof.width != options.width or max(proof.covered, proof.changed) > manifest.source.rows:
         yield "proves something of other tables than it describes"
+    yield from _wrong_counts(manifest)
+
+
+def _wrong_counts(manifest: Manifest) -> Iterator[str]:
+    fit, faults = manifest.fit, manifest.faults
     shares = [rate for each in manifest.detection for rate in (each.held, each.none) if rate is not None]
     counted = [(rate.correct, rate.total) for rate in (*manifest.rates, *shares)]
     counted += [(each.correct, each.total) for each in fit.compared]
     if faults is not None:
-        counted += [(count, faults.total) for count in (faults.correct, *(each.correct for each in worst))]
+        counted += [(count, faults.total) for count in (faults.correct, *(each.correct for each in faults.worst))]
     if any(correct > total for correct, total in counted) or manifest.stopped_after > fit.number("rounds"):
         yield "counts more than there is"
 
@@ -516,6 +550,17 @@ def _wrong_segments(manifest: Manifest) -> Iterator[str]:
     segments, has_none = manifest.segments, manifest.grasps[-1] == NONE
     if segments and (segments.n_lanes, segments.refusal is None) != (len(manifest.grasps), has_none):
         yield "has costs of segments of other classes than its tables"
+
+
+def _wrong_rejection(manifest: Manifest) -> Iterator[str]:
+    held = manifest.rejection
+    if held is None:
+        return
+    lists: list[tuple[object, ...]] = [held.least_scores, held.closed, held.ranges]
+    if {*map(len, lists)} != {len(manifest.grasps)} or {*map(len, held.ranges)} != {len(manifest.joints)}:
+        yield "refuses frames of other grasp types or joints than it has"
+    if NONE in manifest.grasps:
+        yield "refuses frames, and has a class for them"
 
 
 def _wrong_names(kind: str, names: Iterable[str], longest: int = LONGEST_NAME) -> Iterator[str]:

@@ -53,12 +53,14 @@ from .ensemble import ensemble_to_bytes
 from .training import (
     Tested,
     Trained,
+    answered,
     cross_validated,
     cuts_of,
     detection_of,
     groups_for,
     integers_of,
     rates_of,
+    rejected_by,
     samples_of,
     scores_of,
     segments_for,
@@ -111,6 +113,8 @@ def _foreign(folder: Path, members: frozenset[str]) -> list[Path]:
     """Return the entries of `folder` that are not files with a member's name."""
     return [path for path in sorted(folder.iterdir()) if path.name not in members or not path.is_file()]
 
+
+_MOST_REFUSED = 0.5
 
 # A wiring, or what makes one for the names of the kept switches.
 Wired = Harness | Callable[[Sequence[str]], Harness]
@@ -205,6 +209,8 @@ def _sound(options: Options) -> Options:
         raise CompileError(f"tables of {options.table_bits} bits: firmware has entries of 8 or 16")
     if not 4 <= options.width <= 16:
         raise CompileError(f"sums of {options.width} bits: tables have 4 to 16")
+    if not 0 <= options.refuse < _MOST_REFUSED:
+        raise CompileError(f"{options.refuse} of all grasps may be refused: give a share from 0 up to {_MOST_REFUSED}")
     METHODS.named(options.placement).check_given(options.keep, options.prune)
     only, *others = Training.candidates(options)
     trainer, given = options.trainer, {name: getattr(options, name) for name in SHARED} | options.settings
@@ -260,6 +266,7 @@ class Making:
         if self.harness is not None:
             self.scan = plan_scan(names, self.integers, self.harness, kept.switches, kept.codes)
         self.comparison = compare(trained.model, self.integers, kept.switches, kept.codes)
+        self.rejection = rejected_by(trained, samples, self.integers, options, groups_for(grasp_set, options))
         self._inputs = (*names, *(grasp_set.joint_names[joint] for joint in trained.joints))
         sources = [grasp_set.element_names[element.column] for element in trained.kept]
         self._groups = groups_of(self.scan, sources, len(trained.joints))
@@ -311,7 +318,7 @@ class Making:
         """Return what `build.json` says, not sealed yet; `files` are name -> content of what lies beside it."""
         digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
         grasp_set, options, fitting = self.grasp_set, self.options, self.trained.fitting
-        deployed = self.comparison.deployed
+        deployed = answered(self.integers, self.rejection, self.trained.read(self.samples))
         rates = rates_of("training", self.samples, deployed, options.seed)
         detection = detection_of("training", self.samples, deployed, options.seed)
         switches = zip(self.trained.kept, names_of(grasp_set, self.trained.kept), self.trained.gains, strict=True)
@@ -344,6 +351,7 @@ class Making:
             fitting=fitting if fitting is not None and fitting.compared else None,
             faults=worst_faults(self.faults, self._inputs, self._groups),
             detection=detection if tested is None else (*detection, *tested.detection),
+            rejection=self.rejection,
             segments=segments_for(
                 grasp_set, self.samples, None if tested is None else tested.scores, self.integers.scale
             ),

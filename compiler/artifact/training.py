@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.manifest import By, Detected, Fitting, Of, Options, Protocol, Recognised
+from thenar.runtime.manifest import By, Detected, Fitting, Of, Options, Protocol, Recognised, Rejection
+from thenar.runtime.rejection import refused
 from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables
 
@@ -33,6 +34,7 @@ from ..trainers.base import Report, Training
 from ..workers import in_workers, little
 from . import CompileError
 from .ensemble import MAX_STUMPS, model_fault
+from .rejecting import rejection_of
 
 Answers = NDArray[np.intp]
 Groups = NDArray[np.str_] | None
@@ -47,7 +49,7 @@ class Trained:
     gains     what each of these brought (bits): to the tree of ID3, which is None where another method chose, and alone
               otherwise
     joints    columns of the kept joints
-    fitting   how the fit was chosen
+    fitting   how the fit was chosen; training: what made the model. None where an estimator did
     """
 
     elements: Elements
@@ -57,6 +59,7 @@ class Trained:
     model: Model
     joints: Columns
     fitting: Fitting | None = None
+    training: Training | None = None
 
     @property
     def kept(self) -> Elements:
@@ -148,12 +151,17 @@ def train(
     if not (inputs != inputs[0]).any():
         raise CompileError("no input differs between rows: there is nothing to tell grasp types apart by")
     candidates, of = Training.candidates(options), OF[options.by or "subject"]
-    groups = None if groups is None else groups[rows]
-    fitting = choose_training(kept, candidates, seed=options.seed, groups=groups, of=of, jobs=jobs, report=report)
-    model = Training.chosen(fitting, masked=options.robust).train(kept, report if len(candidates) == 1 else None)
+    # Frames of a movement resemble their neighbours: of many, some are enough to compare fits by.
+    some = np.arange(0, len(rows), -(-len(rows) // _COMPARED) if samples.has_none else 1)
+    by = None if groups is None else groups[rows[some]]
+    fitting = choose_training(
+        kept.rows(some), candidates, seed=options.seed, groups=by, of=of, jobs=jobs, report=report
+    )
+    training = Training.chosen(fitting, masked=options.robust)
+    model = training.train(kept, report if len(candidates) == 1 else None)
     if fault := model_fault(model, kept.n_switches, kept.codes.shape[1], kept.n_classes):
         raise CompileError(f"trainer {fitting.trainer!r} made a model that {fault}: it is at fault")
-    return Trained(elements, columns, chosen.gains, chosen.tree, model, joints, fitting)
+    return Trained(elements, columns, chosen.gains, chosen.tree, model, joints, fitting, training)
 
 
 def integers_of(trained: Trained, samples: Samples, options: Options) -> IntegerTables:
@@ -163,6 +171,8 @@ def integers_of(trained: Trained, samples: Samples, options: Options) -> Integer
     return quantise(tables, kept.switches, kept.codes, options.width, options.table_bits)
 
 
+# Rows by which fits are compared where there are rows of nothing held.
+_COMPARED = 4096
 USUAL_ROUNDS = 100  # where a fit is chosen, its work is taken to be that of so many
 
 Scores = NDArray[np.float64]
@@ -224,7 +234,7 @@ def scores_of(
     samples: Samples, options: Options, ports: PortCosts | None, groups: Groups, limits: Limits | None, fold: Fold
 ) -> Scores:
     """Choose and train on the fold's training rows alone; return the scores (m, K), in units, that the integers give
-    its test rows.
+    its test rows. Where frames are refused, column K is infinite for those that are, and else its negative.
 
     Raises CompileError, which names the fold, as `train` does.
     """
@@ -235,8 +245,31 @@ def scores_of(
     except CompileError as wrong:
         raise CompileError(f"in fold {fold.name}: {wrong}, or do without folds (0)") from None
     tables = integers_of(trained, learning, options)
+    rejection = rejected_by(trained, learning, tables, options, own)
     test = trained.read(samples.rows(fold.test))
-    return integer_scores(tables, test.switches, test.codes) / tables.scale
+    scores = integer_scores(tables, test.switches, test.codes)
+    if rejection is None:
+        return scores / tables.scale
+    beyond = np.where(refused(rejection, scores, test.switches, test.codes), np.inf, -np.inf)
+    return np.column_stack([scores / tables.scale, beyond])
+
+
+def rejected_by(
+    trained: Trained, samples: Samples, tables: IntegerTables, options: Options, groups: Groups
+) -> Rejection | None:
+    """Return what a build of these tables refuses, learnt from the rows trained on; None of an estimator's."""
+    if trained.training is None:
+        return None
+    return rejection_of(trained.read(samples), tables, trained.training, options, groups)
+
+
+def answered(tables: IntegerTables, rejection: Rejection | None, samples: Samples) -> Answers:
+    """Return the classes (n,) that integers give rows of the kept inputs; the number of classes: refused."""
+    scores = integer_scores(tables, samples.switches, samples.codes)
+    found: Answers = scores.argmax(axis=1)
+    if rejection is not None:
+        found[refused(rejection, scores, samples.switches, samples.codes)] = samples.n_classes
+    return found
 
 
 def cross_validated(
@@ -257,9 +290,10 @@ def cross_validated(
     ):
         answers[place, fold.test] = found.argmax(axis=1)
         if not place:
-            scores[fold.test] = found
+            scores[fold.test] = found[:, : samples.n_classes]
         report(done, len(folds))
-    confusion = np.zeros((len(samples.grasps),) * 2, dtype=np.intp)
+    refuses = not samples.has_none and bool((answers == samples.n_classes).any())
+    confusion = np.zeros((samples.n_classes + refuses,) * 2, dtype=np.intp)
     np.add.at(confusion, (samples.labels, answers[0]), 1)
     measured, seed = list(zip(cuts, answers, strict=True)), options.seed
     rates = [rate for cut, own in measured for rate in rates_of("nested", samples, own, seed, cut)]
@@ -296,10 +330,10 @@ def detection_of(
     protocol: Protocol, samples: Samples, answers: Answers, seed: int, cut: Cut | None = None
 ) -> tuple[Detected, ...]:
     """Return the share of trials of grasps in which something is said to be held, and of those of nothing held in which
-    nothing is; and those of their frames where trials have several. There are none where nothing can be said not to be.
+    nothing is; and those of their frames where trials have several. There are none where no row is said to show that.
     """
     none = samples.is_none
-    if not none.any():
+    if not (none.any() or (answers == samples.n_types).any()):
         return ()
     said = (answers == samples.n_types).astype(np.intp)
     held, empty = (
@@ -307,7 +341,7 @@ def detection_of(
         for rows in (~none, none)
     )
     units = [unit for unit in UNITS if unit in held or unit in empty]
-    return tuple(Detected(held.get(unit, held["trials"]), empty.get(unit, empty["trials"])) for unit in units)
+    return tuple(Detected(held.get(unit, held["trials"]), empty.get(unit, empty.get("trials"))) for unit in units)
 
 
 def _rates(
@@ -321,6 +355,8 @@ def _rates(
 ) -> tuple[Recognised, ...]:
     """Return what `rated` does of these rows (n,)."""
     cut = cut or Cut("pooled", ())
+    if not rows.any():
+        return ()
     groups = None if cut.groups is None else cut.groups[rows]
     found = rated(answers[rows], truth[rows], samples.trials[rows], of=cut.of, groups=groups)
     return tuple(

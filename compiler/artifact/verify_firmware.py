@@ -100,7 +100,7 @@ def made_firmware(manifest: Manifest, tables: IntegerTables, scan: ScanMap | Non
     """Return path in the build -> text of its firmware, and a sentence that says what for, or why there is none."""
     try:
         fit = smallest_fit(tables, ports=ports_of_scan(scan))
-        made = Library(LIBRARY_NAME, manifest, fit.choice.layout, fit.target.avr, fit.notes()).files
+        made = Library(LIBRARY_NAME, manifest, fit.choice.layout, fit.target.avr, fit.notes()).whole
     except FirmwareError as reason:
         return {}, f"no firmware: {reason}"
     return {f"{FIRMWARE_NAME}/{name}": text for name, text in made.items()}, f"firmware {fit.words}"
@@ -184,7 +184,9 @@ class FirmwareTrial:
         """Compile the classifier as `fit` says and hold its answers against Python's. Raises FirmwareError."""
         answers = self._run(fit, incremental=answer == "update", lost=self._lost if missing else None)
         scores = self._scores_without if missing else self._scores
-        wrong = (answers.scores != scores).any(axis=1) | (answers.classes != scores.argmax(axis=1))
+        # On an AVR the harness sees what classify() returns, before held() may refuse it.
+        classes = scores.argmax(axis=1) if fit.target.avr else self._classes(scores, missing=missing)
+        wrong = (answers.scores != scores).any(axis=1) | (answers.classes != classes)
         return TargetCheck(
             part=fit.target.part,
             layout=fit.choice.why,
@@ -198,6 +200,20 @@ class FirmwareTrial:
             unit=answers.unit,
             stack=answers.stack,
         )
+
+    def _classes(self, scores: NDArray[np.int64], *, missing: bool) -> NDArray[np.intp]:
+        """Return the class of each frame (n,), the number of classes where it is refused."""
+        rejector, (n, k), found = self._build.rejector, scores.shape, np.asarray(scores.argmax(axis=1))
+        if rejector is None:
+            return found
+        lost = self._lost if missing else np.zeros((n, self._frames.bits.shape[1] + self._frames.codes.shape[1]), bool)
+        at = self._frames.bits.shape[1]
+        masks = (_masks(each) for each in (self._frames.bits, lost[:, :at], lost[:, at:]))
+        frames = zip((scores + LANE_OFFSET).tolist(), *masks, self._frames.codes.tolist(), strict=True)
+        refused = [
+            rejector.refuses(own, bits, gone, codes, lost_joints=joints) for own, bits, gone, joints, codes in frames
+        ]
+        return np.asarray(np.where(refused, k, found))
 
     def _misnamed(self, answers: Answers) -> int | None:
         if answers.names is None:
@@ -235,6 +251,11 @@ class FirmwareTrial:
 
     def _grasp(self, number: int) -> str:
         return self._build.grasps[number] if number < len(self._build.grasps) else f"type {number}, which there is not"
+
+
+def _masks(flags: NDArray[np.bool_]) -> list[int]:
+    """Return each row of flags (n, m) as a mask, the first the lowest bit."""
+    return [int.from_bytes(row.tobytes(), "little") for row in np.packbits(flags, axis=1, bitorder="little")]
 
 
 class FirmwareVerification(Struct, frozen=True, kw_only=True):

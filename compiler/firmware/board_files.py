@@ -17,7 +17,7 @@ from .layout import NO_SWITCH, Layout, Ports
 from .protocol import BoardConfig
 from .targets.avr import best_setting
 from .targets.base import Mode
-from .words import Names
+from .words import Names, answers_of
 
 _TIMER_US, _TIMER_DIVIDER = 20_000, 8  # the timer begins anew so often, and counts such a part of the clock
 _BITS_A_BYTE = 9
@@ -167,8 +167,8 @@ def board_files(name: str, names: Names, layout: Layout, board: Board, mode: Mod
     """
     switches = keys_of(board, names.switches)
     check_switches(board, switches)
-    if mode == "glove" and len(names.grasps) > _MOST_GRASPS:
-        raise FirmwareError(f"{len(names.grasps)} grasp types: a board can tell {_MOST_GRASPS} apart")
+    if mode == "glove" and len(answers_of(names)) > _MOST_GRASPS:
+        raise FirmwareError(f"{len(answers_of(names))} grasp types: a board can tell {_MOST_GRASPS} apart")
     ports = readings(board, switches, layout.tables)
     files = clock_files(board) | uart_files(board, 0, board.baud, receive_bytes=128, send_bytes=256)
     files |= _inputs(board, switches, layout)
@@ -222,6 +222,7 @@ def _glove_main(identifier: str, names: Names, board: Board, joints: bool, early
         whole_us=board.heartbeat_us or _WHOLE_US,
         many_keys=len(key_names(board, switches)) > _BYTE,
         keys_of_switches=_keys_of_switches(board, switches),
+        rejects=names.rejection is not None,
     )
 
 

@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.firmware_templates.rendering import render
-from thenar.runtime.manifest import Calibration
+from thenar.runtime.manifest import Calibration, Rejection
+from thenar.runtime.published import NONE
 
 from .assembly import assembly_values, calls_are_near, check_size
 from .layout import MOST_INLINE, NO_SWITCH, Field, JointLayout, Layout, Lookup, Parts
-from .words import Names, comment, inputs_in_words, string, switches_in_words
+from .segments import segment_files
+from .words import Names, answers_of, comment, inputs_in_words, string, switches_in_words
 
 _STARTS_PER_LINE = 4
 _HIGHEST = 65535  # no code is above it
@@ -232,7 +234,9 @@ def _after(first: int, place: str) -> str:
 LIBRARY_NAME = "glove"
 """What the library is called unless it is named: its files are thenar_glove.h and so on, its functions alike."""
 FIRMWARE_NAME = "firmware"
-LIBRARY_FILES = tuple(f"thenar_{LIBRARY_NAME}{ending}" for ending in (".h", ".c", "_avr.S"))
+LIBRARY_FILES = tuple(
+    f"thenar_{LIBRARY_NAME}{part}{ending}" for part in ("", "_segments") for ending in (".h", ".c", "_avr.S")
+)
 """The folder of a build that carries the library, and what it may hold."""
 
 COLUMNS = 120
@@ -328,6 +332,17 @@ class Library:
         """The classifier's own files, name -> text."""
         return classifier_files(self.name, self.names, self.layout, avr=self.avr, notes=self.notes)
 
+    @cached_property
+    def whole(self) -> dict[str, str]:
+        """The classifier's files, and those of the decoder of segments where the build has costs of them."""
+        model = self.names.segments
+        return self.files if model is None else self.files | segment_files(self.name, model, avr=self.avr)
+
+    @property
+    def objects(self) -> str:
+        """What its sources are compiled to, for a Makefile."""
+        return " ".join(path.rsplit(".", 1)[0] + ".o" for path in self.whole if path.endswith((".c", ".S")))
+
 
 def classifier_files(
     name: str, names: Names, layout: Layout, *, avr: bool, notes: Sequence[str] = ()
@@ -394,6 +409,8 @@ def _common_values(name: str, names: Names, layout: Layout, avr: bool) -> dict[s
         "n_rows": layout.n_rows,
         "n_slopes": len(layout.tables.slopes),
         "relative": layout.tables.relative,
+        "nothing_held": len(answers) - 1 if (answers := answers_of(names))[-1] == NONE else None,
+        "rejection": names.rejection,
     }
 
 
@@ -422,12 +439,24 @@ def _source_values(names: Names, layout: Layout) -> dict[str, object]:
         "n_inputs": len(means),
         "starts": number_lines(layout.start.tolist()),
         "open_scores": number_lines(layout.all_open.tolist()),
-        "names": [string(grasp) for grasp in names.grasps],
-        "longest_name": max(len(grasp.encode()) for grasp in names.grasps) + 1,
+        "names": [string(grasp) for grasp in answers_of(names)],
+        "longest_name": max(len(grasp.encode()) for grasp in answers_of(names)) + 1,
         "places": _place_lines(layout),
         "port_type": _unsigned(len(layout.ports)),
         "first_classes": number_lines(layout.parts.firsts),
         "avr_macros": avr_macros(layout.parts.width, layout.entry_bits),
+        **({} if names.rejection is None else _rejection_lines(names.rejection)),
+    }
+
+
+def _rejection_lines(rejection: Rejection) -> dict[str, list[str]]:
+    ranges = ["{" + ", ".join(f"{{{low}u, {high}u}}" for low, high in own) + "}," for own in rejection.ranges]
+    wrapped = (
+        textwrap.wrap(line, COLUMNS - 8, initial_indent=_INDENT, subsequent_indent=2 * _INDENT) for line in ranges
+    )
+    return {
+        "least_scores": number_lines(rejection.least_scores),
+        "ranges": [line for own in wrapped for line in own],
     }
 
 

@@ -8,7 +8,9 @@ from functools import lru_cache
 from importlib.metadata import version
 from typing import Protocol
 
-from thenar.runtime.manifest import Calibration, Switch
+from thenar.runtime.manifest import Calibration, Rejection, Switch
+from thenar.runtime.published import NONE
+from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from . import FirmwareError
@@ -44,6 +46,21 @@ class Names(Protocol):
         """The version of thenar that made them."""
         ...
 
+    @property
+    def rejection(self) -> Rejection | None:
+        """What is refused, if anything is."""
+        ...
+
+    @property
+    def segments(self) -> SegmentModel | None:
+        """The costs of segments, where it has learnt any."""
+        ...
+
+
+def answers_of(names: Names) -> tuple[str, ...]:
+    """Return what a frame may be called: the grasp types, and that nothing is held where that is none of them."""
+    return names.grasps if names.rejection is None else (*names.grasps, NONE)
+
 
 @dataclass(frozen=True, slots=True)
 class Numbered:
@@ -54,6 +71,8 @@ class Numbered:
     joints: tuple[Calibration, ...]
     tables_sha256: str
     thenar: str
+    rejection: Rejection | None = None
+    segments: None = None
 
 
 @lru_cache(maxsize=4)

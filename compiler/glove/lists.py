@@ -95,6 +95,9 @@ def expectations(expected: Expected) -> Iterator[str]:
         )
     for rate in sorted(expected.rates, key=lambda rate: rate.protocol == "training"):
         yield f"Recognised, {rate}."
+    for each in expected.detection:
+        if each.held.protocol != "training":
+            yield f"Nothing held, {each}."
     for sentence in () if expected.faults is None else expected.faults.sentences:
         yield f"At worst, of the rows trained on: {sentence}."
 

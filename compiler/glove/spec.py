@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.manifest import Faults, Manifest, Recognised, Switch
+from thenar.runtime.manifest import Detected, Faults, Manifest, Recognised, Switch
 from thenar.runtime.names import list_names
 from thenar.runtime.scanning.plan import check_harness, unwired
 from thenar.runtime.scanning.ports import whole_scan, wired_names
@@ -48,6 +48,7 @@ class Expected(Struct, frozen=True):
     glove_us     between records of the CyberGlove, of as many `sensors` as the build has joints; None where it has none
     rates        the recognition that was measured when the build was compiled
     faults       what the worst faults leave of the rows trained on; None in specs of older builds
+    detection    how surely it was said whether something is held
     """
 
     transactions: int
@@ -58,6 +59,7 @@ class Expected(Struct, frozen=True):
     glove_us: float | None
     rates: tuple[Recognised, ...]
     faults: Faults | None = None
+    detection: tuple[Detected, ...] = ()
 
 
 def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected:
@@ -77,6 +79,7 @@ def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected
         glove_us=None if glove is None else glove_us(glove, len(manifest.joints)),
         rates=manifest.rates,
         faults=manifest.faults,
+        detection=manifest.detection,
     )
 
 

@@ -1,21 +1,29 @@
-"""Recordings of guided collections (MCAP) into a `GraspSet`: a row for every trial that was accepted.
+"""Recordings of guided collections (MCAP) into a `GraspSet`: a row for every trial that was accepted, or a stream.
 
-A row is what the devices had delivered last when the grasp was captured. The CyberGlove's sensors but the wrist's,
+A row is what the devices had delivered last when the grasp was captured. Trials in which nothing is held have a row for
+every 0.2 s of their movement. A stream has a row for every 10 ms, with its time: a grasp is held while the hand stays
+as it was captured, and nothing is held in the rest of the trials of a collection that also records the empty hand. Of
+another collection the rest is left out, as are trials that were done again.
+
+The CyberGlove's sensors but the wrist's,
 which the paper does not use either, become joints: raw bytes where the glove was not calibrated, half degrees on one
 scale for all subjects where it was. Taxels keep their counts, what their baselines moved taken off; where they were
 calibrated, the counts of all are those of the first calibration.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.names import SHOWN, shortened
+from thenar.runtime.published import NONE
+from thenar.runtime.recording.guide import FRESH_US
 from thenar.runtime.recording.messages import switch_matrix
 from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
@@ -38,18 +46,34 @@ _BYTES = Calibration(code_a=1, value_a=1.0, code_b=255, value_b=255.0)
 
 @dataclass(frozen=True, slots=True)
 class _Grasp:
-    """An accepted trial and the frames that were captured; counts are the taxels', None for one with a fault."""
+    """A row: what is held in which trial, and the newest frames at `time_us`; counts are the taxels', None for one with
+    a fault.
+    """
 
     label: Label
     switches: SwitchFrame | None
     glove: GloveFrame | None
     counts: tuple[int | None, ...] = ()
+    time_us: int = 0
 
     def whole(self, session: Session) -> bool:
         """Return whether everything that the session records was read."""
         read = self.switches is not None and not self.switches.lost | self.switches.unread
         read = read and len(self.counts) == len(session.taxels) and None not in self.counts
         return (read or not (session.switches or session.taxels)) and (self.glove is not None or not session.sensors)
+
+
+@dataclass(slots=True)
+class _Attempt:
+    """A trial that was captured: when it began, the row of its capture, when it was judged, its rows, and how it was
+    judged.
+    """
+
+    begun_us: int
+    captured: _Grasp
+    judged_us: int
+    rows: tuple[_Grasp, ...]
+    accepted: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +86,11 @@ class _Part:
     grasps: tuple[_Grasp, ...]
 
 
-def import_files(paths: Sequence[Path], columns: Path | None = None) -> tuple[GraspSet, ImportReport]:
-    """Import one table as the columns.toml in file `columns` says, or recordings, which say themselves what they hold.
+def import_files(
+    paths: Sequence[Path], columns: Path | None = None, stream: bool = False
+) -> tuple[GraspSet, ImportReport]:
+    """Import one table as the columns.toml in file `columns` says, or recordings, which say themselves what they hold,
+    as a `stream` or trial by trial.
 
     Without `columns`, what the columns of a table are is found from their names and values.
 
@@ -72,7 +99,9 @@ def import_files(paths: Sequence[Path], columns: Path | None = None) -> tuple[Gr
     if all(path.suffix.lower() == ".mcap" for path in paths):
         if columns is not None:
             raise ColumnsError(f"a recording says itself what its columns are: leave {columns.name} out")
-        return import_recordings(paths)
+        return import_recordings(paths, stream)
+    if stream:
+        raise ColumnsError("each row of a table is imported as it is: --stream is for recordings (.mcap), leave it out")
     if len(paths) > 1:
         raise TableError("several recordings (.mcap) can be imported together, but only one table")
     if columns is None:
@@ -83,8 +112,9 @@ def import_files(paths: Sequence[Path], columns: Path | None = None) -> tuple[Gr
     return import_file(paths[0], columns)
 
 
-def import_recordings(paths: Sequence[Path]) -> tuple[GraspSet, ImportReport]:
-    """Import the accepted trials of recordings of one glove and one taxonomy; subjects may differ.
+def import_recordings(paths: Sequence[Path], stream: bool = False) -> tuple[GraspSet, ImportReport]:
+    """Import the accepted trials of recordings of one glove and one taxonomy; subjects may differ. As a `stream` they
+    have a row every 10 ms, and what was begun anew is a session of its own.
 
     Raises McapError, TableError or RecordingError naming the file; OSError as it comes.
     """
@@ -93,52 +123,181 @@ def import_recordings(paths: Sequence[Path]) -> tuple[GraspSet, ImportReport]:
     size = 0
     for path in paths:
         reader = Reader(path)
-        parts += _parts(reader)
+        parts += _parts(reader, stream)
         findings += [Finding(fault.kind, fault.count, fault.message) for fault in reader.faults()]
         size += reader.end.size if reader.end is not None else 0
     what = ", ".join(path.name for path in paths)
     _check_alike(parts)
     grasps = [(part, grasp) for part in parts for grasp in part.grasps if grasp.whole(part.session)]
-    findings += _left_out(parts)
+    findings += _left_out(parts, stream)
     if not grasps:
         raise TableError(f"{what}: no trial was accepted; `thenar record` makes recordings with labelled trials")
-    check_made(f"{what}: its trials", _bytes_of(grasps), size)
-    grasp_set, costs = _joined(grasps)
+    # A row of a stream holds what other rows do.
+    check_made(f"{what}: its trials", _bytes_of(grasps) // (4 if stream else 1), size)
+    grasp_set, costs = _joined(grasps, stream)
     return grasp_set, report_of(what, grasp_set, costs, (*findings, *find_oddities(grasp_set, grasp_set.trials)))
 
 
-def _parts(reader: Reader) -> Iterator[_Part]:
+# From one row of a trial in which nothing is held to the next, and of a stream.
+_MOVING_TICK_US, _TICK_US = 200_000, 10_000
+# A hold of a stream goes on over so many ticks in which the hand seems to have moved; and joints that are so near to
+# those that were captured, as a share of how far they go, have not moved.
+_BRIDGED, _NEAR, _NEAR_CODES = 3, 0.25, 2.0
+
+
+def _parts(reader: Reader, stream: bool) -> Iterator[_Part]:
     """Yield every session with trials; those without are not labelled and bring nothing."""
-    grasps: list[_Grasp] = []
-    for session, grasp in _accepted(reader):
-        if grasp is not None:
-            grasps.append(grasp)
-        elif session.collection is not None and grasps:
-            yield _Part(reader.path.name, session, session.collection, tuple(grasps))
-            grasps = []
+    for watch in _watched(reader, stream):
+        collection = watch.session.collection
+        if collection is not None and (rows := _streamed(watch, collection) if stream else watch.rows()):
+            yield _Part(reader.path.name, watch.session, collection, rows)
 
 
-def _accepted(reader: Reader) -> Iterator[tuple[Session, _Grasp | None]]:
-    """Yield the accepted grasps, each with its session, and (session, None) at every session's end."""
-    switches: SwitchFrame | None = None
-    glove: GloveFrame | None = None
-    captured: _Grasp | None = None
-    session, taxels = reader.session, _taxels(reader)
+def _watched(reader: Reader, stream: bool) -> Iterator["_Watch"]:
+    """Yield what came of each session, at its end."""
+    watch = _Watch(reader, stream)
     for entry in reader:
         if isinstance(entry, Session):
-            yield session, None
-            session, switches, glove, captured, taxels = entry, None, None, None, _taxels(reader)
-        elif isinstance(entry, SwitchFrame):
-            switches = entry
-            taxels.read(entry.time_us, entry.taxels or [None] * len(session.taxels))
-        elif isinstance(entry, GloveFrame):
-            glove = entry
+            yield watch
+            watch = _Watch(reader, stream)
+        elif isinstance(entry, SwitchFrame | GloveFrame):
+            watch.frame(entry)
         elif isinstance(entry, Label):
-            if entry.event == "accepted" and captured is not None and captured.label.trial == entry.trial:
-                yield session, captured
-            counts = tuple(taxels.counts)
-            captured = _Grasp(entry, switches, glove, counts) if entry.event == "captured" else None
-    yield session, None
+            watch.label(entry)
+    yield watch
+
+
+class _Watch:
+    """The session that begins: its newest frames, the trials that were captured, and rows at ticks, of a stream from
+    the first label on, otherwise while the empty hand moves.
+    """
+
+    def __init__(self, reader: Reader, stream: bool) -> None:
+        self.session, self.attempts, self.ticks = reader.session, list[_Attempt](), list[_Grasp]()
+        self._path, self._size = reader.path, reader.path.stat().st_size
+        self._stream, self._tick_us = stream, _TICK_US if stream else _MOVING_TICK_US
+        self._taxels = _taxels(reader)
+        self._switches: SwitchFrame | None = None
+        self._glove: GloveFrame | None = None
+        self._label: Label | None = None
+        self._begun_us: int | None = None
+        self._due_us: int | None = None
+
+    def rows(self) -> tuple[_Grasp, ...]:
+        """Return the rows of trials that were accepted."""
+        return tuple(row for attempt in self.attempts if attempt.accepted for row in attempt.rows)
+
+    def frame(self, frame: SwitchFrame | GloveFrame) -> None:
+        """Take a frame, after the ticks that are due before it."""
+        self._tick(frame.time_us)
+        if isinstance(frame, SwitchFrame):
+            self._switches = frame
+            self._taxels.read(frame.time_us, frame.taxels or [None] * len(self.session.taxels))
+        else:
+            self._glove = frame
+
+    def label(self, label: Label) -> None:
+        """Take what became of a trial."""
+        self._tick(label.time_us)
+        before, self._label = self._label, label
+        if label.event == "begun":
+            self._begun_us = label.time_us
+            if not self._stream and label.grasp == NONE:
+                self.ticks, self._due_us = [], label.time_us + self._tick_us
+        elif label.event == "captured":
+            row = self._row(label, label.time_us)
+            ticks = self.ticks if self._due_us is not None and not self._stream else []
+            # The last tick may be a moment before the capture.
+            enough_us = label.time_us - self._tick_us // 2
+            rows = [replace(tick, label=label) for tick in ticks if tick.time_us <= enough_us]
+            begun_us = self._begun_us
+            if begun_us is None:
+                begun_us = self.attempts[-1].judged_us if self.attempts else label.time_us
+            self.attempts.append(_Attempt(begun_us, row, label.time_us, (*rows, row)))
+            self._begun_us = None
+        elif before is not None and before.event == "captured":
+            accepted = label.event == "accepted" and label.trial == before.trial
+            self.attempts[-1].accepted, self.attempts[-1].judged_us = accepted, label.time_us
+        if self._stream:
+            self._due_us = label.time_us if self._due_us is None else self._due_us
+        elif label.event != "begun":
+            self._due_us = None
+
+    def _tick(self, until_us: int) -> None:
+        """Note rows that are due before `until_us`, while devices are read."""
+        while self._label is not None and self._due_us is not None and self._due_us < until_us:
+            steps = 1
+            if self._is_fresh(self._due_us):
+                self.ticks.append(self._row(self._label, self._due_us))
+                if len(self.ticks) % 1000 == 0:
+                    made = len(self.ticks) * (128 + 8 * len(self.session.taxels))
+                    check_made(f"{self._path.name}: its stream", made // 4, self._size)
+            else:
+                steps = -(-(until_us - self._due_us) // self._tick_us)
+            self._due_us += steps * self._tick_us
+
+    def _is_fresh(self, time_us: int) -> bool:
+        switches, glove, session = self._switches, self._glove, self.session
+        lacks = bool(session.switches or session.taxels) and (switches is None or time_us - switches.time_us > FRESH_US)
+        return not lacks and not (session.sensors and (glove is None or time_us - glove.time_us > FRESH_US))
+
+    def _row(self, label: Label, time_us: int) -> _Grasp:
+        return _Grasp(label, self._switches, self._glove, tuple(self._taxels.counts), time_us)
+
+
+def _streamed(watch: _Watch, collection: Collection) -> tuple[_Grasp, ...]:
+    """Return the rows of a session as a stream: those in which a grasp is held, and those of the other rows of trials
+    in which nothing is.
+    """
+    ticks, attempts, session = watch.ticks, watch.attempts, watch.session
+    if not ticks:
+        return ()
+    time = np.array([tick.time_us for tick in ticks], np.int64)
+    closed = switch_matrix([tick.switches.closed if tick.switches else 0 for tick in ticks], len(session.switches))
+    places = [place for place, name in enumerate(session.sensors) if name not in WRIST]
+    codes = np.array([[tick.glove.sensors[place] for place in places] if tick.glove else [] for tick in ticks])
+    if not places:
+        codes = np.array([[count or 0 for count in tick.counts] for tick in ticks])
+    codes = codes.astype(np.int32).reshape(len(ticks), -1)
+    empty = {number for number, attempt in enumerate(attempts) if attempt.captured.label.grasp == NONE}
+    empty = empty if NONE not in collection.types else set()
+    trial, held = np.full(len(ticks), -1), np.zeros(len(ticks), np.bool_)
+    captures = [0, *(int(np.searchsorted(time, each.captured.time_us, "right")) for each in attempts), len(ticks)]
+    records_none = NONE in {task.grasp for task in collection.tasks}
+    for number, attempt in enumerate(attempts):
+        end_us = attempt.captured.time_us if number in empty else attempt.judged_us
+        if attempt.accepted and records_none:
+            first, beyond = np.searchsorted(time, [attempt.begun_us, end_us]).tolist()
+            trial[first:beyond] = np.where(held[first:beyond], trial[first:beyond], number)
+        before, here, after = captures[number : number + 3]
+        if attempt.accepted and number not in empty and before < here:
+            first, beyond = _held(closed[before:after], codes[before:after], time[before:after], here - 1 - before)
+            trial[before + first : before + beyond], held[before + first : before + beyond] = number, True
+    labels = [(structs.replace(each.captured.label, grasp=NONE), each.captured.label) for each in attempts]
+    rows = np.flatnonzero(trial >= 0).tolist()
+    return tuple(replace(ticks[row], label=labels[trial[row]][int(held[row])]) for row in rows)
+
+
+def _held(closed: NDArray[np.bool_], codes: NDArray[np.int32], time: NDArray[np.int64], here: int) -> tuple[int, int]:
+    """Return from which of neighbouring rows on, and until before which, the hand stays as it is in row `here`.
+
+    It does while half of the switches that are closed there still are, and while joints stay near.
+    """
+    near = np.zeros(len(time), np.bool_)
+    near[here] = True
+    if closed[here].any() or codes.shape[1]:
+        near = 2 * (closed & closed[here]).sum(axis=1) >= closed[here].sum()
+    if codes.shape[1]:
+        away = np.abs(codes - codes[here]).mean(axis=1)
+        near &= away <= max(_NEAR * float(np.percentile(away, 95)), _NEAR_CODES)
+    ends = []
+    for step, stop in ((-1, -1), (1, len(time))):
+        end = row = here
+        while row + step != stop and abs(row - end) <= _BRIDGED and abs(time[row + step] - time[row]) <= 2 * _TICK_US:
+            row += step
+            end = row if near[row] else end
+        ends.append(end)
+    return ends[0], ends[1] + 1
 
 
 def _taxels(reader: Reader) -> Taxels:
@@ -148,10 +307,11 @@ def _taxels(reader: Reader) -> Taxels:
     return Taxels(session.taxels, [[]] * len(session.taxels), session.taxel_calibration, settings)
 
 
-def _left_out(parts: Sequence[_Part]) -> Iterator[Finding]:
+def _left_out(parts: Sequence[_Part], stream: bool) -> Iterator[Finding]:
     trials = [grasp.label.trial for part in parts for grasp in part.grasps if not grasp.whole(part.session)]
     if trials:
-        message = f"{len(trials)} trials in which not everything was read were left out: {list_rows(np.array(trials))}"
+        what = f"{len(trials)} {'rows' if stream else 'trials'} in which not everything was read"
+        message = f"{what} were left out: {list_rows(np.array(trials))}"
         yield Finding("dropped rows", len(trials), message, tuple(trials[:SHOWN]))
 
 
@@ -190,8 +350,10 @@ def _bytes_of(grasps: Sequence[tuple[_Part, _Grasp]]) -> int:
     return len(grasps) * (len(session.switches) + 2 * len(session.sensors) + 2 * len(session.taxels) + 4 * letters)
 
 
-def _joined(grasps: Sequence[tuple[_Part, _Grasp]]) -> tuple[GraspSet, tuple[CodingCost, ...]]:
+def _joined(grasps: Sequence[tuple[_Part, _Grasp]], stream: bool) -> tuple[GraspSet, tuple[CodingCost, ...]]:
     first = grasps[0][0]
+    began = {id(part): grasp.time_us for part, grasp in reversed(grasps)}
+    session = {part: str(number) for number, part in enumerate(dict.fromkeys(id(part) for part, _ in grasps), start=1)}
     trials = np.array([grasp.label.trial for _, grasp in grasps], np.int64)
     joints = [_joint(name, grasps, trials) for name in first.session.sensors if name not in WRIST]
     labels = [grasp.label for _, grasp in grasps]
@@ -209,6 +371,8 @@ def _joined(grasps: Sequence[tuple[_Part, _Grasp]]) -> tuple[GraspSet, tuple[Cod
         trials=trials,
         taxels=np.array([codes for codes, _ in taxels], np.uint16).T if taxels else np.empty(0, np.uint16),
         taxel_columns=tuple(taxel for _, taxel in taxels),
+        sessions=np.array([session[id(part)] for part, _ in grasps] if stream else [], np.str_),
+        times_us=np.array([grasp.time_us - began[id(part)] for part, grasp in grasps] if stream else [], np.int64),
     )
     return grasp_set, tuple(cost for _, _, cost in joints)
 

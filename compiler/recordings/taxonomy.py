@@ -6,6 +6,8 @@ gave each two of different volume); a key a grasp type, its value a list of obje
 
     PoS = ["bottle", "broom"]
     Tip = ["pin", "bead"]
+
+Of "none" it lists movements of the empty hand, in place of MOVEMENTS.
 """
 
 import difflib
@@ -178,19 +180,29 @@ FEIX_33 = published("feix33")
 
 # What a grasp type is collected with where no object is named.
 ANY = "any"
+# What an empty hand does, and how the wearer is asked for it.
+MOVEMENTS = {
+    "open hand": "hold the hand open, flat or relaxed, and touch nothing",
+    "approach": "reach for an object and shape the hand for it, without touching it",
+    "release": "draw back from an object that was just let go, and open the hand",
+    "idle movement": "move the hand as between two tasks: point, turn, wave, touch nothing",
+}
 
 
-def collected(taxonomy: str, objects: Path | None) -> tuple[Taxonomy, tuple[Task, ...]]:
-    """Return the taxonomy of this name and what is to be collected of it: what `objects` lists, or every type.
+def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[Taxonomy, tuple[Task, ...]]:
+    """Return the taxonomy of this name and what is to be collected of it: what `objects` lists, or every type; with
+    `none`, movements of the empty hand as well.
 
     "own" is the user's own taxonomy: the types that `objects` lists, in its order. Raises RecordingError, or
     ColumnsError naming file, line and key.
     """
     if objects is None:
         types = published(taxonomy)
-        return types, tuple(Task(grasp, (ANY,)) for grasp in types.types)
+        return types, (*(Task(grasp, (ANY,)) for grasp in types.types), *_nothing(tuple(MOVEMENTS), none))
     source = read_source(objects, ColumnsError)
     tables = source.tables()
+    listed = [key for key in tables if plain(key) == NONE]
+    movements = _objects(source, listed[0], tables.pop(listed[0])) if listed else tuple(MOVEMENTS)
     if len(tables) < 2:
         raise ColumnsError(f"{objects.name} names {len(tables)} grasp types: a collection takes two at least")
     types = own(tables) if taxonomy == "own" else published(taxonomy)
@@ -203,7 +215,11 @@ def collected(taxonomy: str, objects: Path | None) -> tuple[Taxonomy, tuple[Task
         if grasp in tasks:
             raise source.error((key,), f"is {grasp}, which is there already: list it once")
         tasks[grasp] = Task(grasp, _objects(source, key, value))
-    return types, tuple(tasks.values())
+    return types, (*tasks.values(), *_nothing(movements, none))
+
+
+def _nothing(movements: tuple[str, ...], none: bool) -> tuple[Task, ...]:
+    return (Task(NONE, movements),) if none else ()
 
 
 def _objects(source: TomlText, key: str, value: object) -> tuple[str, ...]:

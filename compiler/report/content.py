@@ -33,7 +33,7 @@ class ReportContent:
     firmware      a sentence: what the firmware in the build is laid out for, or why there is none
     only_answer   the one grasp type that every row gets, where there is but one
     tree          the tree that chose the switches, over the recordings' switches; classes index manifest.grasps
-    confusion     (K, K) counts of frames in the headline's folds, row: true, column: recognised, as in manifest.grasps
+    confusion     (K, K) counts of frames in the headline's folds, row: true, column: recognised, as in manifest.answers
     study         the paper's tables for these recordings; no_study: a sentence, why there are none
     frontier      of which the report tells; point: the number of the one that the build is, None if it is none of them
     hand          where the recordings' switches lie
@@ -67,10 +67,10 @@ class ReportContent:
     transitions: Transitions | None = None
 
     def __post_init__(self) -> None:
-        grasps = len(self.manifest.grasps)
+        grasps, answers = len(self.manifest.grasps), len(self.manifest.answers)
         if self.tables.n_classes != grasps or self.tables.n_switches != len(self.manifest.switches):
             raise ReportError("the tables are of another build than build.json: compile the build again")
-        if self.confusion is not None and self.confusion.shape != (grasps, grasps):
+        if self.confusion is not None and self.confusion.shape not in ((grasps, grasps), (answers, answers)):
             raise ReportError(f"a confusion matrix of {grasps} grasp types is not {self.confusion.shape}")
         if self.tree is not None and len(self.tree.classes) > grasps:
             raise ReportError("the tree knows more grasp types than the build: it is of other recordings")

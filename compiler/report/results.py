@@ -87,7 +87,9 @@ def confusions(content: ReportContent) -> Iterator[ConfusionView]:
     if content.confusion is not None:
         rate = content.manifest.headline
         folds = "" if rate is None else f", {rate.title}, {counted(rate.folds, 'nested fold')}"
-        yield confusion_view(f"This build's own recipe{folds}", content.manifest.grasps, content.confusion)
+        yield confusion_view(
+            f"This build's own recipe{folds}", content.manifest.answers[: len(content.confusion)], content.confusion
+        )
     if content.study is None:
         return
     for table in content.study.tables:

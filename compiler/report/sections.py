@@ -7,13 +7,14 @@ from itertools import accumulate
 import msgspec
 
 from thenar.runtime.manifest import AUTO, Manifest
+from thenar.runtime.published import NONE
 from thenar.runtime.scanning.propose import own_joints
 from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us, scanner_us, taxels_us
 
 from ..placement.gain import entropy_bits
 from ..placement.methods.base import METHODS
 from ..tables.faults import FaultCounts
-from ..text import INDEPENDENT, NBSP, counted, microseconds, percent, sentence
+from ..text import INDEPENDENT, NBSP, counted, detection_sentences, microseconds, percent, sentence
 from ..trainers.base import TRAINERS
 from .content import PlainTable, ReportContent
 
@@ -27,7 +28,8 @@ def headline(manifest: Manifest) -> str:
         inputs.append(f"{len(manifest.switches)} of {counted(manifest.source.switches, 'switch', 'switches')}")
     if manifest.joints:
         inputs.append(counted(len(manifest.joints), "joint"))
-    said = f"This build recognises {len(manifest.grasps)} grasp types from {' and '.join(inputs)}"
+    types = len(manifest.grasps) - (manifest.grasps[-1] == NONE)
+    said = f"This build recognises {types} grasp types from {' and '.join(inputs)}"
     rate = manifest.headline
     if rate is None:
         return f"{said}; what to expect of new grasps was not measured."
@@ -39,6 +41,18 @@ def facts(content: ReportContent) -> Iterator[tuple[str, str, str]]:
     manifest = content.manifest
     for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
         yield f"Recognised, {rate.title}", percent(rate.rate, NBSP), rate.basis
+    if (found := manifest.detected) is not None:
+        yield (
+            f"Held, {found.held.title}",
+            percent(found.held.rate, NBSP),
+            f"of grasps said to be held, {found.held.basis}",
+        )
+        if found.none is not None:
+            yield (
+                f"Nothing held, {found.none.title}",
+                percent(found.none.rate, NBSP),
+                f"said to be none, {found.none.basis}",
+            )
     yield "Switches kept", f"{len(manifest.switches)}", f"of {manifest.source.switches}"
     whose = "of a source of your own" if _unread(content) else "of the CyberGlove"
     yield "Joints", f"{len(manifest.joints)}", whose if manifest.joints else "none are used"
@@ -55,6 +69,11 @@ def _unread(content: ReportContent) -> str:
     """Return a sentence on joints that no CyberGlove measures; "" without any, or where one is wired."""
     wired = content.harness is not None and content.harness.cyberglove is not None
     return "" if wired else own_joints([joint.name for joint in content.manifest.joints])
+
+
+def nothing_held(manifest: Manifest) -> Iterator[str]:
+    """Yield what the build says of hands that hold nothing, in sentences."""
+    yield from detection_sentences(manifest)
 
 
 def warnings(content: ReportContent) -> Iterator[str]:

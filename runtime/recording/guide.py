@@ -13,6 +13,7 @@ from thenar.drivers.errors import SettingError
 
 from ..frames import GloveFrame, SwitchFrame
 from ..names import list_names
+from ..published import NONE
 from .layout import Tail
 from .reader import Reader
 from .session import MOST_TRIALS, Collection, Event, Label, Session
@@ -21,7 +22,7 @@ from .writer import Recorder
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One grasp to record: its number in the collection, from 1, its type and its object."""
+    """One grasp to record: its number in the collection, from 1, its type and its object; of none, its movement."""
 
     number: int
     grasp: str
@@ -76,13 +77,18 @@ def read_journal(path: Path) -> Journal:
 
 # A frame this old was not read while the grasp was held.
 FRESH_US = 200_000
+# So long the empty hand moves in a trial of none.
+MOVING_US = 2_000_000
 
 
 class Stage(Enum):
-    """Where a collection stands: before its first countdown, counting, with a captured grasp to judge, or over."""
+    """Where a collection stands: before its first countdown, counting, while the empty hand moves, with a captured
+    trial to judge, or over.
+    """
 
     READY = "ready"
     COUNTDOWN = "countdown"
+    MOVING = "moving"
     REVIEW = "review"
     OVER = "over"
 
@@ -129,14 +135,21 @@ class Guide:
         return self._switches, self._glove
 
     def seconds_left(self, now_us: int) -> float:
-        """Return what is left of the countdown."""
+        """Return what is left of the countdown, or of the movement."""
         return max(0, self._zero_us - now_us) / 1e6
 
     def take(self, now_us: int, arrived: Sequence[SwitchFrame | GloveFrame]) -> None:
-        """Record what came in, and capture the grasp if the countdown has ended. Raises FrameError."""
+        """Record what came in; where the countdown has ended, capture the grasp, or begin the movement of the empty
+        hand, which is captured when its time has passed. Raises FrameError.
+        """
         for frame in arrived:
             self._record(frame)
-        if self.stage is Stage.COUNTDOWN and now_us >= self._zero_us:
+        if self.stage not in (Stage.COUNTDOWN, Stage.MOVING) or now_us < self._zero_us:
+            return
+        if self.stage is Stage.COUNTDOWN and self._left[-1].grasp == NONE:
+            self._zero_us, self.stage = now_us + MOVING_US, Stage.MOVING
+            self._label(now_us, "begun")
+        else:
             self._capture(now_us)
 
     def press(self, now_us: int, key: Key) -> None:
@@ -158,6 +171,8 @@ class Guide:
         self.problem = ""
         self._zero_us = now_us + self._countdown_us
         self.stage = Stage.COUNTDOWN if self._left else Stage.OVER
+        if self._left and self._left[-1].grasp != NONE:
+            self._label(now_us, "begun")
 
     def _record(self, frame: SwitchFrame | GloveFrame) -> None:
         if isinstance(frame, SwitchFrame):

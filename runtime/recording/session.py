@@ -19,7 +19,8 @@ from ..policy import Policy
 from ..taxels import TaxelCalibration
 
 METADATA = "thenar"
-VERSION = 1
+# Collections are of version 2, which says when a trial began; all else is written as version 1.
+VERSION = 2
 # No glove, no taxonomy and no patience goes beyond them. A file that does is damaged, or made to fill the memory.
 _MOST_SWITCHES, _MOST_SENSORS, _MOST_TYPES, _MOST_OBJECTS = 65_536, 255, 10_000, 1000
 MOST_TRIALS = 1_000_000
@@ -28,7 +29,7 @@ Number = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
 
 
 class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A grasp type to collect, and the objects to grasp so, by turns."""
+    """A grasp type to collect, and the objects to grasp so, by turns; of "none", the movements of the empty hand."""
 
     grasp: str
     objects: Annotated[tuple[str, ...], msgspec.Meta(min_length=1, max_length=_MOST_OBJECTS)]
@@ -48,14 +49,15 @@ class Collection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     seed: Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
 
 
-Event = Literal["captured", "accepted", "redone"]
+Event = Literal["begun", "captured", "accepted", "redone"]
 
 
 class Label(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What happened to a trial, numbered from 1 in the order of the collection.
 
-    "captured": the frames before this one are the grasp; "accepted": those captured last are kept; "redone": they are
-    not. time_us is the host's monotonic clock.
+    "begun": the hand moves from now on, to the grasp, or, of none, without one until "captured"; "captured": the frames
+    before this one are the grasp; "accepted": those captured last are kept; "redone": they are not. time_us is the
+    host's monotonic clock.
     """
 
     time_us: Number
@@ -104,7 +106,7 @@ def to_metadata(session: Session) -> dict[str, str]:
     """Return `session` as the keys and texts of a Metadata record."""
     written = [field.name for field in _FIELDS if session.taxels or field.name not in _OF_TAXELS]
     texts = {name: _text(getattr(session, name)) for name in written}
-    return {"version": str(VERSION), **texts}
+    return {"version": str(1 if session.collection is None else VERSION), **texts}
 
 
 def from_metadata(texts: dict[str, str]) -> Session:

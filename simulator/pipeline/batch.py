@@ -107,11 +107,14 @@ class Batch:
         return self.condition.site(self.repetitions)
 
     def holds(self, let_go_us: int | None) -> Bits:
-        """Return in which frames (n, F) the hand holds something: from first contact until the last switch has opened
-        after it let go, at let_go_us.
+        """Return in which frames (n, F) the hand holds something: from first contact until no place is pressed hard
+        enough any more to close a switch, after it let go at let_go_us.
         """
-        last = np.where(self.off_us == NEVER, -1, self.off_us).max(axis=1)
-        over = np.maximum(last, NEVER if let_go_us is None else let_go_us)
+        over = np.full(len(self), NEVER if let_go_us is None else let_go_us)
+        if self.ramp is not None and let_go_us is not None:
+            first = self.on_us.min(axis=1)
+            # Forces fall as they grew.
+            over += np.where(first == NEVER, 0, round(self.ramp.rise_us) - np.where(first == NEVER, 0, first))
         held: Bits = (self.frame_us >= 0) & (self.frame_us < over[:, None])
         return held
 

@@ -291,7 +291,7 @@ def _ticks(reader: Reader, rest: bytes, period_us: int) -> Iterator[Moment]:
                 codes = tuple(old if code is None else code for old, code in zip(before, entry.taxels, strict=True))
         elif isinstance(entry, GloveFrame):
             sensors = entry.sensors
-        elif isinstance(entry, LiveGrasp | Label):
+        elif isinstance(entry, LiveGrasp) or (isinstance(entry, Label) and entry.event != "begun"):
             grasp = entry.grasp
         else:
             continue

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import monotonic
 
+import numpy as np
 import pytest
 
 from thenar.cli import run
@@ -42,7 +43,8 @@ class Terminal:
     def __init__(self, folder: Path, *more: str, most_bytes: int = resource.RLIM_INFINITY) -> None:
         self.master, slave = pty.openpty()
         options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--objects", folder / "objects.toml"]
-        options += ["--subject", "A", "--repetitions", "2", "--countdown", "0.05", "-o", folder / "set.grasps", *more]
+        options += ["--subject", "A", "--repetitions", "2", "--countdown", "0.05", "-o", folder / "set.grasps"]
+        options += more or ["--no-none"]
         command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
         environment = os.environ | {"TERM": "xterm", "COLUMNS": "120", "LINES": "40"}
         self.process = subprocess.Popen(
@@ -142,7 +144,7 @@ def reviewed(terminal: Terminal, number: int) -> None:
 
 
 def test_a_whole_collection_becomes_a_set(folder: Path, start: Start, scanner: EmulatedScanner) -> None:
-    terminal = start("--seed", "5")
+    terminal = start("--seed", "5", "--no-none")
     terminal.until(rb"Enter: start the countdown")
     terminal.press(b"\r")
     for number in (1, 2, 3, 4):
@@ -168,7 +170,7 @@ def test_a_whole_collection_becomes_a_set(folder: Path, start: Start, scanner: E
 
 
 def test_after_a_kill_the_same_command_goes_on_where_it_was(folder: Path, start: Start) -> None:
-    first = start("--seed", "5")
+    first = start("--seed", "5", "--no-none")
     first.until(rb"Enter: start the countdown")
     first.press(b"\r")
     reviewed(first, 1)
@@ -205,7 +207,7 @@ def test_pads_are_recorded_beside_the_rest_and_survive_a_kill(
     (folder / "pads.toml").write_text(TaxelCalibration(unit="N", taxels=(TaxelLine("p0", 100, 900, 2.0),)).to_toml())
     scanner.reboot(ScannerBoard(1, 4, channels=2))
     scanner.press((500, 40))
-    first = start("--seed", "5")
+    first = start("--seed", "5", "--no-none")
     first.until(rb"Enter: start the countdown")
     first.press(b"\r")
     reviewed(first, 1)
@@ -291,12 +293,13 @@ def test_a_device_that_is_gone_is_no_grasp(folder: Path, start: Start, glove: Em
         (["--subject", "B"], "was begun with other subject than asked for now (A, not B)"),
         (["--repetitions", "3"], "was begun with other repetitions"),
         (["--seed", "6"], "was begun with other seed"),
+        (["--none"], "was begun with other tasks"),
     ],
 )
 def test_another_collection_does_not_go_into_the_same_file(
     folder: Path, start: Start, change: list[str], said: str
 ) -> None:
-    first = start("--seed", "5")
+    first = start("--seed", "5", "--no-none")
     first.until(rb"Enter: start the countdown")
     first.press(b"q")
     assert first.finish()[0] == 0
@@ -340,22 +343,34 @@ def test_without_its_devices_nothing_is_recorded(folder: Path) -> None:
     assert not list(folder.glob("set.*"))
 
 
-def test_without_a_terminal_lines_are_the_keys(folder: Path) -> None:
+def test_without_a_terminal_lines_are_the_keys_and_the_empty_hand_is_recorded_too(
+    folder: Path, scanner: EmulatedScanner
+) -> None:
+    scanner.set(0)
     options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--objects", folder / "objects.toml"]
     options += ["--subject", "A", "--repetitions", "1", "--countdown", "0", "-o", folder / "set.grasps"]
     command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         assert process.stdin is not None
         assert process.stderr is not None
-        accepted = 0
+        accepted, moving = 0, False
         for line in process.stderr:
             accepted += b"keep it" in line
+            moving = b"nothing held, open hand: hold the hand open" in line or moving
             if b"Enter" in line:
                 process.stdin.write(b"\n")
                 process.stdin.flush()
-        assert accepted == 2
+        assert (accepted, moving) == (3, True)
         assert process.wait(30) == 0
-    assert len(GraspSet.load(folder / "set.grasps")) == 2
+        assert process.stdout is not None
+        assert b"12 grasps, in 10 of which nothing is held; 3 of 3 trials are done" in process.stdout.read()
+    grasp_set = GraspSet.load(folder / "set.grasps")
+    assert (len(grasp_set), len(grasp_set.without_none())) == (12, 2)
+    assert set(grasp_set.rows(grasp_set.is_none).objects.tolist()) == {"open hand"}
+    assert run(["import", str(folder / "set.mcap"), "-o", str(folder / "stream.grasps"), "--stream"]) == 0
+    stream = GraspSet.load(folder / "stream.grasps")
+    assert len(stream.rows(stream.is_none)) > 150
+    assert set(np.diff(stream.times_us).tolist()) >= {10_000}
 
 
 def test_without_stdin_it_says_where_keys_would_come_from(folder: Path) -> None:

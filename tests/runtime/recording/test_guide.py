@@ -1,3 +1,4 @@
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -6,7 +7,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.recording.guide import FRESH_US, Guide, Key, Stage, planned
+from thenar.runtime.recording.guide import FRESH_US, MOVING_US, Guide, Key, Stage, planned
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Collection, Label, Session, Task
 from thenar.runtime.recording.writer import Recorder
@@ -29,8 +30,16 @@ def whole(time_us: int, closed: int = 1) -> list[SwitchFrame | GloveFrame]:
     return [SwitchFrame(time_us, closed), GloveFrame(time_us, b"\x01\x02", 3)]
 
 
+def labels(recorder: Recorder) -> list[Label]:
+    return [entry for entry in Reader(recorder.path) if isinstance(entry, Label)]
+
+
 def events(recorder: Recorder) -> list[tuple[str, int]]:
-    return [(entry.event, entry.trial) for entry in Reader(recorder.path) if isinstance(entry, Label)]
+    """What became of trials; that every capture follows when its trial began is looked at here."""
+    found = labels(recorder)
+    for begun, label in pairwise(found):
+        assert label.event != "captured" or (begun.event, begun.trial) == ("begun", label.trial)
+    return [(label.event, label.trial) for label in found if label.event != "begun"]
 
 
 def stage(guide: Guide) -> Stage:
@@ -63,7 +72,8 @@ def test_what_came_when_the_countdown_ended_is_captured_and_nothing_later(guide:
     guide.take(COUNTDOWN_US + 1, whole(COUNTDOWN_US + 1, closed=0b010))
     assert guide.captured == (SwitchFrame(COUNTDOWN_US, 0b101), GloveFrame(COUNTDOWN_US, b"\x01\x02", 3))
     entries = list(Reader(recorder.path))
-    before = entries[: next(place for place, entry in enumerate(entries) if isinstance(entry, Label))]
+    captured = [isinstance(entry, Label) and entry.event == "captured" for entry in entries]
+    before = entries[: captured.index(True)]
     assert before[-2] == SwitchFrame(COUNTDOWN_US, 0b101)
 
 
@@ -142,6 +152,39 @@ def test_a_glove_without_switches_and_switches_without_a_glove_are_enough(tmp_pa
         guide.press(0, Key.ACCEPT)
         guide.take(0, [frame])
         assert stage(guide) is Stage.REVIEW
+
+
+def test_an_empty_hand_moves_after_the_countdown_and_is_captured_then(tmp_path: Path, session: Session) -> None:
+    collection = replace(COLLECTION, tasks=(Task("none", ("open hand", "release")),))
+    with Recorder(tmp_path / "a.mcap", replace(session, collection=collection)) as recorder:
+        guide = Guide(planned(collection), recorder, COUNTDOWN_US)
+        guide.press(0, Key.ACCEPT)
+        assert stage(guide) is Stage.COUNTDOWN
+        now = COUNTDOWN_US
+        guide.take(now, whole(now))
+        assert stage(guide) is Stage.MOVING
+        assert guide.seconds_left(now) == MOVING_US / 1e6
+        guide.take(now + MOVING_US - 1, whole(now + MOVING_US - 1))
+        guide.press(now + MOVING_US - 1, Key.ACCEPT)
+        assert stage(guide) is Stage.MOVING
+        guide.press(now + MOVING_US - 1, Key.REDO)
+        assert stage(guide) is Stage.COUNTDOWN
+        now += COUNTDOWN_US + MOVING_US
+        guide.take(now, whole(now))
+        guide.take(now + MOVING_US, [])
+        assert (guide.stage, guide.problem) == (Stage.READY, "the switches are silent")
+        guide.press(now, Key.ACCEPT)
+        now += COUNTDOWN_US
+        for moment in (now, now + MOVING_US):
+            guide.take(moment, whole(moment))
+        assert stage(guide) is Stage.REVIEW
+        guide.press(now + MOVING_US, Key.ACCEPT)
+        assert (guide.trial, guide.accepted) == (planned(collection)[1], 1)
+    assert events(recorder) == [("captured", 1), ("accepted", 1)]
+    found = labels(recorder)
+    assert [label.event for label in found] == ["begun", "begun", "begun", "captured", "accepted"]
+    assert found[-2].time_us - found[-3].time_us == MOVING_US
+    assert {label.grasp for label in found} == {"none"}
 
 
 def test_nothing_left_is_over_at_once(recorder: Recorder) -> None:

@@ -13,7 +13,7 @@ from thenar.simulator.body.cyberglove import common_joints
 from thenar.simulator.body.layout import murakami160
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import Setting
-from thenar.simulator.pipeline.ramp import NEVER
+from thenar.simulator.pipeline.ramp import NEVER, Ramp
 from thenar.simulator.running.report import Codes, Rows, grasp_set, joined, rows_of
 
 SWITCHES = tuple(patch.name for patch in murakami160())
@@ -40,14 +40,14 @@ def recorded(make_condition: Callable[..., Condition], make_batch: Callable[...,
         # The two conditions of the first subject share its session.
         batch.trials = random.permutation(6) * 2 + number % 2
         batch.bits = random.random((6, FRAMES, 160)) < 0.2
-        batch.frame_us, batch.off_us = np.tile(FRAME_US, (6, 1)), np.full((6, 160), 20_000)
+        batch.frame_us = np.tile(FRAME_US, (6, 1))
         found.append((condition, batch, random.integers(0, 1000, (6, FRAMES, 16)).astype(np.uint16)))
     return found
 
 
 def part_of(batch: Batch, codes: Codes, pick: slice, make_batch: Callable[..., Batch]) -> tuple[Batch, Codes]:
     part = make_batch(batch.repetitions[pick], batch.condition)
-    for name in ("trials", "bits", "frame_us", "off_us"):
+    for name in ("trials", "bits", "frame_us"):
         setattr(part, name, getattr(batch, name)[pick])
     return part, codes[pick]
 
@@ -142,15 +142,19 @@ def test_a_clock_never_goes_back_and_begins_at_nought(
         assert (np.diff(clock) >= 0).all()
 
 
-def test_a_grasp_is_held_until_its_last_switch_opens(
-    recorded: list[Recorded], make_batch: Callable[..., Batch]
+def test_a_grasp_is_held_until_nothing_is_pressed_as_it_was_when_the_first_switch_closed(
+    make_batch: Callable[..., Batch],
 ) -> None:
-    batch, _ = part_of(recorded[0][1], recorded[0][2], slice(0, 3), make_batch)
-    batch.off_us = np.full((3, 160), NEVER)
-    batch.off_us[0, 7], batch.off_us[1, 9] = 20_001, 5_000  # one that opens late, one pressed in passing
-    held = [batch.holds(15_000).tolist(), batch.holds(None).tolist()]
-    assert held[0] == [[False, True, True, True], [False, True, True, False], [False, True, True, False]]
-    assert held[1] == [[False, True, True, True]] * 3
+    batch = make_batch(range(3))
+    batch.frame_us = np.tile(FRAME_US, (3, 1))
+    assert batch.holds(15_000).tolist() == [[False, True, True, False]] * 3
+    batch.on_us = np.full((3, 160), NEVER)
+    batch.on_us[0, 7], batch.on_us[1, 9] = 2_999, 3_000
+    batch.ramp = Ramp(np.zeros((2, 3, 160)), 8_000.0)
+    late, early, never = batch.holds(15_000).tolist()
+    assert late == [False, True, True, True]
+    assert early == never == [False, True, True, False]
+    assert batch.holds(None).tolist() == [[False, True, True, True]] * 3
 
 
 def test_a_batch_of_which_nothing_is_kept_has_no_rows(recorded: list[Recorded], make: MakeSetting) -> None:

@@ -1,0 +1,121 @@
+"""What a build refuses that was trained without rows of nothing held: thresholds, learnt from its training rows.
+
+A held-out frame lies beyond what its candidate's type was trained on by three deviations: its score below the least of
+the type's rows; its closed switches below their least or above their most; and how many of its joints are outside the
+ranges that hold all but TAIL of the type's rows at either end. How far a grasp may lie beyond, the slack of each, is
+learnt from inner folds: no more than the share asked for is refused there. As ranks, deviations are comparable: a frame
+is refused for the rank of its rarest one, and one limit of ranks makes all three slacks.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.manifest import Options, Rejection
+from thenar.runtime.published import NONE
+from thenar.runtime.tables import HIGHEST_CODE, LIMIT, IntegerTables
+
+from ..evaluation.choosing import inner_folds
+from ..firmware.layout import code_bits
+from ..samples import Samples
+from ..tables.collapse import collapse
+from ..tables.quantise import integer_scores, quantise
+from ..trainers.base import Training
+
+Floats = NDArray[np.float64]
+
+# Of kamakura's open hands that are taken for Add, 2 % were refused with whole ranges, 58 with 1 % less at either end,
+# 43 with 5: the narrower they are, the more joints of a held-out grasp are outside.
+TAIL = 0.01
+
+
+def rejection_of(
+    samples: Samples, tables: IntegerTables, training: Training, options: Options, groups: NDArray[np.generic] | None
+) -> Rejection | None:
+    """Return what a build of these tables refuses; None where none is a class, nothing is to be refused, or there are
+    too few trials.
+
+    samples   the rows that the tables were trained on, of the kept switches and joints
+    training  what made them
+    groups    of each row (n,), what inner folds leave out together
+    """
+    if not options.refuse or samples.has_none or NONE in samples.grasps:
+        return None
+    deviations = [
+        _Limits(samples.rows(fold.train), _tables(samples.rows(fold.train), training, options)).deviations(
+            samples.rows(fold.test)
+        )
+        for fold in inner_folds(samples, options.seed, groups)
+    ]
+    if not deviations:
+        return None
+    slacks = _slacks(np.concatenate(deviations), options.refuse)
+    return _Limits(samples, tables).rejection(*slacks, options.refuse)
+
+
+def _tables(samples: Samples, training: Training, options: Options) -> IntegerTables:
+    model = collapse(training.train(samples), samples.n_switches)
+    return quantise(model, samples.switches, samples.codes, options.width, options.table_bits)
+
+
+class _Limits:
+    """What rows of each type show: least scores, in units, least and most closed switches, and ranges of codes."""
+
+    def __init__(self, samples: Samples, tables: IntegerTables) -> None:
+        self._tables, self._k = tables, samples.n_classes
+        scores, closed = self._scores(samples), samples.switches.sum(axis=1)
+        n_joints = samples.codes.shape[1]
+        # A type without rows keeps limits that nothing is beyond.
+        self.least = np.full(self._k, -np.inf)
+        self.closed = np.tile(np.array([0, samples.n_switches]), (self._k, 1))
+        self.ranges = np.tile(np.array([0, HIGHEST_CODE]), (self._k, n_joints, 1))
+        for label in np.unique(samples.labels).tolist():
+            own = samples.labels == label
+            self.least[label] = scores[own, label].min()
+            self.closed[label] = closed[own].min(), closed[own].max()
+            codes = np.sort(samples.codes[own], axis=0)
+            tail = int(TAIL * len(codes))
+            self.ranges[label] = np.stack([codes[tail], codes[-1 - tail]], axis=1)
+
+    def _scores(self, samples: Samples) -> Floats:
+        scores: Floats = integer_scores(self._tables, samples.switches, samples.codes) / self._tables.scale
+        return scores
+
+    def deviations(self, samples: Samples) -> Floats:
+        """Return by how much each row lies beyond the limits of its candidate, (n, 3)."""
+        scores, closed, codes = self._scores(samples), samples.switches.sum(axis=1), samples.codes
+        best = scores.argmax(axis=1)
+        low, high = np.moveaxis(self.ranges[best], 2, 0)
+        outside = ((codes < low) | (codes > high)).sum(axis=1)
+        fewest, most = self.closed[best].T
+        counts = np.maximum(0, np.maximum(fewest - closed, closed - most))
+        return np.column_stack([np.maximum(0, self.least[best] - scores.max(axis=1)), counts, outside])
+
+    def rejection(self, score: float, closed: float, outside: float, share: float) -> Rejection:
+        """Return these limits with the slack of each deviation."""
+        least = np.floor(np.maximum(self.least - score, -LIMIT / self._tables.scale) * self._tables.scale)
+        ranges = self.ranges.copy()
+        if code_bits(self._tables) == 8:
+            # Firmware takes codes above 255 for 255.
+            ranges[:, :, 0] = np.minimum(ranges[:, :, 0], 255)
+            ranges[:, :, 1][ranges[:, :, 1] >= 255] = HIGHEST_CODE
+        fewest, most = np.maximum(0, self.closed[:, 0] - int(closed)), self.closed[:, 1] + int(closed)
+        return Rejection(
+            share=share,
+            least_scores=tuple(least.astype(int).tolist()),
+            closed=tuple(zip(fewest.tolist(), most.tolist(), strict=True)),
+            ranges=tuple(tuple((low, high) for low, high in each) for each in ranges.tolist()),
+            outside=int(outside),
+        )
+
+
+def _slacks(deviations: Floats, share: float) -> tuple[float, float, float]:
+    """Return how far each deviation may go, so that no more than `share` of the rows (n, 3) have one beyond."""
+    n = len(deviations)
+    sorted_ = np.sort(deviations, axis=0)
+    # How many rows deviate by as much or more: few is rare.
+    ranks = np.column_stack(
+        [n - np.searchsorted(column, own) for column, own in zip(sorted_.T, deviations.T, strict=True)]
+    )
+    limit = np.sort(ranks.min(axis=1))[int(share * n)]
+    score, closed, outside = (float(own[rank >= limit].max()) for own, rank in zip(deviations.T, ranks.T, strict=True))
+    return score, closed, outside

@@ -1,0 +1,77 @@
+"""Refusing: a frame unlike all that a build was trained on is none of its grasp types, it shows that nothing is held.
+
+A frame is refused for its candidate, the grasp type of the largest score, if that score is below the least of the type,
+if fewer or more switches are closed than the type's least and most, or if more joints than `outside` lie beyond the
+type's ranges. All of that are integers: Python and C refuse the same frames. What is lost is left out: a lost or unread
+switch may be closed or open, a lost joint lies within, and with unread switches the score is not judged.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .frames import Mask
+from .manifest import Rejection
+from .scores import LANE_OFFSET
+
+
+class Rejector:
+    """Says of live frames whether a build refuses them."""
+
+    __slots__ = ("_closed", "_least", "_outside", "_ranges")
+
+    def __init__(self, rejection: Rejection) -> None:
+        self._least = [least + LANE_OFFSET for least in rejection.least_scores]
+        self._closed, self._ranges, self._outside = rejection.closed, rejection.ranges, rejection.outside
+
+    def refuses(
+        self,
+        lanes: Sequence[int],
+        closed: Mask,
+        lost: Mask,
+        codes: Sequence[int] | None,
+        *,
+        unread: Mask = 0,
+        lost_joints: Mask = 0,
+    ) -> bool:
+        """Return whether nothing is held.
+
+        Parameters
+        ----------
+        lanes : sequence of int
+            The K scores, each 2^15 too high, as `Scorer.lanes` has them.
+        closed, lost, unread : int
+            Masks of the kept switches that are closed, lost, and left unread.
+        codes : sequence of int or None
+            The joints' codes; None: all are lost.
+        lost_joints : int
+            A mask of the joints that are lost.
+        """
+        best = max(lanes)
+        candidate = lanes.index(best)
+        if best < self._least[candidate] and not unread:
+            return True
+        fewest, most = self._closed[candidate]
+        doubtful = lost | unread
+        seen = (closed & ~doubtful).bit_count()
+        if seen > most or seen + doubtful.bit_count() < fewest:
+            return True
+        if codes is None:
+            return False
+        outside = 0
+        for joint, (code, (low, high)) in enumerate(zip(codes, self._ranges[candidate], strict=True)):
+            outside += not (low <= code <= high or lost_joints >> joint & 1)
+        return outside > self._outside
+
+
+def refused(
+    rejection: Rejection, scores: NDArray[np.integer], bits: NDArray[np.bool_], codes: NDArray[np.integer]
+) -> NDArray[np.bool_]:
+    """Return which frames are refused (n,): scores (n, K), kept switches (n, s) and codes (n, j), nothing lost."""
+    candidate = scores.argmax(axis=1)
+    closed, ranges = np.array(rejection.closed), np.array(rejection.ranges).reshape(len(rejection.closed), -1, 2)
+    count, (fewest, most), (low, high) = bits.sum(axis=1), closed[candidate].T, np.moveaxis(ranges[candidate], 2, 0)
+    outside = ((codes < low) | (codes > high)).sum(axis=1)
+    least = np.array(rejection.least_scores)[candidate]
+    return np.asarray((scores.max(axis=1) < least) | (count < fewest) | (count > most) | (outside > rejection.outside))
