@@ -25,6 +25,7 @@ Labels = NDArray[np.intp]
 
 LAG_TICKS = 15  # of the live answer: 150 ms
 _AT_HALF = len(OVERLAPS) - 1
+_LARGEST = 4095
 _SCALE = 256.0  # steps per unit of the scores that are tried
 _MOST_NATS = 6.0  # a frame tells no more, before its temperature
 # The shortest duration is a half of the shortest seen, and no more than so many ticks.
@@ -136,21 +137,21 @@ def model_of(
     bias = round(STEPS * temperature * lead)
     stay = [cost + max(-bias, 0) for cost in stay[:K]] + [stay[K] + max(bias, 0)]
     extra = STEPS * change
-    changes = counts.changes.astype(np.float64) + 0.5
-    into = changes[K, :K] / changes[K, :K].sum()
-    away = changes[:K].sum(axis=1) - np.diag(changes)[:K]
-    none, other = changes[:K, K] / away, (changes[:K, :K].sum() - np.trace(changes[:K, :K])) / away.sum()
-    # A type that follows another does so with its share of those that begin.
-    direct = [_cost(other * share, extra) for share in into]
+    into = counts.changes[K, :K] + 0.5
+    enter = [_cost(share / into.sum(), extra) for share in into]
+    # Alike for all types: few changes are seen of each, and a small processor saves a look-up.
+    others, ends = int(counts.changes[:K, :K].sum()) + 0.5, int(counts.changes[:K, K].sum()) + 0.5
+    leave, other = ends / (others + ends), others / (others + ends)
+    more = _cost(other, 0)
     return SegmentModel(
         shift=shift,
         gain=gain,
         most=most,
         least=tuple(least),
         stay=tuple(stay),
-        enter=tuple(_cost(share, extra) for share in into),
-        leave=tuple(_cost(share, extra) for share in none),
-        direct=tuple(direct),
+        enter=tuple(enter),
+        leave=(_cost(leave, extra),) * K,
+        direct=tuple(min(cost + more, _LARGEST) for cost in enter),
         tick_us=tick_us,
     )
 
@@ -187,4 +188,4 @@ def _staying(durations: Sequence[int], least: int) -> int:
 
 
 def _cost(probability: float, extra: float) -> int:
-    return min(round(-STEPS * math.log(probability) + extra), 4095)
+    return min(round(-STEPS * math.log(probability) + extra), _LARGEST)
