@@ -72,7 +72,7 @@ class Build:
     @property
     def knows_none(self) -> bool:
         """Whether it says when nothing is held."""
-        return self.grasps[-1] == NONE
+        return self.none is not None or self.rejector is not None
 
     @classmethod
     def load(cls, folder: str | PathLike[str]) -> Self:
