@@ -69,11 +69,6 @@ class Build:
         self.none = len(self.grasps) - 1 if self.grasps[-1] == NONE else None
         self.rejector = None if manifest.rejection is None else Rejector(manifest.rejection)
 
-    @property
-    def knows_none(self) -> bool:
-        """Whether it says when nothing is held."""
-        return self.none is not None or self.rejector is not None
-
     @classmethod
     def load(cls, folder: str | PathLike[str]) -> Self:
         """Return the build in `folder`.
