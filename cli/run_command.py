@@ -81,6 +81,11 @@ class _SinkOption(click.Option):
 @click.option("--lead", type=Number(0), help="Lead in score units that a new grasp type needs.")
 @click.option("--dwell-ms", type=Number(0, 10_000), help="Time for which it has to keep the lead.")
 @click.option("--max-lost", type=Number(0, 1), help="Share of the build's weight that may be missing.")
+@click.option(
+    "--grace-ms",
+    type=Number(0, 10_000),
+    help="Age up to which a late record of the CyberGlove serves.  [default: four periods, at least 60]",
+)
 @click.option("--no-quarantine", is_flag=True, help="Use inputs that are stuck, chatter or drift all the same.")
 @click.option("--error-rate", type=Number(0, 1), help="Decide by a sequential test of this error rate instead.")
 @click.option("--spacing-ms", type=Number(0, 10_000), help="Minimum spacing of frames in the sequential test.")
@@ -103,6 +108,7 @@ def command(
     lead: float | None,
     dwell_ms: float | None,
     max_lost: float | None,
+    grace_ms: float | None,
     no_quarantine: bool,
     error_rate: float | None,
     spacing_ms: float | None,
@@ -134,6 +140,7 @@ def command(
             "lead": lead,
             "dwell_us": _us(dwell_ms),
             "max_lost": max_lost,
+            "grace_us": _us(grace_ms),
             "quarantine": False if no_quarantine else None,
             "error_rate": error_rate,
             "spacing_us": _us(spacing_ms),
@@ -158,7 +165,7 @@ def command(
 
 
 _LIVE = ("record", "full_scan", "status")
-_POLICY = ("lead", "dwell_ms", "max_lost", "no_quarantine", "error_rate", "spacing_ms", "lag_ms")
+_POLICY = ("lead", "dwell_ms", "max_lost", "grace_ms", "no_quarantine", "error_rate", "spacing_ms", "lag_ms")
 
 
 def _refuse_idle(glove: Path | None, replay: Path | None) -> None:

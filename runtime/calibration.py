@@ -72,10 +72,11 @@ class CodeTables:
 class Joints:
     """The newest record of a CyberGlove as the codes of a build's joints, for one thread.
 
-    A record counts for two of its periods; one of a glove that is not plugged into its box holds no measurement.
+    A record counts for two of its periods. After that it is late, and serves until it is `grace_us` old. One of a glove
+    that is not plugged into its box holds no measurement.
     """
 
-    __slots__ = ("_coded", "_codes", "_last", "_longest_us", "_wanted", "newest")
+    __slots__ = ("_coded", "_codes", "_grace_us", "_last", "_longest_us", "_wanted", "newest")
 
     def __init__(
         self,
@@ -83,6 +84,7 @@ class Joints:
         sensor_names: Sequence[str],
         calibration: GloveCalibration | None,
         period_us: int | None,
+        grace_us: int = 0,
     ) -> None:
         """Take what `CodeTables` takes, and how often records should come; None: there is no CyberGlove.
 
@@ -91,7 +93,7 @@ class Joints:
         self.newest = Newest[GloveFrame]()
         self._coded: GloveFrame | None = None
         self._last: list[int] | None = None
-        self._wanted, self._longest_us = bool(joints), PERIODS * (period_us or 0)
+        self._wanted, self._longest_us, self._grace_us = bool(joints), PERIODS * (period_us or 0), grace_us
         self._codes = None if period_us is None else CodeTables(joints, sensor_names, calibration)
 
     def codes(self, now_us: int, frame: GloveFrame | None) -> list[int] | None:
@@ -107,7 +109,11 @@ class Joints:
         if found is not self._coded and found is not None:
             self._last = self._codes.codes(found.sensors) if found.plugged else None
             self._coded = found
-        return self._last if now_us <= newest.expires_us else None
+        return self._last if now_us <= max(newest.expires_us, newest.time_us + self._grace_us) else None
+
+    def late(self, now_us: int) -> bool:
+        """Return whether the codes are of a late record."""
+        return self._wanted and now_us > self.newest.expires_us
 
 
 class AngleReader:

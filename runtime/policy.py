@@ -8,6 +8,7 @@ from thenar.drivers.errors import SettingError
 # Beyond them no frames that a hand can hold ever decide.
 _LARGEST_LEAD = 1e6
 _LEAST_RATE = 1e-100
+_GRACE_US = 60_000
 # Paths are kept for so long.
 _LONGEST_LAG_US = 10_000_000
 
@@ -26,6 +27,8 @@ class Policy:
                 ends wrong no more often, under the assumptions that it states; `dwell_us` is not used then, and
                 `hold_us` is the longest that one test may take and that its answer holds
     spacing_us  sequential test: frames count only if they are so far apart
+    grace_us    how long after it was measured a late record of the glove still serves, the answer degraded, before its
+                joints are lost; None: four of its periods, at least 60 ms
     quarantine  whether inputs that are read and yet wrong (quarantine.py) are treated as lost
     lag_us      segments: how long after a moment its state is said for good; None: no segments are sought
     """
@@ -36,6 +39,7 @@ class Policy:
     max_lost: float = 0.5
     error_rate: float | None = None
     spacing_us: int = 0
+    grace_us: int | None = None
     quarantine: bool = True
     lag_us: int | None = 150_000
 
@@ -50,8 +54,14 @@ class Policy:
             raise SettingError(f"an error rate of {self.error_rate}: it lies between 0 and 1, from {_LEAST_RATE} on")
         if self.lag_us is not None and not 0 <= self.lag_us <= _LONGEST_LAG_US:
             raise SettingError(f"a lag of {self.lag_us} us: it is 0 to {_LONGEST_LAG_US}")
+        if self.grace_us is not None and self.grace_us < 0:
+            raise SettingError(f"a grace of {self.grace_us} us: it is 0 or more")
         if self.spacing_us < 0:
             raise SettingError(f"frames {self.spacing_us} us apart: it is 0 or more")
+
+    def grace_of(self, period_us: int) -> int:
+        """Return `grace_us`, or what is usual where records come every `period_us`."""
+        return max(4 * period_us, _GRACE_US) if self.grace_us is None else self.grace_us
 
     def lead_steps(self, scale: float) -> int:
         """Return `lead` in the steps of tables with `scale` steps per unit, rounded up."""

@@ -24,7 +24,8 @@ class LiveGrasp(msgspec.Struct, frozen=True, omit_defaults=False):
     health        "ok": everything is read, `grasp` was decided on whole frames, and the candidate does not lead it by
                   the lead that a change takes (policy.py) or more. "changing": everything is read, but the candidate
                   leads `grasp` by that much, and the change has not dwelt yet; or no sequential test has ended yet.
-                  "degraded": means stood in for something that is lost. "unknown": too much is lost
+                  "degraded": means stood in for something that is lost, or the glove's record is late. "unknown": too
+                  much is lost
     switch_age_us, glove_age_us   how old the newest frames are; None before the first, or without such a device
     latency_us    from the newer of both frames to this moment
     lost          names of the switches and joints that are missing

@@ -24,6 +24,7 @@ from .training import USUAL_ROUNDS, Trained
 if TYPE_CHECKING:
     from ..evaluation.study import Study
     from ..frontier.points import Frontier
+    from ..segmenting.transitions import Transitions
 
 REPORT_NAME, SPEC_FOLDER = "report.html", "spec"
 _TRAININGS = 40  # about so many for the paper's tables
@@ -106,7 +107,6 @@ class Documents:
     def _report(self, made: BuildReport, jobs: int, progress: Progress | None) -> bytes:
         from ..report.content import ReportContent
         from ..report.page import report_html
-        from ..segmenting.transitions import Transitions
 
         study, no_study = _study(made, jobs, progress)
         names = [switch.name for switch in made.manifest.switches]
@@ -127,12 +127,23 @@ class Documents:
                 hand=None if self.hand is None else self.hand.fitted(made.grasp_set.element_names),
                 scan=made.scan,
                 harness=made.harness,
-                transitions=Transitions.of_set(made.grasp_set) if made.grasp_set.is_none.any() else None,
+                transitions=_transitions(made.grasp_set),
                 comparison=made.comparison,
                 faults=made.faults,
                 worst=worst_case(made.trained.model, made.tables, made.comparison, made.manifest.grasps, names),
             )
         )
+
+
+def _transitions(grasp_set: GraspSet) -> "Transitions | None":
+    """Return which type follows which, where the rows are whole movements."""
+    from ..segmenting.streams import SegmentingError
+    from ..segmenting.transitions import Transitions
+
+    try:
+        return Transitions.of_set(grasp_set) if grasp_set.is_none.any() else None
+    except SegmentingError:
+        return None
 
 
 def _study(made: BuildReport, jobs: int, progress: Progress | None) -> "tuple[Study | None, str]":

@@ -100,7 +100,7 @@ def made_firmware(manifest: Manifest, tables: IntegerTables, scan: ScanMap | Non
     """Return path in the build -> text of its firmware, and a sentence that says what for, or why there is none."""
     try:
         fit = smallest_fit(tables, ports=ports_of_scan(scan))
-        made = Library(LIBRARY_NAME, manifest, fit.choice.layout, fit.target.avr, fit.notes()).files
+        made = Library(LIBRARY_NAME, manifest, fit.choice.layout, fit.target.avr, fit.notes()).whole
     except FirmwareError as reason:
         return {}, f"no firmware: {reason}"
     return {f"{FIRMWARE_NAME}/{name}": text for name, text in made.items()}, f"firmware {fit.words}"

@@ -15,6 +15,7 @@ from thenar.runtime.published import NONE
 
 from .assembly import assembly_values, calls_are_near, check_size
 from .layout import MOST_INLINE, NO_SWITCH, Field, JointLayout, Layout, Lookup, Parts
+from .segments import segment_files
 from .words import Names, answers_of, comment, inputs_in_words, string, switches_in_words
 
 _STARTS_PER_LINE = 4
@@ -233,7 +234,9 @@ def _after(first: int, place: str) -> str:
 LIBRARY_NAME = "glove"
 """What the library is called unless it is named: its files are thenar_glove.h and so on, its functions alike."""
 FIRMWARE_NAME = "firmware"
-LIBRARY_FILES = tuple(f"thenar_{LIBRARY_NAME}{ending}" for ending in (".h", ".c", "_avr.S"))
+LIBRARY_FILES = tuple(
+    f"thenar_{LIBRARY_NAME}{part}{ending}" for part in ("", "_segments") for ending in (".h", ".c", "_avr.S")
+)
 """The folder of a build that carries the library, and what it may hold."""
 
 COLUMNS = 120
@@ -328,6 +331,17 @@ class Library:
     def files(self) -> dict[str, str]:
         """The classifier's own files, name -> text."""
         return classifier_files(self.name, self.names, self.layout, avr=self.avr, notes=self.notes)
+
+    @cached_property
+    def whole(self) -> dict[str, str]:
+        """The classifier's files, and those of the decoder of segments where the build has costs of them."""
+        model = self.names.segments
+        return self.files if model is None else self.files | segment_files(self.name, model, avr=self.avr)
+
+    @property
+    def objects(self) -> str:
+        """What its sources are compiled to, for a Makefile."""
+        return " ".join(path.rsplit(".", 1)[0] + ".o" for path in self.whole if path.endswith((".c", ".S")))
 
 
 def classifier_files(

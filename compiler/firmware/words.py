@@ -10,6 +10,7 @@ from typing import Protocol
 
 from thenar.runtime.manifest import Calibration, Rejection, Switch
 from thenar.runtime.published import NONE
+from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from . import FirmwareError
@@ -50,6 +51,11 @@ class Names(Protocol):
         """What is refused, if anything is."""
         ...
 
+    @property
+    def segments(self) -> SegmentModel | None:
+        """The costs of segments, where it has learnt any."""
+        ...
+
 
 def answers_of(names: Names) -> tuple[str, ...]:
     """Return what a frame may be called: the grasp types, and that nothing is held where that is none of them."""
@@ -66,6 +72,7 @@ class Numbered:
     tables_sha256: str
     thenar: str
     rejection: Rejection | None = None
+    segments: None = None
 
 
 @lru_cache(maxsize=4)

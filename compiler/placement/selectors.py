@@ -11,6 +11,8 @@ from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ..samples import Samples
+from .constraints import Limits
+from .elements import elements_of
 from .inputs import check_bits
 from .methods.base import BEST, METHODS, PAPERS
 from .placement import choose
@@ -32,6 +34,8 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
         switches.
     ports : PortCosts or None, default=None
         What reading each port costs, in microseconds, for methods that heed it; None: all switches cost the same.
+    limits : Limits or None, default=None
+        What the placement must obey; its names are those of the columns of X, all of them switches.
     binarize : float or None, default=0.0
         A switch counts as closed where its input exceeds this number, as in scikit-learn's `BernoulliNB`. Of bits, the
         default changes nothing. None refuses whatever is not a bit already.
@@ -76,12 +80,14 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
         min_samples: int = 0,
         ports: PortCosts | None = None,
         binarize: float | None = 0.0,
+        limits: Limits | None = None,
     ) -> None:
         self.method = method
         self.n_switches = n_switches
         self.min_samples = min_samples
         self.ports = ports
         self.binarize = binarize
+        self.limits = limits
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Choose the switches that tell the labels apart.
@@ -110,9 +116,13 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
         bits = check_bits(inputs) if self.binarize is None else inputs > self.binarize
         self.classes_, labels = np.unique(targets, return_inverse=True)
         none = np.zeros((len(bits), 0), np.uint16)
-        chosen = choose(
-            Samples(bits, none, labels, tuple(map(str, self.classes_.tolist()))), method, float(parameter), self.ports
-        )
+        samples = Samples(bits, none, labels, tuple(map(str, self.classes_.tolist())))
+        bound = None
+        if self.limits is not None:
+            if len(self.limits.names) != bits.shape[1]:
+                raise ValueError(f"the limits name {len(self.limits.names)} switches, X has {bits.shape[1]} columns")
+            bound = self.limits.on(elements_of(samples), self.ports)
+        chosen = choose(samples, method, float(parameter), self.ports, bound)
         self.order_ = np.array(chosen.columns, dtype=np.intp)
         self.gains_ = np.array(chosen.gains)
         return chosen.tree

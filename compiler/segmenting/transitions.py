@@ -96,8 +96,8 @@ class Transitions:
         return msgspec.json.encode(found) + b"\n"
 
 
-# Of the picture: its side, the radius of the circle of types and of a type's own.
-SIZE, _CIRCLE, _DOT = 720, 262.0, 21.0
+# Of the picture: its side, the radius of the circle of types and of a type's own, which is less where there are many.
+SIZE, _CIRCLE, _LARGEST_DOT = 720, 262.0, 21.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,18 +129,19 @@ class Graph:
 
     nodes: tuple[Node, ...]
     edges: tuple[Edge, ...]
+    radius: float
     size: int = SIZE
-    radius: float = _DOT
 
 
 def graph_of(found: Transitions) -> Graph:
     """Return the graph as shapes, in a square of SIZE."""
     shares, K = found.probabilities, len(found.types)
+    dot = round(min(_LARGEST_DOT, 0.8 * pi * _CIRCLE / max(K, 1)), 1)
     angles = [2 * pi * number / K - pi / 2 for number in range(K)]
     places = [(SIZE / 2 + _CIRCLE * cos(angle), SIZE / 2 + _CIRCLE * sin(angle)) for angle in angles]
     nodes = []
     for name, angle, (x, y), own in zip(found.types, angles, places, found.counts, strict=True):
-        reach = _CIRCLE + _DOT + 10
+        reach = _CIRCLE + dot + 10
         label = SIZE / 2 + reach * cos(angle), SIZE / 2 + reach * sin(angle) + 5
         anchor = "middle" if abs(cos(angle)) < 0.2 else "start" if cos(angle) > 0 else "end"
         nodes.append(
@@ -159,22 +160,25 @@ def graph_of(found: Transitions) -> Graph:
             places[a],
             places[b],
             angles[a],
+            dot,
             share,
             f"{found.types[a]} to {found.types[b]}: {found.counts[a, b]} of {found.counts[a].sum()} ({share:.0%})",
         )
         for share, a, b in sorted(changes)
     ]
-    return Graph(tuple(nodes), tuple(edges))
+    return Graph(tuple(nodes), tuple(edges), dot)
 
 
-def _edge(start: tuple[float, float], end: tuple[float, float], angle: float, share: float, words: str) -> Edge:
+def _edge(
+    start: tuple[float, float], end: tuple[float, float], angle: float, dot: float, share: float, words: str
+) -> Edge:
     """Return the arrow from a type to another, bent towards the middle, so that both directions are apart; or a loop
     outside.
     """
     width, opacity = 1 + 6 * share, 0.12 if share < FREQUENT else min(1.0, 0.35 + share)
     if start == end:
         angle += 1.2  # past the name
-        x, y = start[0] + _DOT * cos(angle), start[1] + _DOT * sin(angle)
+        x, y = start[0] + dot * cos(angle), start[1] + dot * sin(angle)
         turned = [(x + 26 * cos(angle + turn), y + 26 * sin(angle + turn)) for turn in (-1.0, 1.0)]
         points = [(x, y), *turned, (x, y)]
         path = "M{} C{} {} {}".format(*map(_point, points))
@@ -186,11 +190,11 @@ def _edge(start: tuple[float, float], end: tuple[float, float], angle: float, sh
         (start[0] + end[0]) / 2 * 0.6 + middle * 0.4 - dy * 0.12,
         (start[1] + end[1]) / 2 * 0.6 + middle * 0.4 + dx * 0.12,
     )
-    first, last = _towards(start, bend, _DOT), _towards(end, bend, _DOT + 9)
+    first, last = _towards(start, bend, dot), _towards(end, bend, dot + 9)
     ux, uy = (end[0] - bend[0]), (end[1] - bend[1])
     length = hypot(ux, uy) or 1.0
     ux, uy, half = ux / length, uy / length, 3 + width / 2
-    point = _towards(end, bend, _DOT)
+    point = _towards(end, bend, dot)
     tip = [point, (last[0] - uy * half, last[1] + ux * half), (last[0] + uy * half, last[1] - ux * half)]
     path = f"M{_point(first)} Q{_point(bend)} {_point(last)}"
     return Edge(path, " ".join(map(_point, tip)), round(width, 2), round(opacity, 2), words)

@@ -49,7 +49,8 @@ class Moment(msgspec.Struct):
 class LiveRecognizer:
     """Joins switches and CyberGlove and says what they show, whatever of them is there.
 
-    A frame counts for two of its periods. What is older, or lost, or of a glove that is not plugged into its box, is
+    A frame counts for two of its periods. A record of the glove that is older serves until `policy.grace_us`, and the
+    answer is degraded. What is older still, or lost, or of a glove that is not plugged into its box, is
     replaced by its mean contribution, and the answer is degraded; it is unknown when the share of the tables' weight
     that is lost exceeds `policy.max_lost`, and when nothing is left that the build uses. An input that is read and yet
     wrong is treated as lost (`quarantine`). A device whose kind the build does not use is left aside. The answer
@@ -80,7 +81,8 @@ class LiveRecognizer:
         self._reads_switches = switch_period_us is not None and tables.n_switches > 0
         self._longest_us = PERIODS * (switch_period_us or 0)
         self._switches = Newest[SwitchFrame]()
-        self._joints = Joints(build.manifest.joints, sensor_names, calibration, glove_period_us)
+        grace_us = self._policy.grace_of(glove_period_us or 0)
+        self._joints = Joints(build.manifest.joints, sensor_names, calibration, glove_period_us, grace_us)
         self._scores = LiveScores(build.scorer)
         self._scored: tuple[Sequence[int] | None, Mask] = None, 0
         self._missing = MissingInputs(build, self._policy.max_lost)
@@ -137,13 +139,16 @@ class LiveRecognizer:
         # Ports that were left unread are certain only with the joints by which their scan ended; and a frame that was
         # handed over once stays the newest, so every scan that can end early brings the joints' frame along.
         codes = self._joints.codes(now_us, glove if frame is None or frame.glove is None else frame.glove)
+        late = codes is not None and self._joints.late(now_us)
         if codes:
             self.quarantine.look_at_joints(self._joints.newest.time_us, codes)
         read, joints_lost, known = frame, self._all_joints if codes is None else 0, None
-        if self._alone is not None and codes is None:
+        if self._alone is not None and (codes is None or late):
             known = self._without_joints(frame := self._trusted(read, 0))
         if known is None:
             frame = self._trusted(read, joints_lost)
+        else:
+            codes, late = None, False
         dull = self.quarantine.out[1]
         if codes is not self._scored[0] or dull != self._scored[1]:
             self._scores.joints(codes, dull)
@@ -160,10 +165,10 @@ class LiveRecognizer:
             self._decider.forget()
             decided = None
         else:
-            decided = self._decider.update(max(seen_us, 0), standing, whole=not missing.names)
+            decided = self._decider.update(max(seen_us, 0), standing, whole=not (missing.names or late))
         scores, refused = (None, False) if missing.too_much else whole
         segment = Segment() if self._segments is None else self._segments.update(now_us, scores, refused)
-        grasp = self._published(now_us, unix_us, standing, missing, decided, seen_us, segment)
+        grasp = self._published(now_us, unix_us, standing, missing, decided, seen_us, segment, late)
         self._number += 1
         return Moment(grasp, switches, glove, codes, scores=scores, refused=refused)
 
@@ -211,13 +216,14 @@ class LiveRecognizer:
         decided: int | None,
         seen_us: int,
         segment: Segment,
+        late: bool,
     ) -> LiveGrasp:
         switches_us, glove_us = self._switches.time_us, self._joints.newest.time_us
         unknown = missing.too_much
         health: Health = "ok"
         if unknown:
             health = "unknown"
-        elif missing.names:
+        elif missing.names or late:
             health = "degraded"
         elif decided is None or standing.contradicts(decided, self._lead):
             health = "changing"

@@ -126,4 +126,5 @@ class System:
     def joints(self) -> Joints:
         """Return what makes the build's joint codes of the CyberGlove's records."""
         period_us = slowest_us(self.harness, self.scan, "joints")
-        return Joints(self.build.manifest.joints, self.sensor_names, self.calibration, period_us)
+        grace_us = self.policy.grace_of(period_us or 0)
+        return Joints(self.build.manifest.joints, self.sensor_names, self.calibration, period_us, grace_us)

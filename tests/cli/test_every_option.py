@@ -42,7 +42,7 @@ LINES: dict[str, tuple[str, str]] = {
     "firmware": ("build", "--target host -o new"),
     "spec": ("build", "-o new"),
     "run": ("build", "--replay set.grasps"),
-    "teach": ("set.grasps", "-b build -o new.json"),
+    "teach": ("movements.grasps", "-b build -o new.json"),
     "calibrate": ("missing/port", "-o new.toml"),
     "record": ("", "--glove glove.toml --subject A --objects objects.toml --taxonomy own -o new.grasps"),
     "emulate": ("set.grasps", "--glove glove.toml --dir new --period-ms 1"),

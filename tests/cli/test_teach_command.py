@@ -4,6 +4,7 @@ import json
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from threading import Event
 
 import msgspec
 import numpy as np
@@ -11,9 +12,11 @@ import pytest
 
 from thenar.compiler import GraspSet, Joint, compile_build
 from thenar.compiler.recordings.taxonomy import own
-from thenar.runtime import Build
+from thenar.drivers.errors import SettingError
+from thenar.runtime import Build, Glove
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.live.sources import Taken
 from thenar.runtime.live.system import System
 from thenar.runtime.recording.session import Session
 from thenar.runtime.recording.writer import Recorder
@@ -58,12 +61,11 @@ def states(types: str, held: int = 40) -> list[int]:
     return [3] * 30 + [each for letter in types for each in ["cpr".index(letter)] * held + [3] * 30]
 
 
-@pytest.fixture(scope="module")
-def build(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    labels = np.array(states("cprrpcpcr" * 2))
+def grasps_of(labels: np.ndarray) -> GraspSet:
+    """Return a set of frames, 10 ms apart, in which this is held."""
     read = np.array([readings(label) for label in labels.tolist()])
     starts = np.flatnonzero(np.diff(labels, prepend=-1))
-    grasp_set = GraspSet(
+    return GraspSet(
         switches=(read[:, :1] >> np.arange(3) & 1).astype(bool),
         switch_names=("s0", "s1", "s2"),
         codes=read[:, 1:].astype(np.uint16),
@@ -75,6 +77,11 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Path:
         trials=np.searchsorted(starts, np.arange(len(labels)), side="right") // 2,
         times_us=10_000 * np.arange(len(labels)),
     )
+
+
+@pytest.fixture(scope="module")
+def build(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    grasp_set = grasps_of(np.array(states("cprrpcpcr" * 2)))
     folder = tmp_path_factory.mktemp("taught") / "build"
     return compile_build(grasp_set, folder, rounds=10, folds=0).folder
 
@@ -132,6 +139,19 @@ def test_a_demonstration_follows_its_own_task_to_the_end(
     assert all(0.35 <= step["median_s"] <= 0.45 for step in found["steps"])
     assert [step["then"] for step in found["steps"]] == [["pen", "rod"], ["rod"], []]
     assert (tmp_path / "task.xml").read_bytes().count(b'<Action ID="Grasp" name=') == 3
+    assert thenar("segment", demos[0], "-b", build, "--transitions", tmp_path / "graph.json").returncode == 0
+    graph = json.loads((tmp_path / "graph.json").read_bytes())
+    assert (graph["types"], graph["counts"]) == (list(TYPES), [[0, 1, 0], [0, 0, 1], [0, 0, 0]])
+    again = thenar(
+        "teach", demos[2], "-b", build, "-o", tmp_path / "two.json", "--transitions", tmp_path / "graph.json"
+    )
+    assert again.returncode == 0, again.stderr
+    assert [step["then"] for step in json.loads((tmp_path / "two.json").read_bytes())["steps"]] == [
+        ["rod", "pen"],
+        ["pen"],
+        ["rod"],
+        [],
+    ]
     done = thenar("run", build, "--replay", demos[0], "--task", task)
     news = progress_of(done)
     assert [(each.step, each.grasp, each.done) for each in news] == [
@@ -180,3 +200,46 @@ def test_what_teaches_nothing_is_refused(thenar: Thenar, build: Path, set_file: 
     done = thenar("teach", empty, *task)
     assert "task.xml is there already" in done.stderr
     assert not (tmp_path / "task.json").exists()
+
+
+class Played:
+    """A feed of what is held, 10 ms a frame, that ends the run."""
+
+    def __init__(self, build: Path, held: list[int], stop: Event) -> None:
+        self._kept = [switch.column for switch in Build.load(build).manifest.switches]
+        self._held, self._stop, self._frames = held, stop, 0
+
+    def take(self) -> Taken:
+        time_us, (closed, code) = 10_000 * self._frames, readings(self._held[self._frames])
+        self._frames += 1
+        if self._frames == len(self._held):
+            self._stop.set()
+        glove = GloveFrame(time_us, bytes([code]) + bytes(17), 3)
+        switches = SwitchFrame(time_us, sum(1 << bit for bit, column in enumerate(self._kept) if closed >> column & 1))
+        return Taken(time_us, switches, glove, (), glove)
+
+
+def test_a_live_glove_says_where_the_hand_is_in_its_task_and_in_its_sinks(
+    thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path
+) -> None:
+    assert thenar("teach", *demos[:1], "-b", build, "-o", tmp_path / "task.json").returncode == 0
+    stop, lines = Event(), tmp_path / "lines"
+    harness = parse_harness(GLOVE, "glove.toml")
+    feed = Played(build, states("cpr"), stop)
+    with Glove(build, harness, task=tmp_path / "task.json", sinks=(f"jsonl:{lines}",), stop=stop, feed=feed) as glove:
+        for _ in glove:
+            pass
+        assert glove.follower is not None
+        assert glove.follower.progress.text == "task is done"
+    sent = msgspec.json.Decoder(Line | HealthLine | ProgressLine).decode_lines(lines.read_bytes())
+    news = [line for line in sent if isinstance(line, ProgressLine)]
+    assert [(each.step, each.grasp) for each in news if each.grasp != "none"] == [(1, "cup"), (2, "pen"), (3, "rod")]
+    assert msgspec.structs.asdict(news[-1]) == msgspec.structs.asdict(glove.follower.progress)
+    other = compile_build(_without_pens(), tmp_path / "other", rounds=3, folds=0).folder
+    with pytest.raises(SettingError, match="task task: the build does not recognise pen"):
+        Glove(other, harness, task=tmp_path / "task.json")
+
+
+def _without_pens() -> GraspSet:
+    labels = np.array(states("crcrcr"))
+    return grasps_of(labels).rows(np.flatnonzero(labels != 3))

@@ -41,17 +41,20 @@ class Arduino(Target):
         properties = {"version": _VERSION, "classes": len(grasps), "architectures": architectures, "inputs": inputs}
         readme = {"thenar": markdown(names.thenar), "grasps": grasps, "inputs": inputs, **counts}
         return {
-            **{f"src/{path}": text for path, text in library.files.items()},
+            **{f"src/{path}": text for path, text in library.whole.items()},
             "library.properties": render("arduino/library.properties.j2", name=name, **properties),
-            "keywords.txt": render("arduino/keywords.txt.j2", words=_keywords(name)),
+            "keywords.txt": render("arduino/keywords.txt.j2", words=_keywords(name, names.segments is not None)),
             "README.md": render("arduino/README.md.j2", name=name, **readme),
             "examples/Recognise/Recognise.ino": render("arduino/Recognise.ino.j2", name=name, **_example(library)),
         }
 
 
-def _keywords(name: str) -> list[tuple[str, str]]:
+def _keywords(name: str, segments: bool) -> list[tuple[str, str]]:
     """Return each word of the library with the kind of keyword that it is to the Arduino editor."""
-    kinds = {"KEYWORD1": _TYPES, "KEYWORD2": (*_FUNCTIONS, *_VARIABLES)}
+    kinds = {
+        "KEYWORD1": (*_TYPES, *(("segmenter",) if segments else ())),
+        "KEYWORD2": (*_FUNCTIONS, *_VARIABLES, *(("segment_start", "segment_push") if segments else ())),
+    }
     words = [(f"thenar_{name}_{word}", kind) for kind, ours in kinds.items() for word in ours]
     return [*words, *((f"THENAR_{name.upper()}_{word}", "LITERAL1") for word in _CONSTANTS)]
 

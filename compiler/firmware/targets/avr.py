@@ -56,10 +56,10 @@ class Avr(Target):
         from thenar.firmware_templates.rendering import render
 
         name, layout = library.name, library.layout
-        values = {"name": name, "part": self.part, "programmer": self.programmer}
+        values = {"name": name, "part": self.part, "programmer": self.programmer, "objects": library.objects}
         class_type = "uint8_t" if len(layout.start) <= 255 else "uint16_t"
         return {
-            **library.files,
+            **library.whole,
             "Makefile": render("avr_library/Makefile.j2", **values),
             "main.c": render("avr_library/main.c.j2", name=name, joints=layout.tables.n_joints, class_type=class_type),
         }

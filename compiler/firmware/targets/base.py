@@ -105,7 +105,7 @@ class Target:
 
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text of all that is written for it: as it is here, the C99 of the library alone."""
-        return dict(library.files)
+        return dict(library.whole)
 
     def missing(self) -> str | None:
         """Return what keeps code from being compiled and run here, and what to install; None if nothing does."""

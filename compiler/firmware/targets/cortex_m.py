@@ -52,9 +52,9 @@ class CortexM(Target):
         from ..probes import CHECKS, check_header
 
         name = library.name
-        values = {"name": name, "core": self.title}
+        values = {"name": name, "core": self.title, "objects": library.objects}
         return {
-            **library.files,
+            **library.whole,
             "Makefile": render("cortex_m/Makefile.j2", **values, part=self.part, machine=self.machine.name),
             "main.c": render("cortex_m/main.c.j2", **values, checks=CHECKS),
             f"thenar_{name}_check.h": check_header(name, library.layout, library.names.grasps),

@@ -26,8 +26,8 @@ class Host(Target):
         from ..probes import CHECKS, check_header
 
         return {
-            **library.files,
-            "Makefile": render("host/Makefile.j2", name=library.name),
+            **library.whole,
+            "Makefile": render("host/Makefile.j2", name=library.name, objects=library.objects),
             "check.c": render("host/check.c.j2", name=library.name, checks=CHECKS),
             f"thenar_{library.name}_check.h": check_header(library.name, library.layout, library.names.grasps),
         }

@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from thenar.compiler.firmware.board import parse_board
 from thenar.compiler.firmware.generate import Firmware
@@ -15,6 +16,7 @@ from thenar.compiler.firmware.targets.base import Mode
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
+from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -58,6 +60,8 @@ CASES: dict[str, tuple[str, Mode, str, Mapping[str, int]]] = {
     "arduino": ("arduino", "classify", "", {}),
     "avr": ("avr328p", "classify", "", {}),
     "avr, codes of 16 bits": ("avr2560", "classify", "", {"highest": 900}),
+    "host, segments": ("host", "classify", "", {}),
+    "avr, segments": ("avr328p", "classify", "", {}),
     "scan pins": ("avr328p", "scan", PINS, {}),
     "scan a matrix": ("avr328p", "scan", MATRIX + "\ndiodes = true\n", {}),
     "scan a wide matrix without diodes": ("avr2560", "scan", WIDE, {}),
@@ -72,7 +76,10 @@ PART = {"avr328p": "atmega328p", "avr2560": "atmega2560"}
 def files_of(case: str, make_tables: MakeTables, describe: Describe) -> dict[str, str]:
     platform, mode, text, shape = CASES[case]
     tables = make_tables(**shape)
-    build = Build(describe(tables), tables)
+    manifest = describe(tables)
+    if case.endswith(", segments"):
+        manifest = replace(manifest, segments=SegmentModel.usual(tables.n_classes, False, tables.scale))
+    build = Build(manifest, tables)
     board = parse_board(f'part = "{PART[platform]}"\n{text}') if text else None
     build = for_one_hand(build, HAND) if mode == "glove" else build
     return Firmware(build.tables, build.manifest, platform, mode, board=board).files()

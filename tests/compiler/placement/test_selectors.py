@@ -15,6 +15,7 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from thenar.compiler import GraspSet, grow_id3
 from thenar.compiler.placement import selectors
+from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.placement.placement import place
 from thenar.compiler.placement.population import place_for_crowd
 from thenar.compiler.placement.ports import PortCosts
@@ -115,3 +116,15 @@ def test_what_cannot_be_chosen_is_said(data: tuple[Any, Any]) -> None:
 
 def test_the_examples_run() -> None:
     assert doctest.testmod(selectors).failed == 0
+
+
+@pytest.mark.parametrize("method", ["cmim", "elimination", "id3"])
+def test_limits_are_obeyed_by_the_names_of_the_columns(method: str, data: tuple[Any, Any]) -> None:
+    bits, labels = data
+    names = tuple(f"s{number}" for number in range(9))
+    limits = Limits(names=names, n_switches=9, keep=("s8",), never=("s5",))
+    kept = SwitchSelector(method, n_switches=3, limits=limits).fit(bits, labels).get_support()
+    assert kept[8]
+    assert not kept[5]
+    with pytest.raises(ValueError, match="the limits name 9 switches, X has 8 columns"):
+        SwitchSelector(method, limits=limits).fit(bits[:, :8], labels)

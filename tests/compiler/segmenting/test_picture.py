@@ -1,5 +1,6 @@
 """The timeline as a picture: axes are named, names fit into their segments, and equal timelines are equal bytes."""
 
+import itertools
 import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -40,9 +41,7 @@ def test_names_lie_within_their_segments_and_the_axes_are_named(monkeypatch: pyt
             place = text.get_window_extent()
             assert any(box.x0 <= place.x0 and place.x1 <= box.x1 and box.y0 <= place.y0 for box in boxes)
             named += 1
-        assert all(
-            one.x1 <= other.x0 + 0.01 for one, other in zip(boxes, boxes[1:], strict=False) if one.y0 == other.y0
-        )
+        assert all(one.x1 <= other.x0 + 0.01 for one, other in itertools.pairwise(boxes) if one.y0 == other.y0)
     assert named > 10
 
 

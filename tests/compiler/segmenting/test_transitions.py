@@ -18,6 +18,7 @@ from thenar.compiler.segmenting.streams import SegmentingError
 from thenar.compiler.segmenting.transitions import FREQUENT, SIZE, Transitions, graph_of
 
 TYPES = tuple(f"type {number}" for number in range(14))
+MANY = tuple(f"type {number}" for number in range(60))
 SEQUENCES = st.lists(st.lists(st.sampled_from(TYPES), max_size=12), max_size=6)
 
 
@@ -35,11 +36,13 @@ def test_every_change_is_counted_once_and_shares_are_of_a_types_own_changes(sequ
         assert all(share >= FREQUENT for share in shares)
 
 
-@given(SEQUENCES)
-def test_each_change_is_an_arrow_within_the_picture_between_types_that_do_not_touch(sequences: list[list[str]]) -> None:
-    found = Transitions.of(sequences, TYPES)
+@given(SEQUENCES, st.sampled_from([TYPES, MANY]))
+def test_each_change_is_an_arrow_within_the_picture_between_types_that_do_not_touch(
+    sequences: list[list[str]], types: tuple[str, ...]
+) -> None:
+    found = Transitions.of(sequences, types)
     graph = graph_of(found)
-    assert [node.name for node in graph.nodes] == list(TYPES)
+    assert [node.name for node in graph.nodes] == list(types)
     assert len(graph.edges) == np.count_nonzero(found.counts)
     for one in graph.nodes:
         for other in graph.nodes:
@@ -79,12 +82,12 @@ def test_a_report_has_the_graph_where_the_recordings_are_whole_movements(
     make_movements: Callable[..., GraspSet], tmp_path: Path
 ) -> None:
     grasp_set = make_movements("AB", 2)
-    for rows, drawn in ((grasp_set, True), (replace(grasp_set.without_none(), times_us=np.zeros(0, np.int64)), False)):
-        folder = compile_build(rows, tmp_path / f"{drawn}", rounds=3, folds=0, documents=Documents()).folder
+    apart = replace(grasp_set, trials=np.arange(len(grasp_set)))
+    for number, (rows, drawn) in enumerate(((grasp_set.without_none(), False), (apart, False), (grasp_set, True))):
+        folder = compile_build(rows, tmp_path / f"{number}", rounds=3, folds=0, documents=Documents()).folder
         page = (folder / "report.html").read_text()
         assert ('<svg class="changes"' in page) == ("Which grasp follows which" in page) == drawn
     found = Transitions.of_set(grasp_set)
-    page = (tmp_path / "True" / "report.html").read_text()
     assert page.count("stroke-width") >= np.count_nonzero(found.counts)
     for name in found.types:
         assert re.search(rf"<text[^>]*>{name}</text>", page)

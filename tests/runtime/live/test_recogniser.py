@@ -29,7 +29,8 @@ SWITCHES, JOINTS = 6, 3
 SWITCH_PERIOD, GLOVE_PERIOD = 1000, 700
 NAMES = tuple(f"s{number}" for number in range(SWITCHES))
 SENSORS = ("j2", "other", "j0", "j1")
-AT_ONCE = Policy(lead=0, dwell_us=0, hold_us=0)
+GRACE = 2200
+AT_ONCE = Policy(lead=0, dwell_us=0, hold_us=0, grace_us=GRACE)
 
 masks = st.integers(0, (1 << SWITCHES) - 1)
 delays = st.integers(0, 300)
@@ -78,7 +79,8 @@ def definition(build: Build, arrivals: list[Arrival]) -> dict[str, Any]:
     now, tables = arrivals[-1][0], build.tables
     switches, glove = newest([arrival[1] for arrival in arrivals]), newest([arrival[2] for arrival in arrivals])
     no_switches = switches is None or now - switches.time_us > 2 * SWITCH_PERIOD
-    no_glove = glove is None or now - glove.time_us > 2 * GLOVE_PERIOD or (glove.status or 1) % 2 == 0
+    no_glove = glove is None or now - glove.time_us > GRACE or (glove.status or 1) % 2 == 0
+    late = not no_glove and now - glove.time_us > 2 * GLOVE_PERIOD
     lost = flags((1 << SWITCHES) - 1) if no_switches else flags(switches.lost)
     bits = flags(0) if no_switches else flags(switches.closed)
     codes = [0, 0, 0] if no_glove else [glove.sensors[SENSORS.index(f"j{number}")] for number in range(JOINTS)]
@@ -95,7 +97,7 @@ def definition(build: Build, arrivals: list[Arrival]) -> dict[str, Any]:
         "candidate": UNKNOWN if unknown else build.grasps[best],
         "probability": 0.0 if unknown else 1 / odds.sum(),
         "margin": 0 if unknown else int(np.diff(np.sort(lanes)[-2:])[0]),
-        "health": "unknown" if unknown else "degraded" if names else "ok",
+        "health": "unknown" if unknown else "degraded" if names or late else "ok",
         "switch_age_us": None if switches is None else now - switches.time_us,
         "glove_age_us": None if glove is None else now - glove.time_us,
         "latency_us": min([now - frame.time_us for frame in (switches, glove) if frame is not None], default=0),
@@ -318,6 +320,35 @@ def test_a_scan_ends_only_when_the_lead_that_the_decision_asks_for_is_sure(make_
     assert sum(ends[0]) > sum(ends[1]) > 0
 
 
+@pytest.mark.parametrize(
+    ("period_us", "grace_us", "until_us"), [(10_000, None, 60_000), (30_000, None, 120_000), (10_000, 25_000, 25_000)]
+)
+def test_a_late_record_serves_degraded_with_its_age_until_the_grace_is_over(
+    make_build: MakeBuild, period_us: int, grace_us: int | None, until_us: int
+) -> None:
+    """Joints hold all the weight, so without them the answer is unknown. A late record displaces no answer."""
+    build = make_build(joints=JOINTS, switches=0)
+    live = LiveRecognizer(
+        build, sensor_names=SENSORS, glove_period_us=period_us, policy=Policy(grace_us=grace_us, hold_us=500_000)
+    )
+    first = live.step(0, 0, None, GloveFrame(0, b"\x05\x06\x07\x08")).grasp
+    assert first.health == "ok"
+    for age_us, health in (
+        (2 * period_us, "ok"),
+        (2 * period_us + 1, "degraded"),
+        (until_us, "degraded"),
+        (until_us + 1, "unknown"),
+    ):
+        moment = live.step(age_us, 0, None, None)
+        grasp = moment.grasp
+        assert (grasp.health, grasp.glove_age_us) == (health, age_us)
+        assert (grasp.grasp == UNKNOWN) is (health == "unknown")
+        assert (moment.codes is None) is (health == "unknown")
+        assert grasp.lost == (("j0", "j1", "j2") if health == "unknown" else ())
+    back = live.step(until_us + 2, 0, None, GloveFrame(until_us + 2, b"\x05\x06\x07\x08")).grasp
+    assert (back.health, back.grasp) == ("ok", first.grasp)
+
+
 def test_after_unknown_the_first_candidate_is_decided_on_at_once(make_build: MakeBuild) -> None:
     live, record = recognizer(make_build(), Policy(dwell_us=10**6, hold_us=10**6)), b"\x05\x06\x07\x08"
     first = live.step(0, 0, SwitchFrame(0, 0), GloveFrame(0, record)).grasp
@@ -329,7 +360,7 @@ def test_after_unknown_the_first_candidate_is_decided_on_at_once(make_build: Mak
     )
     held = live.step(100, 0, SwitchFrame(100, other), GloveFrame(100, record)).grasp
     assert held.grasp == first.grasp != held.candidate
-    assert live.step(9000, 0, None, None).grasp.grasp == UNKNOWN
+    assert live.step(90_000, 0, None, None).grasp.grasp == UNKNOWN
     found = live.step(9100, 0, SwitchFrame(9100, other), GloveFrame(9100, record)).grasp
     assert found.grasp == found.candidate == held.candidate
 

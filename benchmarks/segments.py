@@ -1,0 +1,249 @@
+"""What a tick of the decoder of segments takes: 14 types and none, 10 ms a tick, a lag of 150 ms.
+
+    python benchmarks/segments.py
+
+prints a table of the usual costs, of costs of each type's own, and of a build without a class "none": Python's us on
+this machine, cycles on an ATmega328P in libsimavr, flash, RAM and stack. Every compiled answer is compared to Python's.
+"""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from thenar.compiler.firmware import FirmwareError
+from thenar.compiler.firmware.segments import segment_files
+from thenar.compiler.firmware.simavr import harness
+from thenar.compiler.firmware.targets.cortex_m import CortexM, bare_files
+from thenar.compiler.firmware.tools import (
+    ARM_EMULATOR,
+    AVR_COMPILER,
+    HOST_COMPILER,
+    STRICT,
+    call,
+    find,
+    workshop,
+)
+from thenar.runtime.segmenting.decoder import Decoder
+from thenar.runtime.segmenting.model import SegmentModel
+
+SCALE = 1000.0
+_NAME = "hand"
+_SANITIZE = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+Lanes = NDArray[np.int16]
+Flags = NDArray[np.bool_]
+
+# What the decoder needs of the classifier: its scores.
+_HEADER = """\
+#ifndef THENAR_HAND_H
+#define THENAR_HAND_H
+#include <stdbool.h>
+#include <stdint.h>
+typedef uint8_t thenar_hand_class;
+extern int16_t thenar_hand_scores[{lanes}];
+#endif
+"""
+_COMMON = """\
+#include "thenar_hand_segments.h"
+struct record {{ int16_t lanes[{lanes}]; uint8_t best, refused; }};
+struct record record;
+int16_t thenar_hand_scores[{lanes}];
+static thenar_hand_segmenter stream;
+uint8_t answer(void);
+uint8_t copy(void);
+__attribute__((noinline, noclone)) uint8_t copy(void)
+{{
+    for (uint8_t lane = 0u; lane < {lanes}u; lane++)
+        thenar_hand_scores[lane] = record.lanes[lane];
+    return record.best;
+}}
+__attribute__((noinline, noclone)) uint8_t answer(void)
+{{
+    return thenar_hand_segment_push(&stream, copy(), record.refused != 0u);
+}}
+"""
+_MAINS = {
+    "host": """\
+#include <stdio.h>
+int main(void)
+{{
+    thenar_hand_segment_start(&stream);
+    while (fread(&record, sizeof record, 1, stdin) == 1)
+        (void)putchar(answer());
+    return fflush(stdout) != 0;
+}}
+""",
+    "avr": """\
+int main(void)
+{{
+    thenar_hand_segment_start(&stream);
+    for (;;)
+        (void){function}();
+}}
+""",
+    "cortex-m": """\
+#include "semihosting.h"
+void thenar_fault(void);
+void thenar_fault(void)
+{{
+    for (;;)
+        semihosting_exit(true);
+}}
+int main(void)
+{{
+    const uint32_t given = semihosting_open("frames", 6, SEMIHOSTING_RB);
+    const uint32_t answers = semihosting_open("answers", 7, SEMIHOSTING_WB);
+    bool whole = true;
+    thenar_hand_segment_start(&stream);
+    while (semihosting_read(given, &record, sizeof record)) {{
+        const uint8_t state = answer();
+        whole = semihosting_write(answers, &state, 1) && whole;
+    }}
+    semihosting_exit(!whole);
+    return 0;
+}}
+""",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What a compiled decoder answered; on an AVR also cycles a tick, and bytes of flash, RAM and stack."""
+
+    states: NDArray[np.uint8]
+    cycles: NDArray[np.int64]
+    flash: int = 0
+    ram: int = 0
+    stack: int = 0
+
+
+def records(lanes: Lanes, refused: Flags) -> bytes:
+    """Return what the programs read of each tick: its scores, the number of the best, whether it is refused."""
+    held = np.zeros(len(lanes), [("lanes", "<i2", lanes.shape[1:]), ("best", "u1"), ("refused", "u1")])
+    held["lanes"], held["best"], held["refused"] = lanes, lanes.argmax(axis=1), refused
+    return held.tobytes()
+
+
+def sources(model: SegmentModel, kind: str, function: str = "answer") -> dict[str, str]:
+    """Return path -> text of a program around the decoder."""
+    values = {"lanes": model.n_lanes, "function": function}
+    header, main = (text.format(**values) for text in (_HEADER, _COMMON + _MAINS[kind]))
+    files = segment_files(_NAME, model, avr=kind == "avr")
+    return {**files, "thenar_hand.h": header, "main.c": main}
+
+
+def _compiled(files: Mapping[str, str]) -> list[str]:
+    return sorted(path for path in files if path.endswith((".c", ".S")))
+
+
+def _lag(ticks: int) -> str:
+    return f"-DTHENAR_HAND_LAG_TICKS={ticks}u"
+
+
+def run_host(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> Run:
+    """Run the decoder on this machine, with sanitizers."""
+    files = sources(model, "host")
+    with workshop(files) as folder:
+        call([find(HOST_COMPILER), *STRICT, *_SANITIZE, _lag(lag), *_compiled(files), "-o", "program"], folder)
+        printed = call([str(folder / "program")], folder, records(lanes, refused))
+    return Run(np.frombuffer(printed, np.uint8), np.zeros(0, np.int64))
+
+
+def run_avr(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> Run:
+    """Run the decoder on an ATmega328P in libsimavr; its cycles are those of push() alone."""
+    given, program = records(lanes, refused), harness("simavr_classify")
+    runs, size = [], len(given) // len(lanes)
+    for function in ("answer", "copy"):
+        files = sources(model, "avr", function)
+        with workshop(files) as folder:
+            command = [find(AVR_COMPILER), "-mmcu=atmega328p", "-Os", *STRICT, _lag(lag)]
+            call([*command, *_compiled(files), "-o", "program.elf"], folder)
+            lines = call(["avr-nm", "--format=posix", "program.elf"], folder).decode().splitlines()
+            words = {word[0]: word for word in map(str.split, lines)}
+            span = f"0x{words['record'][2]}:{size}"
+            places = [f"0x{words[symbol][2]}" for symbol in (function, "_end")]
+            printed = call([str(program), "atmega328p", "16000000", "program.elf", *places, span, span], folder, given)
+            parts = [path for path in _compiled(files) if path != "main.c"]
+            call([*command, "-c", *parts], folder)
+            told = call(["avr-size", *(path.rsplit(".", 1)[0] + ".o" for path in parts)], folder)
+            flash = sum(int(line.split()[0]) + int(line.split()[1]) for line in told.decode().splitlines()[1:])
+            ram = int(words["stream"][3], 16)
+        shape = np.dtype([("record", "u1", size), ("state", "u1"), ("r25", "u1"), ("cycles", "<u4"), ("stack", "<u2")])
+        runs.append(np.frombuffer(printed, shape))
+    answered, copied = runs
+    cycles = answered["cycles"].astype(np.int64) - copied["cycles"]
+    return Run(answered["state"], cycles, flash, ram, int(answered["stack"].max()))
+
+
+def run_cortex(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int, core: CortexM) -> Run:
+    """Run the decoder on an Arm core in qemu."""
+    files = sources(model, "cortex-m")
+    machine = core.machine
+    if core.compiler is None:
+        raise FirmwareError(f"{core.name} has no compiler")
+    given = {"frames": records(lanes, refused)}
+    with workshop({**files, **bare_files(machine.flash, machine.ram), **given}) as folder:
+        linked = ["-nostdlib", "-T", "link.ld", "startup.c", *_compiled(files), "-lgcc", "-o", "program.elf"]
+        call([find(core.compiler), *STRICT, *core.flags, _lag(lag), *linked], folder)
+        quiet = ["-display", "none", "-monitor", "none", "-serial", "none"]
+        hosted = ["-semihosting-config", "enable=on,target=native", "-kernel", "program.elf"]
+        call([find(ARM_EMULATOR), "-M", machine.name, *quiet, *hosted], folder)
+        printed = (folder / "answers").read_bytes()
+    return Run(np.frombuffer(printed, np.uint8), np.zeros(0, np.int64))
+
+
+def python_states(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> NDArray[np.uint8]:
+    """Return what Python's decoder answers, tick by tick."""
+    decoder = Decoder(model, lag)
+    pairs = zip(lanes.tolist(), refused.tolist(), strict=True)
+    return np.array([decoder.push(row, no).state for row, no in pairs], np.uint8)
+
+
+def random_lanes(ticks: int, lanes: int, seed: int, reach: int) -> Lanes:
+    """Return scores that dwell about 20 ticks on a level each, with noise of a third."""
+    random = np.random.default_rng(seed)
+    level = np.cumsum(random.random(ticks) < 0.05)
+    levels = random.integers(-reach, reach + 1, (ticks + 1, lanes))
+    noise = random.integers(-reach // 3 - 1, reach // 3 + 2, (ticks, lanes))
+    found: Lanes = np.clip(levels[level] + noise, -32767, 32767).astype(np.int16)
+    return found
+
+
+def models() -> dict[str, SegmentModel]:
+    """Return the costs of which the table is."""
+    usual = SegmentModel.usual(14, True, SCALE)
+    own = replace(
+        usual,
+        enter=tuple(60 + 3 * k for k in range(14)),
+        direct=tuple(150 - k for k in range(14)),
+        leave=tuple(30 + k for k in range(14)),
+        stay=(*(k % 4 for k in range(14)), 1),
+    )
+    return {"usual": usual, "each type its own": own, "no class none": SegmentModel.usual(14, False, SCALE)}
+
+
+def main() -> None:
+    """Print the table."""
+    print("costs             | Python us: median, 99 % | AVR cycles: mean, most | flash | RAM + stack | differing")
+    for name, model in models().items():
+        lag, ticks = 150_000 // model.tick_us, 4000
+        lanes = np.concatenate([random_lanes(ticks, model.n_lanes, seed, 10**seed) for seed in (2, 3, 4)])
+        refused = np.random.default_rng(1).random(len(lanes)) < 0.1
+        decoder, took = Decoder(model, lag), []
+        for row, no in zip(lanes.tolist(), refused.tolist(), strict=True):
+            began = time.perf_counter_ns()
+            decoder.push(row, no)
+            took.append((time.perf_counter_ns() - began) / 1000)
+        run, expected = run_avr(model, lanes, refused, lag), python_states(model, lanes, refused, lag)
+        python = f"{np.median(took):10.1f}, {np.percentile(took, 99):10.1f}"
+        print(
+            f"{name:17} | {python:23} | {run.cycles.mean():8.0f}, {run.cycles.max():12,} | {run.flash:5,} | "
+            f"{run.ram:3} + {run.stack:5} | {np.count_nonzero(run.states != expected)} of {len(expected)}"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,99 @@
+"""The decoder of segments as C99 for every target, and as assembly for an AVR."""
+
+from dataclasses import dataclass
+
+from thenar.firmware_templates.rendering import render
+from thenar.runtime.segmenting.model import SegmentModel
+
+from . import FirmwareError
+
+LAG_US = 150_000
+# An AVR's assembly reaches this many states from one pointer, and multiplies by one byte.
+_MOST_ASSEMBLED, _MOST_GAIN, _MOST_STATES = 15, 255, 255
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """What it costs, and where it waits until it has lasted long enough: a ring, and a place in its rows.
+
+    Assembly that goes from state to state finds its ring where it is not that of the state before, and turns the ring
+    where no later state finds it.
+    """
+
+    enter: int
+    direct: int
+    leave: int
+    stay: int
+    least: int
+    ring: int
+    place: int
+    found: bool
+    turned: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Ring:
+    """The rows in which states of the same shortest duration wait: places `begin` to `end`, `width` a row."""
+
+    begin: int
+    end: int
+    width: int
+
+
+def segment_files(name: str, model: SegmentModel, *, avr: bool) -> dict[str, str]:
+    """Return the texts of thenar_`name`_segments.h and .c, and with `avr` of the assembly where there is one.
+
+    They go with the classifier's, of the same name. Raises FirmwareError if there are too many states.
+    """
+    if model.n_types >= _MOST_STATES:
+        raise FirmwareError(f"{model.n_types} grasp types: segments are decoded in C of {_MOST_STATES - 1} at most")
+    states, rings = _laid_out(model)
+    assembled = avr and len(states) <= _MOST_ASSEMBLED and model.gain <= _MOST_GAIN
+    limit = -(-model.most * 256 // model.gain) << model.shift
+    clipped = model.most if limit <= 65535 else min((65535 >> model.shift) * model.gain >> 8, model.most)
+    values = {
+        "name": name,
+        "upper": name.upper(),
+        "model": model,
+        "types": model.n_types,
+        "refusal": model.refusal,
+        "lag": min(max(LAG_US // model.tick_us, 1), 250),
+        "states": states,
+        "groups": rings,
+        "waiting": rings[-1].end if rings else 0,
+        "mask_bytes": -(-len(states) // 8),
+        "limit": min(limit, 65535),
+        "clipped": clipped,
+        "avr": avr,
+        "assembled": assembled,
+        "one_gap": len({direct - enter for direct, enter in zip(model.direct, model.enter, strict=True)}) == 1,
+        "least_enter": min(model.enter),
+        "one_leave": len(set(model.leave)) == 1,
+    }
+    endings = (".h", ".c", "_avr.S")[: 2 + assembled]
+    return {
+        f"thenar_{name}_segments{ending}": render(f"segments/thenar_NAME_segments{ending}.j2", **values)
+        for ending in endings
+    }
+
+
+def _laid_out(model: SegmentModel) -> tuple[list[_State], list[_Ring]]:
+    """Return the states, and the rings in which they wait."""
+    numbers: dict[int, int] = {}
+    rings: list[_Ring] = []
+    end, K = 0, model.n_types
+    for least in sorted({each for each in model.least if each > 1}, key=model.least.index):
+        width, begin = model.least.count(least), end
+        end = begin + width * (least - 1)
+        numbers[least] = len(rings)
+        rings.append(_Ring(begin, end, width))
+    found = {
+        k: least for k, least in enumerate(model.least) if least > 1 and (k in {0, K} or least != model.least[k - 1])
+    }
+    states = []
+    for k, least in enumerate(model.least):
+        change = (model.enter[k], model.direct[k], model.leave[k]) if k < K else (0, 0, 0)
+        place, later = model.least[:k].count(least), any(number > k and each == least for number, each in found.items())
+        stay = model.stay[k] - min(model.stay)
+        states.append(_State(*change, stay, least, numbers.get(least, 0), place, k in found, k in found and not later))
+    return states, rings
