@@ -1,6 +1,5 @@
 """The live recogniser: the newest frame of each device, joined, scored, decided upon."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -91,7 +90,7 @@ class LiveRecognizer:
         self._decider, self._lead = _decider(build, self._policy), self._policy.lead_steps(tables.scale)
         lag_us, model = self._policy.lag_us, build.manifest.segmenting
         self._segments = None if lag_us is None else LiveSegments(model, build.grasps, lag_us)
-        self._rejector, self._sure = build.rejector, _sure(build)
+        self._rejector, self._none_leads = build.rejector, build.none_leads
         self._whole_for_us, self._whole_until_us = PERIODS * model.tick_us, -1
         self._whole: tuple[tuple[int, ...], bool] = (), False
         self._number = 0
@@ -159,7 +158,7 @@ class LiveRecognizer:
             self.quarantine.look(read, standing.lanes, lost)
         whole = self._whole_scores(now_us, frame, standing, codes, dull)
         if self._rejector is not None:
-            standing = standing.or_none(self._sure if whole[1] else _NEVER)
+            standing = standing.or_none(self._none_leads[whole[1]])
         seen_us = max(newest.time_us, self._joints.newest.time_us)
         if missing.too_much:
             self._decider.forget()
@@ -250,18 +249,6 @@ class LiveRecognizer:
             segment_us=segment.began_us,
             segment_probability=of_segment,
         )
-
-
-# By so many steps none trails in a frame that is not refused: no sum of scores comes near.
-_NEVER = -(1 << 40)
-
-
-def _sure(build: Build) -> int:
-    """Return by how many steps none leads in a frame that is refused: ln((1 - share) / share), where a share of grasps
-    is refused.
-    """
-    share = 0.5 if build.manifest.rejection is None else build.manifest.rejection.share
-    return math.ceil(build.tables.scale * math.log((1 - share) / share))
 
 
 def _decider(build: Build, policy: Policy) -> Decision | SequentialTest:

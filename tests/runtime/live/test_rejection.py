@@ -50,6 +50,10 @@ def recognizer(build: Build, policy: Policy | None = None) -> LiveRecognizer:
     return LiveRecognizer(build, switch_period_us=PERIOD, policy=policy or Policy(lead=0, dwell_us=0, hold_us=0))
 
 
+def flags(closed: int) -> list[bool]:
+    return [bool(closed >> switch & 1) for switch in range(SWITCHES)]
+
+
 def lasting(live: LiveRecognizer, closed: int, ms: int, begin_us: int, lost: int = 0) -> list[LiveGrasp]:
     times = range(begin_us, begin_us + 1000 * ms, 1000)
     return [live.step(now, 0, SwitchFrame(now, closed, lost), None).grasp for now in times]
@@ -70,6 +74,10 @@ def test_what_is_refused_is_none_and_all_else_is_as_the_tables_say(make_build: M
         )
     else:
         assert (found.grasp, found.candidate, found.health) == (NONE, NONE, "ok")
+    alone = build.recognise(flags(closed), [])
+    assert (alone.grasp, alone.probability, alone.margin) == (found.grasp, found.probability, found.margin)
+    assert build.classify(flags(closed), []) == found.grasp
+    if found.grasp == NONE:
         assert found.margin == math.ceil(build.tables.scale * math.log(99))
         # The types share what is left, of which the best has 1 against 99.
         assert 0.99 ** len(build.grasps) < found.probability < 0.99 + 1e-4
@@ -107,6 +115,8 @@ def test_segments_begin_and_end_where_frames_are_refused_no_longer(build: Build)
 def test_lost_switches_refuse_nothing_by_being_lost(build: Build) -> None:
     live = recognizer(build, Policy(lead=0, dwell_us=0, hold_us=0, max_lost=1.0))
     # One is closed, and another may be.
+    assert build.recognise(flags(EMPTY), [], flags(0b010000)).grasp != NONE
+    assert build.recognise(flags(0), [], flags(0b010000)).grasp == NONE
     assert lasting(live, EMPTY, 1, 0, lost=0b010000)[0].grasp != NONE
     assert lasting(live, 0, 1, 1000, lost=0b010000)[0].grasp == NONE
 
