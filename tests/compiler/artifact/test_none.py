@@ -1,0 +1,147 @@
+"""Builds that know that nothing is held: none as a class of the tables, and frames that are refused without one."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.compiler import Build, GraspSet, compile_build, verify
+from thenar.compiler.artifact import CompileError
+from thenar.compiler.artifact.training import cuts_of, samples_of
+from thenar.compiler.artifact.verify_firmware import select_inputs
+from thenar.compiler.evaluation.choosing import inner_folds
+from thenar.compiler.recordings.graspset import Joint
+from thenar.compiler.recordings.taxonomy import own
+from thenar.compiler.samples import Samples
+from thenar.compiler.tables.quantise import integer_scores
+from thenar.runtime.manifest import Options
+from thenar.runtime.rejection import refused
+
+TYPES, TRIALS, FRAMES = ("pinch", "hook", "disk"), 20, 4
+
+
+def moving(subjects: int = 3) -> GraspSet:
+    """Return movements: each grasp with frames before it and after it in which few switches are closed."""
+    random, rows = np.random.default_rng(5), []
+    for subject in range(subjects):
+        for trial in range(TRIALS):
+            for label, grasp in enumerate(TYPES):
+                for frame in range(3 * FRAMES):
+                    held = FRAMES <= frame < 2 * FRAMES
+                    closed = random.random(9) < np.where(np.arange(9) // 3 == label, 0.9, 0.05) * (held or 0.1)
+                    codes = random.normal(100 + 30 * (label == np.arange(3)) * held, 6).astype(np.uint16)
+                    rows.append((closed, codes, grasp if held else "none", f"S{subject}", trial))
+    switches, codes, grasps, people, trials = (np.array(column) for column in zip(*rows, strict=True))
+    return GraspSet(
+        switches=switches,
+        switch_names=tuple(f"s{number}" for number in range(9)),
+        codes=codes,
+        joints=tuple(Joint(f"j{number}", "raw", 0, 0.0, 255, 255.0) for number in range(3)),
+        grasps=grasps,
+        taxonomy=own(TYPES),
+        subjects=people,
+        objects=grasps_objects(grasps, rows),
+        trials=trials,
+    )
+
+
+def grasps_objects(grasps: np.ndarray, rows: list[tuple[object, ...]]) -> np.ndarray:
+    """Return the object of each row: that of its movement."""
+    return np.repeat([f"of {grasp}" for grasp in grasps[FRAMES :: 3 * FRAMES]], 3 * FRAMES)[: len(rows)]
+
+
+@pytest.fixture(scope="module")
+def moved() -> GraspSet:
+    return moving()
+
+
+def test_none_is_the_last_class_and_placed_on_grasps_alone(moved: GraspSet, tmp_path: Path) -> None:
+    made = compile_build(moved, tmp_path / "build", rounds=20, folds=3, keep=4, placement="mrmr", jobs=1)
+    without = compile_build(moved.without_none(), tmp_path / "without", rounds=20, folds=0, keep=4, placement="mrmr")
+    assert made.manifest.grasps == (*sorted(TYPES, key=TYPES.index), "none")
+    assert [each.name for each in made.manifest.switches] == [each.name for each in without.manifest.switches]
+    assert made.manifest.rejection is None
+    assert Build.load(tmp_path / "build").none == 3
+    assert all(rate.total in (180, 720) for rate in made.manifest.rates)
+    found = made.manifest.detected
+    assert found is not None
+    assert found.none is not None
+    assert found.held.of == "new subject"
+    assert found.held.rate > 0.9
+    assert found.none.rate > 0.9
+    assert made.confusion is not None
+    assert made.confusion.shape == (4, 4)
+    assert made.confusion.sum() == len(moved)
+    assert verify(tmp_path / "build", moved).holds
+
+
+def test_no_fold_parts_a_movement(moved: GraspSet) -> None:
+    samples, ids = samples_of(moved, Options()), moved.movement_ids
+    folds = [fold for cut in cuts_of(moved, Options()) for fold in cut.folds] + inner_folds(samples, 1)
+    assert len(np.unique(ids)) == 180
+    for fold in folds:
+        assert not set(ids[fold.train]) & set(ids[fold.test])
+    # Stratified by the grasp: every pooled fold tests as many movements of each type.
+    for fold in inner_folds(samples, 1):
+        types = samples.labels[fold.test][samples.labels[fold.test] < 3]
+        assert np.ptp(np.bincount(types)) <= FRAMES
+
+
+def test_no_more_rows_of_nothing_held_than_of_grasps_are_trained_on(moved: GraspSet) -> None:
+    samples = Samples.of(moved)
+    rows = samples.balanced()
+    assert (np.diff(rows) > 0).all()
+    assert np.count_nonzero(samples.is_none[rows]) == np.count_nonzero(~samples.is_none) == 720
+    assert np.array_equal(samples.without_none().balanced(), np.arange(720))
+
+
+def test_a_build_without_such_rows_refuses_the_share_that_it_was_asked_for(moved: GraspSet, tmp_path: Path) -> None:
+    held = moved.without_none()
+    made = compile_build(held, tmp_path / "build", rounds=20, folds=3, refuse=0.02, jobs=1)
+    build, found = Build.load(tmp_path / "build"), made.manifest.detected
+    assert build.none is None
+    assert build.rejector is not None
+    assert made.manifest.rejection is not None
+    assert found is not None
+    assert found.none is None
+    assert found.held.rate >= 0.95
+    assert made.manifest.answers == (*TYPES, "none")
+    bits, codes = select_inputs(moved, made.manifest)
+    scores = integer_scores(build.tables, bits, codes)
+    gone = refused(made.manifest.rejection, scores, bits, codes)
+    assert gone[~moved.is_none].mean() <= 0.02
+    assert gone[moved.is_none].mean() >= 0.5
+    lost = build.scorer.lanes(bits[0], codes[0])
+    mask = sum(1 << int(number) for number in np.flatnonzero(bits[0]))
+    assert build.rejector.refuses(lost, mask, 0, codes[0].tolist()) == gone[0]
+
+
+def test_without_refusal_the_firmware_says_nothing_of_it(moved: GraspSet, tmp_path: Path) -> None:
+    held = moved.without_none()
+    for refuse in (0.0, 0.01):
+        compile_build(held, tmp_path / f"{refuse}", rounds=5, folds=0, refuse=refuse, jobs=1)
+    texts = [(tmp_path / f"{refuse}" / "firmware" / "thenar_glove.h").read_text() for refuse in (0.0, 0.01)]
+    assert ["THENAR_GLOVE_NONE 3u" in text for text in texts] == [False, True]
+    assert ["thenar_glove_held" in text for text in texts] == [False, True]
+    assert Build.load(tmp_path / "0.0").rejector is None
+
+
+def test_compiled_classifiers_refuse_the_frames_that_python_does(moved: GraspSet, tmp_path: Path) -> None:
+    compile_build(moved.without_none(), tmp_path / "build", rounds=20, folds=0, refuse=0.05, jobs=1)
+    found = verify(tmp_path / "build", moved.without_none(), firmware=["host"]).firmware
+    assert found is not None
+    assert found.holds
+
+
+@pytest.mark.parametrize("share", [-0.1, 0.5])
+def test_a_share_that_makes_no_sense_is_an_error(moved: GraspSet, tmp_path: Path, share: float) -> None:
+    with pytest.raises(CompileError, match="may be refused"):
+        compile_build(moved, tmp_path / "build", refuse=share)
+
+
+def test_a_type_of_ones_own_that_is_called_none_is_a_type_as_any_other(moved: GraspSet) -> None:
+    old = replace(moved, taxonomy=own((*TYPES, "none")))
+    samples = Samples.of(old)
+    assert not samples.has_none
+    assert samples.n_types == 4
