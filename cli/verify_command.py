@@ -106,6 +106,9 @@ def _print(found: "Verification") -> None:
             f"recognised by the integers, {whose}: {rate}, {counted.integers:,} of {counted.total:,} {counted.unit}; "
             f"by the ensemble {counted.ensemble:,}"
         )
+    if (none := found.nothing_held) is not None:
+        empty = f", and of {none.detected:,} of {none.empty:,} rows of nothing held" if none.empty else ""
+        console.print(f"nothing held, it says of {none.missed:,} of {none.grasps:,} rows of grasps{empty}")
     if found.independent:
         console.print(INDEPENDENT)
     console.print(f"rows that change class: {len(found.changed)}")

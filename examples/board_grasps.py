@@ -9,7 +9,7 @@ import sys
 from thenar.drivers.scanner import Scanner
 from thenar.runtime import Build
 
-grasps = Build.load(sys.argv[1]).grasps
+grasps = Build.load(sys.argv[1]).manifest.answers
 with Scanner(sys.argv[2]) as board:
     told = None
     while True:

@@ -318,7 +318,8 @@ class Making:
         """Return what `build.json` says, not sealed yet; `files` are name -> content of what lies beside it."""
         digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
         grasp_set, options, fitting = self.grasp_set, self.options, self.trained.fitting
-        deployed = answered(self.integers, self.rejection, self.trained.read(self.samples))
+        kept = self.trained.read(self.samples)
+        deployed = answered(self.integers, self.rejection, kept.switches, kept.codes)
         rates = rates_of("training", self.samples, deployed, options.seed)
         detection = detection_of("training", self.samples, deployed, options.seed)
         switches = zip(self.trained.kept, names_of(grasp_set, self.trained.kept), self.trained.gains, strict=True)

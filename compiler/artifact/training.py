@@ -263,12 +263,14 @@ def rejected_by(
     return rejection_of(trained.read(samples), tables, trained.training, options, groups)
 
 
-def answered(tables: IntegerTables, rejection: Rejection | None, samples: Samples) -> Answers:
-    """Return the classes (n,) that integers give rows of the kept inputs; the number of classes: refused."""
-    scores = integer_scores(tables, samples.switches, samples.codes)
+def answered(
+    tables: IntegerTables, rejection: Rejection | None, bits: NDArray[np.bool_], codes: NDArray[np.uint16]
+) -> Answers:
+    """Return the classes (n,) that integers give rows of kept switches (n, s) and codes (n, j); K: refused."""
+    scores = integer_scores(tables, bits, codes)
     found: Answers = scores.argmax(axis=1)
     if rejection is not None:
-        found[refused(rejection, scores, samples.switches, samples.codes)] = samples.n_classes
+        found[refused(rejection, scores, bits, codes)] = tables.n_classes
     return found
 
 

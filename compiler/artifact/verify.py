@@ -23,6 +23,7 @@ from ..tables.faults import count_faults, groups_of, worst_faults
 from . import CompileError
 from .documents import Progress
 from .ensemble import MAX_BYTES, ensemble_from_bytes, model_fault
+from .training import answered
 from .verify_firmware import FirmwareVerification, select_inputs, verify_firmware
 
 
@@ -66,14 +67,25 @@ class ScanCheck(Struct, frozen=True):
     changed: int
 
 
+class NothingHeld(Struct, frozen=True):
+    """How many rows of grasps there are, of how many the integers say that nothing is held; and the same of rows in
+    which nothing is.
+    """
+
+    grasps: int
+    missed: int
+    empty: int
+    detected: int
+
+
 class Verification(Struct, frozen=True, kw_only=True):
     """What verification found on `rows` rows; differences beside the bounds that they must keep.
 
     collapse_* compare the ensemble with the float tables, in units of score; integer_* the float tables with the
     integers, in steps. covered counts rows whose margin exceeds safe_margin, covered_changed those of them that change.
-    recognised counts trials, and frames where trials have several; independent says that the recordings state each row
-    to be a trial. worst looks beyond the rows; scan is there if the build says how to read a harness, firmware if it
-    was asked for.
+    recognised counts trials of grasps, and frames where trials have several; independent says that the recordings state
+    each row to be a trial. nothing_held is there if the build ever says so. worst looks beyond the rows; scan is there
+    if the build says how to read a harness, firmware if it was asked for.
     """
 
     same_recordings: bool
@@ -92,6 +104,7 @@ class Verification(Struct, frozen=True, kw_only=True):
     scan: ScanCheck | None
     holds: bool
     firmware: FirmwareVerification | None = None
+    nothing_held: NothingHeld | None = None
 
 
 def verify(
@@ -143,7 +156,9 @@ def verify(
     worst = worst_case(model, build.tables, comparison, build.grasps, names)
     scan = None if build.scan is None else check_scan(build.scan, build.tables, bits, codes, comparison.deployed)
     tried = verify_firmware(folder, grasp_set, firmware, progress) if firmware else None
-    grasps = np.array(build.grasps)
+    grasps, empty = np.array(build.grasps), grasp_set.is_none
+    answers = answered(build.tables, build.manifest.rejection, bits, codes)
+    says = build.none if build.rejector is None else len(grasps)
     return Verification(
         same_recordings=grasp_set.fingerprint() == build.manifest.source.fingerprint,
         rows=len(grasp_set),
@@ -155,13 +170,19 @@ def verify(
         safe_margin=comparison.safe_margin,
         covered=int(np.count_nonzero(comparison.covered)),
         covered_changed=int(np.count_nonzero(comparison.covered[comparison.changed])),
-        recognised=_recognised(comparison, grasps, grasp_set),
+        recognised=_recognised(comparison.trained, answers, grasps, grasp_set),
         worst=worst,
         changed=_changed(comparison, grasps, grasp_set),
         scan=scan,
         holds=comparison.holds and worst.holds and not (scan and scan.changed) and (tried is None or tried.holds),
         firmware=tried,
+        nothing_held=None if says is None else _nothing_held(answers == says, empty),
     )
+
+
+def _nothing_held(said: NDArray[np.bool_], empty: NDArray[np.bool_]) -> NothingHeld:
+    counts = (~empty, said & ~empty, empty, said & empty)
+    return NothingHeld(*(int(np.count_nonzero(each)) for each in counts))
 
 
 def _build_for(folder: str | Path, grasp_set: GraspSet) -> Build:
@@ -218,6 +239,7 @@ def verify_faults(folder: str | Path, grasp_set: GraspSet, progress: Progress | 
     >>> verify_faults("build", grasp_set).worst == report.manifest.faults
     True
     """
+    grasp_set = grasp_set.without_none()
     build = _build_for(folder, grasp_set)
     manifest = build.manifest
     bits, codes = select_inputs(grasp_set, manifest)
@@ -278,11 +300,16 @@ def check_scan(
     return ScanCheck(len(ports), read / len(frames), changed)
 
 
-def _recognised(comparison: Comparison, grasps: NDArray[np.str_], grasp_set: GraspSet) -> tuple[Counted, ...]:
-    labels = _labels(grasps, grasp_set)
+def _recognised(
+    trained: NDArray[np.intp], deployed: NDArray[np.intp], grasps: NDArray[np.str_], grasp_set: GraspSet
+) -> tuple[Counted, ...]:
+    labels, held = _labels(grasps, grasp_set), ~grasp_set.is_none
+    # A type that the build does not know is not what refused frames are.
+    labels[labels == len(grasps)] = len(grasps) + 1
+    if not held.any():
+        return ()
     both = [
-        rated(answers, labels, grasp_set.trial_ids, of="pooled")
-        for answers in (comparison.trained, comparison.deployed)
+        rated(answers[held], labels[held], grasp_set.trial_ids[held], of="pooled") for answers in (trained, deployed)
     ]
     return tuple(
         Counted(one.unit, one.total, one.correct[0], other.correct[0], other.low, other.high)

@@ -48,9 +48,7 @@ def test_what_is_lost_is_refused_only_where_every_value_of_it_would_be(
     best = scores.index(max(scores))
     sure = [number for number in range(S) if lost >> number & 1]
     states = [closed & ~lost | sum(1 << n for n in sure[:count]) for count in range(len(sure) + 1)]
-    likely = [
-        rejection.ranges[best][joint][0] if joints >> joint & 1 else code for joint, code in enumerate(codes)
-    ]
+    likely = [rejection.ranges[best][joint][0] if joints >> joint & 1 else code for joint, code in enumerate(codes)]
     possible = [rejector.refuses(lanes, state, 0, likely) for state in states]
     assert rejector.refuses(lanes, closed, lost, codes, lost_joints=joints) == all(possible)
 
