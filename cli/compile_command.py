@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from thenar.compiler.text import INDEPENDENT, counted, detection_sentences, duration, listed
+from thenar.compiler.text import INDEPENDENT, counted, duration, listed
 from thenar.runtime.manifest import AUTO
 from thenar.runtime.published import NONE
 
@@ -331,7 +331,7 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
     _print_training(manifest)
     for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
         console.print(f"recognised, {rate}")
-    for sentence in detection_sentences(manifest):
+    for sentence in manifest.nothing_held:
         console.print(sentence, soft_wrap=True)
     if manifest.source.independent:
         console.print(INDEPENDENT)

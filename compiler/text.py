@@ -1,11 +1,8 @@
 """Numbers in words, as reports, pictures, tables and sentences write them; and texts in cells that are no formulas."""
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Protocol
-
-from thenar.runtime.manifest import Manifest
-from thenar.runtime.published import NONE
 
 DASH = "–"
 NBSP = "\N{NO-BREAK SPACE}"
@@ -95,18 +92,3 @@ def cells(row: Iterable[object]) -> list[object]:
 def text_of(cell: str) -> str:
     """Return the text whose `cell` it is."""
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
-
-
-def detection_sentences(manifest: Manifest) -> Iterator[str]:
-    """Yield what a build says of hands that hold nothing, and what that is worth."""
-    held = manifest.rejection
-    if manifest.grasps[-1] == NONE:
-        yield "nothing held: a class of the tables"
-    elif held is not None:
-        yield (
-            f"nothing held: refused by score, closed switches and joints, with at most {100 * held.share:g} % of the "
-            "grasps of inner folds; no row shows an empty hand, so how many of those are refused is not known"
-        )
-    else:
-        yield "nothing held: never said, every frame is one of the grasp types"
-    yield from (f"nothing held, {each}" for each in manifest.detection if each.held.protocol != "training")

@@ -14,7 +14,7 @@ from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_u
 from ..placement.gain import entropy_bits
 from ..placement.methods.base import METHODS
 from ..tables.faults import FaultCounts
-from ..text import INDEPENDENT, NBSP, counted, detection_sentences, microseconds, percent, sentence
+from ..text import INDEPENDENT, NBSP, counted, microseconds, percent, sentence
 from ..trainers.base import TRAINERS
 from .content import PlainTable, ReportContent
 
@@ -69,11 +69,6 @@ def _unread(content: ReportContent) -> str:
     """Return a sentence on joints that no CyberGlove measures; "" without any, or where one is wired."""
     wired = content.harness is not None and content.harness.cyberglove is not None
     return "" if wired else own_joints([joint.name for joint in content.manifest.joints])
-
-
-def nothing_held(manifest: Manifest) -> Iterator[str]:
-    """Yield what the build says of hands that hold nothing, in sentences."""
-    yield from detection_sentences(manifest)
 
 
 def warnings(content: ReportContent) -> Iterator[str]:

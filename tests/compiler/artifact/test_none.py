@@ -65,10 +65,13 @@ def test_none_is_the_last_class_and_placed_on_grasps_alone(moved: GraspSet, tmp_
     assert Build.load(tmp_path / "build").none == 3
     assert all(rate.total in (180, 720) for rate in made.manifest.rates)
     found = made.manifest.detected
-    assert found is not None and found.none is not None
+    assert found is not None
+    assert found.none is not None
     assert found.held.of == "new subject"
-    assert found.held.rate > 0.9 and found.none.rate > 0.9
-    assert made.confusion is not None and made.confusion.shape == (4, 4)
+    assert found.held.rate > 0.9
+    assert found.none.rate > 0.9
+    assert made.confusion is not None
+    assert made.confusion.shape == (4, 4)
     assert made.confusion.sum() == len(moved)
     assert verify(tmp_path / "build", moved).holds
 
@@ -97,8 +100,11 @@ def test_a_build_without_such_rows_refuses_the_share_that_it_was_asked_for(moved
     held = moved.without_none()
     made = compile_build(held, tmp_path / "build", rounds=20, folds=3, refuse=0.02, jobs=1)
     build, found = Build.load(tmp_path / "build"), made.manifest.detected
-    assert build.none is None and build.rejector is not None and made.manifest.rejection is not None
-    assert found is not None and found.none is None
+    assert build.none is None
+    assert build.rejector is not None
+    assert made.manifest.rejection is not None
+    assert found is not None
+    assert found.none is None
     assert found.held.rate >= 0.95
     assert made.manifest.answers == (*TYPES, "none")
     bits, codes = select_inputs(moved, made.manifest)
@@ -124,7 +130,8 @@ def test_without_refusal_the_firmware_says_nothing_of_it(moved: GraspSet, tmp_pa
 def test_compiled_classifiers_refuse_the_frames_that_python_does(moved: GraspSet, tmp_path: Path) -> None:
     compile_build(moved.without_none(), tmp_path / "build", rounds=20, folds=0, refuse=0.05, jobs=1)
     found = verify(tmp_path / "build", moved.without_none(), firmware=["host"]).firmware
-    assert found is not None and found.holds
+    assert found is not None
+    assert found.holds
 
 
 @pytest.mark.parametrize("share", [-0.1, 0.5])
@@ -136,4 +143,5 @@ def test_a_share_that_makes_no_sense_is_an_error(moved: GraspSet, tmp_path: Path
 def test_a_type_of_ones_own_that_is_called_none_is_a_type_as_any_other(moved: GraspSet) -> None:
     old = replace(moved, taxonomy=own((*TYPES, "none")))
     samples = Samples.of(old)
-    assert not samples.has_none and samples.n_types == 4
+    assert not samples.has_none
+    assert samples.n_types == 4

@@ -38,7 +38,7 @@ def folder(grasp_set: GraspSet, tmp_path: Path, request: pytest.FixtureRequest) 
     settings = Training.candidates(Options(trainer=trainer))[0].settings
     given: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
     given |= {"rounds": 15} if "rounds" in given else {}
-    made = compile_build(grasp_set, tmp_path / "build", trainer=trainer, folds=0, **(given | changes))
+    made = compile_build(grasp_set, tmp_path / "build", trainer=trainer, folds=0, refuse=0, **(given | changes))
     assert made.manifest.fit.trainer == trainer
     assert bool(made.tables.slopes) == bool(changes)
     return made.folder
