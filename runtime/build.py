@@ -13,9 +13,10 @@ from . import manifest as manifest_file
 from . import tables as tables_file
 from .errors import BuildError
 from .files import read_file
+from .frames import Mask
 from .manifest import Manifest, manifest_from_bytes
 from .published import NONE
-from .rejection import Rejector
+from .rejection import Rejector, none_leads
 from .scanning import scanmap as scan_file
 from .scanning.scanmap import ScanMap, check_switches, scanmap_from_bytes
 from .scores import LANE_OFFSET, Scorer, softmax
@@ -45,10 +46,10 @@ class Build:
     order of `manifest.joints`. Of equal scores the first grasp type wins. `scan` is how to read the kept switches, None
     where the build was compiled for no harness. `scorer` is what all that score frames of this build share. `none` is
     the class of frames in which nothing is held, None where no row trained on showed that; then `rejector` says which
-    frames are refused, None where none is.
+    frames are refused, None where none is, and `none_leads` by how much none leads one that is not, and one that is.
     """
 
-    __slots__ = ("grasps", "manifest", "none", "rejector", "scan", "scorer", "tables")
+    __slots__ = ("grasps", "manifest", "none", "none_leads", "rejector", "scan", "scorer", "tables")
 
     def __init__(self, manifest: Manifest, tables: IntegerTables, scan: ScanMap | None = None) -> None:
         """Put together what belongs together. Raises BuildError if they describe different builds."""
@@ -67,12 +68,9 @@ class Build:
         self.grasps = manifest.grasps
         self.scorer = Scorer(tables)
         self.none = len(self.grasps) - 1 if self.grasps[-1] == NONE else None
-        self.rejector = None if manifest.rejection is None else Rejector(manifest.rejection)
-
-    @property
-    def knows_none(self) -> bool:
-        """Whether it says when nothing is held."""
-        return self.grasps[-1] == NONE
+        refusal = manifest.rejection
+        self.rejector = None if refusal is None else Rejector(refusal)
+        self.none_leads = (0, 0) if refusal is None else none_leads(refusal, tables.scale)
 
     @classmethod
     def load(cls, folder: str | PathLike[str]) -> Self:
@@ -99,9 +97,26 @@ class Build:
         return np.array(self.scorer.lanes(bits, codes)) - LANE_OFFSET
 
     def classify(self, bits: ArrayLike, codes: ArrayLike) -> str:
-        """Return the grasp type of one frame. Raises FrameError."""
-        lanes = self.scorer.lanes(bits, codes)
-        return self.grasps[lanes.index(max(lanes))]
+        """Return the grasp type of one frame, "none" if nothing is held. Raises FrameError."""
+        lanes = self._answers(self.scorer.lanes(bits, codes), bits, codes)
+        return self.manifest.answers[lanes.index(max(lanes))]
+
+    def _answers(
+        self,
+        lanes: tuple[int, ...],
+        bits: ArrayLike,
+        codes: ArrayLike,
+        lost_switches: ArrayLike = False,
+        lost_joints: ArrayLike = False,
+    ) -> tuple[int, ...]:
+        """Return the scores of all answers: with one of none, if the build may refuse the frame."""
+        if self.rejector is None:
+            return lanes
+        n_switches, n_joints = self.tables.n_switches, self.tables.n_joints
+        closed, lost = (_mask(np.broadcast_to(flags, n_switches)) for flags in (bits, lost_switches))
+        joints = _mask(np.broadcast_to(lost_joints, n_joints))
+        refused = self.rejector.refuses(lanes, closed, lost, np.asarray(codes).tolist(), lost_joints=joints)
+        return (*lanes, max(lanes) + self.none_leads[refused])
 
     def recognise(
         self,
@@ -129,16 +144,21 @@ class Build:
             If the frame does not fit the build.
         """
         if lost_switches is None and lost_joints is None:
-            lanes, degraded = self.scorer.lanes(bits, codes), False
+            lanes, degraded = self._answers(self.scorer.lanes(bits, codes), bits, codes), False
         else:
             switches = np.zeros(self.tables.n_switches, bool) if lost_switches is None else lost_switches
             joints = np.zeros(self.tables.n_joints, bool) if lost_joints is None else lost_joints
             lanes = self.scorer.lanes_without(bits, codes, switches, joints)
             degraded = bool(np.any(switches) or np.any(joints))
+            lanes = self._answers(lanes, bits, codes, switches, joints)
         second, best = sorted(lanes)[-2:]
         winner = lanes.index(best)
         probability = softmax(lanes, winner, self.tables.scale)
-        return Recognition(self.grasps[winner], probability, best - second, degraded)
+        return Recognition(self.manifest.answers[winner], probability, best - second, degraded)
+
+
+def _mask(flags: ArrayLike) -> Mask:
+    return int.from_bytes(np.packbits(np.asarray(flags, np.bool_), bitorder="little").tobytes(), "little")
 
 
 def load_manifest(folder: Path) -> Manifest:

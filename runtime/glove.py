@@ -58,7 +58,7 @@ class Glove:
         Preshapes of a robot's hand: a table that ships, "barrett_bh8" or "parallel_gripper", or a file of your own.
     change_while_held : bool
         Whether the preshape may change while something is held. Otherwise that takes nothing held in between, where the
-        build knows that.
+        build was trained with rows of that.
     sinks : sequence of str or Sink
         Where each moment goes besides: "unix:/run/grasps", as `thenar run --sink` spells them.
     record : str or path, optional

@@ -6,6 +6,7 @@ type's ranges. All of that are integers: Python and C refuse the same frames. Wh
 switch may be closed or open, a lost joint lies within, and with unread switches the score is not judged.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,6 +15,18 @@ from numpy.typing import NDArray
 from .frames import Mask
 from .manifest import Rejection
 from .scores import LANE_OFFSET
+
+_LEAST_SHARE, _EVEN = 1e-9, 0.5
+# By so many steps none trails in a frame that is not refused: no sum of scores comes near.
+_NEVER = -(1 << 40)
+
+
+def none_leads(rejection: Rejection, scale: float) -> tuple[int, int]:
+    """Return by how many of `scale` steps a unit none leads the best score where a frame is not refused, and where it
+    is: there by ln((1 - share) / share), where a share of grasps is refused.
+    """
+    share = max(rejection.share, _LEAST_SHARE)
+    return _NEVER, math.ceil(scale * math.log((1 - share) / share)) if share < _EVEN else 1
 
 
 class Rejector:

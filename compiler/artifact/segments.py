@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from thenar.drivers.errors import SettingError
 from thenar.runtime.build import Build
 from thenar.runtime.live.replay import moments
+from thenar.runtime.rejection import refused
 from thenar.runtime.segmenting.decoder import decode
 from thenar.runtime.segmenting.model import emissions
 
@@ -81,8 +82,10 @@ def segment(
     known = np.array([number.get(name, len(types)) for name in grasp_set.taxonomy.names], np.intp)
     found = []
     for done, stream in enumerate(streams, 1):
-        scores = integer_scores(build.tables, bits[stream.rows], codes[stream.rows])
-        states, likely = _decoded(build, scores, lag_us)
+        own = bits[stream.rows], codes[stream.rows]
+        scores, rejection = integer_scores(build.tables, *own), build.manifest.rejection
+        no = None if rejection is None else refused(rejection, scores, *own)
+        states, likely = _decoded(build, scores, no, lag_us)
         truth, tick_us = known[grasp_set.labels[stream.rows]], build.manifest.segmenting.tick_us
         found.append(Timeline(stream.subject, stream.session, stream.start_us, tick_us, types, states, likely, truth))
         if progress is not None:
@@ -91,26 +94,27 @@ def segment(
 
 
 def _decoded(
-    build: Build, scores: NDArray[np.integer], lag_us: int | None
+    build: Build, scores: NDArray[np.integer], no: NDArray[np.bool_] | None, lag_us: int | None
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Return the state of each tick of scores (T, n_lanes), and its probability."""
+    """Return the state of each tick of scores (T, n_lanes), of which some are refused, and its probability."""
     model = build.manifest.segmenting
     if lag_us is None:
-        states = decode(model, emissions(scores, model))
+        states = decode(model, emissions(scores, model, no))
     else:
-        states = live_states(model, scores, min(lag_us // model.tick_us, len(scores)))
+        states = live_states(model, scores, min(lag_us // model.tick_us, len(scores)), no)
     return states, probabilities(scores, states, build.tables.scale)
 
 
 def _of_run(build: Build, path: Path, lag_us: int | None, warn: Callable[[str], None]) -> tuple[Timeline, ...]:
     """Return the timelines of a live run, cut where too little could be read; the tick takes the newest scores."""
     tick_us, types = build.manifest.segmenting.tick_us, build.grasps[: build.manifest.segmenting.n_types]
-    parts: list[tuple[int, list[Sequence[int]]]] = []
+    parts: list[tuple[int, list[tuple[Sequence[int], bool]]]] = []
     zero_us: int | None = None
-    before: Sequence[int] | None = None
+    before: tuple[Sequence[int], bool] | None = None
     due_us = 0
     for entry, moment in moments(build, path, None, warn):
-        now_us, scores = entry.unix_us, moment.scores
+        now_us = entry.unix_us
+        scores = None if moment.scores is None else (moment.scores, moment.refused)
         zero_us = now_us if zero_us is None else zero_us
         if scores is not None and (before is None or not 0 <= now_us - due_us + tick_us < PAUSE_US):
             parts.append((now_us, []))
@@ -122,16 +126,9 @@ def _of_run(build: Build, path: Path, lag_us: int | None, warn: Callable[[str], 
         before = scores
     if not parts:
         raise SegmentingError(f"{path.name} holds no moment in which the build could read enough")
-    return tuple(
-        Timeline(
-            path.stem,
-            str(number),
-            start_us,
-            tick_us,
-            types,
-            *_decoded(build, np.array(rows), lag_us),
-            None,
-            zero_us or 0,
-        )
-        for number, (start_us, rows) in enumerate(parts, 1)
-    )
+    found = []
+    for number, (start_us, rows) in enumerate(parts, 1):
+        lanes, no = (np.array(each) for each in zip(*rows, strict=True))
+        states, likely = _decoded(build, lanes, no, lag_us)
+        found.append(Timeline(path.stem, str(number), start_us, tick_us, types, states, likely, zero_us=zero_us or 0))
+    return tuple(found)

@@ -25,7 +25,7 @@ from ..evaluation.folds import Fold, leave_groups_out, trial_folds
 from ..evaluation.rates import student
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
-from ..segmenting.learning import LAG_TICKS, Counts, live_states
+from ..segmenting.learning import LAG_TICKS, Counts, announced_live, live_states
 from ..segmenting.scores import OVERLAPS, Score, score
 from ..segmenting.streams import TICK_US, SegmentingError, streams_of
 from ..tables.quantise import integer_scores
@@ -184,7 +184,7 @@ class _Decoded:
     def every(self) -> Mapping[str, tuple[Labels, Labels | None]]:
         none, policy = self.model.n_types, Policy()
         live = live_states(self.model, self.lanes, LAG_TICKS)
-        announced = np.concatenate([np.full(LAG_TICKS, none, np.intp), live])[: len(live)]
+        announced = announced_live(live, none, LAG_TICKS)
         lead = policy.lead_steps(self.scale)
         rules: dict[str, Decision | SequentialTest] = {
             f"dwell {ms} ms": Decision(lead, 1000 * ms, policy.hold_us) for ms in (50, 200)

@@ -90,10 +90,12 @@ def _laid_out(model: SegmentModel) -> tuple[list[_State], list[_Ring]]:
     found = {
         k: least for k, least in enumerate(model.least) if least > 1 and (k in {0, K} or least != model.least[k - 1])
     }
+    usual = max(model.stay, key=model.stay.count)
     states = []
     for k, least in enumerate(model.least):
         change = (model.enter[k], model.direct[k], model.leave[k]) if k < K else (0, 0, 0)
         place, later = model.least[:k].count(least), any(number > k and each == least for number, each in found.items())
-        stay = model.stay[k] - min(model.stay)
+        # What all states cost alike decides nothing; what is less is added modulo 2^16.
+        stay = (model.stay[k] - usual) % 65536
         states.append(_State(*change, stay, least, numbers.get(least, 0), place, k in found, k in found and not later))
     return states, rings

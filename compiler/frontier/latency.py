@@ -1,7 +1,7 @@
 """How long after a hand has arrived in a grasp `thenar run` has decided on it.
 
-The runtime's own `Decision` and `SequentialTest` decide on a stream. Where many frames in succession are alike, a
-decider does nothing in most of them: they are shown those frames alone in which something can happen.
+The runtime's own `Decision`, `SequentialTest` and `LiveSegments` decide on a stream. Where many frames in succession
+are alike, a decider does nothing in most of them: they are shown those frames alone in which something can happen.
 """
 
 import math
@@ -21,6 +21,8 @@ from thenar.runtime.live.decision import Decision, SequentialTest, Standing
 from thenar.runtime.policy import Policy
 from thenar.runtime.scanning.decided import Decided as Undecided
 from thenar.runtime.scores import LANE_OFFSET, Scorer
+from thenar.runtime.segmenting.live import LiveSegments
+from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables
 
 from ..evaluation.folds import Rows
@@ -86,9 +88,9 @@ def stretches(scores: NDArray[np.int32], at_us: NDArray[np.int64], step_us: int)
     return Stretches(scores[kept], np.append(due[kept], due[-1]), step_us)
 
 
-def decisions(tables: IntegerTables, frames: Stretches, policy: Policy) -> Decisions:
+def decisions(tables: IntegerTables, frames: Stretches, policy: Policy | None) -> Decisions:
     """Return what `thenar run` decides under `policy` on these frames, each whole and seen once, by both devices at the
-    same time.
+    same time; None: which segments it says are held.
     """
     decider, scorer = decider_of(tables, policy), Scorer(tables)
     found: list[Decided] = []
@@ -103,12 +105,30 @@ def decisions(tables: IntegerTables, frames: Stretches, policy: Policy) -> Decis
     )
 
 
-def decider_of(tables: IntegerTables, policy: Policy) -> Decider:
-    """Return the decider that the live recogniser has under `policy`."""
+def decider_of(tables: IntegerTables, policy: Policy | None) -> Decider:
+    """Return the decider that the live recogniser has under `policy`; None: its segments."""
+    if policy is None:
+        return _Segments(tables)
     if policy.error_rate is None:
         return _Hysteresis(Decision(policy.lead_steps(tables.scale), policy.dwell_us, policy.hold_us))
     test = _Test(tables.n_classes, tables.scale, policy.error_rate, policy.hold_us, policy.spacing_us)
     return _Tests(test, Scorer(tables))
+
+
+class _Segments:
+    """Segments of the usual model, with the usual lag. Frames between two ticks change nothing."""
+
+    def __init__(self, tables: IntegerTables) -> None:
+        model = SegmentModel.usual(tables.n_classes, has_none=False, scale=tables.scale)
+        self._live = LiveSegments(model, [str(number) for number in range(tables.n_classes)], Policy().lag_us or 0)
+
+    def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
+        """Yield what is held at the first frame of a stretch, and at each that takes a tick."""
+        place = 0
+        while place < len(times):
+            found = self._live.update(times[place], standing.lanes)
+            yield times[place], None if found.state == "forming" else found.label
+            place = bisect_left(times, True, place + 1, key=self._live.due)
 
 
 class _Hysteresis:
@@ -243,8 +263,13 @@ class _Tests:
 Times = NDArray[np.int64]
 
 # What `thenar run` does under each. Scans that end early decide alike.
-POLICIES: Mapping[DecisionKind, Policy] = MappingProxyType(
-    {"single": Policy(lead=0.0, dwell_us=0), "dwell": Policy(), "sequential": Policy(dwell_us=0, error_rate=0.01)}
+POLICIES: Mapping[DecisionKind, Policy | None] = MappingProxyType(
+    {
+        "single": Policy(lead=0.0, dwell_us=0),
+        "dwell": Policy(),
+        "sequential": Policy(dwell_us=0, error_rate=0.01),
+        "segments": None,
+    }
 )
 
 
@@ -288,7 +313,9 @@ class _Held:
     types: NDArray[np.intp]
 
 
-def latency(tables: IntegerTables, columns: Sequence[int], stream: Stream, frame_us: float, policy: Policy) -> Latency:
+def latency(
+    tables: IntegerTables, columns: Sequence[int], stream: Stream, frame_us: float, policy: Policy | None
+) -> Latency:
     """Return the latency of tables on a stream whose frames follow one another every frame_us, in whole microseconds.
 
     columns  the stream's switches that the tables take, in their order; of its joints they take all, or none
@@ -336,9 +363,11 @@ def latency_on_demand(tables: IntegerTables, columns: Sequence[int], stream: Str
 
 
 def decided_on(
-    tables: IntegerTables, columns: Sequence[int], stream: Stream, step_us: int, policy: Policy
+    tables: IntegerTables, columns: Sequence[int], stream: Stream, step_us: int, policy: Policy | None
 ) -> Decisions:
-    """Return what is decided under `policy` on a stream whose frames begin every step_us, the first with the stream."""
+    """Return what is decided under `policy` (None: by segments) on a stream whose frames begin every step_us, the first
+    with the stream.
+    """
     codes = stream.codes[:, : None if tables.n_joints else 0]
     scores = integer_scores(tables, stream.bits[:, list(columns)], codes)
     return decisions(tables, stretches(scores, stream.at_us, step_us), policy)

@@ -40,7 +40,7 @@ _LEFT, _RIGHT, _BOTTOM, _TOP = 0.72, 0.18, 0.58, 1.02  # inches around the axes
 _SIZE, _MARK_SIZE, _TRIED_SIZE = 34.0, 52.0, 9.0  # square points
 _LOWEST = 1.0  # microseconds or switches: a logarithmic axis has no 0, and nothing takes less
 _FEW = 16  # switches: curves may leave the picture below the rate of so many
-_DECISIONS = {"single": "one frame", "dwell": "dwell", "sequential": "sequential test"}
+_DECISIONS = {"single": "one frame", "dwell": "dwell", "sequential": "sequential test", "segments": "segments"}
 
 
 @dataclass(frozen=True, slots=True)

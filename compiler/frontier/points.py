@@ -20,7 +20,7 @@ MAX_BYTES = 64 << 20
 # formula: the vendor's, of a single source. given: by the user. unknown: left out of every sum.
 How = Literal["measured", "simulated", "wire", "model", "formula", "given", "unknown"]
 Scan = Literal["full", "early", "demand"]
-DecisionKind = Literal["single", "dwell", "sequential"]
+DecisionKind = Literal["single", "dwell", "sequential", "segments"]
 # What a rate is of: subjects who are left out, or rows of everybody in random folds of whole trials.
 By = Literal["new subject", "pooled"]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]

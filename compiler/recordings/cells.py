@@ -1,9 +1,11 @@
 """The cells of a column as numbers, bits, codes and names; which of them are missing, and which are wrong."""
 
 import math
+import re
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import compress
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -20,6 +22,7 @@ from .table import Column, pieces
 MISSING_NUMBERS = frozenset({"", "?", "na", "n/a", "#n/a", "nan", "null", "none"})
 MISSING_NAMES = frozenset({"", "?"})
 
+_DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:\.\d{1,9})?)?")
 _BITS = {"true": 1.0, "false": 0.0}
 _PIECE = 1 << 14
 
@@ -61,6 +64,24 @@ def codes(column: Column, decimal: str = ".") -> Parsed[np.float64]:
     """Read `column` as codes 0..65535; missing as in `numbers`, wrong: anything else."""
     parsed = integers(column, decimal)
     return Parsed(parsed.values, parsed.missing, parsed.wrong | (parsed.values < 0) | (parsed.values >= CODES))
+
+
+def times(column: Column, decimal: str = ".") -> Parsed[np.float64]:
+    """Read `column` as finite numbers, or all of it as dates with times of day (ISO 8601, without offsets), in
+    microseconds since 1970; missing as in `numbers`, wrong: anything else.
+    """
+    parsed = numbers(column, decimal)
+    if not parsed.wrong.any() or (isinstance(column, np.ndarray) and column.dtype.kind != "U"):
+        return parsed
+    texts = [text.strip().removesuffix("Z") for piece in pieces(column) for text in piece]
+    if not all(map(_DATE.fullmatch, compress(texts, (~parsed.missing).tolist()))):
+        return parsed
+    try:
+        stamps = np.array(["NaT" if gone else text for text, gone in zip(texts, parsed.missing, strict=True)], "M8[us]")
+    except ValueError:
+        return parsed
+    values = np.where(parsed.missing, np.nan, stamps.astype(np.int64))
+    return Parsed(values, parsed.missing, np.zeros(len(values), np.bool_))
 
 
 def names(column: Column, cells: bool = False, size: int = 0) -> Parsed[np.str_]:

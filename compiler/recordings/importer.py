@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from thenar.runtime.names import SHOWN, list_names, shortened
 from thenar.runtime.published import NONE
 
-from .cells import Parsed, Value, bits, codes, integers, names, numbers
+from .cells import Parsed, Value, bits, codes, integers, names, numbers, times
 from .coding import CodingCost, coarse, code_joint
 from .columns import KEYS, Columns, Selection, read_columns, select
 from .errors import TYPES, ColumnsError, RecordingError, TableError, check_room, list_rows
@@ -79,7 +79,7 @@ def read_cells(table: Table, columns: Columns, selection: Selection) -> Read:
         objects=reader.names(columns.parts("object")),
         sessions=reader.names(columns.parts("session")),
         trials=reader.trials(columns.parts("trial"), notes),
-        time=np.zeros(len(labels)) if columns.time is None else reader.read(columns.time, numbers, "finite numbers"),
+        time=reader.time(columns.time),
         switches=_switches(reader, selection, notes),
         joints=_joints(reader, selection),
     )
@@ -320,6 +320,12 @@ class _Reader:
             return self._noted(column, parse(self.table.columns[column]), "names that can be printed")
         except RecordingError as reason:
             raise TableError(f"{self.table.what}: column {shortened(repr(column))}: {reason}") from reason
+
+    def time(self, column: str | None) -> NDArray[np.float64]:
+        """Return what `column` says, 0 throughout without one."""
+        if column is None:
+            return np.zeros(len(self.table.rows))
+        return self.read(column, times, "finite numbers, or dates with times")
 
     def trials(self, columns: tuple[str, ...], notes: list[str]) -> NDArray[np.int64]:
         """Return the number of each row's trial: what one column of whole numbers says, otherwise counted from 1."""

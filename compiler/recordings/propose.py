@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from thenar.runtime.names import printable, shortened
 from thenar.runtime.published import NONE
 
-from .cells import bits, names, numbers
+from .cells import bits, names, numbers, times
 from .coding import sound_grid
 from .columns import KEYS, PLAIN, Columns, JointColumns, TaxelColumns, TextFormat, TimeUnit
 from .errors import TableError
@@ -51,6 +51,8 @@ _LISTS = {
 _WORDS = {role: frozenset(word.removesuffix("s") or word for word in words.split()) for role, words in _LISTS.items()}
 # In so many of the changes of a stream's label what means that nothing is held is left or reached.
 _BETWEEN = 0.9
+# Before a grasp and after it nothing is held; a number that more runs than those share is not that of a movement.
+_SHARED = 3
 # More distinct values than these are no grasp types.
 _TYPES = 200
 # An unknown analog column is at rest in so many of its cells, in the lowest tenth of its range: then it is a pad.
@@ -136,7 +138,7 @@ def _look(table: Table, name: str) -> _Column:
     column = table.columns[name]
     found = re.findall(r"[A-Z]{2,}(?![^\W\dA-Z_])|[^\W\d_][^\W\dA-Z_]*", name)
     words = frozenset(word.casefold().removesuffix("s") or word for word in found)
-    parsed = numbers(column, table.decimal)
+    parsed = (times if _is_time(words) else numbers)(column, table.decimal)
     if parsed.wrong.any():
         switch = bits(column, table.decimal)
         if not switch.wrong.any():
@@ -306,18 +308,19 @@ def _told(
 
 
 def _is_stream(table: Table, chosen: dict[str, tuple[str, ...]], held: NDArray[np.bool_]) -> bool:
-    """Return whether runs of labels tell trials apart, and better than a number of trials: one that most rows in which
-    nothing is held share with a grasp is theirs.
+    """Return whether runs of labels tell trials apart, and better than a number of trials: one that many runs share in
+    which nothing is held is no movement's.
     """
-    texts = [_texts(table, [name]) for key in ("subject", "session", "trial") for name in chosen.get(key, ())]
-    if not in_runs(_texts(table, chosen["label"]), *texts):
-        return False
-    movement = groups(*texts) if "trial" in chosen else np.arange(len(held))
-    return bool(np.isin(movement[~held], movement[held]).mean() < 0.5)
+    who = [_texts(table, [name]) for key in ("label", "subject", "session", "trial") for name in chosen.get(key, ())]
+    if "trial" not in chosen or not in_runs(*who):
+        return in_runs(*who)
+    ids = groups(*who)
+    runs = np.count_nonzero((np.diff(ids, prepend=-1) != 0) & ~held)
+    return bool(runs > _SHARED * len(np.unique(ids[~held])))
 
 
 def _time(table: Table, chosen: dict[str, tuple[str, ...]]) -> NDArray[np.float64] | None:
-    return numbers(table.columns[chosen["time"][0]], table.decimal).values if "time" in chosen else None
+    return times(table.columns[chosen["time"][0]], table.decimal).values if "time" in chosen else None
 
 
 def _add_parts(

@@ -12,6 +12,7 @@ from thenar.drivers.scanner import BoardGrasp
 
 from ..frames import SwitchFrame
 from ..harness.wiring import GloveWiring, Harness
+from ..names import list_names
 from ..scanning.ports import whole_scan
 from ..scanning.scanmap import ScanMap
 from ..scanning.timing import ChipTime, glove_us, scan_us
@@ -20,6 +21,7 @@ from ..sources.i2c import I2cDevice, PortLevels
 from ..sources.scanner import ScannerDevice
 from ..sources.spi import SpiConverter
 from ..taxels import Taxels, calibration_of
+from .quarantine import Chattering, numbers
 
 # So much slower than its wire a device may be: computers have other things to do, too.
 SLOW = 1.5
@@ -117,7 +119,7 @@ def _scanner(harness: Harness, number: int) -> tuple[Finding, ...]:
         device.close()
         device.open()
         measured = _gap(read)
-        remarks = (*_recognising(device.driver.grasp), *_counted(device))
+        remarks = (*_recognising(device.driver.grasp), *_counted(device), *_wrong(harness.switches, frames))
     except ThenarError as wrong:
         return (Finding(device.name, "", False, float(device.period_us), None, (str(wrong),)),)
     finally:
@@ -129,6 +131,20 @@ def _scanner(harness: Harness, number: int) -> tuple[Finding, ...]:
     highest = None if analog is None else (1 << analog.bits) - 1
     wired = [name for name in harness.scanners[number].taxels if name]
     return (_told(found), *taxel_findings(device.name, wired, harness, frames, highest))
+
+
+def _wrong(switches: Sequence[str], frames: Sequence[SwitchFrame]) -> Iterator[str]:
+    """Yield remarks on switches that were closed in all frames, and on those that changed faster than a hand."""
+    chattering, seen, closed = Chattering(len(switches)), 0, (1 << len(switches)) - 1
+    for frame in frames:
+        read = ~(frame.lost | frame.unread)
+        chattering.frame(frame.time_us, frame.closed, read)
+        seen, closed = seen | read, closed & (frame.closed | ~read)
+    shaking = chattering.switches
+    if never := [switches[number] for number in numbers(seen & closed & ~shaking)] if frames else []:
+        yield f"closed all the time: {list_names(never)}; if nothing was touched, stuck"
+    if shaking:
+        yield f"faster than a hand: {list_names([switches[number] for number in numbers(shaking)])}; a loose contact?"
 
 
 def taxel_findings(

@@ -37,6 +37,8 @@ class Standing:
     Without unread switches every number here is that of the frame. With some, `margin`, `lead` and `probability` are
     the least that any state of the unread switches, closed, open or lost, would have given: the true ones are no less.
     `Scorer.joints_bit` among them says that the joints are unread, too.
+
+    Of a build that refuses frames there are K + 1 of them (`or_none`), and none is the last class.
     """
 
     __slots__ = ("_rivals", "_scorer", "_unread", "candidate", "lanes")
@@ -79,7 +81,7 @@ class Standing:
         """
         if self.candidate == held:
             return False
-        most = self._scorer.reach(held, self._unread)[self.candidate] if self._unread else 0
+        most = self._reach(held)[self.candidate] if self._unread else 0
         return self.lanes[self.candidate] - self.lanes[held] + most >= lead
 
     def probability(self, number: int, scale: float) -> float:
@@ -87,9 +89,20 @@ class Standing:
         near = self._nearest(number) if self._unread and number != self.candidate else self._rivals
         return softmax(near, number, scale)
 
+    def or_none(self, lead: int) -> "Standing":
+        """Return the same with none, the last class, `lead` steps above the best: below it, where that is negative."""
+        return Standing((*self.lanes, max(self.lanes) + lead), self._scorer, self._unread)
+
+    def _reach(self, number: int) -> tuple[int, ...]:
+        """Return how much closer to class `number` the unread switches can bring each: none is left where it is."""
+        classes = self._scorer.tables.n_classes
+        if number == classes:
+            return (0,) * (classes + 1)
+        return (*self._scorer.reach(number, self._unread), *(0,) * (len(self.lanes) - classes))
+
     def _nearest(self, number: int) -> tuple[int, ...]:
         """Return the scores with every rival of class `number` as near to it, or as far above it, as it can come."""
-        return tuple(map(add, self.lanes, self._scorer.reach(number, self._unread)))
+        return tuple(map(add, self.lanes, self._reach(number)))
 
 
 @dataclass(slots=True)

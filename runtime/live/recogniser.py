@@ -32,6 +32,7 @@ class Moment(msgspec.Struct):
               settled (`PreshapeSelector`: 0.1 s)
     angles    the glove's joints; None without a calibration, and while the glove says nothing
     scores    those of all classes that segments are made of; None while too little can be read
+    refused   whether the build refuses their frame
     """
 
     grasp: LiveGrasp
@@ -41,6 +42,7 @@ class Moment(msgspec.Struct):
     preshape: Preshape | None = None
     angles: JointAngles | None = None
     scores: Sequence[int] | None = None
+    refused: bool = False
 
 
 class LiveRecognizer:
@@ -72,7 +74,7 @@ class LiveRecognizer:
 
         Raises SettingError if the CyberGlove cannot serve the build.
         """
-        self._policy, self._scorer, self._grasps = policy or Policy(), build.scorer, build.grasps
+        self._policy, self._scorer, self._grasps = policy or Policy(), build.scorer, build.manifest.answers
         tables = build.tables
         self._scale, self._all_switches = tables.scale, (1 << tables.n_switches) - 1
         self._reads_switches = switch_period_us is not None and tables.n_switches > 0
@@ -88,7 +90,9 @@ class LiveRecognizer:
         self._decider, self._lead = _decider(build, self._policy), self._policy.lead_steps(tables.scale)
         lag_us, model = self._policy.lag_us, build.manifest.segmenting
         self._segments = None if lag_us is None else LiveSegments(model, build.grasps, lag_us)
-        self._whole_until_us, self._whole = -1, tuple[int, ...]()
+        self._rejector, self._none_leads = build.rejector, build.none_leads
+        self._whole_for_us, self._whole_until_us = PERIODS * model.tick_us, -1
+        self._whole: tuple[tuple[int, ...], bool] = (), False
         self._number = 0
         self._alone = LiveScores(build.scorer) if on_demand else None
 
@@ -152,19 +156,20 @@ class LiveRecognizer:
         missing = self._missing.of(lost, dull | joints_lost * (known is None))
         if read is not None:
             self.quarantine.look(read, standing.lanes, lost)
+        whole = self._whole_scores(now_us, frame, standing, codes, dull)
+        if self._rejector is not None:
+            standing = standing.or_none(self._none_leads[whole[1]])
         seen_us = max(newest.time_us, self._joints.newest.time_us)
         if missing.too_much:
             self._decider.forget()
             decided = None
         else:
             decided = self._decider.update(max(seen_us, 0), standing, whole=not (missing.names or late))
-        segment, scores = Segment(), None
-        if self._segments is not None:
-            scores = None if missing.too_much else self._whole_scores(now_us, frame, standing, self._segments.tick_us)
-            segment = self._segments.update(now_us, scores)
+        scores, refused = (None, False) if missing.too_much else whole
+        segment = Segment() if self._segments is None else self._segments.update(now_us, scores, refused)
         grasp = self._published(now_us, unix_us, standing, missing, decided, seen_us, segment, late)
         self._number += 1
-        return Moment(grasp, switches, glove, codes, scores=scores)
+        return Moment(grasp, switches, glove, codes, scores=scores, refused=refused)
 
     def _standing(self, frame: SwitchFrame | None) -> tuple[Standing, Mask]:
         """Return who leads, and what is lost: unread switches are, unless the candidate is certain without them.
@@ -183,16 +188,22 @@ class LiveRecognizer:
         return Standing(self._scores.lanes(frame.closed & ~lost, lost), self._scorer), lost
 
     def _whole_scores(
-        self, now_us: int, frame: SwitchFrame | None, standing: Standing, tick_us: int
-    ) -> tuple[int, ...]:
-        """Return the scores for a tick of the segments: those of the newest frame of which nothing was left unread, if
-        it is at most two ticks old; otherwise what is unread counts as lost.
+        self, now_us: int, frame: SwitchFrame | None, standing: Standing, codes: Sequence[int] | None, dull: Mask
+    ) -> tuple[tuple[int, ...], bool]:
+        """Return the scores of the newest frame of which nothing was left unread, and whether the build refuses it; if
+        that is more than two ticks old, those of this one, in which what is unread counts as lost.
         """
-        if standing.whole:
-            self._whole_until_us, self._whole = now_us + PERIODS * tick_us, standing.lanes
-        elif frame is not None and now_us > self._whole_until_us:
-            lost = frame.lost | frame.unread
-            return self._scores.lanes(frame.closed & ~lost, lost)
+        if standing.whole or now_us > self._whole_until_us:
+            closed, lost, lanes = 0, self._all_switches, standing.lanes
+            if frame is not None:
+                closed, lost = frame.closed, frame.lost | frame.unread
+            if not standing.whole:
+                lanes = self._scores.lanes(closed & ~lost, lost)
+            refuses = None if self._rejector is None else self._rejector.refuses
+            found = lanes, refuses is not None and refuses(lanes, closed, lost, codes, lost_joints=dull)
+            if not standing.whole:
+                return found
+            self._whole_until_us, self._whole = now_us + self._whole_for_us, found
         return self._whole
 
     def _published(
@@ -244,7 +255,7 @@ def _decider(build: Build, policy: Policy) -> Decision | SequentialTest:
     scale = build.tables.scale
     if policy.error_rate is None:
         return Decision(policy.lead_steps(scale), policy.dwell_us, policy.hold_us)
-    return SequentialTest(len(build.grasps), scale, policy.error_rate, policy.hold_us, policy.spacing_us)
+    return SequentialTest(len(build.manifest.answers), scale, policy.error_rate, policy.hold_us, policy.spacing_us)
 
 
 @dataclass(frozen=True, slots=True)

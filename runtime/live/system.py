@@ -112,8 +112,8 @@ class System:
         return Sources(self.harness, self.switch_names, scan, early, sensors, on_demand=self.on_demand)
 
     def early_exit(self, ports: Sequence[Mask]) -> EarlyExit:
-        """Return what ends a scan of these ports early without changing any decision. Segments need all scores: every
-        half tick a scan goes to its end.
+        """Return what ends a scan of these ports early without changing any decision. Segments, and builds that refuse
+        frames, need whole ones: every half tick a scan goes to its end.
 
         Hand `start` the codes of the glove's record that the recogniser will be given with the scan.
         """

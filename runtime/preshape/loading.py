@@ -76,13 +76,15 @@ def load_preshapes(name: str | os.PathLike[str]) -> PreshapeTable:
 def preshape_selector(
     name: str | os.PathLike[str], build: Build, *, segments: bool = True, change_while_held: bool = False
 ) -> tuple[PreshapeSelector, str]:
-    """Return what selects from a table for a build, by segments where the build knows when nothing is held (without
-    `segments` by the grasp type alone), and a sentence on grasp types for which the table has no preshape, or nothing.
+    """Return what selects from a table for a build, and a sentence on grasp types for which it has no preshape, or "".
+
+    It selects by `segments` where the build was trained with rows in which nothing is held, otherwise by the grasp type
+    alone: a build that only refuses frames misses most of the times at which contact is lost.
 
     Raises PreshapeError.
     """
     table = load_preshapes(name)
-    by_segments = segments and build.knows_none
+    by_segments = segments and build.none is not None
     return PreshapeSelector(table, segments=by_segments, change_while_held=change_while_held), table.check(build.grasps)
 
 

@@ -166,6 +166,28 @@ def test_a_table_is_imported_without_a_columns_toml(glove: Path, capsys: pytest.
     assert sorted(path.name for path in glove.glob("*.toml")) == ["columns.toml"]
 
 
+def test_a_stream_with_rest_is_imported_as_it_comes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    runs = [("rest", 30), ("cup", 50), ("rest", 40), ("pen", 60), ("rest", 20)] * 2
+    labels = [label for label, count in runs for _ in range(count)]
+    poses = {"rest": 10, "cup": 80, "pen": 50}
+    rows = [f"{n / 100},{label},{poses[label] + n % 7}.5\n" for n, label in enumerate(labels)]
+    (tmp_path / "stream.csv").write_text("t,label,bend\n" + "".join(rows))
+    assert run(["import", str(tmp_path / "stream.csv"), "-o", str(tmp_path / "set.grasps"), "--yes"]) == 0
+    said = capsys.readouterr().out
+    assert "nothing is held where the label is 'rest' (45% of the rows): see `none`" in said
+    assert "400 grasps of 2 types (own), in 180 of which nothing is held; subjects 1" in said
+    assert 'none = "rest"' in (tmp_path / "columns.toml").read_text()
+    grasp_set = GraspSet.load(tmp_path / "set.grasps")
+    assert grasp_set.times_us[-1] == 3_990_000
+    assert len(set(grasp_set.movement_ids.tolist())) == 5
+
+
+def test_stream_is_of_recordings(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert thenar_import(folder, "--stream") == 2
+    assert "--stream is for recordings (.mcap), leave it out" in capsys.readouterr().err
+    assert not (folder / "set.grasps").exists()
+
+
 def test_without_a_terminal_nothing_is_imported_and_the_next_command_is_said(
     glove: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,18 @@ def test_a_set_is_described_for_people(grasps: Path, capsys: pytest.CaptureFixtu
         "Separability",
     ):
         assert words in said
+
+
+def test_rows_in_which_nothing_is_held_are_shown_last(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = GraspSet.load(grasps)
+    replace(found, grasps=np.array(["mug", "ball", "none", "none"]), times_us=np.array([0, 0, 10_000, 20_000])).save(
+        grasps
+    )
+    assert run(["info", str(grasps)]) == 0
+    said = capsys.readouterr().out
+    assert "4 grasps of 2 types (own), in 2 of which nothing is held; subjects 2" in said
+    assert "movements 4, 0.0 s" in said
+    assert [line.split()[1] for line in said.splitlines() if line.endswith("% │")] == ["mug", "ball", "none"]
 
 
 def test_a_set_is_described_for_machines(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:

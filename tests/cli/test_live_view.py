@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from rich.console import Console
 
 from thenar.cli.live_view import LiveView, drawn
-from thenar.runtime.published import DeviceHealth, Health, HealthReport, LiveGrasp
+from thenar.runtime.published import DeviceHealth, Health, HealthReport, LiveGrasp, Quarantined
 from thenar.runtime.task import Progress
 
 LONG_S = 10.0
@@ -106,6 +106,15 @@ def test_what_is_missing_is_named_six_of_it_at_most() -> None:
         lost = tuple(f"s{number}" for number in range(count))
         assert said in picture(replace(grasp("Tripod"), health="degraded", lost=lost))
     assert not any(line.startswith("missing") for line in picture(grasp("Tripod")))
+
+
+def test_what_is_in_quarantine_is_drawn_with_the_reason_with_or_without_status() -> None:
+    wrong = (Quarantined("palm", "stuck closed"), Quarantined("tip", "chattering", used=True))
+    terminal = Terminal()
+    health = HealthReport(0, (), (), (), (), 100.0, 90.0, 120, 0, 0, 0, quarantined=wrong)
+    with LiveView(Console(file=terminal, force_terminal=True, width=80)) as view:
+        view.show(grasp("first"), nobody, health)
+        terminal.until("palm", "stuck closed, treated as lost", "chattering, used all the same")
 
 
 def test_the_newest_grasp_is_drawn() -> None:

@@ -363,9 +363,13 @@ def test_without_a_terminal_lines_are_the_keys_and_the_empty_hand_is_recorded_to
         assert (accepted, moving) == (3, True)
         assert process.wait(30) == 0
         assert process.stdout is not None
-        assert b"12 grasps, in 10 of which nothing is held; 3 of 3 trials are done" in process.stdout.read()
+        said = re.search(rb"(\d+) grasps, in (\d+) of which nothing is held; 3 of 3", process.stdout.read())
     grasp_set = GraspSet.load(folder / "set.grasps")
-    assert (len(grasp_set), len(grasp_set.without_none())) == (12, 2)
+    # Ten, but for those that a busy machine read too late.
+    assert 3 <= len(grasp_set) - 2 <= 10
+    assert said is not None
+    assert [*map(int, said.groups())] == [len(grasp_set), int(grasp_set.is_none.sum())]
+    assert len(grasp_set.without_none()) == 2
     assert set(grasp_set.rows(grasp_set.is_none).objects.tolist()) == {"open hand"}
     assert run(["import", str(folder / "set.mcap"), "-o", str(folder / "stream.grasps"), "--stream"]) == 0
     stream = GraspSet.load(folder / "stream.grasps")

@@ -107,3 +107,13 @@ def test_streams_are_evaluated_without_the_subject(
     assert dwell["recognised"]["mean"] < live["recognised"]["mean"] == 1
     assert len(live["F1@50"]["subjects"]) == 3
     assert rows["both", "decoder, afterwards"]["latency ms"]["mean"] is None
+
+
+def test_a_build_of_grasps_alone_finds_segments_by_what_it_refuses(
+    movements: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    held = GraspSet.load(movements).without_none()
+    folder = compile_build(held, tmp_path / "build", rounds=5, folds=0).folder
+    assert "segments" not in json.loads((folder / "build.json").read_text())
+    assert run(["segment", str(movements), "-b", str(folder), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["f1"][2] > 0.9

@@ -243,3 +243,23 @@ def test_a_live_glove_says_where_the_hand_is_in_its_task_and_in_its_sinks(
 def _without_pens() -> GraspSet:
     labels = np.array(states("crcrcr"))
     return grasps_of(labels).rows(np.flatnonzero(labels != 3))
+
+
+@pytest.mark.parametrize("lag", [(), ("--lag-ms", "150")])
+def test_a_recorded_run_is_cut_into_its_grasps(
+    thenar: Thenar, build: Path, demos: list[Path], tmp_path: Path, lag: tuple[str, ...]
+) -> None:
+    done = thenar("segment", demos[0], "-b", build, "-o", tmp_path / "s.csv", "--json", *lag)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert [one["type"] for one in found["segments"]] == ["cup", "pen", "rod"]
+    assert (found["streams"], found["f1"]) == (1, None)
+    for number, one in enumerate(found["segments"]):
+        assert one["start_s"] == pytest.approx(0.3 + 0.7 * number, abs=0.02)
+        assert one["end_s"] == pytest.approx(0.7 + 0.7 * number, abs=0.02)
+    assert len((tmp_path / "s.csv").read_text().splitlines()) == 4
+    # Of another build's switches nothing can be said.
+    other = compile_build(_without_pens(), tmp_path / "other", rounds=3, folds=0).folder
+    refused = thenar("segment", demos[0], "-b", other)
+    assert refused.returncode == 2
+    assert "another build" in refused.stderr

@@ -56,9 +56,9 @@ def _recording(session: Session, messages: Sequence[Message]) -> bytes:
 
 
 def _collected() -> bytes:
-    """Return a guided collection: two trials, calibrated, the second done again."""
+    """Return a guided collection, calibrated: two trials, the second done again, and one of the empty hand."""
     lines = tuple(SensorCalibration(name, 40, 0.0, 200, 90.0) for name in SENSORS_18)
-    tasks = tuple(Task(grasp, ("mug", "pen")) for grasp in GRASPS)
+    tasks = tuple(Task(grasp, ("mug", "pen")) for grasp in (*GRASPS, "none"))
     session = Session(
         thenar="0.1.0",
         switches=SWITCHES,
@@ -68,11 +68,14 @@ def _collected() -> bytes:
         collection=Collection("anna", "own", GRASPS, tasks, 2, 5),
         clock_ns=_CLOCK_NS,
     )
-    events = (("captured", 1), ("accepted", 1), ("captured", 2), ("redone", 2), ("captured", 2), ("accepted", 2))
+    events = [(event, 1) for event in ("begun", "captured", "accepted")]
+    events += [(event, 2) for event in ("captured", "redone", "captured", "accepted")]
+    events += [(event, 3) for event in ("begun", "captured", "accepted")]
     messages: list[Message] = []
     for number, (event, trial) in enumerate(events):
-        label = Label(1000 * number + 2, event, trial, GRASPS[trial], "anna", "mug")  # type: ignore[arg-type]
-        messages += [*_frames(1000 * number), (layout.TRIALS, label.time_us, encode_text(msgspec.json.encode(label)))]
+        time_us = 120_000 * number
+        label = Label(time_us + 2, event, trial, (*GRASPS, "none")[trial], "anna", "mug")  # type: ignore[arg-type]
+        messages += [*_frames(time_us), (layout.TRIALS, label.time_us, encode_text(msgspec.json.encode(label)))]
     return _recording(session, messages)
 
 
@@ -114,7 +117,7 @@ def _use(data: bytes, folder: Path) -> None:
     path = folder / "anna.mcap"
     path.write_bytes(data)
     refusals = []
-    for step in (_imported, _resumed, _replayed, _played):
+    for step in (_imported, _streamed, _resumed, _replayed, _played):
         try:
             step(path)
         except (ThenarError, OSError) as refusal:
@@ -125,6 +128,10 @@ def _use(data: bytes, folder: Path) -> None:
 
 def _imported(path: Path) -> None:
     import_recordings([path])
+
+
+def _streamed(path: Path) -> None:
+    import_recordings([path], stream=True)
 
 
 def _resumed(path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import gzip
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -77,7 +78,10 @@ def _grasps() -> bytes:
     from thenar.compiler.recordings import graspset as file
     from thenar.runtime.sealed import seal
 
-    return seal(file.KIND, file.VERSION, file._pack(grasp_set()))
+    plain = grasp_set()
+    nothing = np.where(np.arange(len(plain)) % 5, plain.grasps, "none")
+    timed = replace(plain, grasps=nothing, times_us=10_000 * np.arange(len(plain)))
+    return seal(file.KIND, file.VERSION, file._pack(timed))
 
 
 def _use(grasps: GraspSet) -> None:

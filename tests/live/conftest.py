@@ -79,6 +79,10 @@ class Shown:
     row: int
 
 
+# A record of the glove that is older than two of its periods is late.
+LATE_US = 20_000
+
+
 @dataclass(eq=False)
 class Truth:
     """What a build makes of the rows of a performance."""
@@ -120,7 +124,8 @@ class Truth:
             if grasp.health == "unknown":
                 assert (grasp.grasp, grasp.probability, grasp.margin) == (UNKNOWN, 0.0, 0), grasp
                 continue
-            assert (grasp.health in ("ok", "changing")) == (not grasp.lost), grasp
+            late = grasp.health == "degraded" and (grasp.glove_age_us or 0) > LATE_US
+            assert (grasp.health in ("ok", "changing")) == (not grasp.lost and not late), grasp
             ages = grasp.switch_age_us, grasp.glove_age_us
             rows = [
                 0 if set(names) <= set(grasp.lost) else _row_at(shown, grasp.time_us - (age or 0), grasp.time_us)

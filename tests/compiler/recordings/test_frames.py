@@ -98,6 +98,12 @@ def test_repetitions_are_not_taken_for_frames(seed: int) -> None:
         assert looks_like_frames(make(trials=30, seed=seed, **few)) is None
 
 
+def test_frames_in_which_nothing_is_held_are_not_taken_for_trials() -> None:
+    frames = misnamed(make(frames=15), "row")
+    assert looks_like_frames(frames)
+    assert not looks_like_frames(replace(frames, grasps=np.full(len(frames), "none")))
+
+
 def test_what_never_varies_and_what_is_hardly_there_says_nothing() -> None:
     grasp_set = make(trials=20)
     still = replace(grasp_set, switches=np.ones_like(grasp_set.switches), codes=np.full_like(grasp_set.codes, 7))

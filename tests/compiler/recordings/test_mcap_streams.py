@@ -22,7 +22,10 @@ START_US, COUNTDOWN_US, TICK_US = 1_000_000, 2_000_000, 5_000
 GRASPS = (Task("PoS", ("jar",)), Task("Tip", ("pin",)))
 COLLECTION = Collection("A", "kamakura14", KAMAKURA_14.types, (*GRASPS, Task("none", tuple(MOVEMENTS)[:2])), 2, 3)
 SESSION = Session(thenar="1", switches=("s1", "s2", "s3"), sensors=SENSORS, collection=COLLECTION)
-POSES = {"PoS": (0b011, (180, 170, 160, 150)), "Tip": (0b100, (90, 100, 170, 180))}
+POSES: dict[str, tuple[int, tuple[float, ...]]] = {
+    "PoS": (0b011, (180, 170, 160, 150)),
+    "Tip": (0b100, (90, 100, 170, 180)),
+}
 OPEN = np.array([60.0, 60, 60, 60])
 
 
@@ -134,6 +137,18 @@ def test_of_a_collection_without_the_empty_hand_only_what_is_held_is_known(tmp_p
     grasp_set, report = import_recordings([recorder.path], stream=True)
     assert (report.none, report.trials) == (0, 4)
     assert grasp_set.switches.any(axis=1).all()
+
+
+def test_a_hand_that_never_moves_is_empty_where_the_guide_said_so(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "a.mcap", SESSION) as recorder:
+        wearer = Wearer(recorder)
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setitem(POSES, "PoS", (0, tuple(OPEN)))
+            patched.setitem(POSES, "Tip", (0, tuple(OPEN)))
+            wearer.collect()
+    grasp_set, report = import_recordings([recorder.path], stream=True)
+    assert report.none == 2 * MOVING_US // 10_000
+    assert len(np.unique(grasp_set.trial_ids)) == 6
 
 
 def test_what_was_begun_anew_is_another_session(recorded: tuple[Path, Wearer]) -> None:

@@ -189,6 +189,16 @@ def test_a_set_is_parted_by_three_things_only(small: GraspSet) -> None:
             part()
 
 
+def test_times_and_rows_in_which_nothing_is_held_are_merged(small: GraspSet) -> None:
+    timed = replace(small, grasps=np.array(["none", *small.grasps[1:]]), times_us=np.arange(6) * 10_000)
+    other = replace(timed, sessions=np.full(6, "2"))
+    merged = merge({"a": timed, "b": other})
+    assert merged.times_us.tolist() == [*timed.times_us.tolist()] * 2
+    assert merged.is_none.tolist() == [True, *[False] * 5] * 2
+    assert not merge({"a": timed, "b": replace(other, times_us=np.empty(0, np.int64))}).times_us.size
+    assert merge({"a": timed, "b": small.rows([])}).times_us.tolist() == timed.times_us.tolist()
+
+
 def test_no_set_is_no_merge() -> None:
     with pytest.raises(RecordingError, match="no set to merge"):
         merge({})

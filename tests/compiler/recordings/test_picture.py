@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -50,6 +51,17 @@ def test_an_svg_names_grasp_types_and_joints_and_is_the_same_every_time(small: G
     assert picture == draw(small, "svg")
     for words in ("PoS", "Tip", "palm copy", "wrist", "6 grasps"):
         assert f"<!-- {words} -->".encode() in picture
+
+
+def test_rows_in_which_nothing_is_held_are_drawn_last(small: GraspSet) -> None:
+    drawn = draw(replace(small, grasps=np.array(["none", *small.grasps[1:]])), "svg").decode()
+    assert "6 grasps, in 1 of which nothing is held" in drawn
+    assert [name for name in re.findall(r"<!-- (\w+) -->", drawn) if name in ("PoS", "PoH", "Tip", "none")][:4] == [
+        "PoS",
+        "PoH",
+        "Tip",
+        "none",
+    ]
 
 
 def test_a_set_without_rows_cannot_be_drawn(small: GraspSet) -> None:

@@ -110,12 +110,13 @@ def test_a_stream_is_imported_without_knowledge(tmp_path: Path, rest: str, hz: i
     assert (grasp_set.grasps[found.complete] != "none").all()
 
 
-def test_numbers_of_repetitions_that_rest_does_not_share_are_left_out(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [lambda label, n: 0 if label == "0" else n, lambda _, n: n])
+def test_numbers_of_repetitions_that_many_rests_share_are_left_out(number: Any, tmp_path: Path) -> None:
     repetition: dict[str, Any] = {
         "restimulus": lambda label, _: label,
-        "rerepetition": lambda label, n: 0 if label == "0" else n,
+        "rerepetition": number,
     }
-    made = stream("0", ("1", "2", "10"), stimulus=lambda label, _: label, **repetition)
+    made = stream("0", ("1", "2", "3", "7", "10"), stimulus=lambda label, _: label, **repetition)
     named = made._replace(header=["time", "subject", "ignored", *made.header[3:]])
     proposal, grasp_set, _ = imported(named._replace(rows=[[*row[:2], "x", *row[3:]] for row in made.rows]), tmp_path)
     assert (proposal.columns.label, proposal.columns.trial, proposal.columns.frames) == ("restimulus", None, "restart")
@@ -235,6 +236,24 @@ def test_a_taxonomy_that_lists_none_takes_it_for_a_type() -> None:
 )
 def test_the_unit_of_a_time_is_told_by_its_name_or_its_steps(name: str, step: float, unit: str | None) -> None:
     assert unit_of_time(name, np.tile(step * np.arange(20.0), 2)) == unit
+
+
+def test_dates_are_times(tmp_path: Path) -> None:
+    made = stream()
+    start = np.datetime64("2024-03-01T23:59:59.9", "us")
+    stamps = [start + np.timedelta64(10_000 * number, "us") for number in range(len(made.rows))]
+    rows = [[str(stamp).replace("T", " "), *row[1:]] for stamp, row in zip(stamps, made.rows, strict=True)]
+    proposal, grasp_set, _ = imported(made._replace(header=["Timestamp", *made.header[1:]], rows=rows), tmp_path)
+    assert (proposal.columns.time, proposal.columns.time_unit) == ("Timestamp", "us")
+    assert np.diff(grasp_set.times_us).tolist() == [10_000] * (len(rows) - 1)
+    check(made, grasp_set, "rest")
+
+
+@pytest.mark.parametrize("wrong", ["2024-13-01 10:00:00", "yesterday", "2024-03-01 10:00:00+01:00", "inf"])
+def test_what_is_no_time_is_named(wrong: str) -> None:
+    table = Table("t.csv", {"g": ["a", "b"], "t": ["2024-03-01 10:00:00", wrong], "s": ["0", "1"]}, np.arange(2))
+    with pytest.raises(TableError, match="not finite numbers, or dates with times: 2 cells"):
+        import_table(table, Columns("g", time="t", switches=("s",)))
 
 
 def test_times_of_no_known_unit_order_frames_and_are_not_kept() -> None:

@@ -31,6 +31,18 @@ def test_an_unplugged_port_is_missed_at_once_and_found_again_within_a_second(
     assert running.device({"cyberglove": "scanner", "scanner": "cyberglove"}[kind]).opened == 1
 
 
+def test_a_record_that_stays_away_is_late_for_the_grace_before_its_joints_are_lost(run: MakeRun) -> None:
+    running = run("both", "glove", "scanner")
+    grasps, joints = running.scene.grasps, running.scene.truth.joint_names
+    running.scene.well(0)
+    gone_us = running.now_us()
+    running.bench.lines[0].unplug()
+    lost = grasps.wait(lambda grasp: grasp.lost == joints, gone_us)
+    late = [grasp for grasp in grasps.since(gone_us) if grasp.health == "degraded" and not grasp.lost]
+    assert late
+    assert all(2 * PERIOD_US < grasp.glove_age_us <= 60_000 < lost.glove_age_us for grasp in late)
+
+
 def test_without_any_port_nothing_is_claimed_and_both_come_back(run: MakeRun, outage: Outage) -> None:
     running = run("both", "glove", "scanner")
     glove, scanner = running.bench.lines

@@ -1,6 +1,6 @@
 """A hand changes its preshape when the grasp type is sure and has been for a moment, and at no other time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import groupby
 from typing import Any
 
@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from thenar.runtime.preshape import Preshape, PreshapeError, PreshapeSelector, PreshapeTable
+from thenar.runtime import Build
+from thenar.runtime.preshape import Preshape, PreshapeError, PreshapeSelector, PreshapeTable, preshape_selector
 from thenar.runtime.published import NONE, UNKNOWN, Health, LiveGrasp, State
 
 WRAP = Preshape("wrap", ("a",), (0.0,), 1.0)
@@ -208,6 +209,20 @@ def test_an_empty_hand_changes_to_nothing_but_what_opens_it_and_a_held_grasp_cha
         # After the preshape of what is held was taken, nothing changes until it is let go of.
         assert states.count("held") <= 1
         assert "held" not in states[:-1]
+
+
+@pytest.mark.parametrize(("last", "segments"), [(NONE, True), ("Tip", False)])
+def test_segments_call_where_the_build_was_trained_with_rows_of_nothing_held(
+    make_build: Callable[..., Build], last: str, segments: bool
+) -> None:
+    plain = make_build(classes=3)
+    build = Build(replace(plain.manifest, grasps=("CMF", "PoS", last)), plain.tables)
+    selector, lacking = preshape_selector("barrett_bh8", build)
+    assert not lacking
+    one = replace(frame(0, "CMF"), state="held", segment_type="PoS", segment_probability=1.0)
+    told = [selector.update(replace(one, time_us=ms * 1000)) for ms in range(200)][-1]
+    assert told is not None
+    assert told.name == ("cylindrical" if segments else "spherical")
 
 
 def test_a_table_need_not_name_none() -> None:

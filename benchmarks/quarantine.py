@@ -1,0 +1,143 @@
+"""Faults of single switches under a live recogniser: what they cost with and without quarantine, and false alarms.
+
+    python benchmarks/quarantine.py BUILD SET.grasps
+
+BUILD has switches alone; each row of the set, of other subjects as a rule, is a grasp. Subjects take turns; their
+grasps come in random order, with an open hand for a moment in between. Every switch is stuck, closed and open, from one
+of the grasps on. Points are lost against the same grasps without the fault.
+"""
+
+import argparse
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+
+from thenar.compiler.artifact.verify_firmware import select_inputs
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.runtime.build import Build
+from thenar.runtime.frames import SwitchFrame
+from thenar.runtime.live.quarantine import SETTLED_US
+from thenar.runtime.live.recogniser import LiveRecognizer
+from thenar.runtime.policy import Policy
+
+GRASPS = 30
+_HELD_US = 3 * SETTLED_US
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """Points of recognition lost by a fault of one switch, without and with quarantine: in the first GRASPS grasps, and
+    in as many after them; after how many grasps it was found, None where it was not; and what else was.
+    """
+
+    name: str
+    without: tuple[float, float]
+    quarantined: tuple[float, float]
+    delays: tuple[int | None, ...]
+    others: int
+
+
+def held(
+    build: Build,
+    grasps: Sequence[int],
+    quarantine: bool,
+    *,
+    open_us: int = 50_000,
+    at: int = 0,
+    stuck: int = 0,
+    dead: int = 0,
+) -> Iterator[tuple[str, frozenset[str]]]:
+    """Yield the candidate for each grasp, and what was in quarantine after it; from grasp `at` on, switches are stuck
+    closed, or open. The hand is open for `open_us` between them: from SETTLED_US on that is an observation, too.
+    """
+    policy = Policy(lead=0, dwell_us=0, hold_us=0, lag_us=None, quarantine=quarantine)
+    live, now_us = LiveRecognizer(build, switch_period_us=_HELD_US, policy=policy), 0
+    for number, closed in enumerate(grasps):
+        late = number >= at
+        for pause_us, shown in ((open_us, 0), (1, 0), (_HELD_US - SETTLED_US, closed), (SETTLED_US, closed)):
+            frame = SwitchFrame(now_us, (shown | stuck * late) & ~(dead * late))
+            grasp = live.step(now_us, 0, frame, None).grasp
+            now_us += pause_us
+        yield grasp.candidate, frozenset(wrong.name for wrong in live.quarantine.found)
+
+
+def masks_of(build: Build, grasp_set: GraspSet) -> list[int]:
+    """Return the kept switches that are closed in each row."""
+    bits = np.packbits(select_inputs(grasp_set, build.manifest)[0], axis=1, bitorder="little")
+    return [int.from_bytes(row.tobytes(), "little") for row in bits]
+
+
+def orders(grasp_set: GraspSet, draws: int, seed: int = 0) -> Iterator[np.ndarray]:
+    """Yield rows of one subject after the other, in random order."""
+    names = np.unique(grasp_set.subjects)
+    for draw in range(draws):
+        own = np.flatnonzero(grasp_set.subjects == names[draw % len(names)])
+        yield np.random.default_rng((seed, draw)).permutation(own)
+
+
+def false_alarms(build: Build, grasp_set: GraspSet, draws: int, open_us: int = 50_000) -> tuple[int, int]:
+    """Return how many times an input was put into quarantine without a fault, and in how many grasps."""
+    masks, alarms, grasps = masks_of(build, grasp_set), 0, 0
+    for order in orders(grasp_set, draws, seed=1):
+        before: frozenset[str] = frozenset()
+        for _, found in held(build, [masks[row] for row in order], True, open_us=open_us):
+            alarms, before = alarms + len(found - before), found
+        grasps += len(order)
+    return alarms, grasps
+
+
+def cost(build: Build, grasp_set: GraspSet, closed: bool, draws: int, switch: int, open_us: int = 50_000) -> Cost:
+    """Return what it costs that a switch is stuck closed, or open."""
+    masks, name = masks_of(build, grasp_set), build.manifest.switches[switch].name
+    lost = np.zeros((2, 2))
+    delays, others, bit = list[int | None](), 0, 1 << switch
+    for draw, order in enumerate(orders(grasp_set, draws, seed=2 + switch)):
+        at = GRASPS + draw % GRASPS
+        rows = order[: at + 2 * GRASPS]
+        grasps, right = [masks[row] for row in rows], []
+        for quarantine, faulty in ((False, False), (False, True), (True, True)):
+            stuck, dead = bit * (faulty and closed), bit * (faulty and not closed)
+            seen = list(held(build, grasps, quarantine, open_us=open_us, at=at, stuck=stuck, dead=dead))
+            same = np.array([grasp for grasp, _ in seen]) == grasp_set.grasps[rows]
+            right.append(same[at:].reshape(2, GRASPS).mean(axis=1))
+        lost += 100 * (right[0] - np.array(right[1:])) / draws
+        after = [found for _, found in seen[at:]]
+        delays.append(next((number for number, found in enumerate(after) if name in found), None))
+        others += len(frozenset().union(*after) - {name})
+    (without, quarantined) = ((float(first), float(second)) for first, second in lost)
+    return Cost(name, without, quarantined, tuple(delays), others)
+
+
+def main() -> None:
+    """Print a table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("build")
+    parser.add_argument("grasps")
+    parser.add_argument("--draws", type=int, default=6, help="orders of the grasps, each of a subject")
+    parser.add_argument("--open-ms", type=int, default=50, help="how long the hand is open between grasps")
+    asked = parser.parse_args()
+    open_us = 1000 * asked.open_ms
+    build, grasp_set = Build.load(asked.build), GraspSet.load(asked.grasps)
+    alarms, grasps = false_alarms(build, grasp_set, asked.draws, open_us)
+    print(f"without a fault: {alarms} false alarms in {grasps} grasps")
+    for closed, what in ((True, "closed"), (False, "open")):
+        switches = range(build.tables.n_switches)
+        every = [cost(build, grasp_set, closed, asked.draws, switch, open_us) for switch in switches]
+        found = sorted(every, key=lambda each: -each.without[1])
+        print(f"stuck {what}: points lost, grasps 1 to {GRASPS} and {GRASPS + 1} to {2 * GRASPS}; found after")
+        for each in found:
+            delays = [GRASPS * 2 if delay is None else delay + 1 for delay in each.delays]
+            missed = sum(delay is None for delay in each.delays)
+            print(
+                f"{each.name:20}{each.without[0]:7.1f}{each.without[1]:7.1f}  quarantined{each.quarantined[0]:7.1f}"
+                f"{each.quarantined[1]:7.1f}  {median(delays):5.1f} grasps, {missed} missed, {each.others} others"
+            )
+        for title, name in (("without", "without"), ("quarantined", "quarantined")):
+            both = np.array([getattr(each, name) for each in found])
+            print(f"{title}: mean {both.mean(axis=0).round(1)}, worst {both.max(axis=0).round(1)}")
+
+
+if __name__ == "__main__":
+    main()

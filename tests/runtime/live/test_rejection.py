@@ -1,0 +1,160 @@
+"""A build that refuses frames says "none" of them, by the same decisions as of any type, and segments know it."""
+
+import math
+from collections.abc import Callable
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thenar.runtime import Build
+from thenar.runtime.frames import SwitchFrame
+from thenar.runtime.live.decision import Standing
+from thenar.runtime.live.recogniser import LiveRecognizer
+from thenar.runtime.manifest import Rejection
+from thenar.runtime.policy import Policy
+from thenar.runtime.published import NONE, UNKNOWN, LiveGrasp
+from thenar.runtime.scanning.decided import EarlyExit
+
+MakeBuild = Callable[..., Build]
+
+SWITCHES = 6
+PORTS = (0b000011, 0b001100, 0b110000)
+PERIOD = 1000
+# Of 6 switches 2 to 4 are closed in a grasp.
+CLOSED = (2, 4)
+HELD, EMPTY, FULL = 0b000111, 0b000001, 0b011111
+masks = st.integers(0, (1 << SWITCHES) - 1)
+
+
+@pytest.fixture
+def build(make_build: MakeBuild) -> Build:
+    return refusing(make_build(joints=0))
+
+
+def refusing(plain: Build, share: float = 0.01) -> Build:
+    n, joints = len(plain.grasps), len(plain.manifest.joints)
+    rejection = Rejection(
+        share=share,
+        least_scores=(-32768,) * n,
+        closed=(CLOSED,) * n,
+        ranges=(((0, 65535),) * joints,) * n,
+        outside=0,
+    )
+    return Build(msgspec.structs.replace(plain.manifest, rejection=rejection), plain.tables)
+
+
+def recognizer(build: Build, policy: Policy | None = None) -> LiveRecognizer:
+    return LiveRecognizer(build, switch_period_us=PERIOD, policy=policy or Policy(lead=0, dwell_us=0, hold_us=0))
+
+
+def flags(closed: int) -> list[bool]:
+    return [bool(closed >> switch & 1) for switch in range(SWITCHES)]
+
+
+def lasting(live: LiveRecognizer, closed: int, ms: int, begin_us: int, lost: int = 0) -> list[LiveGrasp]:
+    times = range(begin_us, begin_us + 1000 * ms, 1000)
+    return [live.step(now, 0, SwitchFrame(now, closed, lost), None).grasp for now in times]
+
+
+@given(closed=masks)
+def test_what_is_refused_is_none_and_all_else_is_as_the_tables_say(make_build: MakeBuild, closed: int) -> None:
+    plain = make_build(joints=0)
+    build = refusing(plain)
+    found = recognizer(build).step(0, 0, SwitchFrame(0, closed), None).grasp
+    if CLOSED[0] <= closed.bit_count() <= CLOSED[1]:
+        assert found.grasp == found.candidate != NONE
+        expected = recognizer(plain).step(0, 0, SwitchFrame(0, closed), None).grasp
+        assert (found.grasp, found.probability, found.margin) == (
+            expected.grasp,
+            expected.probability,
+            expected.margin,
+        )
+    else:
+        assert (found.grasp, found.candidate, found.health) == (NONE, NONE, "ok")
+    alone = build.recognise(flags(closed), [])
+    assert (alone.grasp, alone.probability, alone.margin) == (found.grasp, found.probability, found.margin)
+    assert build.classify(flags(closed), []) == found.grasp
+    if found.grasp == NONE:
+        assert found.margin == math.ceil(build.tables.scale * math.log(99))
+        # The types share what is left, of which the best has 1 against 99.
+        assert 0.99 ** len(build.grasps) < found.probability < 0.99 + 1e-4
+
+
+def test_none_is_decided_on_like_any_type(build: Build) -> None:
+    live = recognizer(build, Policy(dwell_us=50_000, hold_us=500_000))
+    held = lasting(live, HELD, 200, 0)
+    empty = lasting(live, EMPTY, 200, 200_000)
+    again = lasting(live, HELD, 200, 400_000)
+    for before, after in ((held, empty), (empty, again)):
+        assert {one.grasp for one in after[:50]} == {before[-1].grasp}
+        assert {one.health for one in after[:50]} == {"changing"}
+        assert {(one.grasp, one.health) for one in after[50:]} == {(after[-1].candidate, "ok")}
+    assert held[-1].grasp == again[-1].grasp != empty[-1].grasp == NONE
+
+
+def test_a_sequential_test_ends_with_none(build: Build) -> None:
+    live = recognizer(build, Policy(error_rate=0.01))
+    assert {one.grasp for one in lasting(live, EMPTY, 200, 0)} <= {UNKNOWN, NONE}
+    assert lasting(live, EMPTY, 1, 200_000)[-1].grasp == NONE
+    assert lasting(live, HELD, 900, 201_000)[-1].grasp not in (UNKNOWN, NONE)
+
+
+def test_segments_begin_and_end_where_frames_are_refused_no_longer(build: Build) -> None:
+    live = recognizer(build, Policy(dwell_us=0, hold_us=0, lag_us=150_000))
+    states = [
+        [(one.state, one.segment) for one in lasting(live, closed, 500, begin)]
+        for begin, closed in enumerate((EMPTY, HELD, EMPTY, HELD, FULL))
+        for begin in [500_000 * begin]
+    ]
+    assert [each[-1] for each in states] == [("none", 0), ("held", 1), ("none", 1), ("held", 2), ("none", 2)]
+
+
+def test_lost_switches_refuse_nothing_by_being_lost(build: Build) -> None:
+    live = recognizer(build, Policy(lead=0, dwell_us=0, hold_us=0, max_lost=1.0))
+    # One is closed, and another may be.
+    assert build.recognise(flags(EMPTY), [], flags(0b010000)).grasp != NONE
+    assert build.recognise(flags(0), [], flags(0b010000)).grasp == NONE
+    assert lasting(live, EMPTY, 1, 0, lost=0b010000)[0].grasp != NONE
+    assert lasting(live, 0, 1, 1000, lost=0b010000)[0].grasp == NONE
+
+
+@settings(max_examples=20)
+@given(seed=st.integers(0, 20), hand=st.lists(masks, max_size=8))
+def test_early_exit_changes_no_answer_where_whole_scans_follow_the_hand(
+    make_build: MakeBuild, seed: int, hand: list[int]
+) -> None:
+    build, policy = refusing(make_build(seed, joints=0)), Policy(dwell_us=12_000, hold_us=100_000, lag_us=50_000)
+    half = build.manifest.segmenting.tick_us // 2
+    whole, early = recognizer(build, policy), recognizer(build, policy)
+    exit_ = EarlyExit(build.scorer, PORTS, lead=policy.lead_steps(build.tables.scale))
+    for now in range(0, half * 20 * len(hand), 500):
+        closed = hand[now // (20 * half)]
+        exit_.start([])
+        last = next((port for port in range(3) if now % half and exit_.after(port, closed)), 2)
+        unread = exit_.unread(last)
+        found = early.step(now, 0, SwitchFrame(now, closed & ~unread, 0, unread), None).grasp
+        full = whole.step(now, 0, SwitchFrame(now, closed), None).grasp
+        for name in ("grasp", "candidate", "health", "state", "segment", "segment_type", "segment_us"):
+            assert getattr(found, name) == getattr(full, name)
+
+
+@given(st.data())
+def test_with_none_a_standing_is_that_of_one_more_class(make_build: MakeBuild, data: st.DataObject) -> None:
+    build = make_build(data.draw(st.integers(0, 9)), joints=0)
+    unread, lead = data.draw(masks), data.draw(st.integers(-40, 40))
+    lanes = build.scorer.lanes(np.array([data.draw(st.booleans()) and not unread >> s & 1 for s in range(6)]), [])
+    plain = Standing(lanes, build.scorer, unread)
+    both, none = plain.or_none(lead), len(lanes)
+    assert both.candidate == (none if lead > 0 else plain.candidate)
+    assert both.lanes[none] - max(lanes) == lead
+    for held in range(none):
+        if lead <= 0:
+            assert both.lead(held) == plain.lead(held)
+            assert both.contradicts(held, 5) == plain.contradicts(held, 5)
+    # None is refused or not whatever the unread switches are.
+    assert both.contradicts(none, 5) == (lead <= -5)
+    assert both.leads(3) == (lead >= 3 if lead > 0 else plain.leads(3) and -lead >= 3)
+    assert both.whole == plain.whole == (not unread)

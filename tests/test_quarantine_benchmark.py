@@ -1,0 +1,80 @@
+"""What the benchmark of faults finds, on a small scene, and on the build that the documents measure."""
+
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from thenar.cli import run
+from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.recordings.taxonomy import own
+from thenar.runtime import Build
+
+
+@pytest.fixture
+def faults(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / "benchmarks"))
+    return import_module("quarantine")
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., GraspSet]:
+    folder = tmp_path_factory.mktemp("quarantine")
+
+    def made(name: str, *options: str) -> GraspSet:
+        path = folder / f"{name}.grasps"
+        assert run(["simulate", name, *options, "-o", str(path)]) == 0
+        return GraspSet.load(path)
+
+    return made
+
+
+def build_of(grasp_set: GraspSet, folder: Path, prune: int) -> Build:
+    made = compile_build(grasp_set, folder, inputs="switches", prune=prune, rounds=60, folds=0)
+    return Build.load(made.folder)
+
+
+def drawn(seed: int) -> GraspSet:
+    """Return grasps of two subjects, of four types that each close three switches of twelve nearly always."""
+    random, kinds = np.random.default_rng(seed), ("a", "b", "c", "d")
+    label = random.integers(0, 4, 600)
+    often = np.where(np.arange(12) // 3 == label[:, np.newaxis], 0.9, 0.05)
+    return GraspSet(
+        switches=random.random((600, 12)) < often,
+        switch_names=tuple(f"s{number}" for number in range(12)),
+        codes=np.zeros((600, 0), np.uint16),
+        joints=(),
+        grasps=np.array(kinds)[label],
+        subjects=np.array(["A", "B"])[np.arange(600) % 2],
+        objects=np.array(["thing"] * 600),
+        sessions=np.array(["1"] * 600),
+        trials=np.arange(600),
+        taxonomy=own(kinds),
+    )
+
+
+def test_a_switch_that_sticks_is_found_and_none_without_a_fault(faults: ModuleType, tmp_path: Path) -> None:
+    build, fresh = build_of(drawn(1), tmp_path / "build", 8), drawn(2)
+    alarms, grasps = faults.false_alarms(build, fresh, 2)
+    assert (alarms, grasps) == (0, len(fresh))
+    found = faults.cost(build, fresh, True, 3, 0)
+    assert found.name == build.manifest.switches[0].name
+    assert all(delay is not None and delay < 12 for delay in found.delays)
+    assert found.quarantined[1] <= min(found.without[1], 12)
+
+
+@pytest.mark.slow
+def test_of_every_switch_that_sticks_closed_and_of_healthy_gloves_of_other_men(
+    faults: ModuleType, scene: Callable[..., GraspSet], tmp_path: Path
+) -> None:
+    """39 switches of three men, on three other men: at most the points that the switch costs as lost."""
+    build, others = build_of(scene("kamakura"), tmp_path / "build", 62), scene("kamakura-def")
+    alarms, grasps = faults.false_alarms(build, others, 3)
+    assert alarms <= grasps / 1000
+    for switch in range(build.tables.n_switches):
+        found = faults.cost(build, others, True, 2, switch)
+        assert found.quarantined[1] <= (14 if found.name == "palm_heel_6" else 12), found
+        assert None not in found.delays or found.without[1] <= 12, found
