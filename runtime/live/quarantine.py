@@ -294,10 +294,12 @@ class Quarantine:
         if len(self._chosen) >= _KEPT:
             self._chosen.clear()
         out, found = [0, 0], list[Quarantined]()
+        # Where too much is lost anyway, nothing that is used would help.
+        unknown = not self._fits(lost, joints_lost)
         for (is_joint, number), reason in self._wrong.items():
             more = list(out)
             more[is_joint] |= 1 << number
-            fits = self._active and self._fits(lost | more[0], joints_lost | more[1])
+            fits = self._active and (unknown or self._fits(lost | more[0], joints_lost | more[1]))
             out = more if fits else out
             found.append(Quarantined(self._names[is_joint][number], reason, not fits))
         return (out[0], out[1]), tuple(found)

@@ -190,6 +190,18 @@ def test_no_more_is_left_out_than_the_answer_can_do_without(make_build: MakeBuil
     assert {one.name for one in hand.found} == {one.name for one in before}
 
 
+def test_while_all_is_lost_what_is_in_quarantine_stays_there(make_build: MakeBuild) -> None:
+    """A stall of the host is no news of the switch."""
+    shares = closing()
+    hand = Hand(exact(make_build, shares))
+    for closed in drawn(shares, 40, 3):
+        hand.grasp(closed, stuck=1)
+    found = hand.found
+    moment = hand.live.step(hand.now_us + 10 * GRASP_US, 0, None, None)
+    assert moment.grasp.health == "unknown"
+    assert found == hand.live.quarantine.found == (Quarantined("s0", STUCK_CLOSED),)
+
+
 def test_without_quarantine_the_fault_is_named_and_nothing_is_left_out(make_build: MakeBuild) -> None:
     shares = closing()
     hand, grasps = Hand(exact(make_build, shares), replace(AT_ONCE, quarantine=False)), drawn(shares, 40, 3)
