@@ -223,9 +223,11 @@ def _sound(options: Options) -> Options:
     own: dict[str, Any] = {n: value for n, value in values.items() if value is not None and value != usual.get(n)}
     shared = {name: own.pop(name, None) for name in SHARED}
     shared |= {name: int(shared[name]) for name in ("rounds", "max_bins") if shared[name] is not None}
-    # A name that is equal to a default is left out if it is the very same string.
+    # A value that is equal to a default is left out if it is the very same object.
     names = {"placement": sys.intern(options.placement), "trainer": sys.intern(trainer)}
-    return replace(options, **shared, **names, settings=own)
+    usually = Options().refuse
+    refuse = usually if options.refuse == usually else float(options.refuse)
+    return replace(options, **shared, **names, settings=own, refuse=refuse)
 
 
 class _Steps:

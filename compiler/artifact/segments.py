@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from thenar.drivers.errors import SettingError
 from thenar.runtime.build import Build
 from thenar.runtime.live.replay import moments
-from thenar.runtime.published import NONE
 from thenar.runtime.rejection import refused
 from thenar.runtime.segmenting.decoder import decode
 from thenar.runtime.segmenting.model import emissions
@@ -115,7 +114,7 @@ def _of_run(build: Build, path: Path, lag_us: int | None, warn: Callable[[str], 
     due_us = 0
     for entry, moment in moments(build, path, None, warn):
         now_us = entry.unix_us
-        scores = None if moment.scores is None else (moment.scores, moment.grasp.candidate == NONE)
+        scores = None if moment.scores is None else (moment.scores, moment.refused)
         zero_us = now_us if zero_us is None else zero_us
         if scores is not None and (before is None or not 0 <= now_us - due_us + tick_us < PAUSE_US):
             parts.append((now_us, []))

@@ -74,13 +74,13 @@ def for_one_hand(build: Build, calibration: GloveCalibration) -> Build:
     codes = [codes_of_bytes(joint, calibration) for joint in joints]
     tables = on_bytes(build.tables, codes)
     if rejection is not None:
-        ranges = tuple(tuple(map(_byte_range, own, codes)) for own in rejection.ranges)
+        ranges = tuple(tuple(map(byte_range, own, codes)) for own in rejection.ranges)
         rejection = structs.replace(rejection, ranges=ranges)
     raw = tuple(Calibration(joint.column, joint.name, "raw", _FIRST, 1.0, _LAST, 255.0) for joint in joints)
     return Build(structs.replace(build.manifest, joints=raw, rejection=rejection), tables)
 
 
-def _byte_range(limits: tuple[int, int], codes: Sequence[int]) -> tuple[int, int]:
+def byte_range(limits: tuple[int, int], codes: Sequence[int]) -> tuple[int, int]:
     """Return the bytes whose codes lie within the limits, from the first to the last: codes rise or fall with bytes."""
     within = [byte for byte in range(_FIRST, _LAST + 1) if limits[0] <= codes[byte] <= limits[1]]
     return (within[0], within[-1]) if within else (_LAST, 0)

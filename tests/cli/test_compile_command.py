@@ -50,7 +50,7 @@ def test_help_has_an_example(thenar: Thenar) -> None:
 
 def test_every_option_reaches_the_build(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
     options = {"prune": 2, "rounds": 3, "inputs": "both", "shrinkage": 0.5, "folds": 2, "seed": 7, "tolerance": 1e-9}
-    options |= {"table_bits": 8, "max_bins": 4, "width": 15}
+    options |= {"table_bits": 8, "max_bins": 4, "width": 15, "refuse": 0.125}
     given = [word for name, value in options.items() for word in (f"--{name.replace('_', '-')}", value)]
     done = thenar("compile", set_file, "-o", tmp_path / "build", *given, "--no-report", "--json")
     assert json.loads(done.stdout)["options"] == options

@@ -30,7 +30,7 @@ def moving(subjects: int = 3) -> GraspSet:
                 for frame in range(3 * FRAMES):
                     held = FRAMES <= frame < 2 * FRAMES
                     closed = random.random(9) < np.where(np.arange(9) // 3 == label, 0.9, 0.05) * (held or 0.1)
-                    codes = random.normal(100 + 30 * (label == np.arange(3)) * held, 6).astype(np.uint16)
+                    codes = np.asarray(random.normal(100 + 30 * (label == np.arange(3)) * held, 6)).astype(np.uint16)
                     rows.append((closed, codes, grasp if held else "none", f"S{subject}", trial))
     switches, codes, grasps, people, trials = (np.array(column) for column in zip(*rows, strict=True))
     return GraspSet(
@@ -41,14 +41,9 @@ def moving(subjects: int = 3) -> GraspSet:
         grasps=grasps,
         taxonomy=own(TYPES),
         subjects=people,
-        objects=grasps_objects(grasps, rows),
+        objects=np.repeat([f"of {grasp}" for grasp in grasps[FRAMES :: 3 * FRAMES]], 3 * FRAMES),
         trials=trials,
     )
-
-
-def grasps_objects(grasps: np.ndarray, rows: list[tuple[object, ...]]) -> np.ndarray:
-    """Return the object of each row: that of its movement."""
-    return np.repeat([f"of {grasp}" for grasp in grasps[FRAMES :: 3 * FRAMES]], 3 * FRAMES)[: len(rows)]
 
 
 @pytest.fixture(scope="module")

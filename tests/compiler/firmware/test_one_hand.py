@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.one_hand import BYTES, for_one_hand, on_bytes
+from thenar.compiler.firmware.one_hand import BYTES, byte_range, for_one_hand, on_bytes
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.errors import SettingError
 from thenar.runtime.build import Build
@@ -102,3 +102,12 @@ def test_codes_of_the_runtime_fit() -> None:
 def test_anything_but_256_codes_a_joint_is_refused(codes: list[range]) -> None:
     with pytest.raises(FirmwareError, match="256 bytes are needed for each of 1 joints"):
         on_bytes(tables_of([[10]], 1), codes)
+
+
+@pytest.mark.parametrize(
+    "codes", [[2 * byte for byte in range(256)], [800 - 3 * byte for byte in range(256)], [7] * 256]
+)
+@pytest.mark.parametrize("limits", [(0, 65535), (100, 301), (7, 7), (601, 40_000), (9000, 9001)])
+def test_a_byte_is_within_its_limits_where_its_code_is(codes: list[int], limits: tuple[int, int]) -> None:
+    low, high = byte_range(limits, codes)
+    assert all((low <= byte <= high) == (limits[0] <= codes[byte] <= limits[1]) for byte in range(1, 256))

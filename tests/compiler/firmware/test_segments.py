@@ -115,13 +115,13 @@ def test_on_an_avr_a_tick_of_14_types_and_none_takes_the_cycles_and_the_memory_t
     runs: Any, avr: None
 ) -> None:
     """Cycles of a simulated part are no times: they are the same on every machine."""
-    for name, most in (("usual", 1500), ("each type its own", 1750), ("no class none", 1500)):
+    for name, most in (("usual", 1500), ("learnt", 1500), ("each type its own", 1750), ("no class none", 1500)):
         model = runs.models()[name]
         lanes, refused = _lanes(runs, model, 300, 1)
         run = runs.run_avr(model, lanes, refused, LAG)
         assert run.cycles.max() <= most
         assert run.flash <= 3000
-        assert run.ram <= 460
+        assert run.ram == 15 + 4 * 15 + 2 * sum(least - 1 for least in model.least) + LAG * (4 + 2 * 2)
         assert run.stack <= 40
 
 

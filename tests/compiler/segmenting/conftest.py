@@ -25,7 +25,7 @@ def movements(subjects: str = "AB", repetitions: int = 3, seed: int = 1, noise: 
     sizes = [len(states) for *_, states in parts]
     switches = (labels[:, None] == np.arange(len(TYPES))) ^ (random.random((len(labels), len(TYPES))) < noise)
     codes = np.clip(np.where(labels < len(TYPES), 60 * labels + 60, 10) + random.integers(-8, 9, len(labels)), 0, 255)
-    subject = np.repeat([subject for subject, *_ in parts], sizes)
+    owners = np.repeat([subject for subject, *_ in parts], sizes)
     return GraspSet(
         switches=switches,
         switch_names=("tip", "palm", "side"),
@@ -33,10 +33,10 @@ def movements(subjects: str = "AB", repetitions: int = 3, seed: int = 1, noise: 
         joints=(Joint("bend", "deg", 0, 0.0, 255, 90.0),),
         grasps=np.array([*TYPES, NONE])[labels],
         taxonomy=own(TYPES),
-        subjects=subject,
+        subjects=owners,
         objects=np.full(len(labels), "thing"),
         trials=np.repeat([trial for _, trial, _ in parts], sizes),
-        times_us=np.concatenate([10_000 * np.arange(np.count_nonzero(subject == each)) for each in subjects]),
+        times_us=np.concatenate([10_000 * np.arange(np.count_nonzero(owners == each)) for each in subjects]),
     )
 
 

@@ -27,7 +27,12 @@ def timeline(ticks: int = 2500) -> Timeline:
 
 def test_names_lie_within_their_segments_and_the_axes_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Figure] = []
-    monkeypatch.setattr(picture, "rendered", lambda figure, _: drawn.append(figure) or b"")
+
+    def keep(figure: "Figure", _: str) -> bytes:
+        drawn.append(figure)
+        return b""
+
+    monkeypatch.setattr(picture, "rendered", keep)
     picture.draw([timeline(), replace(timeline(), subject="B", truth=None)], "png")
     figure = drawn[0]
     figure.canvas.draw()

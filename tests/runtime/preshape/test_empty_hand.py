@@ -64,7 +64,7 @@ def changes(grasps: Sequence[LiveGrasp], truth: Sequence[str], *, segments: bool
 def test_an_empty_hand_changes_no_preshape_where_the_build_knows_none(sets: list[GraspSet], tmp_path: Path) -> None:
     trained, played = sets
     truth = played.grasps.tolist()
-    found = {}
+    found = dict[tuple[str, bool], tuple[int, int]]()
     for name, grasp_set in (("moving", trained), ("static", trained.without_none())):
         build = Build.load(compile_build(grasp_set, tmp_path / name, rounds=60, folds=0).folder)
         grasps = live(build, played)
