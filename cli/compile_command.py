@@ -241,7 +241,6 @@ def command(
     if chosen is not None:
         options |= chosen.options
         documents = documents and replace(documents, frontier=chosen.frontier, point=chosen.point.number)
-    warn_of_budget(asked["budget_us"], grasp_set.joint_names, None if given is None else given.cyberglove)
     with progress("compiling, then the paper's tables" if report and asked["folds"] else "compiling") as told:
         made = compile_build(
             grasp_set,
@@ -254,6 +253,7 @@ def command(
             progress=told,
             **options,
         )
+    warn_of_budget(asked["budget_us"], grasp_set.joint_names, None if given is None else given.cyberglove)
     if made.only_answer is not None:
         warning(
             f"the build recognises every row as {made.only_answer}: no input tells grasp types apart by "

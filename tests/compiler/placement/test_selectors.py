@@ -123,7 +123,7 @@ def test_limits_are_obeyed_by_the_names_of_the_columns(method: str, data: tuple[
     bits, labels = data
     names = tuple(f"s{number}" for number in range(9))
     limits = Limits(names=names, n_switches=9, keep=("s8",), never=("s5",))
-    kept = SwitchSelector(method, n_switches=3, limits=limits).fit(bits, labels).get_support()
+    kept = np.asarray(SwitchSelector(method, n_switches=3, limits=limits).fit(bits, labels).get_support())
     assert kept[8]
     assert not kept[5]
     with pytest.raises(ValueError, match="the limits name 9 switches, X has 8 columns"):
