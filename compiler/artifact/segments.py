@@ -10,8 +10,7 @@ from thenar.drivers.errors import SettingError
 from thenar.runtime.build import Build
 from thenar.runtime.live.replay import moments
 from thenar.runtime.rejection import refused
-from thenar.runtime.segmenting.decoder import decode
-from thenar.runtime.segmenting.model import emissions
+from thenar.runtime.segmenting.decoder import decode, emissions
 
 from ..recordings.graspset import GraspSet
 from ..segmenting.learning import live_states

@@ -18,8 +18,8 @@ from thenar.runtime.live.decision import Decision, SequentialTest, Standing
 from thenar.runtime.manifest import Inputs, Options
 from thenar.runtime.policy import Policy
 from thenar.runtime.scores import LANE_OFFSET, Scorer
-from thenar.runtime.segmenting.decoder import decode
-from thenar.runtime.segmenting.model import SegmentModel, emissions
+from thenar.runtime.segmenting.decoder import decode, emissions
+from thenar.runtime.segmenting.model import SegmentModel
 
 from ..evaluation.folds import Fold, leave_groups_out, trial_folds
 from ..evaluation.rates import student

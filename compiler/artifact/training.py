@@ -93,10 +93,10 @@ def samples_of(grasp_set: GraspSet, options: Options) -> Samples:
     for kind, names in (("switches", grasp_set.element_names), ("joints", grasp_set.joint_names)):
         if wanted == kind and not names:
             raise CompileError(f"the recordings have no {kind}: choose other inputs than {kind!r}")
+    if (types := len(np.unique(grasp_set.labels[~grasp_set.is_none]))) < 2:
+        raise CompileError(f"the recordings hold {types} grasp type(s): there is nothing to tell apart")
     samples = Samples.of(grasp_set, wanted)
     found = samples.n_classes
-    if samples.n_types < 2:
-        raise CompileError(f"the recordings hold {samples.n_types} grasp type(s): there is nothing to tell apart")
     if options.keep_joints is not None and not samples.codes.shape[1]:
         raise CompileError("there are no joints to keep some of: leave keep_joints (--keep-joints) out")
     there = samples.codes.shape[1]

@@ -19,16 +19,18 @@ import os
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
-from ..build import Build
 from ..names import fault, nearest, shortened
 from ..toml_source import Place, TomlText, read_source
 from ..toml_struct import check_finite, convert
 from .selector import Preshape, PreshapeError, PreshapeSelector, PreshapeTable
+
+if TYPE_CHECKING:
+    from ..build import Build
 
 SHIPPED = ("barrett_bh8", "parallel_gripper")
 
@@ -74,7 +76,7 @@ def load_preshapes(name: str | os.PathLike[str]) -> PreshapeTable:
 
 
 def preshape_selector(
-    name: str | os.PathLike[str], build: Build, *, segments: bool = True, change_while_held: bool = False
+    name: str | os.PathLike[str], build: "Build", *, segments: bool = True, change_while_held: bool = False
 ) -> tuple[PreshapeSelector, str]:
     """Return what selects from a table for a build, and a sentence on grasp types for which it has no preshape, or "".
 

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thenar.drivers.errors import SettingError
 
+from ..errors import BuildError
 from .model import SegmentModel
 
 _NEVER = 1 << 60
@@ -170,6 +171,35 @@ class Decoder:
     def finish(self) -> list[int]:
         """Return the states of the ticks that the lag still holds back, on the cheapest path to the newest."""
         return self._paths.states(min(self._lag, self._paths.tick + 1))
+
+
+def emissions(scores: ArrayLike, model: SegmentModel, refused: ArrayLike | None = None) -> NDArray[np.int64]:
+    """Return what frames cost the states, (T, K + 1), as `SegmentModel.costs` does frame by frame.
+
+    Parameters
+    ----------
+    scores : array of int, shape (T, n_lanes)
+        The frames' scores.
+    model : SegmentModel
+        Its `shift`, `gain`, `most` and `refusal` are used.
+    refused : array of bool, shape (T,), optional
+        Frames that the build's rejection refuses; of a model with a refusal.
+
+    Raises
+    ------
+    BuildError
+        If the scores are of another number of classes.
+    """
+    lanes = np.asarray(scores, np.int64)
+    if lanes.ndim != 2 or lanes.shape[1] != model.n_lanes:
+        raise BuildError(f"scores of shape {lanes.shape}, the segment model takes {model.n_lanes} a frame")
+    behind = lanes.max(axis=1, initial=np.iinfo(np.int64).min, keepdims=True) - lanes
+    found: NDArray[np.int64] = np.minimum((behind >> model.shift) * model.gain >> 8, model.most)
+    if model.refusal is None:
+        return found
+    no = np.zeros(len(lanes), bool) if refused is None else np.asarray(refused, bool)
+    more = np.where(no, model.refusal, 0)[:, np.newaxis]
+    return np.hstack([found + more, model.refusal - more])
 
 
 def decode(model: SegmentModel, emissions: ArrayLike) -> NDArray[np.intp]:

@@ -14,9 +14,7 @@ The first segment begins for nothing.
 from collections.abc import Sequence
 from typing import Annotated, Self
 
-import numpy as np
 from msgspec import Meta, Struct
-from numpy.typing import ArrayLike, NDArray
 
 from ..errors import BuildError
 
@@ -144,32 +142,3 @@ def gain_of(scale: float, temperature: float, steps: int = STEPS) -> tuple[int, 
     factor = steps * temperature / scale
     shift = max((shift for shift in range(9) if round(factor * 2.0 ** (8 + shift)) <= 255), default=0)
     return shift, min(max(round(factor * 2.0 ** (8 + shift)), 1), 65535)
-
-
-def emissions(scores: ArrayLike, model: SegmentModel, refused: ArrayLike | None = None) -> NDArray[np.int64]:
-    """Return what frames cost the states, (T, K + 1), as `SegmentModel.costs` does frame by frame.
-
-    Parameters
-    ----------
-    scores : array of int, shape (T, n_lanes)
-        The frames' scores.
-    model : SegmentModel
-        Its `shift`, `gain`, `most` and `refusal` are used.
-    refused : array of bool, shape (T,), optional
-        Frames that the build's rejection refuses; of a model with a refusal.
-
-    Raises
-    ------
-    BuildError
-        If the scores are of another number of classes.
-    """
-    lanes = np.asarray(scores, np.int64)
-    if lanes.ndim != 2 or lanes.shape[1] != model.n_lanes:
-        raise BuildError(f"scores of shape {lanes.shape}, the segment model takes {model.n_lanes} a frame")
-    behind = lanes.max(axis=1, initial=np.iinfo(np.int64).min, keepdims=True) - lanes
-    found: NDArray[np.int64] = np.minimum((behind >> model.shift) * model.gain >> 8, model.most)
-    if model.refusal is None:
-        return found
-    no = np.zeros(len(lanes), bool) if refused is None else np.asarray(refused, bool)
-    more = np.where(no, model.refusal, 0)[:, np.newaxis]
-    return np.hstack([found + more, model.refusal - more])

@@ -78,7 +78,7 @@ def small_set(seed: int, rows: int, switches: int, joints: int, types: int, nois
 def small_build(grasps: GraspSet, rounds: int, prune: int = 0) -> SmallBuild:
     """Return the build of `grasps`, compiled into a folder and loaded from it."""
     with TemporaryDirectory() as folder:
-        where = compile_build(grasps, Path(folder) / "build", rounds=rounds, prune=prune, folds=0).folder
+        where = compile_build(grasps, Path(folder) / "build", rounds=rounds, prune=prune, folds=0, refuse=0).folder
         build = Build.load(where)
         stumps = ensemble_from_bytes((where / ENSEMBLE_NAME).read_bytes())
     bits, codes = select_inputs(grasps, build.manifest)

@@ -24,7 +24,7 @@ int main()
         for (unsigned i = 0; i < THENAR_GLOVE_SWITCHES; ++i)
             thenar_glove_set_switch(static_cast<thenar_glove_switch>(i), (closed >> i & 1u) != 0);
         thenar_glove_input.codes[0] = static_cast<thenar_glove_code>(code);
-        std::cout << thenar_glove_grasp(thenar_glove_classify());
+        std::cout << thenar_glove_grasp(thenar_glove_held(thenar_glove_classify(), 0u));
         for (int score : thenar_glove_scores)
             std::cout << ' ' << score;
         std::cout << '\\n';

@@ -9,8 +9,8 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.segmenting.learning import Counts, learnt, live_states, model_of
 from thenar.compiler.segmenting.scores import Score, score
 from thenar.compiler.segmenting.streams import streams_of
-from thenar.runtime.segmenting.decoder import decode
-from thenar.runtime.segmenting.model import STEPS, emissions
+from thenar.runtime.segmenting.decoder import decode, emissions
+from thenar.runtime.segmenting.model import STEPS
 
 Make = Callable[..., GraspSet]
 

@@ -10,8 +10,8 @@ from hypothesis.strategies import DrawFn
 from numpy.typing import NDArray
 
 from thenar.drivers.errors import SettingError
-from thenar.runtime.segmenting.decoder import Decoder, decode
-from thenar.runtime.segmenting.model import SegmentModel, emissions
+from thenar.runtime.segmenting.decoder import Decoder, decode, emissions
+from thenar.runtime.segmenting.model import SegmentModel
 
 Segments = list[tuple[int, int]]
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.runtime.errors import BuildError
-from thenar.runtime.segmenting.decoder import _NEVER, _Paths
-from thenar.runtime.segmenting.model import LARGEST, SegmentModel, emissions, gain_of
+from thenar.runtime.segmenting.decoder import _NEVER, _Paths, emissions
+from thenar.runtime.segmenting.model import LARGEST, SegmentModel, gain_of
 
 _USUAL = SegmentModel.usual(3, True, 100.0)
 
