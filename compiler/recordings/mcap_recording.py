@@ -271,7 +271,7 @@ def _streamed(watch: _Watch, collection: Collection) -> tuple[_Grasp, ...]:
             trial[first:beyond] = np.where(held[first:beyond], trial[first:beyond], number)
         before, here, after = captures[number : number + 3]
         if number + 1 in empty:
-            after = int(np.searchsorted(time, attempts[number + 1].begun_us))
+            after = max(here, int(np.searchsorted(time, attempts[number + 1].begun_us)))
         if attempt.accepted and number not in empty and before < here:
             first, beyond = _held(closed[before:after], codes[before:after], time[before:after], here - 1 - before)
             trial[before + first : before + beyond], held[before + first : before + beyond] = number, True
