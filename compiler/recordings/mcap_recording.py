@@ -262,7 +262,9 @@ def _streamed(watch: _Watch, collection: Collection) -> tuple[_Grasp, ...]:
     empty = {number for number, attempt in enumerate(attempts) if attempt.captured.label.grasp == NONE}
     empty = empty if NONE not in collection.types else set()
     trial, held = np.full(len(ticks), -1), np.zeros(len(ticks), np.bool_)
-    captures = [0, *(int(np.searchsorted(time, each.captured.time_us, "right")) for each in attempts), len(ticks)]
+    ends = [int(np.searchsorted(time, each.captured.time_us, "right")) for each in attempts]
+    # A damaged recording may say that a grasp was captured before the one before it.
+    captures = np.maximum.accumulate([0, *ends, len(ticks)]).tolist()
     records_none = NONE in {task.grasp for task in collection.tasks}
     for number, attempt in enumerate(attempts):
         end_us = attempt.captured.time_us if number in empty else attempt.judged_us
