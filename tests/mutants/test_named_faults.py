@@ -84,8 +84,8 @@ FAULTS = (
     Fault(
         "of tied classes the build takes the last",
         "runtime/build.py",
-        "self.grasps[lanes.index(max(lanes))]",
-        "self.grasps[len(lanes) - 1 - lanes[::-1].index(max(lanes))]",
+        "self.manifest.answers[lanes.index(max(lanes))]",
+        "self.manifest.answers[len(lanes) - 1 - lanes[::-1].index(max(lanes))]",
         "tests/runtime/test_build.py",
     ),
     Fault(
@@ -112,8 +112,8 @@ FAULTS = (
     Fault(
         "a code at a threshold goes right, in the build",
         "runtime/scores.py",
-        "map(bisect_left, self.thresholds, codes)",
-        "map(__import__('bisect').bisect_right, self.thresholds, codes)",
+        "sum(map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes)))",
+        "sum(map(getitem, self.joint_rows, map(__import__('bisect').bisect_right, self.thresholds, codes)))",
         "tests/runtime/test_scorer.py",
     ),
     Fault(
