@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 SOAKED = Path(__file__).with_name("soaked.py")
 # Ten minutes of switches a millisecond apart, or as many as a minute of CPU takes.
 FRAMES, CPU_S = 600_000, 60.0
-MOST_BYTES = 40 << 20
+MOST_BYTES = 48 << 20
 # Until caches are full and every path was taken once, in windows of 10,000 frames.
 WARM_UP = 5
 MOST_KIB = 1024
