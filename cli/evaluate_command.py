@@ -64,7 +64,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
 )
 @click.option(
     "--repeats",
-    type=click.IntRange(min=1),
+    type=click.IntRange(1, 1000),
     default=3,
     show_default=True,
     help="Repeats of random folds, other seeds each.",

@@ -89,7 +89,7 @@ def _address(_: click.Context, __: click.Parameter, text: str | None) -> str | N
 @click.option("--rivals", type=method_list, help="Methods to compare them with, or none.  [default: most rivals]")
 @trainer_option(AUTO)
 @click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="The most rounds to try.")
-@click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="Repeats of the folds.")
+@click.option("--repeats", type=click.IntRange(1, 1000), default=3, show_default=True, help="Repeats of the folds.")
 @click.option(
     "--finalists", type=click.IntRange(1), default=12, show_default=True, help="Placements to refine and price."
 )
