@@ -24,7 +24,7 @@ help:           ## list the targets
 $(VENV)/installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install --quiet --editable ".[compiler,cluster,sim,stability,ros]" --group dev
+	$(BIN)/python -m pip install --quiet --editable ".[compiler,cluster,sim,stability,ros,ws,lsl]" --group dev
 	touch $@
 
 demo: $(VENV)/installed  ## recordings, rates, frontier, build, report, run: SCENE=quick, or TABLE=examples/home_glove.csv
@@ -52,11 +52,11 @@ endif
 	@echo "what accuracy costs in time: $(OUT)/frontier/frontier.svg; the build on one page: $(OUT)/build/report.html; its glove: $(OUT)/build/spec;"
 	@echo "the rates: $(OUT)/evaluation.json."
 
-test: $(VENV)/installed  ## the tests, some six minutes on two cores
+test: $(VENV)/installed  ## the tests, some thirteen minutes on two cores
 	$(BIN)/python -m pytest -m "not slow" -n $(WORKERS)
 
 test-slow: $(VENV)/installed pythons  ## the slower checks: real Weka, fuzzing, real recordings at full length
-	$(BIN)/python -m pytest -m slow -n $(CORES)
+	$(BIN)/python -m pytest -m slow -n $(CORES) --dist loadfile --no-loadscope-reorder
 
 test-all: test test-slow  ## both
 

@@ -68,8 +68,9 @@ def of_ours(
     """
     files = classifier_files("glove", numbered(layout.tables), layout, avr=True)
     called = ("classify", "update") if changes else ("classify",)
-    body = " ".join(f"thenar_glove_{function}();" for function in called)
-    program = {**files, "main.c": f'#include "thenar_glove.h"\nint main(void) {{ for (;;) {{ {body} }} }}\n'}
+    body = " ".join(f"thenar_glove_{function}(&glove);" for function in ("init", *called))
+    main = f'#include "thenar_glove.h"\nthenar_glove glove;\nint main(void) {{ for (;;) {{ {body} }} }}\n'
+    program = {**files, "main.c": main}
     with workshop(program) as folder:
         flash, ram = _linked(folder, program, target.part)
     answers = target.run(files, "glove", layout, frames, incremental=changes)

@@ -6,6 +6,7 @@ are `shift` bits finer than the rest. After them come groups of switches, fields
 rows are bytes above the least of a class. No sum leaves 16 bits: that is checked for all rows there can be.
 """
 
+import re
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -14,7 +15,7 @@ from firmwaredata import JOINTS, PORTS, SWITCHES, Fold, Labels, Rows, split
 from numpy.typing import NDArray
 from sklearn.linear_model import LogisticRegression
 
-from thenar.compiler.firmware.assembly import group_lines
+from thenar.compiler.firmware.assembly import FLAGS, group_lines
 from thenar.compiler.firmware.layout import Field
 
 _LIMIT, _BYTE = 32767, 255
@@ -92,7 +93,8 @@ class IntegerLogit:
         lines += [f"ldi r16, {len(_SUMS)}", "ldi r17, 0"]
         first = 0
         for fields, table in zip(self.groups.fields, self.tables, strict=True):
-            lines += group_lines(fields, [f"input + {field.port}" for field in fields], [None] * len(fields))
+            # Y, by which thenar's own loads its frame, is two sums here.
+            lines += [re.sub(r"ldd +(r\d+), Y\+(\d+)", _loaded, line) for line in group_lines(fields)]
             lines += ["mul r30, r16", "movw r30, r0"]
             lines += [f"subi r30, lo8(-(rows + {first}))", f"sbci r31, hi8(-(rows + {first}))"]
             for register in _SUMS:
@@ -106,6 +108,36 @@ class IntegerLogit:
             f"    .balign 2\n    .text\n    .global predict\n    .type predict, @function\npredict:\n{text}"
         )
 
+    @property
+    def c_source(self) -> str:
+        """The same in C, for cores of 32 bits: `predict` over `input`, sums in variables, nothing left to loops."""
+        leasts = [table.min(axis=0) for table in self.tables]
+        starts = (self.bias + sum(leasts)) << self.groups.shift
+        classes, first, lines = range(len(starts)), 0, []
+        lines += [f"int32_t s{k} = {start};" for k, start in enumerate(starts.tolist())]
+        for joint, weights in enumerate(self.joints.tolist()):
+            low, high = int(self.low[joint]), int(self.high[joint])
+            lines += [
+                f"code = input[{PORTS + joint}];",
+                f"code = (code < {low} ? {low} : code > {high} ? {high} : code) - {low};",
+            ]
+            lines += [f"s{k} += {weight} * code;" for k, weight in enumerate(weights) if weight]
+        lines += [f"s{k} >>= {self.groups.shift};" for k in classes]
+        for fields, table in zip(self.groups.fields, self.tables, strict=True):
+            parts = (f"((input[{f.port}] >> {f.bit} & {(1 << f.width) - 1}) << {f.to})" for f in fields)
+            lines += [f"row = rows + {first} + {len(classes)} * ({' | '.join(parts)});"]
+            lines += [f"s{k} += row[{k}];" for k in classes]
+            first += table.size
+        lines += ["int best = 0;", "int32_t most = s0;"]
+        lines += [f"if (s{k} > most) {{ most = s{k}; best = {k}; }}" for k in classes[1:]]
+        rows = np.concatenate([(table - least).ravel() for table, least in zip(self.tables, leasts, strict=True)])
+        body = "".join(f"    {line}\n" for line in [*lines, f"return most < 0 ? {len(classes)} : best;"])
+        return (
+            f"#include <stdint.h>\nuint8_t input[{PORTS + JOINTS}];\n"
+            f"static const uint8_t rows[] = {{{', '.join(map(str, rows.tolist()))}}};\n"
+            f"int predict(void)\n{{\n    const uint8_t *row;\n    int32_t code;\n{body}}}\n"
+        )
+
     def _joint(self, joint: int) -> list[str]:
         low, span = int(self.low[joint]), int(self.high[joint] - self.low[joint])
         lines = [f"lds r17, input + {PORTS + joint}", f"subi r17, {low}", "brcc 1f", "ldi r17, 0"]
@@ -115,6 +147,10 @@ class IntegerLogit:
                 lines += [f"ldi r16, {weight & _BYTE}", "mulsu r16, r17", f"add r{register}, r0"]
                 lines += [f"adc r{register + 1}, r1"]
         return lines
+
+
+def _loaded(by_y: re.Match[str]) -> str:
+    return f"lds {by_y[1]}, input + {int(by_y[2]) - FLAGS}"
 
 
 def _saved(how: str) -> list[str]:

@@ -28,13 +28,15 @@ _HELD_US = 3 * SETTLED_US
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Points of recognition lost by a fault of one switch, without and with quarantine: in the first GRASPS grasps, and
-    in as many after them; after how many grasps it was found, None where it was not; and what else was.
+    """Points of recognition lost by a fault of one switch, without quarantine, with it, and where the switch is known
+    to be lost: in the first GRASPS grasps, and in as many after them; after how many grasps it was found, None where
+    it was not; and what else was.
     """
 
     name: str
     without: tuple[float, float]
     quarantined: tuple[float, float]
+    lost: tuple[float, float]
     delays: tuple[int | None, ...]
     others: int
 
@@ -48,16 +50,17 @@ def held(
     at: int = 0,
     stuck: int = 0,
     dead: int = 0,
+    lost: int = 0,
 ) -> Iterator[tuple[str, frozenset[str]]]:
     """Yield the candidate for each grasp, and what was in quarantine after it; from grasp `at` on, switches are stuck
-    closed, or open. The hand is open for `open_us` between them: from SETTLED_US on that is an observation, too.
+    closed, or open, or lost. The hand is open for `open_us` between them.
     """
     policy = Policy(lead=0, dwell_us=0, hold_us=0, lag_us=None, quarantine=quarantine)
     live, now_us = LiveRecognizer(build, switch_period_us=_HELD_US, policy=policy), 0
     for number, closed in enumerate(grasps):
         late = number >= at
         for pause_us, shown in ((open_us, 0), (1, 0), (_HELD_US - SETTLED_US, closed), (SETTLED_US, closed)):
-            frame = SwitchFrame(now_us, (shown | stuck * late) & ~(dead * late))
+            frame = SwitchFrame(now_us, (shown | stuck * late) & ~(dead * late), lost * late)
             grasp = live.step(now_us, 0, frame, None).grasp
             now_us += pause_us
         yield grasp.candidate, frozenset(wrong.name for wrong in live.quarantine.found)
@@ -91,23 +94,23 @@ def false_alarms(build: Build, grasp_set: GraspSet, draws: int, open_us: int = 5
 def cost(build: Build, grasp_set: GraspSet, closed: bool, draws: int, switch: int, open_us: int = 50_000) -> Cost:
     """Return what it costs that a switch is stuck closed, or open."""
     masks, name = masks_of(build, grasp_set), build.manifest.switches[switch].name
-    lost = np.zeros((2, 2))
+    points = np.zeros((3, 2))
     delays, others, bit = list[int | None](), 0, 1 << switch
     for draw, order in enumerate(orders(grasp_set, draws, seed=2 + switch)):
         at = GRASPS + draw % GRASPS
         rows = order[: at + 2 * GRASPS]
         grasps, right = [masks[row] for row in rows], []
-        for quarantine, faulty in ((False, False), (False, True), (True, True)):
-            stuck, dead = bit * (faulty and closed), bit * (faulty and not closed)
-            seen = list(held(build, grasps, quarantine, open_us=open_us, at=at, stuck=stuck, dead=dead))
+        fault = {"stuck" if closed else "dead": bit}
+        for quarantine, faults in ((False, {}), (False, fault), (False, {"lost": bit}), (True, fault)):
+            seen = list(held(build, grasps, quarantine, open_us=open_us, at=at, **faults))
             same = np.array([grasp for grasp, _ in seen]) == grasp_set.grasps[rows]
             right.append(same[at:].reshape(2, GRASPS).mean(axis=1))
-        lost += 100 * (right[0] - np.array(right[1:])) / draws
+        points += 100 * (right[0] - np.array(right[1:])) / draws
         after = [found for _, found in seen[at:]]
         delays.append(next((number for number, found in enumerate(after) if name in found), None))
         others += len(frozenset().union(*after) - {name})
-    (without, quarantined) = ((float(first), float(second)) for first, second in lost)
-    return Cost(name, without, quarantined, tuple(delays), others)
+    without, as_lost, quarantined = ((float(first), float(second)) for first, second in points)
+    return Cost(name, without, quarantined, as_lost, tuple(delays), others)
 
 
 def main() -> None:
@@ -132,11 +135,12 @@ def main() -> None:
             missed = sum(delay is None for delay in each.delays)
             print(
                 f"{each.name:20}{each.without[0]:7.1f}{each.without[1]:7.1f}  quarantined{each.quarantined[0]:7.1f}"
-                f"{each.quarantined[1]:7.1f}  {median(delays):5.1f} grasps, {missed} missed, {each.others} others"
+                f"{each.quarantined[1]:7.1f}  as lost{each.lost[0]:7.1f}{each.lost[1]:7.1f}"
+                f"  {median(delays):5.1f} grasps, {missed} missed, {each.others} others"
             )
-        for title, name in (("without", "without"), ("quarantined", "quarantined")):
+        for name in ("without", "quarantined", "lost"):
             both = np.array([getattr(each, name) for each in found])
-            print(f"{title}: mean {both.mean(axis=0).round(1)}, worst {both.max(axis=0).round(1)}")
+            print(f"{name}: mean {both.mean(axis=0).round(1)}, worst {both.max(axis=0).round(1)}")
 
 
 if __name__ == "__main__":

@@ -15,12 +15,10 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.segments import segment_files
 from thenar.compiler.firmware.simavr import harness
-from thenar.compiler.firmware.targets.cortex_m import CortexM, bare_files
+from thenar.compiler.firmware.targets.bare import Bare
 from thenar.compiler.firmware.tools import (
-    ARM_EMULATOR,
     AVR_COMPILER,
     HOST_COMPILER,
     STRICT,
@@ -44,26 +42,27 @@ _HEADER = """\
 #include <stdbool.h>
 #include <stdint.h>
 typedef uint8_t thenar_hand_class;
-extern int16_t thenar_hand_scores[{lanes}];
+typedef struct {{ int16_t scores[{lanes}]; }} thenar_hand;
 #endif
 """
 _COMMON = """\
 #include "thenar_hand_segments.h"
 struct record {{ int16_t lanes[{lanes}]; uint8_t best, refused; }};
 struct record record;
-int16_t thenar_hand_scores[{lanes}];
+static thenar_hand glove;
 static thenar_hand_segmenter stream;
 uint8_t answer(void);
 uint8_t copy(void);
 __attribute__((noinline, noclone)) uint8_t copy(void)
 {{
     for (uint8_t lane = 0u; lane < {lanes}u; lane++)
-        thenar_hand_scores[lane] = record.lanes[lane];
+        glove.scores[lane] = record.lanes[lane];
     return record.best;
 }}
 __attribute__((noinline, noclone)) uint8_t answer(void)
 {{
-    return thenar_hand_segment_push(&stream, copy(), record.refused != 0u);
+    const uint8_t best = copy();
+    return thenar_hand_segment_push(&stream, &glove, best, record.refused != 0u);
 }}
 """
 _MAINS = {
@@ -179,20 +178,10 @@ def run_avr(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> Run:
     return Run(answered["state"], cycles, flash, ram, int(answered["stack"].max()))
 
 
-def run_cortex(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int, core: CortexM) -> Run:
-    """Run the decoder on an Arm core in qemu."""
-    files = sources(model, "cortex-m")
-    machine = core.machine
-    if core.compiler is None:
-        raise FirmwareError(f"{core.name} has no compiler")
-    given = {"frames": records(lanes, refused)}
-    with workshop({**files, **bare_files(machine.flash, machine.ram), **given}) as folder:
-        linked = ["-nostdlib", "-T", "link.ld", "startup.c", *_compiled(files), "-lgcc", "-o", "program.elf"]
-        call([find(core.compiler), *STRICT, *core.flags, _lag(lag), *linked], folder)
-        quiet = ["-display", "none", "-monitor", "none", "-serial", "none"]
-        hosted = ["-semihosting-config", "enable=on,target=native", "-kernel", "program.elf"]
-        call([find(ARM_EMULATOR), "-M", machine.name, *quiet, *hosted], folder)
-        printed = (folder / "answers").read_bytes()
+def run_cortex(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int, core: Bare) -> Run:
+    """Run the decoder on a core in qemu."""
+    given: dict[str, str | bytes] = {**sources(model, "cortex-m"), "frames": records(lanes, refused)}
+    printed = core.emulate(given, flags=(*STRICT, _lag(lag)))
     return Run(np.frombuffer(printed, np.uint8), np.zeros(0, np.int64))
 
 

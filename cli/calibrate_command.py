@@ -44,8 +44,8 @@ def _rate(_context: click.Context, _option: click.Parameter, text: str) -> int |
 
 
 def _device(context: click.Context, argument: click.Parameter, text: str) -> str:
-    """Return the port; with --taxels the path of a glove.toml."""
-    if context.params.get("taxels"):
+    """Return the port, or the path of a glove.toml, which --taxels takes in any case."""
+    if context.params.get("taxels") or text.endswith(".toml"):
         return str(existing_file.convert(text, argument, context))
     return serial_port(context, argument, text)
 
@@ -71,7 +71,7 @@ def command(
     hold: float,
 ) -> None:
     """Calibrate the CyberGlove at PORT (/dev/ttyUSB0, socket://HOST:PORT, ...) for the hand that wears it; with
-    --taxels, the taxels of a glove.toml.
+    --taxels, the taxels of a glove.toml; of a glove.toml without it, the joints of its [[stream]].
 
     One is asked for a flat hand, a fist and five more poses, sees what the sensors say, and takes each pose with Enter.
     Of taxels, rest and press are learnt: one presses nothing, then every taxel once. The file is written at the end:
@@ -81,6 +81,7 @@ def command(
     Example:
         thenar calibrate /dev/ttyUSB0 -o anna.toml
         thenar calibrate glove.toml --taxels -o pads.toml
+        thenar calibrate glove.toml -o anna.toml
     """
     from thenar.drivers.cyberglove import CyberGlove
     from thenar.runtime.files import write_atomically
@@ -94,7 +95,11 @@ def command(
         return
     if newtons is not None:
         raise click.UsageError("--newtons is the force of presses on taxels: add --taxels")
-    glove = CyberGlove(port, baud=baud, sensors=int(sensors) if sensors else None)
+    glove: CyberGlove | StreamedJoints
+    if port.endswith(".toml"):
+        glove = StreamedJoints(Path(port), output)
+    else:
+        glove = CyberGlove(port, baud=baud, sensors=int(sensors) if sensors else None)
     try:
         guide = Guide(glove, glove.open(), hold)
         calibrated = _calibrated(guide, wearer)
@@ -128,9 +133,9 @@ def _calibrate_taxels(glove: Path, output: Path, wearer: str, newtons: float | N
 
 
 def _calibrated(guide: "Guide", subject: str) -> "GloveCalibration":
-    from thenar.drivers.calibration import FLAT, POSES, calibration
+    from thenar.drivers.calibration import calibration, poses_of
 
-    poses = (FLAT, *(pose for pose in POSES if set(pose.degrees) & set(guide.info.names)))
+    poses = poses_of(guide.info.names)
     taken: list[Held] = []
     while len(taken) < len(poses):
         flat = taken[0] if taken else None
@@ -144,7 +149,7 @@ def _calibrated(guide: "Guide", subject: str) -> "GloveCalibration":
 class Guide:
     """Leads through the poses on stderr, with the sensors' bytes live where that is a terminal; answers are typed."""
 
-    def __init__(self, glove: "CyberGlove", info: "GloveInfo", hold_s: float) -> None:
+    def __init__(self, glove: "CyberGlove | StreamedJoints", info: "GloveInfo | StreamedJoints", hold_s: float) -> None:
         self.info = info
         self._glove, self._hold_s = glove, hold_s
         self._console = err()
@@ -214,8 +219,8 @@ class Guide:
 
     def _raw(self) -> bytes | None:
         timed = self._glove.read(_WAIT_S)
-        if timed is None:
-            return None
+        if timed is None or isinstance(timed, bytes):
+            return timed
         if timed[1].fault == "unplugged":
             from thenar.drivers.errors import DeviceError
 
@@ -230,6 +235,58 @@ class Guide:
 
     def _say(self, text: str) -> None:
         self._console.print(text, soft_wrap=True)
+
+
+class StreamedJoints:
+    """The joints of the stream of a glove.toml, as the guide reads a glove: their names, and the bytes of a row.
+
+    Raises UsageError if the harness has no such stream.
+    """
+
+    notes: tuple[str, ...] = ()
+
+    def __init__(self, glove: Path, output: Path) -> None:
+        from msgspec.structs import replace
+
+        from thenar.runtime.harness.loading import load_harness
+        from thenar.runtime.harness.wiring import StreamWiring
+        from thenar.runtime.live.sources import Sources
+        from thenar.runtime.scanning.ports import whole_scan
+        from thenar.runtime.taxels import TaxelSettings
+
+        keep_apart(glove, output)
+        harness = load_harness(glove)
+        device = harness.joint_device
+        if not isinstance(device, StreamWiring):
+            raise click.UsageError(f"{glove.name} has no [[stream]] with joints: name the port of the CyberGlove")
+        alone = replace(harness, buses=(), spi=(), scanners=(), streams=(device,), taxel_settings=TaxelSettings())
+        self.url, self.names = device.port, device.sensor_names
+        self._sources = Sources(alone, (), whole_scan(alone, ()))
+
+    def open(self) -> "StreamedJoints":
+        """Wait for the first row. Raises DeviceError if none comes."""
+        from thenar.drivers.errors import DeviceError
+
+        self._sources.__enter__()
+        end = monotonic() + _PATIENCE_S
+        while self.read(_WAIT_S) is None:
+            self._sources.raise_settings()
+            if monotonic() > end:
+                state = self._sources.health()[0]
+                raise DeviceError(f"{state.name}: {state.error or 'no joint comes'}; nothing is calibrated")
+        return self
+
+    def read(self, timeout_s: float) -> bytes | None:
+        """Return the newest row that measures every joint."""
+        from thenar.runtime.frames import GloveFrame
+
+        arrived = self._sources.take(round(timeout_s * 1e6)).arrived
+        whole = [frame.sensors for frame in arrived if isinstance(frame, GloveFrame) and 0 not in frame.sensors]
+        return whole[-1] if whole else None
+
+    def close(self) -> None:
+        """Close the devices."""
+        self._sources.__exit__(None, None, None)
 
 
 class TaxelGuide:

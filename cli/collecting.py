@@ -11,12 +11,11 @@ import click
 
 from thenar.compiler.recordings.errors import check_names
 from thenar.compiler.recordings.taxonomy import Taxonomy
-from thenar.drivers.calibration import GloveCalibration
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import now_us
-from thenar.runtime.harness.wiring import GloveWiring, Harness
+from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.sources import NOT_YET, DeviceState, Sources, Taken
 from thenar.runtime.recording.guide import Guide, Journal, Stage, Trial
 from thenar.runtime.recording.session import Collection, Session
@@ -63,8 +62,9 @@ def collect(
     """
     if sys.stdin is None:
         raise click.UsageError("stdin is closed: the keys that lead through a collection come from there")
-    switches, glove = harness.switches, harness.cyberglove
-    sensors = () if glove is None else glove.sensor_names
+    if any(stream.port == "-" for stream in harness.streams):
+        raise click.UsageError("the keys that lead through a collection come from stdin: let rows come by udp:")
+    switches, sensors = harness.switches, harness.sensor_names
     check_names("column", (*switches, *harness.taxel_names, *sensors))
     scan = whole_scan(harness, switches, every_taxel=True)
     with ended_by_signals() as stop, Sources(harness, switches, scan) as sources:
@@ -73,7 +73,7 @@ def collect(
             switches=switches,
             sensors=sensors,
             harness=read_source(file, HarnessError).text,
-            calibration=_calibration(harness.cyberglove),
+            calibration=None if harness.calibration is None else load_calibration(Path(harness.calibration)),
             collection=collection,
             taxels=harness.taxel_names,
             taxel_calibration=calibration_of(harness.taxel_settings),
@@ -117,10 +117,6 @@ def lead(guide: Guide, devices: Devices, recorder: Recorder, view: GuideView, st
 
 def _taxonomy(collection: Collection) -> Taxonomy:
     return Taxonomy(collection.taxonomy, collection.types)
-
-
-def _calibration(wiring: GloveWiring | None) -> GloveCalibration | None:
-    return None if wiring is None or wiring.calibration is None else load_calibration(Path(wiring.calibration))
 
 
 def _check_same_glove(journal: Journal, session: Session) -> None:

@@ -117,10 +117,13 @@ def _either(names: Sequence[str]) -> str:
 
 
 class OneOf(click.Choice[str]):
-    """One of the names of a kind, which are read when they are first needed and not when a command is defined."""
+    """One of the names of a kind, which are read when they are first needed and not when a command is defined.
 
-    def __init__(self, kind: str, names: Callable[[], Iterable[str]]) -> None:
-        self.kind, self._names, self.case_sensitive = kind, names, True
+    `otherwise` is a sentence that is added where none of them was named.
+    """
+
+    def __init__(self, kind: str, names: Callable[[], Iterable[str]], otherwise: str = "") -> None:
+        self.kind, self._names, self.case_sensitive, self._otherwise = kind, names, True, otherwise
 
     @property
     def choices(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -134,7 +137,7 @@ class OneOf(click.Choice[str]):
         if value not in self.choices:
             near = nearest(str(value), self.choices)
             others = "" if "did you mean" in near else f": choose one of {', '.join(self.choices)}"
-            self.fail(f"there is no {self.kind} {shortened(repr(value))}{others or near}.", param, ctx)
+            self.fail(f"there is no {self.kind} {shortened(repr(value))}{others or near}.{self._otherwise}", param, ctx)
         return value
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
@@ -228,8 +231,8 @@ def keep_apart(*paths: Path | None) -> None:
 
 def check_devices(harness: "Harness", path: Path) -> None:
     """Raise UsageError if the `harness` in `path` names no device: whatever is done with it would come to nothing."""
-    if harness.cyberglove is None and not harness.scanners and not harness.buses and not harness.spi:
-        takes = "it takes a [cyberglove], a [[scanner]], a [[bus]] or an [[spi]]"
+    if not (harness.cyberglove or harness.scanners or harness.buses or harness.spi or harness.streams):
+        takes = "it takes a [cyberglove], a [[scanner]], a [[bus]], an [[spi]] or a [[stream]]"
         raise click.UsageError(f"{path.name} names no device: {takes}")
 
 

@@ -410,6 +410,9 @@ def _print_scan(scan: "ScanMap", harness: "Harness") -> None:
             f"{scanner_us(board):.0f} us a bitmap"
             + (f", {taxels_us(board, channels):.0f} us its taxels" if (channels := scan.board_channels[number]) else "")
         )
+    for stream, read in zip(harness.streams, scan.streams, strict=True):
+        count = len(read.switches) + len(read.levels)
+        out().print(f"stream {stream.port}: {count} kept switches and levels, a row every {stream.period_us} us")
 
 
 def _print_chips(time: "ScanTime") -> None:

@@ -5,7 +5,22 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import check_devices, err, existing_file, existing_folder, json_flag, of_device, out, progress, show, table
+from .common import (
+    Number,
+    OutputFile,
+    check_devices,
+    err,
+    existing_file,
+    existing_folder,
+    json_flag,
+    of_device,
+    out,
+    overwrite_flag,
+    progress,
+    show,
+    table,
+)
+from .lines import echo
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -16,22 +31,52 @@ if TYPE_CHECKING:
 
 
 @click.command("doctor")
-@click.argument("glove", metavar="glove.toml", type=existing_file)
+@click.argument("glove", metavar="[glove.toml]", type=existing_file, required=False)
+@click.option("--line", metavar="PORT", help="Listen to rows from PORT in place of it, and propose a glove.toml.")
+@click.option("--baud", type=click.IntRange(1), default=115_200, show_default=True, help="Baud rate, with --line.")
+@click.option("--seconds", type=Number(0.5, 600), default=5.0, show_default=True, help="For how long, with --line.")
+@click.option("--names", metavar="NAME,...", help="Names of the columns, where the sender does not name them.")
+@click.option("--propose", metavar="FILE.toml", type=OutputFile(".toml"), help="Write the proposal here, with --line.")
+@overwrite_flag
 @click.option("--build", metavar="BUILD", type=existing_folder, help="Look only at what this build reads of the glove.")
 @click.option("--write", is_flag=True, help="Write the CyberGlove's measured record time into glove.toml.")
 @json_flag
-def command(glove: Path, build: Path | None, write: bool) -> None:
+def command(
+    glove: Path | None,
+    line: str | None,
+    baud: int,
+    seconds: float,
+    names: str | None,
+    propose: Path | None,
+    build: Path | None,
+    write: bool,
+) -> None:
     """Open every device of glove.toml and say what is there, how fast it is and how fast its wire would let it be.
 
     Of a CyberGlove it measures a record of all sensors, and one of those that the build reads, or of half of them,
     against the vendor's formula. With --write, `thenar frontier --glove glove.toml` goes by what was measured.
+
+    With --line, what a board or a program sends as lines of numbers (CSV, JSON, name:value) is shown column by column:
+    press every switch and pad, and bend every finger, while it listens. PORT is a serial port, tcp://HOST:PORT,
+    udp://HOST:PORT, unix:PATH, ws://HOST:PORT/PATH, - (stdin), lsl:NAME or ros:/TOPIC.
 
     Exit code 1 if something is missing; with --build, also if the build cannot work with the glove's calibration.
 
     \b
     Example:
         thenar doctor glove.toml --build build/
+        thenar doctor --line /dev/ttyUSB0 --propose glove.toml
     """
+    if (glove is None) == (line is None):
+        raise click.UsageError("name a glove.toml, or the --line to listen to")
+    if line is not None:
+        if build is not None or write:
+            raise click.UsageError("--build and --write look at a glove.toml: leave --line out")
+        _listen(line, baud, seconds, [] if names is None else names.split(","), propose)
+        return
+    assert glove is not None
+    if propose is not None or names is not None:
+        raise click.UsageError("--names and --propose are of what --line hears: name the line")
     from thenar.runtime.build import Build
     from thenar.runtime.harness.loading import load_harness
     from thenar.runtime.live.checkup import check_up
@@ -55,6 +100,38 @@ def command(glove: Path, build: Path | None, write: bool) -> None:
         click.get_current_context().exit(1)
 
 
+def _listen(port: str, baud: int, seconds: float, columns: "Sequence[str]", propose: Path | None) -> None:
+    """Show what comes from a port, and print the glove.toml that reads it, or write it into a file."""
+    from thenar.runtime.files import write_atomically
+    from thenar.runtime.harness.checks import faults
+    from thenar.runtime.harness.wiring import Harness
+    from thenar.runtime.harness.writing import harness_to_toml
+    from thenar.runtime.live.listening import propose_stream
+
+    echo(f"listening to {port} for {seconds:g} s: press every switch and pad, bend every finger", err=True)
+    found = propose_stream(port, baud, seconds, columns)
+    harness = Harness(name="glove", streams=(found.stream,))
+    text = harness_to_toml(harness)
+
+    def show_heard(_: object) -> None:
+        heard = table(("column", "least", "greatest", "taken for"), ("least", "greatest"), f"{found.rows} rows")
+        for one in found.columns:
+            ends = ("" if end is None else f"{end:g}" for end in (one.least, one.greatest))
+            heard.add_row(one.column, *ends, one.taken_for)
+        err().print(heard)
+        for remark in found.remarks:
+            err().print(of_device(port, remark))
+        if propose is None:
+            echo(text.rstrip("\n"))
+
+    show(found, show_heard)
+    for _, reason in faults(harness):
+        err().print(f"to be mended before it can be used: {reason}", highlight=False)
+    if propose is not None:
+        write_atomically(propose, text.encode())
+        err().print(f"{propose}: read it through, then `thenar doctor {propose}`", highlight=False)
+
+
 def _write(glove: Path, found: "Sequence[Finding]") -> None:
     from thenar.runtime.harness.writing import write_record_us
     from thenar.runtime.live.checkup import RECORD
@@ -73,7 +150,7 @@ def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[Finding
     from thenar.runtime.live.checkup import Finding
     from thenar.runtime.live.system import System
 
-    named = None if harness.cyberglove is None else harness.cyberglove.calibration
+    named = harness.calibration
     try:
         if build is not None:
             system = System.of(build, harness)

@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import shutil
 import signal
 import subprocess
 import time
@@ -13,6 +14,8 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 import msgspec
+
+from thenar.drivers.names import fault
 
 from .common import (
     Number,
@@ -43,6 +46,7 @@ _BY_ITSELF_S = 1.0
 _FRAME_US = 10_000
 _HARNESS, _CALIBRATION, _TAXELS = "glove.toml", "calibration.toml", "taxels.toml"
 _BITS = 10
+_LONGEST_PATH = 4095  # of Linux
 # What a shell adds to the number of the signal that ended a command.
 _KILLED = 128
 _PROCESSES = Path("/proc")
@@ -100,9 +104,9 @@ def command(
     .mcap recording of a live run.
 
     A CyberGlove and scanner boards appear as serial ports in DIR, paced like the wire, with the wire effects that the
-    scene lists; expanders and converters on /dev/i2c-N and
-    /dev/spidevB.C, through umockdev. With a COMMAND, that runs beside the emulated glove and sees
-    it: {glove} in it stands for the glove.toml that names the emulated ports. It is ended when the playing is over.
+    scene lists; streams as lines by the way that their port names, on loopback; expanders and converters on
+    /dev/i2c-N and /dev/spidevB.C, through umockdev. With a COMMAND, that runs beside the emulated glove and sees it:
+    {glove} in it stands for the glove.toml that names the emulated ports. It is ended when the playing is over.
 
     \b
     Example:
@@ -116,15 +120,20 @@ def command(
     harness = load_harness(glove)
     check_devices(harness, glove)
     worn = harness.cyberglove
-    calibration = None if worn is None or worn.calibration is None else Path(worn.calibration)
+    calibration = None if harness.calibration is None else Path(harness.calibration)
     ours = (folder / name for name in (_HARNESS, _CALIBRATION, _TAXELS))
     keep_apart(glove, Path(source), calibration, *ours, log)
     _check_folder(folder)
-    performance, cable = _performance(source, subject, period_ms, rest_ms)
+    if client and shutil.which(client[0]) is None:
+        raise click.UsageError(f"{client[0]} cannot be run: there is no such command")
+    performance, cable = _performance(source, subject, period_ms, rest_ms, cyberglove=worn is not None)
     if missing := [name for name in harness.switches if name not in performance.switch_names]:
         warning(f"{source} has no switch {list_names(missing)}: open all the time")
     if missing := [name for name in harness.taxel_names if name not in performance.taxel_names]:
         warning(f"{source} has no taxel {list_names(missing)}: 0 counts all the time")
+    streamed = [name for stream in harness.streams for name in stream.joints]
+    if missing := [name for name in streamed if name not in performance.joint_names]:
+        warning(f"{source} has no joint {list_names(missing)}: 0 all the time")
     with ExitStack() as stack:
         stop = stack.enter_context(ended_by_signals())
         folder.mkdir(parents=True, exist_ok=True)
@@ -137,6 +146,7 @@ def command(
                 adapter=adapter,
                 taxel_names=performance.taxel_names,
                 bits=max(_BITS, int(performance.taxels.max(initial=0)).bit_length()),
+                joints=tuple(zip(performance.joint_names, performance.joint_units, strict=True)),
             )
         )
         emulated = _write_harness(bench, performance, folder)
@@ -150,7 +160,11 @@ def command(
 
 
 def _check_folder(folder: Path) -> None:
-    """Raise UsageError if `folder` holds files by the names of ours, and others: then they may be the user's."""
+    """Raise UsageError if `folder` holds files by the names of ours, and others: then they may be the user's; or if no
+    glove.toml could name a port in it.
+    """
+    if reason := fault(str(folder.resolve()), _LONGEST_PATH):
+        raise click.UsageError(f"the path of {folder} {reason}, and glove.toml has to say it: name another --dir")
     there = {path.name for path in folder.iterdir() if not path.is_symlink()} if folder.is_dir() else set()
     ours = there & {_HARNESS, _CALIBRATION, _TAXELS}
     if ours and there - ours and not overwrites(click.get_current_context()):
@@ -158,7 +172,7 @@ def _check_folder(folder: Path) -> None:
 
 
 def _performance(
-    source: str, subject: str | None, period_ms: float | None, rest_ms: float | None
+    source: str, subject: str | None, period_ms: float | None, rest_ms: float | None, *, cyberglove: bool
 ) -> tuple["Performance", "CableOf"]:
     """Return what to play, and what happens on serial line n."""
     from thenar.simulator.playing import performance
@@ -176,7 +190,10 @@ def _performance(
             return performance.of_recording(path, given_us or _FRAME_US, warning), lambda _line: None
         from thenar.compiler.recordings.graspset import GraspSet
 
-        return performance.of_set(GraspSet.load(path), given_us or _FRAME_US, rest_us=rest_us), lambda _line: None
+        played_set = GraspSet.load(path)
+        return performance.of_set(
+            played_set, given_us or _FRAME_US, rest_us=rest_us, cyberglove=cyberglove
+        ), lambda _line: None
     from thenar.simulator.playing.bench import cable_of
     from thenar.simulator.scenes.decode import load_scene
 

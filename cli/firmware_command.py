@@ -40,6 +40,9 @@ def _modes() -> Iterable[str]:
     return dict.fromkeys(mode for target in TARGETS.values() for mode in target.modes)
 
 
+_ANY = " `generic` is for any other part that has a C99 compiler."
+
+
 class _Command(click.Command):
     """The command; its help ends with what each target is."""
 
@@ -52,7 +55,9 @@ class _Command(click.Command):
 
 @click.command("firmware", cls=_Command)
 @click.argument("build", metavar="BUILD", type=existing_folder)
-@click.option("--target", type=OneOf("target", _targets), required=True, help="What the firmware is for.")
+@click.option(
+    "--target", type=OneOf("target", _targets, _ANY), required=True, help="What the firmware is for: see below."
+)
 @click.option("-o", "--output", metavar="DIR", type=OutputFolder(), help="Folder to write the firmware into.")
 @click.option(
     "--mode",
@@ -102,7 +107,8 @@ def command(
     measure: bool,
     overwrite: bool,
 ) -> int:
-    """Write C99 that recognises as BUILD does, bit for bit, with a Makefile, or as an Arduino library.
+    """Write C99 that recognises as BUILD does, bit for bit, with a Makefile, or as a package: for Arduino, PlatformIO,
+    ESP-IDF, Zephyr, pico-sdk and CMake.
 
     The layout of the tables is chosen by a cost model: the fastest that fits. Exits with 1 if --measure finds more
     than the model allows for. The same build and options give the same bytes.
@@ -111,6 +117,7 @@ def command(
     Example:
         thenar firmware build/ --target avr328p -o firmware/ --measure
         thenar firmware build/ --target avr2560 --mode glove --board board.toml -o firmware/
+        thenar firmware build/ --target esp32 -o components/thenar_glove
         thenar firmware build/ --target avr328p --frontier
     """
     from thenar.compiler.firmware.board import load_board
@@ -143,6 +150,8 @@ def command(
     else:
         if mode != "scan":
             _print(fit, measured, frontier=frontier, updates=mode == "glove")
+        if firmware.segments:
+            out().print(f"{firmware.segments}.", soft_wrap=True)
         if output is not None:
             next_step = TARGETS[target].next_step.format(folder=shlex.quote(str(output)))
             out().print(f"{output}: firmware for {target}; {next_step}", soft_wrap=True)

@@ -34,6 +34,8 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "sim": ("mujoco",),
     "stability": ("mpmath", "jinja2"),
     "ros": ("cyclonedds",),
+    "ws": ("websockets",),
+    "lsl": ("pylsl",),
 }
 
 

@@ -69,7 +69,8 @@ def command(
     picture: Path | None,
     transitions: Path | None,
 ) -> None:
-    """Find when each grasp of FILE begins and ends: whole movements (.grasps), or a recorded run of BUILD (.mcap).
+    """Find when each grasp of FILE begins and ends: whole movements (.grasps), or a recording (.mcap) of
+    what BUILD reads.
 
     A segment is one row: start and end in seconds, grasp type, and the mean probability of that type in its frames.
     Between segments nothing is held. Where FILE says what was held, the truth is drawn above, and F1 is printed.

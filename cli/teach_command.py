@@ -47,8 +47,8 @@ if TYPE_CHECKING:
 def command(
     demonstrations: tuple[Path, ...], build: Path, output: Path, preshape: str | None, transitions: Path | None
 ) -> None:
-    """Find the sequence of grasps that demonstrations have in common: recorded runs of BUILD (.mcap), or sets of whole
-    movements (.grasps), each stream of which is one.
+    """Find the sequence of grasps that demonstrations have in common: recordings (.mcap) of what BUILD reads, or
+    sets of whole movements (.grasps), each stream of which is one.
 
     A grasp is a step if most of the demonstrations have it there. A step has its preshape, the median of each joint,
     for how long it was held, and which types may follow. `thenar run --task` follows it.

@@ -47,7 +47,8 @@ def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bo
 
     With --firmware, every score and grasp type of the compiled classifiers is held against Python's: on every row, on
     10,000 random frames and on all extreme ones. host runs with sanitizers; avr on the smaller of ATmega328P and
-    ATmega2560 that holds the build, in simavr; cortex-m on an M0+ and an M4, in qemu.
+    ATmega2560 that holds the build, in simavr; cortex-m on an M0+ and an M4, riscv on an RV32IMAC, xtensa on an LX106,
+    in qemu.
 
     With --faults, every fault is put to every row: each input lost, whose mean row stands in, and stuck at each of its
     values; each port, chip and board of the build's scan map dead; and any two inputs lost.

@@ -10,11 +10,14 @@ from thenar.runtime.manifest import Inputs
 
 from .limits import check_types
 from .recordings.graspset import GraspSet
+from .recordings.trials import groups
 
 Columns = tuple[int, ...]
 
 # Copies of each row with an input lost: 8 took twice the time of 4, for half a point less at the worst single loss.
 MASKED = 4
+# Of a movement that is learnt from: a frame every 30 to 50 ms of one that lasts a second or two.
+FRAMES = 32
 
 
 class SamplesError(ThenarError, ValueError):
@@ -46,6 +49,9 @@ class Samples:
         it. None given: each trial is one.
     has_none : bool
         Whether the last class is that nothing is held.
+    silent : ndarray of bool, shape (n,), optional
+        Rows that say which type is held and not whether any is, as those of static grasps do: of a subject's session of
+        which no row shows nothing held, where others have such rows. None given: there are none.
 
     Raises
     ------
@@ -69,6 +75,7 @@ class Samples:
     taxels: NDArray[np.uint16] = field(default_factory=lambda: np.empty(0, np.uint16))
     movements: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
     has_none: bool = False
+    silent: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
 
     def __post_init__(self) -> None:
         if not self.trials.size:
@@ -79,8 +86,10 @@ class Samples:
             object.__setattr__(self, "taxels", np.empty((len(self.labels), 0), np.uint16))
         if not self.movements.size:
             object.__setattr__(self, "movements", self.trials)
+        if not self.silent.size:
+            object.__setattr__(self, "silent", np.zeros(len(self.labels), np.bool_))
         shapes = {"switches": "(n, s)", "codes": "(n, j)", "labels": "(n,)", "trials": "(n,)", "subjects": "(n,)"}
-        shapes |= {"taxels": "(n, t)", "movements": "(n,)"}
+        shapes |= {"taxels": "(n, t)", "movements": "(n,)", "silent": "(n,)"}
         parts = {name: getattr(self, name) for name in shapes}
         rows = set(map(len, parts.values()))
         if len(rows) != 1 or any(parts[name].ndim != 1 + shape.count(" ") for name, shape in shapes.items()):
@@ -96,6 +105,7 @@ class Samples:
     def of(cls, grasp_set: GraspSet, inputs: Inputs = "both") -> "Samples":
         """Return all rows of a set, with those of its inputs that `inputs` allows, and the grasp types that occur."""
         found, labels = np.unique(grasp_set.labels, return_inverse=True)
+        none, session = grasp_set.is_none, groups(grasp_set.subjects, grasp_set.sessions)
         return cls(
             switches=grasp_set.switches[:, : None if inputs != "joints" else 0],
             codes=grasp_set.codes[:, : None if inputs != "switches" else 0],
@@ -105,7 +115,8 @@ class Samples:
             subjects=np.unique(grasp_set.subjects, return_inverse=True)[1],
             taxels=grasp_set.taxels[:, : None if inputs != "joints" else 0],
             movements=grasp_set.movement_ids,
-            has_none=bool(grasp_set.is_none.any()),
+            has_none=bool(none.any()),
+            silent=none.any() & (np.bincount(session, none) == 0)[session],
         )
 
     @property
@@ -128,6 +139,13 @@ class Samples:
         """Whether nothing is held in each row (n,)."""
         return np.asarray(self.labels == self.n_types)
 
+    @property
+    def given_held(self) -> NDArray[np.bool_] | None:
+        """The rows (n,) that are learnt from as if it were known that something is held; None: no row is, as where no
+        row at all shows nothing held.
+        """
+        return self.silent if self.is_none.any() and self.silent.any() else None
+
     def without_none(self) -> "Samples":
         """Return the rows in which something is held, and the grasp types alone."""
         if not self.has_none:
@@ -135,11 +153,21 @@ class Samples:
         return replace(self.rows(~self.is_none), grasps=self.grasps[:-1], has_none=False)
 
     def balanced(self) -> NDArray[np.intp]:
-        """Return the numbers of rows of which no more show nothing than a grasp: of more, as many, evenly spaced."""
+        """Return the numbers of rows of which no more show nothing than a grasp, and of a movement no more than FRAMES:
+        of more, as many, evenly spaced. Frames of a movement resemble their neighbours.
+        """
         none, held = np.flatnonzero(self.is_none), np.flatnonzero(~self.is_none)
         if len(none) > len(held):
             none = none[np.arange(len(held)) * len(none) // max(1, len(held))]
-        return np.sort(np.concatenate([held, none]))
+        rows = np.sort(np.concatenate([held, none]))
+        if not self.has_none:
+            return rows
+        rows = rows[np.argsort(self.movements[rows], kind="stable")]
+        _, starts, own, counts = np.unique(
+            self.movements[rows], return_index=True, return_inverse=True, return_counts=True
+        )
+        place, frames, most = np.arange(len(rows)) - starts[own], counts[own], np.minimum(counts, FRAMES)[own]
+        return np.sort(rows[(place + 1) * most // frames > place * most // frames])
 
     def rows(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> "Samples":
         """Return some of the rows, by number or by mask (n,)."""
@@ -153,6 +181,7 @@ class Samples:
             self.taxels[chosen],
             self.movements[chosen],
             self.has_none,
+            self.silent[chosen],
         )
 
     def keeping(self, columns: Columns) -> "Samples":

@@ -129,6 +129,18 @@ POSES = (
 )
 
 
+def poses_of(names: Sequence[str]) -> tuple[Pose, ...]:
+    """Return the poses that find the lines of sensors of these names, the flat hand first; sensors whose names say
+    nothing of their joint are bent as far as they go, which counts as 90 degrees.
+    """
+    known = [pose for pose in POSES if set(pose.degrees) & set(names)]
+    others = [name for name in names if not any(name in pose.degrees for pose in POSES)]
+    if others:
+        how = "Bend every joint that has a sensor as far as it goes."
+        known.append(Pose("everything bent", how, dict.fromkeys(others, 90.0)))
+    return (FLAT, *known)
+
+
 def held(samples: Sequence[bytes]) -> Held:
     """Return what samples of all sensors, at least one, amount to. The middle one: a glitch moves no median."""
     columns = list(zip(*samples, strict=True))

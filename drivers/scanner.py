@@ -12,6 +12,7 @@ from .scanner_protocol import (
     DEGRADED,
     EARLY,
     NO_GRASP,
+    STATES,
     UNREAD,
     Analog,
     Channels,
@@ -25,9 +26,11 @@ from .scanner_protocol import (
     Hello,
     Mask,
     MessageError,
+    Segment,
     SetChannels,
     SetDebounce,
     SetRate,
+    SetSegments,
     ToBoard,
     encode,
     frame,
@@ -37,6 +40,7 @@ from .scanner_state import BoardKeys, BoardTimes
 from .serial_line import SerialLine
 
 _LOG = logging.getLogger(__name__)
+_Setting = SetRate | SetDebounce | SetChannels | SetSegments
 
 
 class ScannerReading(NamedTuple):
@@ -57,7 +61,8 @@ class ScannerReading(NamedTuple):
 class BoardGrasp(NamedTuple):
     """What a board recognised by itself, in a frame that it read at time_us, in the host's monotonic microseconds.
 
-    number    of the grasp type in the order of the build that the board carries; None: none was recognised
+    number    of the grasp type in the order of the build that the board carries, the one after the last: nothing is
+              held; None: it is not known
     margin    the best score less the second, in steps of the build's tables; 65535 stands for more, too
     degraded  whether an input was missing
     early     whether the scan ended as soon as the rest of the switches could not matter
@@ -68,6 +73,20 @@ class BoardGrasp(NamedTuple):
     margin: int
     degraded: bool
     early: bool
+
+
+class BoardSegment(NamedTuple):
+    """The segment that a board was in when it read a frame at time_us, in the host's monotonic microseconds.
+
+    number  of grasps so far, modulo 65536; while one is forming, its own
+    grasp   the number of the segment's grasp type; None in the state "none"
+    state   "none", "forming", "held" or "releasing", as in `runtime.published.LiveGrasp`
+    """
+
+    time_us: int
+    number: int
+    grasp: int | None
+    state: str
 
 
 @dataclass(slots=True)
@@ -102,6 +121,7 @@ class Scanner(Closing):
     hello   what the board last said of itself
     faults  what it last said of its own troubles; None: nothing yet
     grasp   what it last recognised by itself; None: nothing yet
+    segment the segment that it was last in; None: it has not said so, or does not follow segments
     analog  which channels it measures, how often, in how many bits; None before it answered `set_channels`
     times   gives readings their times: by `clock.trip_us` the last may be older, and `late_us` late came the last
             message with a time of its own
@@ -116,6 +136,7 @@ class Scanner(Closing):
         self.hello: Hello | None = None
         self.faults: Faults | None = None
         self.grasp: BoardGrasp | None = None
+        self.segment: BoardSegment | None = None
         self.analog: Channels | None = None
         self._decoder = FrameDecoder()
         self._sequence = self._received_bytes = 0
@@ -123,8 +144,8 @@ class Scanner(Closing):
         self.times = BoardTimes()
         self._waiting: deque[Received] = deque()
         self._misfits = self._asked = 0
-        self._ask_at = self._channels_at = 0.0
-        self._told: dict[int, SetRate | SetDebounce | SetChannels] = {}
+        self._ask_at = self._channels_at = self._segments_at = 0.0
+        self._told: dict[int, _Setting] = {}
         self._token = 0
 
     def __enter__(self) -> Self:
@@ -139,6 +160,8 @@ class Scanner(Closing):
         try:
             self._line.write(b"\0")  # ends whatever stands half-sent in the board's receiver
             self.hello = self._greet()
+            if self.hello.has_segments:
+                self._tell(SetSegments(1))
         except BaseException:
             self.close()
             raise
@@ -214,7 +237,7 @@ class Scanner(Closing):
         for received in self._decoder.received(data):
             self._waiting.append((came_us, received))
 
-    def _tell(self, setting: SetRate | SetDebounce | SetChannels) -> None:
+    def _tell(self, setting: _Setting) -> None:
         self._send(setting)
         self._told[setting.KIND] = setting
 
@@ -264,9 +287,8 @@ class Scanner(Closing):
                 self._restarted()
         elif isinstance(message, Faults):
             self.faults = message
-        elif isinstance(message, Grasp):
-            flags, number = message.flags, None if message.grasp == NO_GRASP else message.grasp
-            self.grasp = BoardGrasp(time_us, number, message.margin, bool(flags & DEGRADED), bool(flags & EARLY))
+        elif isinstance(message, Grasp | Segment):
+            self._recognised(message, time_us)
         elif isinstance(message, Channels):
             self._measures(message)
         elif isinstance(message, Analog):
@@ -282,9 +304,17 @@ class Scanner(Closing):
     def _restarted(self) -> None:
         """Tell a board that has booted what it was told before."""
         self._keys.restarted()
-        self.analog = None
+        self.analog = self.segment = None
         for setting in self._told.values():
             self._send(setting)
+
+    def _recognised(self, message: Grasp | Segment, time_us: int) -> None:
+        number = None if message.grasp == NO_GRASP else message.grasp
+        if isinstance(message, Segment):
+            self.segment = BoardSegment(time_us, message.number, number, STATES[message.state])
+        else:
+            flags = message.flags
+            self.grasp = BoardGrasp(time_us, number, message.margin, bool(flags & DEGRADED), bool(flags & EARLY))
 
     def _measures(self, message: Channels) -> None:
         if message.token == self._token:
@@ -330,4 +360,8 @@ class Scanner(Closing):
         asked = self._told.get(SetChannels.KIND)
         if asked is not None and self.analog is None and now >= self._channels_at:
             self._channels_at = now + _ASK_AGAIN_S
+            self._send(asked)
+        asked = self._told.get(SetSegments.KIND)
+        if asked is not None and self.segment is None and now >= self._segments_at:
+            self._segments_at = now + _ASK_AGAIN_S
             self._send(asked)

@@ -10,7 +10,8 @@ Integers are little-endian. A frame whose payload is not exactly what its kind a
 nothing else does. Times are the board's microseconds, modulo 2**32; sets of switches are one integer, bit k for key k.
 
 Version 2 is version 1 with analog channels: CHANNELS, ANALOG and SET_CHANNELS. A board of version 2 says so by a flag
-of its HELLO, and sends none of the new frames before it is asked to: a host of version 1 reads its keys as ever.
+of its HELLO, and sends none of the new frames before it is asked to: a host of version 1 reads its keys as ever. So
+it is with SEGMENT and SET_SEGMENTS, of a board that follows segments.
 """
 
 from binascii import crc_hqx
@@ -42,14 +43,15 @@ PROTOCOL = 1
 _TIME = Struct("<I")
 MOST_KEYS = 8 * (MAX_PAYLOAD - _TIME.size)
 # Flags of HELLO: keys stand in a matrix without diodes, where three closed corners of a rectangle close the fourth; and
-# the board speaks version 2, since it has analog channels.
-WITHOUT_DIODES, ANALOG = 0x01, 0x02
+# the board speaks version 2, since it has analog channels; it follows segments.
+WITHOUT_DIODES, ANALOG, SEGMENTS = 0x01, 0x02, 0x04
 ANALOG_VERSION = 2
 # Codes of channels in one ANALOG; the code of a channel that could not be read, and so the most bits of a code.
 MOST_ASKED, MOST_CHANNELS = 122, 255
 UNREAD, MOST_BITS = 0xFFFF, 15
-# What GRASP says where no grasp type was recognised.
+# What GRASP says where nothing can be known, and SEGMENT where nothing is held; the states of a SEGMENT.
 NO_GRASP = 255
+STATES = ("none", "forming", "held", "releasing")
 # Flags of GRASP: an input was missing; the scan ended as soon as the rest of the switches could not matter.
 DEGRADED, EARLY = 0x01, 0x02
 
@@ -170,7 +172,7 @@ class Hello(Fixed):
     """What the board is, and how it works now: sent at boot, and in answer to PING, SET_RATE and SET_DEBOUNCE.
 
     token         that of the PING it answers, 0 where it answers none
-    flags         WITHOUT_DIODES, ANALOG
+    flags         WITHOUT_DIODES, ANALOG, SEGMENTS
     board         a number of this very board's own
     major, minor, patch  version of its firmware
     rows, columns key k stands at row k // columns, column k % columns; directly wired keys are one row
@@ -209,6 +211,11 @@ class Hello(Fixed):
     def has_analog(self) -> bool:
         """Whether the board has analog channels: it speaks version 2."""
         return bool(self.flags & ANALOG)
+
+    @property
+    def has_segments(self) -> bool:
+        """Whether the board follows segments, and sends them once it is asked to."""
+        return bool(self.flags & SEGMENTS)
 
     @property
     def identity(self) -> tuple[int, int, int, int]:
@@ -323,7 +330,7 @@ class Grasp(Fixed):
     """What a board that carries a build recognised.
 
     time_us  when the frame was read
-    grasp    number of the grasp type in the build's order; NO_GRASP: none
+    grasp    number of the grasp type in the build's order, the one after the last: nothing is held; NO_GRASP: not known
     margin   the best score less the second, in steps of the build's tables; 65535 stands for more, too
     flags    DEGRADED, EARLY
     """
@@ -335,6 +342,32 @@ class Grasp(Fixed):
     grasp: int
     margin: int
     flags: int
+
+
+@dataclass(frozen=True, slots=True)
+class Segment(Fixed):
+    """The segment that a board which carries a build is in.
+
+    time_us  when its last frame was read     number  of grasps so far, modulo 65536
+    grasp    number of the segment's grasp type; NO_GRASP in the state "none"
+    state    a place in STATES
+    """
+
+    KIND: ClassVar[int] = 0x0A
+    LAYOUT: ClassVar[Struct] = Struct("<IHBB")
+
+    time_us: int
+    number: int
+    grasp: int
+    state: int
+
+    @classmethod
+    def read(cls, payload: bytes, keys: int = 0) -> Self:
+        """Return the message. Raises MessageError."""
+        segment = super(Segment, cls).read(payload)
+        if segment.state >= len(STATES):
+            raise MessageError(f"a SEGMENT of state {segment.state}: there are 0 to {len(STATES) - 1}")
+        return segment
 
 
 @dataclass(frozen=True, slots=True)
@@ -475,12 +508,24 @@ class SetChannels(_Bitmap):
         return super(SetChannels, cls).read(payload, 8 * max(0, len(payload) - cls.LAYOUT.size))
 
 
-FromBoard = Hello | State | Heartbeat | Event | Faults | Grasp | Lost | Channels | Analog
-ToBoard = SetRate | SetDebounce | GetState | Ping | SetChannels
+@dataclass(frozen=True, slots=True)
+class SetSegments(Fixed):
+    """Send a SEGMENT now, and where `wanted` is not 0, one for every change from now on and after every HEARTBEAT."""
+
+    KIND: ClassVar[int] = 0x16
+    LAYOUT: ClassVar[Struct] = Struct("<B")
+
+    wanted: int
+
+
+FromBoard = Hello | State | Heartbeat | Event | Faults | Grasp | Segment | Lost | Channels | Analog
+ToBoard = SetRate | SetDebounce | GetState | Ping | SetChannels | SetSegments
 _FROM_BOARD: dict[int, type[FromBoard]] = {
-    kind.KIND: kind for kind in (Hello, State, Heartbeat, Event, Faults, Grasp, Lost, Channels, Analog)
+    kind.KIND: kind for kind in (Hello, State, Heartbeat, Event, Faults, Grasp, Segment, Lost, Channels, Analog)
 }
-_TO_BOARD: dict[int, type[ToBoard]] = {kind.KIND: kind for kind in (SetRate, SetDebounce, GetState, Ping, SetChannels)}
+_TO_BOARD: dict[int, type[ToBoard]] = {
+    kind.KIND: kind for kind in (SetRate, SetDebounce, GetState, Ping, SetChannels, SetSegments)
+}
 
 
 def frame(message: FromBoard | ToBoard, sequence: int) -> Frame:

@@ -10,14 +10,15 @@ live byte gets the code that a recorded one got.
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from operator import getitem, itemgetter
 from pathlib import Path
 
-from thenar.drivers.calibration import GloveCalibration
+from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.errors import SettingError
 
 from .errors import FrameError
-from .frames import PERIODS, GloveFrame, Newest
+from .frames import PERIODS, GloveFrame, Mask, Newest
 from .manifest import Calibration
 from .names import nearest
 from .published import JointAngles
@@ -25,6 +26,8 @@ from .toml_source import read_source
 from .toml_struct import convert
 
 _BYTES = 256
+# The unit of recorded bytes that are not calibrated.
+_RAW = "raw"
 _HIGHEST_CODE = 65535
 # A CyberGlove never sends 0: it ends a record.
 _RAW_CODES = range(1, _BYTES)
@@ -36,16 +39,26 @@ def load_calibration(path: Path) -> GloveCalibration:
     return convert(source, (), source.tables(), GloveCalibration)
 
 
-class CodeTables:
-    """The joints of a build as look-ups into a record's bytes. The last record's codes are kept: switches come several
-    times as often as records do.
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """What the bytes of a stream's joints mean where it is not calibrated: the numbers that it sends, which are in the
+    unit of the recordings.
     """
 
-    __slots__ = ("_last", "_last_codes", "_pick", "_sensors", "_tables")
+    sensors: tuple[SensorCalibration, ...]
 
-    def __init__(
-        self, joints: Sequence[Calibration], sensor_names: Sequence[str], calibration: GloveCalibration | None = None
-    ) -> None:
+
+Meaning = GloveCalibration | Numbers | None
+
+
+class CodeTables:
+    """The joints of a build as look-ups into a record's bytes. The last record's codes are kept: switches come several
+    times as often as records do. `lost` are the joints whose bytes in it are 0: nothing was measured.
+    """
+
+    __slots__ = ("_last", "_last_codes", "_pick", "_sensors", "_tables", "lost")
+
+    def __init__(self, joints: Sequence[Calibration], sensor_names: Sequence[str], calibration: Meaning = None) -> None:
         """Take the joints as the build's manifest has them, and the sensors' names in wire order.
 
         Raises SettingError if the glove lacks a joint, or if its bytes cannot be turned into the build's codes.
@@ -56,6 +69,7 @@ class CodeTables:
         self._tables = [codes_of_bytes(joint, calibration) for joint in joints]
         self._last: bytes | None = None
         self._last_codes: list[int] = []
+        self.lost: Mask = 0
 
     def codes(self, sensors: bytes) -> list[int]:
         """Return the codes of the build's joints, in its order, not to be changed. Raises FrameError for a record of
@@ -65,7 +79,8 @@ class CodeTables:
             return self._last_codes
         if len(sensors) != self._sensors:
             raise FrameError(f"a CyberGlove record of {len(sensors)} sensors, {self._sensors} are named")
-        self._last, self._last_codes = sensors, list(map(getitem, self._tables, self._pick(sensors)))
+        self._last, self._last_codes = sensors, list(map(getitem, self._tables, picked := self._pick(sensors)))
+        self.lost = sum(1 << joint for joint, byte in enumerate(picked[: len(self._tables)]) if not byte)
         return self._last_codes
 
 
@@ -82,7 +97,7 @@ class Joints:
         self,
         joints: Sequence[Calibration],
         sensor_names: Sequence[str],
-        calibration: GloveCalibration | None,
+        calibration: Meaning,
         period_us: int | None,
         grace_us: int = 0,
     ) -> None:
@@ -110,6 +125,11 @@ class Joints:
             self._last = self._codes.codes(found.sensors) if found.plugged else None
             self._coded = found
         return self._last if now_us <= max(newest.expires_us, newest.time_us + self._grace_us) else None
+
+    @property
+    def lost(self) -> Mask:
+        """The joints that the newest record does not measure."""
+        return 0 if self._codes is None or not self._last else self._codes.lost
 
     def late(self, now_us: int) -> bool:
         """Return whether the codes are of a late record."""
@@ -154,16 +174,16 @@ def _place(joint: str, sensor_names: Sequence[str]) -> int:
     if joint in sensor_names:
         return list(sensor_names).index(joint)
     raise SettingError(
-        f"the build needs joint {joint!r}, and the CyberGlove has no sensor of that name"
-        f"{nearest(joint, sensor_names)}; name its sensors as the build does: `joints` of [cyberglove] in glove.toml"
+        f"the build needs joint {joint!r}, and the glove has no sensor of that name{nearest(joint, sensor_names)}; "
+        "name its sensors as the build does in glove.toml: `joints` of [cyberglove], or of a [[stream]]"
     )
 
 
-def codes_of_bytes(joint: Calibration, calibration: GloveCalibration | None) -> tuple[int, ...]:
+def codes_of_bytes(joint: Calibration, calibration: Meaning) -> tuple[int, ...]:
     """Return the code of each byte, 0 to 255, of the sensor of `joint`. Raises SettingError where there is none."""
-    if calibration is None:
+    if calibration is None or (isinstance(calibration, Numbers) and joint.unit == _RAW):
         return _raw(joint)
-    if calibration.unit != joint.unit:
+    if isinstance(calibration, GloveCalibration) and calibration.unit != joint.unit:
         raise SettingError(
             f"the glove is calibrated in {calibration.unit!r}, joint {joint.name!r} of the build is in {joint.unit!r}: "
             "compile recordings in that unit"
@@ -178,8 +198,8 @@ def _raw(joint: Calibration) -> tuple[int, ...]:
     if joint.code_a in _RAW_CODES and joint.code_b in _RAW_CODES and joint.code_a != joint.code_b:
         return tuple(range(_BYTES))
     raise SettingError(
-        f"joint {joint.name!r} of the build is coded in {joint.unit!r}, not in a CyberGlove's bytes: calibrate the "
-        "glove (`thenar calibrate`) and name the file: `calibration` of [cyberglove] in glove.toml"
+        f"joint {joint.name!r} of the build is coded in {joint.unit!r}, not in the glove's bytes: calibrate it "
+        "(`thenar calibrate`) and name the file in glove.toml: `calibration` of [cyberglove], or of the [[stream]]"
     )
 
 

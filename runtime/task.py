@@ -141,10 +141,11 @@ def begun(task: Task, step: int, grasp: str) -> Progress:
 class TaskFollower:
     """Follows a hand through a task, by the segments that are published."""
 
-    __slots__ = ("_segment", "progress", "task")
+    __slots__ = ("_segment", "_told", "progress", "task")
 
     def __init__(self, task: Task) -> None:
         self.task, self.progress, self._segment = task, _at(task, 0), 0
+        self._told: Progress | None = None
 
     @classmethod
     def of(cls, path: Path, grasps: tuple[str, ...]) -> "TaskFollower":
@@ -154,14 +155,16 @@ class TaskFollower:
         return cls(task)
 
     def update(self, grasp: LiveGrasp) -> Progress | None:
-        """Return the progress where this moment changes it."""
+        """Return the progress at the first moment, and where a later one changes it."""
         before = self.progress
         if grasp.state in ("held", "releasing"):
             self._hold(grasp)
         elif grasp.state == "none" and before.grasp != NONE:
             over = before.step == before.steps and before.grasp == self.task.steps[-1].grasp
             self.progress = msgspec.structs.replace(before, grasp=NONE, done=before.done or over)
-        return None if self.progress is before else self.progress
+        news = self.progress is not self._told
+        self._told = self.progress
+        return self.progress if news else None
 
     def _hold(self, grasp: LiveGrasp) -> None:
         before = self.progress

@@ -27,7 +27,7 @@ from .calibration import code_of_value
 from .frames import Mask
 from .manifest import Calibration, Switch, Threshold
 from .names import fault, list_names, shortened
-from .scanning.scanmap import ScanMap
+from .scanning.scanmap import BoardLevel, ScanMap
 from .toml_source import read_source
 from .toml_struct import convert
 
@@ -205,8 +205,12 @@ def in_counts(scan: ScanMap, switches: Sequence[Switch], calibration: TaxelCalib
         else port
         for port in scan.ports
     )
-    boards = tuple(tuple((at, limit(number, code), number) for at, code, number in board) for board in scan.taxels)
-    return replace(scan, ports=ports, taxels=boards)
+
+    def limits(levels: Sequence[BoardLevel]) -> tuple[BoardLevel, ...]:
+        return tuple((at, limit(number, code), number) for at, code, number in levels)
+
+    streams = tuple(replace(stream, levels=limits(stream.levels)) for stream in scan.streams)
+    return replace(scan, ports=ports, taxels=tuple(map(limits, scan.taxels)), streams=streams)
 
 
 def _check_counts(coded: Calibration, others: bool) -> None:

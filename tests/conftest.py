@@ -1,5 +1,6 @@
 """What several tests need: where the real recordings and Weka's answers are, and what a missing one means."""
 
+import gc
 import importlib.util
 import os
 import shutil
@@ -72,12 +73,41 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 IN_REAL_TIME = {"live", "cli", "drivers", "runtime"}
 
 
+# Files that take minutes, the longest first. `make test-slow` deals out whole files in this order: so no worker is left
+# alone with a long one at the end, and what a module sets up is set up once.
+LONGEST = (
+    "stability/test_catalogue.py",
+    "fuzz/test_fuzz_recordings.py",
+    "compiler/frontier/test_find.py",
+    "fuzz/test_fuzz_files.py",
+    "cli/test_frontier_command.py",
+    "live/process/test_bus_faults.py",
+    "compiler/firmware/test_names.py",
+    "simulator/planning/test_plan_scene.py",
+    "mutants/test_named_faults.py",
+    "runtime/recording/test_reader.py",
+    "cli/test_narrow.py",
+    "live/firmware/test_chain.py",
+    "compiler/firmware/test_cppcheck.py",
+    "cli/test_compile_documents.py",
+    "simulator/running/test_simulation.py",
+)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Let tests in real time be run again, at most twice."""
+    """Let tests in real time be run again, at most twice; put those that take long first."""
     here = Path(__file__).parent
+    places = {here / name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get(item.path, len(places)))
     for item in items:
         if item.path.relative_to(here).parts[0] in IN_REAL_TIME:
             item.add_marker(pytest.mark.flaky(reruns=2))
+
+
+def pytest_collection_finish() -> None:
+    """Leave what was collected, half a million objects, out of every later search for garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

@@ -15,3 +15,8 @@ def test_no_folder_of_tests_is_passed_by(pytestconfig: pytest.Config) -> None:
     assert not [
         folder for folder in folders for part in folder.parts for name in passed_by if fnmatch.fnmatch(part, name)
     ]
+
+
+def test_the_files_that_are_put_first_are_there(pytestconfig: pytest.Config) -> None:
+    root = next(plugin for plugin in pytestconfig.pluginmanager.get_plugins() if hasattr(plugin, "LONGEST"))
+    assert not [name for name in root.LONGEST if not (TESTS / name).is_file()]

@@ -19,6 +19,7 @@ from thenar.runtime.harness.wiring import (
     Harness,
     ScannerWiring,
     SpiWiring,
+    StreamWiring,
 )
 from thenar.runtime.scanning import plan
 from thenar.runtime.scanning import plan as order
@@ -34,6 +35,7 @@ TABLES: dict[str, type[msgspec.Struct]] = {
     "`[[bus]]`": BusWiring,
     "`[[bus.chip]]`": ChipWiring,
     "`[[spi]]`": SpiWiring,
+    "`[[stream]]`": StreamWiring,
     "`[debounce]`": Debounce,
     "`[taxels]`": TaxelSettings,
 }
@@ -53,7 +55,7 @@ def test_every_example_is_a_sound_harness(number: int, tmp_path: Path) -> None:
 
 
 def test_there_are_examples() -> None:
-    assert len(EXAMPLES) == 4
+    assert len(EXAMPLES) == 5
 
 
 def documented() -> Iterator[tuple[str, str, str]]:
@@ -65,7 +67,7 @@ def documented() -> Iterator[tuple[str, str, str]]:
 
 def test_every_key_is_there_with_its_default() -> None:
     found = list(documented())
-    nested = {"cyberglove", "scanner", "bus", "chip", "spi", "debounce"}
+    nested = {"cyberglove", "scanner", "bus", "chip", "spi", "stream", "debounce"}
     for table, kind in TABLES.items():
         tables = nested | ({"taxels"} if kind is Harness else set())
         keys = {field.encode_name: field for field in msgspec.structs.fields(kind) if field.encode_name not in tables}

@@ -63,18 +63,21 @@ def test_a_switch_that_sticks_is_found_and_none_without_a_fault(faults: ModuleTy
     found = faults.cost(build, fresh, True, 3, 0)
     assert found.name == build.manifest.switches[0].name
     assert all(delay is not None and delay < 12 for delay in found.delays)
-    assert found.quarantined[1] <= min(found.without[1], 12)
+    assert found.quarantined[1] <= min(found.without[1], 12, found.lost[1] + 1)
 
 
 @pytest.mark.slow
 def test_of_every_switch_that_sticks_closed_and_of_healthy_gloves_of_other_men(
     faults: ModuleType, scene: Callable[..., GraspSet], tmp_path: Path
 ) -> None:
-    """39 switches of three men, on three other men: at most the points that the switch costs as lost."""
+    """39 switches of three men, on three other men: at most a point more than the switch costs as lost, and eight in
+    the first 30 grasps.
+    """
     build, others = build_of(scene("kamakura"), tmp_path / "build", 62), scene("kamakura-def")
     alarms, grasps = faults.false_alarms(build, others, 3)
-    assert alarms <= grasps / 1000
+    assert alarms == 0 < grasps
     for switch in range(build.tables.n_switches):
-        found = faults.cost(build, others, True, 12, switch)
-        assert found.quarantined[1] <= (14 if found.name == "palm_heel_6" else 12), found
+        found = faults.cost(build, others, True, 3, switch)
+        assert found.quarantined[0] <= found.lost[0] + 8, found
+        assert found.quarantined[1] <= found.lost[1] + 1, found
         assert None not in found.delays or found.without[1] <= 12, found

@@ -45,6 +45,7 @@ _MOST_STEPS, _MOST_DIRECTIONS, _MOST_HALVINGS = 500, 2000, 40
 _ENOUGH = 1e-4  # of the slope that Armijo's rule wants to see
 _ROUNDING = 2.0**-50  # of the loss, for each entry of the rows: a rise by less may be one of rounding
 _MARKS = 512.0  # of a unit, in which a line measures its column: one or two units from end to end
+_NO_CHANCE = 800.0  # below all scores, where e to it is exactly 0
 _UNSOLVED = 0.3  # of the gradient, that a step leaves
 
 
@@ -117,14 +118,18 @@ def fit_logit(
     linear: bool = False,
     tolerance: float = TOLERANCE,
     weights: Floats | None = None,
+    counted: int = 0,
+    held: NDArray[np.bool_] | None = None,
 ) -> ColumnTables:
     """Fit X (n, d) numbers (NaN: missing), labels (n,) in 0..n_classes-1, weights (n,) >= 0.
 
     `penalty` pulls rows towards zero, `smoothness` those of neighbouring bins towards each other; columns have at most
     `max_bins` bins (2 or more; None: one for each value), that hold frames as evenly as can be. With `linear` a column
     of more than two values adds scores in proportion to them, between the least and the largest, and `smoothness` pulls
-    what a standard deviation of it adds. No derivative of the loss is larger at the answer than `tolerance` times the
-    sum of weights. Raises BoostingError.
+    what a standard deviation of it adds. How many of the first `counted` columns, bits, are set adds scores as well,
+    with the weak pull of a bin: so what they all say alike is learnt at once. Of frames in `held` (n,) it is known that
+    they are not of the last class, which learns nothing of them. No derivative of the loss is larger at the answer than
+    `tolerance` times the sum of weights. Raises BoostingError.
     """
     if not (0 < penalty < math.inf and 0 <= smoothness < math.inf):
         raise BoostingError(f"penalty={penalty} must be above 0, and smoothness={smoothness} at least 0, both finite")
@@ -139,10 +144,35 @@ def fit_logit(
         # By a power of two, which changes no answer: now sums of huge weights stay finite, and of tiny ones exact.
         scale = float(np.ldexp(1.0, -np.frexp(weights.max())[1]))
         weights = on_one_grid(weights * scale, len(X))
-    held = np.ones(len(X)) if weights is None else weights
-    columns = columns_of(X, max_bins, weights, held if linear else None)
-    rows = Fit(columns, labels, n_classes, penalty * scale, smoothness * scale, weights).minimum(tolerance)
-    return tables_of(columns, rows, held)
+    heavy = np.ones(len(X)) if weights is None else weights
+    columns = columns_of(X, max_bins, weights, heavy if linear else None)
+    count = count_of(columns[:counted], heavy)
+    pulls = penalty * scale, smoothness * scale
+    rows = Fit([*columns, *count], labels, n_classes, *pulls, weights, held).minimum(tolerance)
+    return tables_of(columns, spread_out(columns, rows, count), heavy)
+
+
+def count_of(columns: Sequence["Column"], weights: Floats) -> list["Column"]:
+    """Return a column of how many of `columns`, bits, are set, in a list; none where that says no more than one does.
+
+    `weights` (n,) are those of frames.
+    """
+    bits = [column.bins for column in columns if column.counts]
+    number: Floats = np.add.reduce(bits, axis=0).astype(np.float64) if len(bits) > 1 else np.zeros(1)
+    if number.min() == number.max():
+        return []
+    return [Column(np.zeros(0), np.zeros(len(number), np.intp), 0, _Ruler.of(number, weights), free=True)]
+
+
+def spread_out(columns: Sequence["Column"], rows: Floats, count: Sequence["Column"]) -> Floats:
+    """Return rows of `columns` that say what these and those of their count, the last, do together."""
+    if not count or count[0].line is None:
+        return rows
+    ruler, rows, each = count[0].line, rows[:-1].copy(), rows[-1] / count[0].line.unit
+    rows[0] -= (ruler.low + ruler.unit * ruler.centre) * each
+    starts = 1 + np.cumsum([0, *(column.n_rows for column in columns[:-1])])
+    rows[[start for start, column in zip(starts.tolist(), columns, strict=True) if column.counts]] += each
+    return rows
 
 
 def tables_of(columns: Sequence["Column"], rows: Floats, held: Floats) -> ColumnTables:
@@ -196,7 +226,8 @@ class Column:
     """A column of frames: its edges, the bin (n,) of each, the last for missing, and the first bin that has a row.
 
     A line has one row instead of its only bin. Of two columns together, bins are the numbers of `cells`, row by row,
-    each of which has a row, and `smoothness` pulls neighbours in both directions.
+    each of which has a row, and `smoothness` pulls neighbours in both directions. A `free` line is pulled by no
+    smoothness.
     """
 
     edges: Floats
@@ -205,6 +236,12 @@ class Column:
     line: _Ruler | None = None
     cells: tuple[int, int] | None = None
     smoothness: float = 0.0
+    free: bool = False
+
+    @property
+    def counts(self) -> bool:
+        """Whether it is a bit that is set in some frames, and in some not."""
+        return self.first == 1 and len(self.edges) == 1
 
     @property
     def n_rows(self) -> int:
@@ -223,7 +260,7 @@ class Column:
         """Return the pull (rows,) on each row."""
         pulls = np.full(self.n_rows, penalty if self.first else BIN_SHARE * penalty)
         if self.line is not None:
-            pulls[0] = (pulls[0] + smoothness) * self.line.variance
+            pulls[0] = (pulls[0] + (0.0 if self.free else smoothness)) * self.line.variance
         return pulls
 
     def table(self, rows: Floats, weights: Floats) -> Floats:
@@ -297,8 +334,9 @@ class Fit:
         penalty: float,
         smoothness: float,
         weights: Floats | None,
+        held: NDArray[np.bool_] | None = None,
     ) -> None:
-        n, self._labels, self._weights = len(labels), labels, weights
+        n, self._labels, self._weights, self._known = len(labels), labels, weights, held
         self._member = (labels[:, np.newaxis] == np.arange(n_classes)).astype(np.float64)
         self._total = float(n if weights is None else weights.sum())
         self._grids: list[tuple[int, int, tuple[int, int], float]] = []
@@ -330,9 +368,15 @@ class Fit:
             neighbours = [np.minimum(np.arange(count), 1) + np.minimum(np.arange(count)[::-1], 1) for count in cells]
             self._stiffness[first:last] += between * np.add.outer(*neighbours).reshape(-1, 1)
 
-    def minimum(self, tolerance: float) -> Floats:
-        """Return the rows at which no derivative is beyond `tolerance` times the weight of all frames."""
-        point = self._at(np.zeros((len(self._pull), self._member.shape[1])))
+    def minimum(self, tolerance: float, near: Floats | None = None) -> Floats:
+        """Return the rows at which no derivative is beyond `tolerance` times the weight of all frames.
+
+        near  what the first of the rows are near to
+        """
+        rows = np.zeros((len(self._pull), self._member.shape[1]))
+        if near is not None:
+            rows[: len(near)] = near
+        point = self._at(rows)
         wanted = tolerance * self._total
         for _ in range(_MOST_STEPS):
             steep = _largest(point.gradient)
@@ -347,6 +391,8 @@ class Fit:
         # A point is one of the grid itself, so that its loss is that of its rows to the last digits.
         rows = on_one_grid(rows, self._across)
         scores = self._design @ rows
+        if self._known is not None:
+            scores[self._known, -1] = scores.min() - _NO_CHANCE
         shares, mean = softmax_and_loss(np.ascontiguousarray(scores.T), self._labels, self._weights)
         probability, held = np.ascontiguousarray(shares.T), self._held(rows)
         gradient = self._over_frames(probability - self._member) + held

@@ -20,7 +20,7 @@ from ..boosting.boost import BoostingError, check_rows
 from ..boosting.exactsums import exact_sum, on_one_grid
 from ..limits import check_memory
 from ..tables.collapse import Floats, ScoreTables
-from .logit import TOLERANCE, Column, Fit, column_edges, columns_of, sparse, tables_of
+from .logit import TOLERANCE, Column, Fit, column_edges, columns_of, count_of, sparse, spread_out, tables_of
 
 PAIRS, PAIR_BINS, PAIR_SMOOTHNESS = 4, 8, 0.5
 MOST_PAIR_BINS = 16  # 256 cells are the rows of one look-up
@@ -39,6 +39,8 @@ def fit_pairs(
     pair_bins: int = PAIR_BINS,
     pair_smoothness: float = PAIR_SMOOTHNESS,
     tolerance: float = TOLERANCE,
+    counted: int = 0,
+    held: NDArray[np.bool_] | None = None,
 ) -> ScoreTables:
     """Fit switches (n, s), codes (n, j) and labels (n,) in 0..n_classes-1, with at most so many `pairs` of joints.
 
@@ -53,15 +55,18 @@ def fit_pairs(
     check_rows(X, labels, n_classes, None)
     check_memory(len(X), n_classes, BoostingError, *X.shape[1:])
     columns = columns_of(X, max_bins, None, None)
-    alone = Fit(columns, labels, n_classes, penalty, smoothness, None)
+    count = count_of(columns[:counted], np.ones(len(X)))
+    alone = Fit([*columns, *count], labels, n_classes, penalty, smoothness, None, held)
     rows = alone.minimum(tolerance)
     edges = column_edges(codes, pair_bins)
     found = _ranked(edges, codes, alone.residuals(rows), pairs)
     if found:
         made = [_cells(edges, codes, pair, pair_smoothness) for pair in found]
-        rows = Fit([*columns, *made], labels, n_classes, penalty, smoothness, None).minimum(tolerance)
-    own = 1 + sum(column.n_rows for column in columns)
-    tables = tables_of(columns, rows[:own], np.ones(len(X))).score_tables(s)
+        rows = Fit([*columns, *count, *made], labels, n_classes, penalty, smoothness, None, held).minimum(
+            tolerance, rows
+        )
+    own = 1 + sum(column.n_rows for column in (*columns, *count))
+    tables = tables_of(columns, spread_out(columns, rows[:own], count), np.ones(len(X))).score_tables(s)
     blocks = np.split(rows[own:], np.cumsum([column.n_rows for column in made])[:-1]) if found else []
     made_pairs = []
     for (a, b), block in sorted(zip(found, blocks, strict=True), key=lambda each: each[0]):

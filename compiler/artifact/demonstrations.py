@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.build import Build
-from thenar.runtime.live.replay import moments
+from thenar.runtime.live.replay import recognised
 from thenar.runtime.policy import Policy
 
 from ..recordings.graspset import GraspSet
@@ -22,7 +22,7 @@ Codes = tuple[NDArray[np.int64], NDArray[np.uint16]]
 
 
 def demonstrations(folder: Path, recordings: Sequence[Path]) -> Iterator[Demonstration]:
-    """Yield each recorded run (.mcap) of the build, and each stream of each set of whole movements (.grasps).
+    """Yield each recording (.mcap) of what the build reads, and each stream of each set of whole movements (.grasps).
 
     Raises SegmentingError where one shows no grasp, and what `segment` raises.
     """
@@ -44,7 +44,7 @@ def demonstrations(folder: Path, recordings: Sequence[Path]) -> Iterator[Demonst
 
 def _codes_of_run(build: Build, path: Path) -> Codes:
     """Return the times at which the joints were read in a run, on the clock of its timelines, and their codes."""
-    found = [(entry.unix_us, moment.codes) for entry, moment in moments(build, path) if moment.codes is not None]
+    found = [(one.grasp.unix_us, one.codes) for one in recognised(build, path) if one.codes is not None]
     codes = np.array([codes for _, codes in found], np.uint16).reshape(len(found), len(build.manifest.joints))
     return np.array([time_us for time_us, _ in found], np.int64), codes
 

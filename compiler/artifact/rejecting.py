@@ -15,6 +15,7 @@ from thenar.runtime.published import NONE
 from thenar.runtime.tables import HIGHEST_CODE, LIMIT, IntegerTables
 
 from ..evaluation.choosing import inner_folds
+from ..evaluation.folds import leave_groups_out
 from ..firmware.layout import code_bits
 from ..samples import Samples
 from ..tables.collapse import collapse
@@ -31,8 +32,8 @@ TAIL = 0.01
 def rejection_of(
     samples: Samples, tables: IntegerTables, training: Training, options: Options, groups: NDArray[np.generic] | None
 ) -> Rejection | None:
-    """Return what a build of these tables refuses; None where none is a class, nothing is to be refused, or there are
-    too few trials.
+    """Return what a build of these tables refuses; None where none is a class, nothing is to be refused, there are too
+    few trials, or a single group: how far a new one lies beyond it is not known.
 
     samples   the rows that the tables were trained on, of the kept switches and joints
     training  what made them
@@ -40,11 +41,16 @@ def rejection_of(
     """
     if not options.refuse or samples.has_none or NONE in samples.grasps:
         return None
+    several = 0 if groups is None else len(np.unique(groups))
+    if several == 1:
+        return None
+    # Fits may be compared on trials where two groups are left; how far a new group lies beyond shows in groups alone.
+    folds = leave_groups_out(groups, "group") if groups is not None and several == 2 else None
     deviations = [
         _Limits(samples.rows(fold.train), _tables(samples.rows(fold.train), training, options)).deviations(
             samples.rows(fold.test)
         )
-        for fold in inner_folds(samples, options.seed, groups)
+        for fold in folds or inner_folds(samples, options.seed, groups)
     ]
     if not deviations:
         return None

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime.build import Build
-from thenar.runtime.live.replay import moments
+from thenar.runtime.live.replay import recognised
 from thenar.runtime.rejection import refused
 from thenar.runtime.segmenting.decoder import decode, emissions
 
@@ -38,7 +38,8 @@ def segment(
     folder : path
         The build.
     recordings : GraspSet or path
-        Whole movements, as a set or its file; or the file (.mcap) of a live run of this build.
+        Whole movements, as a set or its file; or a recording (.mcap) of all that the build reads: of a live run, of
+        this build or another, or of a collection.
     lag_us : int, optional
         Decide live, so long after each moment. None: from the whole stream, which is exact.
     progress : callable, optional
@@ -56,7 +57,7 @@ def segment(
     SegmentingError
         If the recordings are no whole movements, or hold nothing.
     SettingError
-        If the lag makes no sense, or a live run was of another build.
+        If the lag makes no sense, or a recording lacks an input of the build.
     BuildError, SealError, McapError, CompileError
         If a file is not sound, or the recordings lack inputs of the build.
 
@@ -111,8 +112,8 @@ def _of_run(build: Build, path: Path, lag_us: int | None, warn: Callable[[str], 
     zero_us: int | None = None
     before: tuple[Sequence[int], bool] | None = None
     due_us = 0
-    for entry, moment in moments(build, path, None, warn):
-        now_us = entry.unix_us
+    for moment in recognised(build, path, warn):
+        now_us = moment.grasp.unix_us
         scores = None if moment.scores is None else (moment.scores, moment.refused)
         zero_us = now_us if zero_us is None else zero_us
         if scores is not None and (before is None or not 0 <= now_us - due_us + tick_us < PAUSE_US):

@@ -26,8 +26,8 @@ from ..evaluation.rates import student
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..segmenting.learning import LAG_TICKS, Counts, announced_live, live_states
-from ..segmenting.scores import OVERLAPS, Score, score
-from ..segmenting.streams import TICK_US, SegmentingError, streams_of
+from ..segmenting.scores import OVERLAPS, Score, score, segments_of
+from ..segmenting.streams import TICK_US, SegmentingError, moving, streams_of
 from ..tables.quantise import integer_scores
 from ..workers import in_workers
 from .documents import Progress
@@ -112,7 +112,7 @@ def study_streams(
             "the set has no rows in which nothing is held: record them (thenar record), or simulate a scene that keeps "
             'every frame (rows = "all")'
         )
-    subjects = tuple(np.unique(grasp_set.subjects).tolist())
+    subjects = tuple(sorted({stream.subject for stream in streams}))
     if len(subjects) < 2:
         raise SegmentingError(f"the set holds streams of {subjects[0]} alone: a subject is left out, so it takes two")
     there: dict[Inputs, bool] = {"switches": bool(grasp_set.element_names), "joints": bool(grasp_set.joints)}
@@ -127,7 +127,7 @@ def study_streams(
     return StreamStudy(
         fingerprint=grasp_set.fingerprint(),
         subjects=subjects,
-        movements=len(np.unique(grasp_set.without_none().trial_ids)),
+        movements=sum(len(segments_of(grasp_set.labels[each.rows], len(grasp_set.taxonomy.types))) for each in streams),
         seconds=sum(len(stream.rows) for stream in streams) * TICK_US / 1e6,
         rows=tuple(
             MethodRow(kind, name, what, _row([found[kind, subject][name] for subject in subjects]))
@@ -165,10 +165,17 @@ def _of_subject(
 
 
 def _inner_folds(learning: Samples, own: GraspSet, options: Options) -> list[Fold]:
-    several = len(np.unique(own.subjects))
+    """Return folds that test all rows of streams: each leaves out some of their subjects, or half of the movements of
+    the only one.
+    """
+    rows = np.flatnonzero(moving(own))
+    several = len(np.unique(own.subjects[rows]))
     if several > 1:
-        return leave_groups_out(own.subjects, "subject", min(several, _INNER))
-    return trial_folds(learning.labels, learning.movements, 2, options.seed)
+        folds = leave_groups_out(own.subjects[rows], "subject", min(several, _INNER))
+    else:
+        folds = trial_folds(learning.labels[rows], learning.movements[rows], 2, options.seed)
+    every = np.arange(len(own))
+    return [Fold(np.setdiff1d(every, rows[fold.test]), rows[fold.test], fold.name) for fold in folds]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

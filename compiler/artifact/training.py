@@ -151,12 +151,8 @@ def train(
     if not (inputs != inputs[0]).any():
         raise CompileError("no input differs between rows: there is nothing to tell grasp types apart by")
     candidates, of = Training.candidates(options), OF[options.by or "subject"]
-    # Frames of a movement resemble their neighbours: of many, some are enough to compare fits by.
-    some = np.arange(0, len(rows), -(-len(rows) // _COMPARED) if samples.has_none else 1)
-    by = None if groups is None else groups[rows[some]]
-    fitting = choose_training(
-        kept.rows(some), candidates, seed=options.seed, groups=by, of=of, jobs=jobs, report=report
-    )
+    by = None if groups is None else groups[rows]
+    fitting = choose_training(kept, candidates, seed=options.seed, groups=by, of=of, jobs=jobs, report=report)
     training = Training.chosen(fitting, masked=options.robust)
     model = training.train(kept, report if len(candidates) == 1 else None)
     if fault := model_fault(model, kept.n_switches, kept.codes.shape[1], kept.n_classes):
@@ -171,8 +167,6 @@ def integers_of(trained: Trained, samples: Samples, options: Options) -> Integer
     return quantise(tables, kept.switches, kept.codes, options.width, options.table_bits)
 
 
-# Rows by which fits are compared where there are rows of nothing held.
-_COMPARED = 4096
 USUAL_ROUNDS = 100  # where a fit is chosen, its work is taken to be that of so many
 
 Scores = NDArray[np.float64]
@@ -221,7 +215,8 @@ def cuts_of(grasp_set: GraspSet, options: Options) -> tuple[Cut, ...]:
 @dataclass(frozen=True, slots=True, eq=False)
 class Tested:
     """What came of the folds: the rates, the headline first; and how often frames of each class (rows) were answered by
-    each (columns) in the folds of the headline, (K, K); and the scores of all rows there, (n, K).
+    each (columns) in the folds of the headline, (K, K); and the scores of all rows, (n, K), in the first folds that all
+    learn from rows of nothing held, if the set has any.
     """
 
     rates: tuple[Recognised, ...]
@@ -286,21 +281,35 @@ def cross_validated(
     folds = [(place, fold) for place, cut in enumerate(cuts) for fold in cut.folds]
     answers = np.empty((len(cuts), len(samples.labels)), np.intp)
     scores = np.empty((len(samples.labels), samples.n_classes))
+    knows = [learns_none(samples, cut) for cut in cuts]
+    # Those that segments are learnt from know what nothing held is like, if any do.
+    scored = next((place for place, rows in enumerate(knows) if rows.all()), 0)
     tasks = ((place, fold, test) for place, fold in folds)
     for done, (place, fold, found) in enumerate(
         in_workers(_done, tasks, little(len(folds) * len(samples.labels) * (options.rounds or USUAL_ROUNDS), jobs)), 1
     ):
         answers[place, fold.test] = found.argmax(axis=1)
-        if not place:
+        if place == scored:
             scores[fold.test] = found[:, : samples.n_classes]
         report(done, len(folds))
     refuses = not samples.has_none and bool((answers == samples.n_classes).any())
     confusion = np.zeros((samples.n_classes + refuses,) * 2, dtype=np.intp)
-    np.add.at(confusion, (samples.labels, answers[0]), 1)
+    np.add.at(confusion, (samples.labels[knows[0]], answers[0, knows[0]]), 1)
     measured, seed = list(zip(cuts, answers, strict=True)), options.seed
     rates = [rate for cut, own in measured for rate in rates_of("nested", samples, own, seed, cut)]
     detection = [each for cut, own in measured for each in detection_of("nested", samples, own, seed, cut)]
     return Tested(tuple(rates), tuple(detection), confusion, scores)
+
+
+def learns_none(samples: Samples, cut: "Cut") -> NDArray[np.bool_]:
+    """Return (n,) which rows are tested by a fold whose training rows hold some of nothing held; all, where none do.
+
+    A subject may be the only one whose whole movements were recorded: who is tested on it has not learnt what is not.
+    """
+    found = np.ones(len(samples.labels), bool)
+    for fold in cut.folds if samples.has_none else ():
+        found[fold.test] = samples.is_none[fold.train].any()
+    return found
 
 
 def _done(task: tuple[int, Fold, Test]) -> tuple[int, Fold, Scores]:
@@ -338,8 +347,9 @@ def detection_of(
     if not (none.any() or (answers == samples.n_types).any()):
         return ()
     said = (answers == samples.n_types).astype(np.intp)
+    knows = np.ones(len(none), bool) if cut is None else learns_none(samples, cut)
     held, empty = (
-        {rate.unit: rate for rate in _rates(protocol, samples, said, none.astype(np.intp), rows, seed, cut)}
+        {rate.unit: rate for rate in _rates(protocol, samples, said, none.astype(np.intp), rows & knows, seed, cut)}
         for rows in (~none, none)
     )
     units = [unit for unit in UNITS if unit in held or unit in empty]

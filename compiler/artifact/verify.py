@@ -121,7 +121,7 @@ def verify(
         The build.
     grasp_set : GraspSet
         Recordings, compiled from or not. Columns are found by name.
-    firmware : sequence of {"host", "avr", "cortex-m"}
+    firmware : sequence of {"host", "avr", "cortex-m", "riscv", "xtensa"}
         What to compile the classifier for as well, to hold its scores against Python's.
     progress : callable, optional
         Called with (done, total) as rows and compiled classifiers are done.

@@ -4,7 +4,7 @@ Inner folds part no movement; and where the fit is to recognise a new subject (o
 out as well. Each way to train is scored by the trials that it recognises there, ties by the log-loss. Of those that are
 behind the best one by no more than the standard error of that difference, those with small tables are cheap to
 recognise with; of these, the one with the lowest log-loss is taken. Rows of nothing held are no trials to recognise;
-they count in the log-loss.
+they count in the log-loss. Of trials of many frames some are enough to compare by.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -32,6 +32,9 @@ _LEAST_GROUPS = 3
 # Tables of eight kilobytes, at a byte an entry, fit the smallest microcontrollers; of larger ones, those up to a
 # quarter above the smallest are small.
 _SMALL, _LARGER = 8192, 1.25
+# Frames of a trial resemble their neighbours: of more rows than these, evenly spaced ones are enough to compare fits
+# by, of each trial at least so many.
+_COMPARED, _FRAMES = 2048, 8
 
 
 def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None = None) -> list[Fold]:
@@ -82,6 +85,8 @@ def choose_training(
     Fitting
         `Training.chosen(fitting)` trains so.
     """
+    some = _spread(samples)
+    samples, groups = samples.rows(some), None if groups is None else groups[some]
     folds = inner_folds(samples, seed, groups) if len(candidates) > 1 else []
     if not folds:
         return Fitting(candidates[0].trainer, _values(candidates[0]))
@@ -100,6 +105,12 @@ def choose_training(
     if not grouped:
         of = "pooled" if np.ptp(samples.subjects) else "within subject"
     return _fitting(candidates, scores, samples.n_classes, of, len(folds))
+
+
+def _spread(samples: Samples) -> Rows:
+    rows = len(samples.labels)
+    frames = rows // len(np.unique(samples.trials))
+    return np.arange(0, rows, max(1, min(frames // _FRAMES, -(-rows // _COMPARED))))
 
 
 def _values(training: Training) -> dict[str, float | str | None]:

@@ -16,6 +16,8 @@ _LPM_REACH = 65536
 _NEAR_BYTES = 3600
 _LOOKUP_BYTES, _JOINT_BYTES = 104, 54  # without comparisons
 _SLOPE_BYTES = 80  # but for its products, which no near call reaches across
+FLAGS = 2  # bytes of a glove from where Y points to its input
+_REACH = 63  # of ldd
 
 
 Row = dict[str, object]  # of the template's lists
@@ -34,27 +36,21 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
     """Return what the template of the assembly asks for; `near` is what `calls_are_near` says of the whole layout."""
     parts = layout.parts
     stride = parts.width * layout.entry_bits // 8
-    steps = _Steps(name, names, layout)
-    passes = [_pass(names, layout, number, steps) for number in range(len(parts.firsts))]
+    passes = [_pass(names, layout, number) for number in range(len(parts.firsts))]
     bins = sum(len(joint.bins) for joint in layout.joints)
     return {
         "byte_sums": layout.sum_bits == 8,
         "wide": layout.code_bits == 16,
-        "prepared": prepared(layout),
         "unrolled": layout.adding == "unrolled",
         "call": "rcall" if near else "call",
         "jump": "rjmp" if near else "jmp",
         "passes": passes,
-        "finds": [steps.finding(lookup) for lookup in layout.lookups if lookup.joints],
         "sums": passes[0]["sums"],
         "stride": stride,
+        "frame_size": layout.frame_size,
         "kept": kept_registers(layout),
-        "zero_rows": [lookup.zero_row for lookup in layout.lookups],
-        "n_sources": len(inputs_seen(layout)),
-        "n_seen_slopes": len(layout.tables.slopes),
         "halves": layout.entry_shift == 8,
         "clean": layout.biased and not layout.entry_shift,  # r1 is zero between look-ups
-        "n_found": sum(bool(lookup.joints) for lookup in layout.lookups),
         "tables": [
             *([(f"thenar_{name}_rows", layout.n_rows * len(parts.firsts) * stride)] if layout.n_rows else []),
             *([(f"thenar_{name}_bins", bins)] if bins else []),
@@ -62,11 +58,15 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
     }
 
 
-def prepared(layout: Layout) -> bool:
-    """Return whether joints' rows are found before any sum takes a register: where codes have 16 bits, which take more
-    of them, and once for all passes.
-    """
-    return bool(layout.joints) and (layout.code_bits == 16 or len(layout.parts.firsts) > 1)
+def seen_size(layout: Layout) -> int:
+    """Return the bytes that say what is in the sums: a row of each look-up, a distance of each slope."""
+    return max(len(layout.lookups) + len(layout.tables.slopes), 1)
+
+
+def glove_size(layout: Layout) -> int:
+    """Return the bytes of a glove on an AVR: scores, what they begin with, FLAGS, the input, and what is private."""
+    lost = len(layout.ports) + -(-layout.tables.n_joints // 8) + 2
+    return 4 * layout.tables.n_classes + FLAGS + layout.frame_size + seen_size(layout) + lost
 
 
 def calls_are_near(layout: Layout) -> bool:
@@ -75,7 +75,7 @@ def calls_are_near(layout: Layout) -> bool:
     passes = len(layout.parts.firsts)
     wide = sum(4 * len(joint.thresholds) * joint.compared for joint in layout.joints) * (layout.code_bits == 16)
     groups = [layout.fields[lookup.group] for lookup in layout.lookups if lookup.group is not None]
-    put_together = 2 * sum(len(group_lines(fields, [""] * len(fields), [""] * len(fields))) for fields in groups)
+    put_together = 2 * sum(len(group_lines(fields)) for fields in groups)
     put_together += sum(4 * len(fields) for fields in groups)
     each = put_together + _LOOKUP_BYTES * len(layout.lookups) + _SLOPE_BYTES * len(layout.tables.slopes)
     return each * passes + joints + wide < _NEAR_BYTES
@@ -109,18 +109,34 @@ def _moved(bit: int, width: int, to: int) -> tuple[str, ...]:
     return min(found, key=len)
 
 
-def group_lines(fields: Sequence[Field], inputs: Sequence[str], seen: Sequence[str | None]) -> list[str]:
-    """Return the instructions that make the byte of a group of its fields' ports, at `inputs`, in r30; r31 is theirs to
-    use, r0 and r1 are not. What is read is kept where `seen` says.
+def far(place: int, *, wide: bool = False) -> bool:
+    """Return whether an input at that place in the frame is beyond the reach of Y."""
+    return FLAGS + place + wide > _REACH
+
+
+def taken(place: int, register: int, *, wide: bool = False) -> list[str]:
+    """Return the instructions that load an input from that place in the frame, a wide one into two registers. Y points
+    FLAGS bytes before the frame; what is beyond its reach goes by X.
+    """
+    at = FLAGS + place
+    registers = range(register, register + 1 + wide)
+    if not far(place, wide=wide):
+        return [f"ldd   r{each}, Y+{at + more}" for more, each in enumerate(registers)]
+    moved = ["movw  r26, r28", f"subi  r26, lo8(-{at})", f"sbci  r27, hi8(-{at})"]
+    return moved + [f"ld    r{each}, X+" for each in registers]
+
+
+def group_lines(fields: Sequence[Field]) -> list[str]:
+    """Return the instructions that make the byte of a group of its fields' ports in r30; r31 is theirs to use, r0 and
+    r1 are not.
     """
     lines: list[str] = []
-    for field, source, kept in zip(fields, inputs, seen, strict=True):
+    for field in fields:
         register = "r31" if lines else "r30"
-        lines.append(f"lds   {register}, {source}")
-        if kept is not None:
-            lines.append(f"sts   {kept}, {register}")
         moved = [line.format(register) for line in _moved(field.bit, field.width, field.to)]
-        if register == "r31" and 2 * field.width <= len(moved) + 1:
+        one_by_one = register == "r31" and 2 * field.width <= len(moved) + 1
+        lines += taken(field.port, int(register[1:]))
+        if one_by_one:
             for bit in range(field.width):
                 lines += [f"sbrc  r31, {field.bit + bit}", f"ori   r30, {1 << (field.to + bit):#04x}"]
         else:
@@ -136,24 +152,13 @@ def _registers(layout: Layout) -> list[int]:
 
 
 def kept_registers(layout: Layout) -> list[int]:
-    """Return the registers that are saved because they hold sums."""
+    """Return the registers that are saved: because they hold sums, and because they point at the glove before."""
     halves = (0, 1) if layout.sum_bits == 16 else (0,)
-    return [low + half for low in _registers(layout) for half in halves if low // 2 * 2 in _KEPT]
+    sums = {low + half for low in _registers(layout) for half in halves if low // 2 * 2 in _KEPT}
+    return sorted(sums | {28, 29})
 
 
-def inputs_seen(layout: Layout) -> list[tuple[int, int]]:
-    """Return the bytes of the frame of which update() keeps what they were, of inputs that make rows' numbers: for each
-    the look-up and the byte.
-    """
-    return [
-        (lookup.index, place)
-        for lookup in layout.lookups
-        if lookup.joints and not prepared(layout)
-        for place in _places(lookup, layout)
-    ]
-
-
-def _pass(names: Names, layout: Layout, number: int, steps: "_Steps") -> Row:
+def _pass(names: Names, layout: Layout, number: int) -> Row:
     """Return a pass over all look-ups for some classes: their sums, each in a register or in a pair from `low` on,
     their place among the scores in bytes, and how many of them, the first ones, are in the pass before as well.
     """
@@ -170,27 +175,30 @@ def _pass(names: Names, layout: Layout, number: int, steps: "_Steps") -> Row:
         ],
         "scores": 2 * first,
         "again": parts.firsts[number - 1] + parts.width - first if number else 0,
-        "steps": [steps.step(lookup, number) for lookup in layout.lookups],
-        "slopes": [_slope(steps.name, names, layout, at, first) for at in range(len(layout.tables.slopes))],
+        "steps": [_step(names, layout, lookup, number) for lookup in layout.lookups],
+        "slopes": [_slope(names, layout, at, first) for at in range(len(layout.tables.slopes))],
         "last": number == len(parts.firsts) - 1,
     }
 
 
-def _slope(name: str, names: Names, layout: Layout, at: int, first: int) -> Row:
-    """Return a slope: its code in the input, how that is held within its range and scaled, and what it multiplies:
-    entries, each with the sums that it is added to, or subtracted from.
+def _code(layout: Layout, joint: int) -> list[str]:
+    """Return the instructions that load a joint's code, into r30 or r31:r30."""
+    place = len(layout.ports) + layout.padding + joint * layout.code_bits // 8
+    return taken(place, 30, wide=layout.code_bits == 16)
+
+
+def _slope(names: Names, layout: Layout, at: int, first: int) -> Row:
+    """Return a slope: how its code is loaded, held within its range and scaled, and what it multiplies: entries, each
+    with the sums that it is added to, or subtracted from.
     """
-    slope, bits, registers = layout.tables.slopes[at], layout.code_bits, _registers(layout)
-    place = len(layout.ports) + layout.padding + slope.joint * bits // 8
-    index = len(layout.lookups) + len(inputs_seen(layout)) + at
+    slope, registers = layout.tables.slopes[at], _registers(layout)
     return {
-        "index": index,
+        "at": at,
         "what": comment(names.joints[slope.joint].name),
-        "source": f"thenar_{name}_input + {place}",
-        "wide": bits == 16,
+        "taken": _code(layout, slope.joint),
         "low": slope.low,
         "span": slope.high - slope.low,
-        "upper": slope.high < (1 << bits) - 1,
+        "upper": slope.high < (1 << layout.code_bits) - 1,
         "doubled": max(slope.gain, 0),
         "halved": max(-slope.gain, 0),
         "zero": slope.zero,
@@ -212,104 +220,49 @@ def products(row: Sequence[int]) -> list[tuple[int, list[tuple[int, bool]]]]:
     return [(row[classes[0]], [(k, row[k] == row[classes[0]]) for k in classes]) for classes in found.values()]
 
 
-class _Steps:
-    """Steps of the template, one a look-up: what it is of, where its inputs are and where update() finds what they
-    were, how the row's number is made of them, and which register has it then.
+def _step(names: Names, layout: Layout, lookup: Lookup, part: int) -> Row:
+    """Return a look-up in the pass for the classes of a part: what it is of, how the number of its row is made of the
+    input, which register has it then, and where its rows begin.
     """
-
-    def __init__(self, name: str, names: Names, layout: Layout) -> None:
-        self.name, self.names, self._layout = name, names, layout
-        indexed = [lookup.index for lookup in layout.lookups if lookup.joints and prepared(layout)]
-        self._found = {index: f"thenar_{name}_found + {at}" for at, index in enumerate(indexed)}
-        places = enumerate(inputs_seen(layout), len(layout.lookups))
-        self._seen = {place: f"thenar_{name}_seen + {at}" for at, place in places}
-
-    def step(self, lookup: Lookup, part: int) -> Row:
-        """Return a look-up in a pass for the classes of a part."""
-        layout = self._layout
-        row = part * layout.n_rows + lookup.first_row
-        seen = f"thenar_{self.name}_seen + {lookup.index}"
-        step: Row = {
-            "index": lookup.index,
-            "what": self._what(lookup),
-            "seen": seen,
-            "rows": row * layout.parts.width * layout.entry_bits // 8,
-            "one_group": not lookup.joints,
-            "inline": lookup.index not in self._found and bool(lookup.joints),
-            "register": 30,
-        }
-        if step["inline"]:
-            return step | self.finding(lookup)
-        if lookup.group is None or lookup.joints:
-            lines = [f"lds   r30, {self._found[lookup.index]}"]
-        else:
-            fields = layout.fields[lookup.group]
-            lines = group_lines(fields, [self._input(field.port) for field in fields], [None] * len(fields))
-        return {**step, "lines": lines}
-
-    def finding(self, lookup: Lookup) -> Row:
-        """Return how the number of a row is made of codes."""
-        sources = [self._source(lookup, place) for place in _places(lookup, self._layout)]
-        of_joint = dict(zip((joint.number for joint in lookup.joints), sources, strict=False))
-        compared = [joint for joint in reversed(lookup.joints) if joint.compared]
-        trimmed = [joint for joint in lookup.joints if not joint.compared]
-        grouped = lookup.group is not None
-        weights = [joint.weight for joint in compared]
-        factors = [before // weight for before, weight in pairwise(weights)]
-        return {
-            "what": self._what(lookup),
-            "sources": sources,
-            "compared": [
-                {**of_joint[joint.number], "times": times, "steps": (joint.thresholds.astype(int) + 1).tolist()}
-                for joint, times in zip(compared, [1, *factors], strict=False)
-            ],
-            "times": weights[-1] if weights else 1,
-            "trimmed": [
-                {**of_joint[joint.number], **self._bins(joint), "how": how}
-                for joint, how in zip(trimmed, _adding(len(trimmed), bool(compared), grouped), strict=True)
-            ],
-            "group": self._put_together(lookup, sources) if grouped else [],
-            "register": 30 if trimmed or grouped else 0,
-            "found": self._found.get(lookup.index),
-        }
-
-    def _what(self, lookup: Lookup) -> str:
-        groups = [self._layout.groups[lookup.group]] if lookup.group is not None else []
-        joints = [comment(self.names.joints[joint.number].name) for joint in lookup.joints]
-        return ", ".join([*map(switches_in_words, groups), *joints])
-
-    def _input(self, place: int) -> str:
-        return f"thenar_{self.name}_input + {place}"
-
-    def _source(self, lookup: Lookup, place: int) -> Row:
-        wide = self._layout.code_bits == 16 and place >= len(self._layout.ports)
-        return {"input": self._input(place), "seen": self._seen.get((lookup.index, place)), "wide": wide}
-
-    def _put_together(self, lookup: Lookup, sources: Sequence[Row]) -> list[str]:
-        fields = self._layout.fields[lookup.group or 0]
-        ports = sources[-len(fields) :]
-        seen = [None if port["seen"] is None else str(port["seen"]) for port in ports]
-        return group_lines(fields, [str(port["input"]) for port in ports], seen)
-
-    def _bins(self, joint: JointLayout) -> Row:
-        first, last = joint.first, len(joint.bins) - 1
-        above = first + last < (1 << self._layout.code_bits) - 1
-        paged = self._layout.bins == "direct"
-        return {
-            "bins": joint.first_bin,
-            "first": first,
-            "last": last,
-            "lower": first > 0,
-            "upper": above,
-            "paged": paged,
-        }
+    compared = [joint for joint in reversed(lookup.joints) if joint.compared]
+    trimmed = [joint for joint in lookup.joints if not joint.compared]
+    grouped = lookup.group is not None
+    weights = [joint.weight for joint in compared]
+    factors = [before // weight for before, weight in pairwise(weights)]
+    groups = [] if lookup.group is None else [switches_in_words(layout.groups[lookup.group])]
+    return {
+        "index": lookup.index,
+        "what": ", ".join([*groups, *(comment(names.joints[joint.number].name) for joint in lookup.joints)]),
+        "rows": (part * layout.n_rows + lookup.first_row) * layout.parts.width * layout.entry_bits // 8,
+        "one_group": not lookup.joints,
+        "compared": [
+            {
+                "taken": _code(layout, joint.number),
+                "times": times,
+                "steps": (joint.thresholds.astype(int) + 1).tolist(),
+            }
+            for joint, times in zip(compared, [1, *factors], strict=False)
+        ],
+        "times": weights[-1] if weights else 1,
+        "trimmed": [
+            {"taken": _code(layout, joint.number), **_bins(layout, joint), "how": how}
+            for joint, how in zip(trimmed, _adding(len(trimmed), bool(compared), grouped), strict=True)
+        ],
+        "group": [] if lookup.group is None else group_lines(layout.fields[lookup.group]),
+        "register": 30 if trimmed or grouped else 0,
+    }
 
 
-def _places(lookup: Lookup, layout: Layout) -> list[int]:
-    """Return the bytes of the frame at which the inputs of a look-up begin, its joints first."""
-    codes = len(layout.ports) + layout.padding
-    places = [codes + joint.number * layout.code_bits // 8 for joint in lookup.joints]
-    return places + ([] if lookup.group is None else [field.port for field in layout.fields[lookup.group]])
+def _bins(layout: Layout, joint: JointLayout) -> Row:
+    first, last = joint.first, len(joint.bins) - 1
+    return {
+        "bins": joint.first_bin,
+        "first": first,
+        "last": last,
+        "lower": first > 0,
+        "upper": first + last < (1 << layout.code_bits) - 1,
+        "paged": layout.bins == "direct",
+    }
 
 
 def _adding(count: int, before: bool, after: bool) -> list[str]:

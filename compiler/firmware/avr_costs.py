@@ -6,7 +6,8 @@ does each code of 16 bits that is beyond the ends of a slope.
 """
 
 import re
-from collections.abc import Callable
+from bisect import bisect_right
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -16,36 +17,45 @@ from numpy.typing import NDArray
 
 from thenar.firmware_templates.rendering import render
 
-from .assembly import assembly_values, calls_are_near, inputs_seen, kept_registers, prepared
+from .assembly import assembly_values, calls_are_near, far, glove_size, kept_registers, seen_size
 from .costs import NAME_BYTES, Cost
 from .layout import Field, JointLayout, Layout, Lookup
 from .words import numbered
 
 # AVR Instruction Set Manual, DS40002198, table 5-1: cores AVRe (ATmega328P) and AVRe+ (ATmega2560), whose program
 # counter of three bytes makes calls and returns a cycle longer. A branch or a skip that is taken costs more.
-_ONE = "adc add and andi clr cp cpc cpi eor inc ldi lsl lsr mov movw neg or ori ror sbc sbci sub subi swap tst"
-_TWO = "icall ld ldd lds mul muls pop push st sts"
+_ONE = "adc add and andi bst clr cp cpc cpi eor inc ldi lsl lsr mov movw neg or ori ror sbc sbci set sub subi swap tst"
+_TWO = "icall ld ldd lds mul muls pop push sbiw st std sts"
 _CYCLES = dict.fromkeys(_ONE.split(), 1) | dict.fromkeys(_TWO.split(), 2) | {"lpm": 3}
 _JUMPS = {"rjmp": 2, "jmp": 3}
 _CALLS = {"rcall": 3, "call": 4, "ret": 4}
+_SKIPS = ("cpse", "sbrc")
 _TWO_WORDS = ("lds", "sts", "call", "jmp")
 _COMMENT, _LOOP = re.compile(r"/\*.*?\*/", re.DOTALL), re.compile(r"/\* (\d+) times \*/")
 
 
-Pick = Callable[[tuple[int, int]], int]
+Ways = tuple[int, int]
+"""The fewest and the most cycles of all ways through some code."""
 
 
 class Instruction(NamedTuple):
-    """An instruction, where it may jump to or call, and how often it is met if it ends a loop; 0: it always jumps."""
+    """An instruction, where it may jump to or call, how often it is met if it ends a loop (0: it always jumps), its
+    bytes, and its cycles; 0 where these depend on what follows.
+    """
 
     name: str
     target: str
     times: int
+    size: int
+    cycles: int
 
-    @property
-    def size(self) -> int:
-        """Its bytes."""
-        return 4 if self.name in _TWO_WORDS else 2
+
+class Line(NamedTuple):
+    """A line of assembly: its first word, its label, "" if it has none, and its instruction if it has one."""
+
+    first: str
+    label: str
+    instruction: Instruction | None
 
 
 class Assembly:
@@ -55,108 +65,138 @@ class Assembly:
         self._counter = 3 if elpm else 2
         self._code: list[Instruction] = []
         self._labels: dict[str, list[int]] = {}
-        self._sections: dict[str, int] = {}
-        self._found: dict[int, tuple[int, int]] = {}
+        self._sections: list[str] = []
+        self._found: dict[int, Ways] = {}
         self._read(text, elpm)
+        if unknown := {each.name for each in self._code if each.cycles < 0}:
+            raise AssertionError(f"instructions of unknown cycles: {', '.join(unknown)}")
+        self._to = [-1 if each.cycles else self._at(each.target, at) for at, each in enumerate(self._code)]
 
     def _read(self, text: str, elpm: bool) -> None:
-        macros: dict[str, list[str]] = {}
-        into: list[str] | None = None
+        macros: dict[str, list[Line]] = {}
+        into: list[Line] | None = None
         using, section = True, ""
-        for line in _COMMENT.sub(lambda comment: _times(comment[0]), text).splitlines():
-            first, *rest = line.split(maxsplit=1) or [""]
-            if first in ("#ifdef", "#endif"):
-                using = elpm or first == "#endif"
-            elif first == ".macro":
-                into = macros[rest[0].split()[0]] = []
-            elif first == ".endm":
+        for said in _COMMENT.sub(lambda comment: _times(comment[0]), text).splitlines():
+            line = _read_line(said)
+            if line.first in ("#ifdef", "#endif"):
+                using = elpm or said.split()[1:] != ["__AVR_HAVE_ELPM__"]
+            elif line.first == ".macro":
+                into = macros[said.split()[1]] = []
+            elif line.first == ".endm":
                 into = None
             elif into is not None:
                 into.append(line)
-            elif first == ".section":
-                section = rest[0].split(",")[0]
+            elif line.first == ".section":
+                section = said.split()[1].split(",")[0]
             elif using:
-                for inner in macros.get(first, [line]):
-                    self._sections[section] = self._sections.get(section, 0) + self._add(inner)
+                self._add(_expanded(line, macros), section)
 
-    def _add(self, line: str) -> int:
-        """Note the label and the instruction of a line; return its bytes."""
-        label, _, after = line.rpartition(":")
-        if label:
-            self._labels.setdefault(label.strip(), []).append(len(self._code))
-        if not (found := _instruction(after)):
-            return 0
-        self._code.append(found)
-        return found.size
+    def _add(self, lines: list["Line"], section: str) -> None:
+        """Note the labels and the instructions of lines."""
+        for _, label, found in lines:
+            if label:
+                self._labels.setdefault(label, []).append(len(self._code))
+            if found:
+                self._code.append(found)
+                self._sections.append(section)
 
     def size(self, section: str = "") -> int:
         """Return the bytes of code, of one section or of all."""
-        return self._sections[section] if section else sum(self._sections.values())
+        pairs = zip(self._code, self._sections, strict=True)
+        return sum(each.size for each, its in pairs if section in ("", its))
 
-    def cycles(self, label: str) -> tuple[int, int]:
-        """Return the fewest and the most cycles from a label to the return from there, which is counted."""
+    def cycles(self, label: str) -> Ways:
+        """Return the cycles from a label to the return from there, which is counted."""
         return self._from(self._labels[label][0])
 
-    def _from(self, start: int) -> tuple[int, int]:
-        """Return the fewest and the most cycles from an instruction to the return."""
+    def _from(self, start: int) -> Ways:
+        """Return the cycles from an instruction to the return."""
         if start not in self._found:
-            end = self._end(start) + 1
-            self._found[start] = self._path(start, end, min), self._path(start, end, max)
+            self._found[start] = self._path(start, self._end(start) + 1)
         return self._found[start]
 
     def _end(self, start: int) -> int:
         """Return the first instruction that ends what begins at `start`: no branch leads across it."""
         reached = start
         for at in range(start, len(self._code)):
-            each = self._code[at]
-            if each.name.startswith("br"):
-                reached = max(reached, self._at(each.target, at))
-            if each.name in ("ret", "jmp", "rjmp") and at >= reached and self._code[at - 1].name != "cpse":
+            name = self._code[at].name
+            if name.startswith("br"):
+                reached = max(reached, self._to[at])
+            elif name in ("ret", "jmp", "rjmp") and at >= reached and self._code[at - 1].name != "cpse":
                 return at
         raise AssertionError("assembly that does not return")
 
     def _at(self, target: str, at: int) -> int:
-        """Return the instruction that a jump or call at `at` leads to."""
+        """Return the instruction that a jump or call at `at` leads to, -1 for one outside."""
         if target[:-1].isdigit():
             places = self._labels[target[:-1]]
-            return min(p for p in places if p > at) if target[-1] == "f" else max(p for p in places if p <= at)
+            return places[bisect_right(places, at) - (target[-1] == "b")]
         return self._labels[target][0] if target in self._labels else -1
 
     def _stops(self, at: int) -> bool:
         """Return whether an instruction leaves this assembly for good: no answer takes that way."""
-        return self._code[at].name in _JUMPS and self._at(self._code[at].target, at) < 0
+        return self._code[at].name in _JUMPS and self._to[at] < 0
 
-    def _path(self, start: int, end: int, pick: Pick) -> int:
-        """Return the fewest or the most cycles of code from `start` on until it comes to `end` or returns."""
-        left = dict.fromkeys(range(end, end + 2), 0)  # cycles from an instruction on
+    def _path(self, start: int, end: int) -> Ways:
+        """Return the cycles of code from `start` on until it comes to `end` or returns."""
+        left = {end: (0, 0), end + 1: (0, 0)}  # cycles from an instruction on
         for at in range(end - 1, start - 1, -1):
-            each, after = self._code[at], left[at + 1]
-            to = self._at(each.target, at) if each.target else -1
-            if each.name in _CALLS:
-                left[at] = _CALLS[each.name] + self._counter - 2
-                left[at] += 0 if each.name == "ret" else after + pick(self._from(to))
-            elif each.name in _JUMPS:
-                left[at] = _JUMPS[each.name] + (pick(self._from(to)) if to >= 0 else 0)
-            elif each.name in ("cpse", "sbrc"):
-                skipped = 1 + self._code[at + 1].size // 2 + left[at + 2]
-                left[at] = skipped if self._stops(at + 1) else pick((1 + after, skipped))
-            elif not each.name.startswith("br"):
-                left[at] = _CYCLES[each.name] + after
-            elif not each.times:  # something is missing: what that takes is not counted
-                left[at] = 2 + left[to]
-            elif to > at:
-                left[at] = pick((1 + after, 2 + left[to]))
-            else:
-                left[at] = 1 + after + (each.times - 1) * (2 + self._path(to, at, pick))
+            cycles = self._code[at].cycles
+            least, most = left[at + 1]
+            left[at] = (least + cycles, most + cycles) if cycles else self._ways(at, left)
         return left[start]
+
+    def _ways(self, at: int, left: dict[int, Ways]) -> Ways:
+        """Return the cycles from an instruction on that may be followed by another than the next one."""
+        each, to, after = self._code[at], self._to[at], left[at + 1]
+        if each.name in _CALLS:
+            called = _CALLS[each.name] + self._counter - 2
+            return (called, called) if each.name == "ret" else _more(called, _both(after, self._from(to)))
+        if each.name in _JUMPS:
+            return _more(_JUMPS[each.name], self._from(to) if to >= 0 else (0, 0))
+        if each.name in _SKIPS:
+            skipped = _more(1 + self._code[at + 1].size // 2, left[at + 2])
+            return skipped if self._stops(at + 1) else _either(_more(1, after), skipped)
+        if not each.times:  # something is missing: what that takes is not counted
+            return _more(2, left[to])
+        if to > at:
+            return _either(_more(1, after), _more(2, left[to]))
+        least, most = _more(2, self._path(to, at))
+        return _more(1, _both(after, ((each.times - 1) * least, (each.times - 1) * most)))
+
+
+def _more(cycles: int, ways: Ways) -> Ways:
+    return cycles + ways[0], cycles + ways[1]
+
+
+def _both(one: Ways, other: Ways) -> Ways:
+    return one[0] + other[0], one[1] + other[1]
+
+
+def _either(one: Ways, other: Ways) -> Ways:
+    return min(one[0], other[0]), max(one[1], other[1])
+
+
+def _expanded(line: Line, macros: Mapping[str, list[Line]]) -> list[Line]:
+    """Return the line, or those of the macro that it calls."""
+    return (
+        [each for inner in macros[line.first] for each in _expanded(inner, macros)] if line.first in macros else [line]
+    )
 
 
 @lru_cache(maxsize=4096)
-def _instruction(text: str) -> Instruction | None:
-    """Return the instruction in a line without its label, None if there is none."""
+def _read_line(line: str) -> Line:
+    label, _, text = line.rpartition(":")
     said, _, times = text.partition("\0")
     name, *operands = said.split(maxsplit=1) or ["."]
-    return None if name[0] in ".#" else Instruction(name, operands[0].strip() if operands else "", int(times or 1))
+    first, label = (line.split() or [""])[0], label.strip()
+    if name[0] in ".#":
+        return Line(first, label, None)
+    size = 4 if name in _TWO_WORDS else 2
+    depends = name in _JUMPS or name in _CALLS or name in _SKIPS or name.startswith("br")
+    cycles = 0 if depends else _CYCLES.get(name, -1)  # -1: no instruction, a macro perhaps
+    target = operands[0].strip() if operands else ""
+    return Line(first, label, Instruction(name, target, int(times or 1), size, cycles))
 
 
 def _times(comment: str) -> str:
@@ -166,9 +206,9 @@ def _times(comment: str) -> str:
 
 _LARGE = 5  # numbers from here on are multiplied by `mul`
 # Bytes of C code, rounded up; a table of whole pages of bins begins at one.
-_SET_SWITCH, _GRASP, _PAGE = 80, 40, 256
+_SET_SWITCH, _GRASP, _INIT, _PAGE = 80, 40, 70, 256
 _LOSING, _LOSING_JOINTS = 400, 300
-_LOST_RAM = 5  # how many inputs are missing, whether any is, and what is done then
+_POINTERS = 4  # bytes of variables: the glove, and what is done while an input is missing
 # Return addresses of update(), of what it calls about a change and of what that calls; a row's number in between.
 _CALLS_DEEP = 3
 
@@ -205,16 +245,23 @@ class _Part:
 
 def _of_joint(layout: Layout, joint: JointLayout) -> tuple[int, ...]:
     """Return what the code that finds a row has of a joint: its steps, and what it is multiplied by, or its clamps."""
+    place, wide = len(layout.ports) + layout.padding + joint.number * layout.code_bits // 8, layout.code_bits == 16
+    beyond = far(place, wide=wide)
     if joint.compared:
-        return len(joint.thresholds), min(joint.weight, _LARGE)
+        return beyond, len(joint.thresholds), min(joint.weight, _LARGE)
     if layout.bins == "direct":
-        return ()
-    return -1, joint.first > 0, joint.first + len(joint.bins) < 1 << layout.code_bits
+        return (beyond,)
+    return beyond, -1, joint.first > 0, joint.first + len(joint.bins) < 1 << layout.code_bits
 
 
 def _of_group(layout: Layout, lookup: Lookup) -> tuple[Field, ...]:
     """Return what the code that puts a group together has of it, wherever its ports are."""
-    return () if lookup.group is None else tuple(replace(field, port=0) for field in layout.fields[lookup.group])
+    return () if lookup.group is None else _anywhere(layout.fields[lookup.group])
+
+
+@lru_cache(maxsize=512)
+def _anywhere(fields: tuple[Field, ...]) -> tuple[Field, ...]:
+    return tuple(replace(field, port=far(field.port)) for field in fields)
 
 
 @lru_cache(maxsize=4096)
@@ -224,7 +271,8 @@ def _counted(part: _Part, near: bool, elpm: bool) -> Counts:
     values = assembly_values("x", numbered(layout.tables), layout, near=near)
     common = {"name": "x", "opening": "", "biased": layout.biased, "width": layout.parts.width}
     common |= {"classes": layout.tables.n_classes, "n_rows": layout.n_rows, "relative": layout.tables.relative}
-    found = Assembly(render("classifier/thenar_NAME_avr.S.j2", **common, **values), elpm=elpm)
+    common |= {"n_lookups": len(layout.lookups), "n_slopes": len(layout.tables.slopes)}
+    found = Assembly(render("classifier/thenar_NAME_avr.S.j2", **common, assembly=values), elpm=elpm)
     _, update = found.cycles("thenar_x_update")
     uncalled = found.size(".text.thenar_x_update") + found.size(".text.thenar_x_start_without")
     return Counts(*found.cycles("thenar_x_classify"), update, found.size(), uncalled)
@@ -272,35 +320,27 @@ class AvrCosts:
         return self._counts.least
 
     @property
-    def _variables(self) -> int:
-        """Bytes that say what the scores are of."""
-        return len(self._layout.lookups) + len(inputs_seen(self._layout)) + len(self._layout.tables.slopes)
-
-    @property
     def flash(self) -> int:
         """Bytes of tables and code, at most; the names of the grasp types come on top."""
         layout, parts = self._layout, self._layout.parts
         tables = layout.n_rows * len(parts.firsts) * parts.width * layout.entry_bits // 8
         tables += 2 * layout.tables.n_switches * (2 if len(layout.ports) > 255 else 1)
-        tables += 2 * layout.tables.n_classes + self._variables  # what they are in the beginning
+        tables += 2 * layout.tables.n_classes  # what scores begin with
         bins = sum(len(joint.bins) for joint in layout.joints)
         tables += bins + (_PAGE - 1 if layout.bins == "direct" and bins else 0)
-        return tables + self.losing + self._counts.size + _GRASP + (_SET_SWITCH if layout.groups else 0)
+        return tables + self.losing + self._counts.size + _INIT + _GRASP + (_SET_SWITCH if layout.groups else 0)
 
     @property
     def ram(self) -> int:
-        """Bytes of variables and of the deepest stack, return address included."""
-        found = sum(bool(lookup.joints) for lookup in self._layout.lookups) if prepared(self._layout) else 0
+        """Bytes of a glove, of variables and of the deepest stack, return address included."""
         stack = _CALLS_DEEP * self._counter + len(kept_registers(self._layout)) + 1
-        lost = len(self._layout.ports) + -(-self._layout.tables.n_joints // 8) + _LOST_RAM
-        # Scores as they are, and as they begin where an input is missing.
-        return self._layout.frame_size + 4 * self._layout.tables.n_classes + self._variables + found + lost + stack
+        return glove_size(self._layout) + 2 * seen_size(self._layout) + _POINTERS + stack
 
     @property
     def losing(self) -> int:
         """Bytes of flash, at most and without the assembly, of what replaces missing inputs by their means."""
         means = self._layout.means.size * (1 if self._layout.narrow_means else 2)
-        return means + 2 * self._layout.tables.n_classes + (_LOSING if self._layout.groups else _LOSING_JOINTS)
+        return means + (_LOSING if self._layout.groups else _LOSING_JOINTS)
 
 
 def rises(layout: Layout, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.int64]:
@@ -314,7 +354,7 @@ def rises(layout: Layout, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) ->
     cycles: NDArray[np.int64] = np.count_nonzero(scores[:, 1:] > best[:, :-1], axis=1)
     for slope in layout.tables.slopes if layout.code_bits == 16 else ():
         beyond = (codes[:, slope.joint] < slope.low) | (codes[:, slope.joint] >= slope.high)
-        cycles = cycles + len(layout.parts.firsts) * beyond
+        cycles = cycles + beyond
     return cycles
 
 

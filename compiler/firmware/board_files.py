@@ -15,6 +15,7 @@ from .board_channels import channels_files
 from .board_inputs import expanders_file, joints_file, matrix_file, pair, pins_file, text, wrapped
 from .layout import NO_SWITCH, Layout, Ports
 from .protocol import BoardConfig
+from .segments import segmenter_bytes
 from .targets.avr import best_setting
 from .targets.base import Mode
 from .words import Names, answers_of
@@ -80,6 +81,7 @@ def twi_files(board: Board) -> dict[str, str]:
 # of a class of a look-up. The interrupts of a converter take less than a tenth.
 _SCAN, _KEY, _BUS_BYTE, _READING, _ANALOG_BYTE = 3000, 60, 110, 600, 80
 _ANSWER, _LOOKUP, _CLASS = 600, 40, 10
+_STATE = 100  # of a tick of segments, for each of their states
 
 
 def readings(board: Board, switches: Sequence[str], tables: IntegerTables) -> tuple[Port, ...]:
@@ -107,7 +109,15 @@ def exits_early(board: Board, ports: Sequence[Port]) -> bool:
     return board.early_exit and len(ports) > 1
 
 
-def shortest_scan_us(board: Board, switches: Sequence[str], tables: IntegerTables, *, recognises: bool) -> int:
+def follows_segments(board: Board, names: Names) -> bool:
+    """Return whether a glove on this board follows segments: its build has costs of them, and the part the RAM."""
+    model, ram = names.segments, board.microcontroller.ram
+    return model is not None and segmenter_bytes(model) <= ram * _MOST_RAM
+
+
+def shortest_scan_us(
+    board: Board, switches: Sequence[str], tables: IntegerTables, *, recognises: bool, segments: bool = False
+) -> int:
     """Return how many microseconds a scan takes at most, with all that is done once a scan, rounded up to 50."""
     ports = readings(board, switches, tables)
     rows, columns = rows_and_columns(board, switches)
@@ -126,10 +136,13 @@ def shortest_scan_us(board: Board, switches: Sequence[str], tables: IntegerTable
         lookups = tables.n_switches // 2 + tables.n_joints
         answers = len(ports) if exits_early(board, ports) else 1
         cycles += answers * (_ANSWER + lookups * (_LOOKUP + _CLASS * tables.n_classes))
+        cycles += _STATE * (tables.n_classes + 1) * segments
     return 50 * ceil((seconds + cycles / board.clock_hz) * 1e6 / 50)
 
 
-def config_of(board: Board, switches: Sequence[str], tables: IntegerTables, *, recognises: bool = False) -> BoardConfig:
+def config_of(
+    board: Board, switches: Sequence[str], tables: IntegerTables, *, recognises: bool = False, segments: bool = False
+) -> BoardConfig:
     """Return what the protocol's C is configured with. Raises FirmwareError if the board lacks a switch, has too many
     keys, or is to scan faster than it can.
     """
@@ -144,12 +157,14 @@ def config_of(board: Board, switches: Sequence[str], tables: IntegerTables, *, r
         heartbeat_us=board.heartbeat_us,
         press_us=board.debounce.press_us,
         release_us=board.debounce.release_us,
-        fastest_us=shortest_scan_us(board, switches, tables, recognises=recognises),
+        fastest_us=shortest_scan_us(board, switches, tables, recognises=recognises, segments=segments),
+        segments=segments,
         channels=0 if recognises else board.channels,
     )
 
 
 _MOST_GRASPS = 255  # a grasp is a byte on the line, and 255 says that there is none
+_MOST_RAM = 3 / 8  # of segments; lines, keys and stack need some 900 bytes
 _WHOLE_US = 50_000  # between whole scans of a board that sends no heartbeats
 _BYTE = 0xFF
 _NUMBERS_A_LINE = 14
@@ -209,17 +224,21 @@ def _joints(identifier: str, names: Names, layout: Layout, board: Board) -> dict
 
 
 def _glove_main(identifier: str, names: Names, board: Board, joints: bool, early_exit: bool) -> str:
-    switches = tuple(switch.name for switch in names.switches)
+    switches, model = tuple(switch.name for switch in names.switches), names.segments
+    whole_us = board.heartbeat_us or _WHOLE_US
+    if segments := model is not None and follows_segments(board, names):
+        whole_us = min(whole_us, model.tick_us)
     return text(
         "glove_main.c",
         name=identifier,
-        about=_about_glove(board),
+        about=_about_glove(board, names),
         joints=joints,
         attended=joints and board.cyberglove is not None,
         chips=bool(board.chips),
         early_exit=early_exit,
         ghosts=board.matrix is not None and not board.matrix.diodes,
-        whole_us=board.heartbeat_us or _WHOLE_US,
+        whole_us=whole_us,
+        segments=segments,
         many_keys=len(key_names(board, switches)) > _BYTE,
         keys_of_switches=_keys_of_switches(board, switches),
         rejects=names.rejection is not None,
@@ -261,10 +280,22 @@ def _about_scanner(board: Board) -> str:
     return wrapped(f"{reads} (protocol {2 if board.channels else 1} of thenar's scanner board).", 3)
 
 
-def _about_glove(board: Board) -> str:
+def _about_glove(board: Board, names: Names) -> str:
     reads = f"A glove that recognises by itself. It reads {_inputs_in_words(board)}"
     tells = "tells the host of them and of the grasp type (protocol 1 of thenar's scanner board)"
-    return wrapped(f"{reads}, and {tells}.", 3)
+    follows = f" {said}." if (said := segments_in_words(board, names)) else ""
+    return wrapped(f"{reads}, and {tells}.{follows}", 3)
+
+
+def segments_in_words(board: Board, names: Names) -> str:
+    """Return whether a glove on this board follows segments; nothing where its build has no costs of them."""
+    if names.segments is None:
+        return ""
+    ram = board.microcontroller.ram
+    takes = f"{segmenter_bytes(names.segments)} of {ram} bytes of RAM"
+    if follows_segments(board, names):
+        return f"It follows segments, in {takes}"
+    return f"Segments are left out: they would take {takes}, and {int(ram * _MOST_RAM)} are for them"
 
 
 def board_makefile(name: str, board: Board, mode: Mode, files: Collection[str]) -> str:

@@ -32,6 +32,8 @@ from .targets import TARGETS, Target
 Option = tuple[Layout, Cost]
 
 _NOTE_WIDTH = 114
+# avr-gcc makes no larger object.
+_LARGEST_ARRAY = 32767
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,6 +111,9 @@ def _layouts(tables: IntegerTables, target: Target, ports: Ports | None, entry_b
         try:
             for shared in _sharings(tables, -(-tables.n_switches // size)):
                 layout = arrange(tables, ports=ports, group_size=size, entry_bits=bits, bins=bins, shared=shared)
+                rows = layout.n_rows * layout.parts.width * len(layout.parts.firsts) * layout.entry_bits // 8
+                if target.avr and rows > _LARGEST_ARRAY:
+                    raise FirmwareError(f"the rows need {rows} bytes, an array of an AVR has {_LARGEST_ARRAY} at most")
                 found = True
                 yield from (replace(layout, adding=adding) for adding in _addings(target))
         except FirmwareError as reason:

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.firmware_templates.rendering import render
-from thenar.runtime.manifest import Calibration, Rejection
+from thenar.runtime.manifest import Rejection
 from thenar.runtime.published import NONE
+from thenar.runtime.softmax import POWERS, Softmax
 
 from .assembly import assembly_values, calls_are_near, check_size
-from .layout import MOST_INLINE, NO_SWITCH, Field, JointLayout, Layout, Lookup, Parts
+from .layout import MOST_INLINE, Field, JointLayout, Layout, Lookup, Parts
 from .segments import segment_files
-from .words import Names, answers_of, comment, inputs_in_words, string, switches_in_words
+from .words import Names, answers_of, comment, identifiers, inputs_in_words, joint_in_words, string, switches_in_words
 
 _STARTS_PER_LINE = 4
 _HIGHEST = 65535  # no code is above it
@@ -47,12 +48,12 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
         "lanes": n_lanes,
         "in_words": {2: "two", 4: "four"}[entries],
         "sum_bits": bits,
-        "stores": [(_stored(lane, shift, bits), k) for k, (lane, shift) in enumerate(lanes)],
-        "takes": [(_upmost(lane, shift, bits), k) for k, (lane, shift) in enumerate(lanes)],
+        "in_pairs": bits == 16 and not biased and len(parts.firsts) == 1,
+        "stores": [(lane, shift, k) for k, (lane, shift) in enumerate(lanes)],
+        "takes": [(lane, 32 - bits - shift, k) for k, (lane, shift) in enumerate(lanes)],
         "word_macros": _narrow_macros(parts.width) if biased else _sum_macros(parts.width, bits),
         "start": _start_lines(_in_parts(layout.start, parts), lanes),
         "finds": [_find(name, layout, lookup) for lookup in layout.lookups],
-        "n_lookups": len(layout.lookups),
         "adding": adding,
         "began": [f"start[{lane}]" if _started(lane, biased, layout.entry_shift) else "0u" for lane in range(n_lanes)],
         "finishing": _finishing(n_lanes, biased, layout.entry_shift),
@@ -93,9 +94,7 @@ def _sum_macros(width: int, bits: int) -> list[str]:
 def _narrow_macros(width: int) -> list[str]:
     quad = "QUAD(a, b, c, d) ((uint32_t)(a) | ((uint32_t)(b) << 8) | ((uint32_t)(c) << 16) | ((uint32_t)(d) << 24))"
     rests = ["REST(a) QUAD(a, 0, 0, 0)", "REST(a, b) QUAD(a, b, 0, 0)", "REST(a, b, c) QUAD(a, b, c, 0)"]
-    return [quad, "EVEN(word) ((word) & 0x00FF00FFu)", "ODD(word) (((word) >> 8) & 0x00FF00FFu)"] + (
-        [rests[width % 4 - 1]] if width % 4 else []
-    )
+    return [quad] + ([rests[width % 4 - 1]] if width % 4 else [])
 
 
 def _in_parts(scores: NDArray[np.int64], parts: Parts) -> list[list[int]]:
@@ -103,7 +102,7 @@ def _in_parts(scores: NDArray[np.int64], parts: Parts) -> list[list[int]]:
 
 
 def _start_lines(starts: Sequence[Sequence[int]], lanes: Sequence[tuple[int, int]]) -> list[str]:
-    """Return the lines of the initialiser of the sums, in braces for each part where there are several."""
+    """Return the lines of the initialiser of the sums, in braces for each part."""
     lines = []
     for start in starts:
         sums: dict[int, list[int]] = {}
@@ -112,32 +111,21 @@ def _start_lines(starts: Sequence[Sequence[int]], lanes: Sequence[tuple[int, int
         room = 4 if any(shift == 8 for _, shift in lanes) else 2
         words = [f"START({', '.join(map(str, (sums[lane] + [0] * room)[:room]))})" for lane in sorted(sums)]
         held = [", ".join(words[at : at + _STARTS_PER_LINE]) for at in range(0, len(words), _STARTS_PER_LINE)]
-        text = [f"{line}," for line in held]
-        lines += text if len(starts) == 1 else ["{", *(f"    {line}" for line in text), "},"]
+        lines += ["{", *(f"    {line}," for line in held), "},"]
     return lines
 
 
-def _stored(lane: int, shift: int, bits: int) -> str:
-    """Return the expression that has the score of a class in its lowest bits."""
-    scores = f"SCORES(s{lane})" if bits == 16 else f"s{lane}"
-    return f"{scores} >> {shift}" if shift else scores
-
-
-def _upmost(lane: int, shift: int, bits: int) -> str:
-    """Return the expression that has the sum of a class in its highest bits."""
-    return f"s{lane} << {32 - bits - shift}" if shift + bits < 32 else f"s{lane}"
-
-
 def _arithmetic(lanes: int, biased: bool, shift: int) -> tuple[list[str], list[str]]:
-    """Return what adds a row to the sums s0, s1..., and the statements that replace one in sum[]."""
+    """Return the statements that add a row to the words sum[], and those that replace one."""
     adding, replacing = [], []
     for lane in range(lanes):
-        row, before, after = (f"{each}[{lane // 2 if biased else lane}]" for each in ("(row)", "before", "after"))
+        row, before, after = (f"{each}[{lane // 2 if biased else lane}]" for each in ("entry", "before", "after"))
         if biased:
-            macro = "ODD" if lane % 2 else "EVEN"
-            row = f"{row} >> 8" if lane % 2 else f"EVEN({row})"
-            before, after = f"{macro}({before})", f"{macro}({after})"
-        adding.append(f"s{lane} += {row}")
+            row = f"{row} >> 8" if lane % 2 else f"{row} & 0x00FF00FFu"
+            before, after = (f"({each}{' >> 8' if lane % 2 else ''} & 0x00FF00FFu)" for each in (before, after))
+            if lane % 2:
+                before, after = (each.replace(" >> 8 &", " >> 8) &").replace("(", "((", 1) for each in (before, after))
+        adding.append(f"s{lane} += {row};")
         change = f"({after} - {before}) << {shift}" if shift else f"{after} - {before}"
         replacing.append(f"sum[{lane}] += {change};")
     return adding, replacing
@@ -146,14 +134,13 @@ def _arithmetic(lanes: int, biased: bool, shift: int) -> tuple[list[str], list[s
 def _started(lane: int, biased: bool, shift: int) -> bool:
     """Return whether a sum begins with what it starts from, rather than that it is added in the end."""
     # An even sum must not where it says what the odd one beside it took too much; one that is shifted must not either.
-    # Every other one does: compilers put what is added last first, and then keep all rows until they have it.
-    return not biased or (lane % 2 == 1 and not shift)
+    return biased and lane % 2 == 1 and not shift
 
 
 def _finishing(lanes: int, biased: bool, shift: int) -> list[str]:
-    """Return the statements that make the sums of s0, s1... that rows have been added to, in words of two."""
+    """Return the statements that make the words of two sums s0, s1... which rows have been added to."""
     if not biased:
-        return []
+        return [f"s{lane} += start[{lane}];" for lane in range(lanes)]
     finished = []
     for lane in reversed(range(lanes)):  # an odd one before the even one beside it
         text = f"s{lane} - ((s{lane - 1} >> 16) << 8)" if lane % 2 else f"s{lane}"
@@ -166,35 +153,34 @@ def _finishing(lanes: int, biased: bool, shift: int) -> list[str]:
 
 def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
     """Return the expression of the number of one look-up's row, in lines."""
-    source = f"thenar_{name}_input."
-    found: list[str] = []
+    found = [f"{lookup.first_row}u"] if lookup.first_row else []
     if lookup.group is not None:
-        fields = layout.fields[lookup.group]
-        alone = len(fields) == 1 or not (lookup.joints or lookup.first_row)
-        found = [" | ".join(map(_field, fields)) if alone else f"({' | '.join(map(_field, fields))})"]
+        fields = " | ".join(map(_field, layout.fields[lookup.group]))
+        found.append(f"({fields})" if lookup.joints or found else fields)
     for joint in lookup.joints:
-        code = f"{source}codes[{joint.number}]"
+        code = f"input->codes[{joint.number}]"
         if joint.compared:
             counted = f"not_below({joint.first_step}u, {len(joint.thresholds)}u, {code})"
             if len(joint.thresholds) <= MOST_INLINE:
-                counted = " + ".join(
-                    f"({code} <= {step}u)" if step < _HIGHEST else "1" for step in joint.thresholds.tolist()
-                )
-                counted = f"(uint32_t)({counted})"
-            found.append(f"({joint.weight}u * {counted})" if joint.weight > 1 else counted)
+                steps = joint.thresholds.tolist()
+                # Plain sums of comparisons, stored in a byte, are miscompiled by GCC 12.
+                counted = " + ".join(f"(({code} <= {step}u) ? 1u : 0u)" if step < _HIGHEST else "1u" for step in steps)
+            found.append(f"({joint.weight}u * ({counted}))" if joint.weight > 1 else counted)
         else:
             whole = len(joint.bins) == 1 << layout.code_bits
             place = code if whole else f"clamped({code}, {joint.first}u, {len(joint.bins) - 1}u)"
             found.append(f"thenar_{name}_bins[{_after(joint.first_bin, place)}]")
-    width = COLUMNS - 8 - len(f"row[999] = &thenar_{name}_rows[];")
-    number = _after(lookup.first_row, " + ".join(found))
-    return textwrap.wrap(number, width, subsequent_indent=_INDENT, break_long_words=False)
+    width = COLUMNS - 8 - len(f"found->rows[999] = thenar_{name}_rows[];")
+    kept = " + ".join(found).replace(" ", "\xa0").replace("\xa0+\xa0", " +\xa0")
+    lines = textwrap.wrap(kept, width, subsequent_indent=_INDENT, break_long_words=False)
+    return [line.replace("\xa0", " ") for line in lines]
 
 
 def _field(field: Field) -> str:
     """Return the expression of a field of a port's byte, at its place in the group's."""
     by, mask = field.bit - field.to, ((1 << field.width) - 1) << field.to
-    moved = f"((uint32_t)ports[{field.port}] {'>>' if by > 0 else '<<'} {abs(by)})" if by else f"ports[{field.port}]"
+    port = f"input->switches[{field.port}]"
+    moved = f"((uint32_t){port} {'>>' if by > 0 else '<<'} {abs(by)})" if by else port
     return f"({moved} & 0x{mask:02X}u)"
 
 
@@ -212,9 +198,9 @@ def _lane_words(rows: list[list[int]], lanes: Sequence[tuple[int, int]]) -> list
 def _distance(name: str, layout: Layout, at: int) -> str:
     """Return the expression of the distance of a slope's code."""
     slope = layout.tables.slopes[at]
-    code = f"thenar_{name}_input.codes[{slope.joint}]"
+    code = f"input->codes[{slope.joint}]"
     if layout.stores_distances:
-        return f"distance_of[{at}][{code}]"
+        return f"thenar_{name}_distance_of[{at}][{code}]"
     above = f"clamped({code}, {slope.low}u, {slope.high - slope.low}u)"
     shift = f" {'<<' if slope.gain > 0 else '>>'} {abs(slope.gain)}" if slope.gain else ""
     return f"(int16_t)(({above}{shift}) - {slope.zero})"
@@ -235,7 +221,7 @@ LIBRARY_NAME = "glove"
 """What the library is called unless it is named: its files are thenar_glove.h and so on, its functions alike."""
 FIRMWARE_NAME = "firmware"
 LIBRARY_FILES = tuple(
-    f"thenar_{LIBRARY_NAME}{part}{ending}" for part in ("", "_segments") for ending in (".h", ".c", "_avr.S")
+    f"thenar_{LIBRARY_NAME}{part}{ending}" for part in ("", "_tables", "_segments") for ending in (".h", ".c", "_avr.S")
 )
 """The folder of a build that carries the library, and what it may hold."""
 
@@ -355,37 +341,37 @@ def classifier_files(
     """
     if avr:
         check_size(layout)
-    common = _common_values(name, names, layout, avr)
-    texts: dict[str, dict[str, object]] = {
-        ".h": {"ports": _port_notes(names, layout), "joints": _joint_notes(names)},
-        ".c": _source_values(names, layout) | portable_values(name, layout),
-    }
+    portable, found = portable_values(name, layout), _source_values(names, layout)
+    values = _common_values(name, names, layout, avr) | portable | found | _header_values(name, names, layout)
     if avr:
-        texts["_avr.S"] = assembly_values(name, names, layout, near=calls_are_near(layout))
+        values |= {"assembly": assembly_values(name, names, layout, near=calls_are_near(layout))}
+    endings = (".h", ".c", "_tables.h", "_tables.c", "_avr.S")[: 4 + avr]
     return {
         f"thenar_{name}{ending}": render(
-            f"{_FOLDER}thenar_NAME{ending}.j2", **common, **values, opening=_opening(name, names, ending, notes)
+            f"{_FOLDER}thenar_NAME{ending}.j2", **values, opening=_opening(name, names, ending, notes)
         )
-        for ending, values in texts.items()
+        for ending in endings
     }
 
 
 def _opening(name: str, names: Names, ending: str, notes: Sequence[str]) -> str:
     """Return the comment that every file begins with."""
     what = {
-        ".h": f"recognises {len(names.grasps)} grasp types from "
-        f"{inputs_in_words(len(names.switches), len(names.joints))} of a glove",
-        ".c": "tables and integer arithmetic; the header says how it is used",
-        "_avr.S": "the adding up, on an AVR; the .c holds the tables",
+        ".h": f"Recognises {len(names.grasps)} grasp types from "
+        f"{inputs_in_words(len(names.switches), len(names.joints))} of a glove.",
+        ".c": "integer arithmetic; the header says how it is used.",
+        "_tables.h": "what the library's own files know of the tables; no program needs it.",
+        "_tables.c": "the tables.",
+        "_avr.S": "the adding up, on an AVR.",
     }[ending]
-    lines = [
-        f"thenar_{name}{ending}: {what}.",
-        *map(comment, notes),
-        "",
+    made = (
         f"From the tables {names.tables_sha256[:16]}; thenar {version('thenar')}, "
-        f"template {_FOLDER}thenar_NAME{ending}.j2.",
-    ]
-    return "/* " + "\n".join(f"   {line}".rstrip() for line in lines).lstrip() + " */"
+        f"template {_FOLDER}thenar_NAME{ending}.j2."
+    )
+    if ending != ".h":
+        return f"/* thenar_{name}{ending}: {what}\n\n   {made} */"
+    lines = [f"@file thenar_{name}.h", f"@brief {what}", "", *map(comment, notes), "", made]
+    return "/**\n" + "\n".join(f" * {line}".rstrip() for line in lines) + "\n */"
 
 
 def _common_values(name: str, names: Names, layout: Layout, avr: bool) -> dict[str, object]:
@@ -407,6 +393,7 @@ def _common_values(name: str, names: Names, layout: Layout, avr: bool) -> dict[s
         "parts": len(layout.parts.firsts),
         "width": layout.parts.width,
         "n_rows": layout.n_rows,
+        "n_lookups": len(layout.lookups),
         "n_slopes": len(layout.tables.slopes),
         "relative": layout.tables.relative,
         "nothing_held": len(answers) - 1 if (answers := answers_of(names))[-1] == NONE else None,
@@ -431,14 +418,14 @@ def _source_values(names: Names, layout: Layout) -> dict[str, object]:
         "paged": layout.bins == "direct" and bool(trimmed),
         "clamped": (layout.bins == "trimmed" and bool(trimmed))
         or (bool(layout.tables.slopes) and not layout.stores_distances),
-        "compared": bool(searched),
         "thresholds": number_lines(steps),
         "n_thresholds": len(steps),
         "means": _mean_lines(means),
         "mean_type": "int8_t" if layout.narrow_means else "int16_t",
         "n_inputs": len(means),
         "starts": number_lines(layout.start.tolist()),
-        "open_scores": number_lines(layout.all_open.tolist()),
+        "powers": number_lines(POWERS),
+        "softmax": Softmax(layout.tables.scale),
         "names": [string(grasp) for grasp in answers_of(names)],
         "longest_name": max(len(grasp.encode()) for grasp in answers_of(names)) + 1,
         "places": _place_lines(layout),
@@ -482,17 +469,29 @@ def _place_lines(layout: Layout) -> list[str]:
     return [_INDENT + " ".join(pairs[at : at + 8]) for at in range(0, len(pairs), 8)]
 
 
-def _port_notes(names: Names, layout: Layout) -> list[str]:
-    shown = (("-" if n == NO_SWITCH else comment(names.switches[n].name) for n in port) for port in layout.ports)
-    wrapped = (textwrap.wrap(", ".join(port), COLUMNS - 20, break_on_hyphens=False) for port in shown)
-    return [f"\n{' ' * 18}".join(lines) for lines in wrapped]
+def _header_values(name: str, names: Names, layout: Layout) -> dict[str, list[str]]:
+    """Return the lines of the enumerations in the header."""
+    kinds = {
+        "grasp": [(grasp, comment(grasp)) for grasp in names.grasps],
+        "switch": [
+            (switch.name, comment(f"{switch.name}: switches[{port}], 0x{1 << bit:02X}"))
+            for switch, (port, bit) in zip(names.switches, layout.places, strict=True)
+        ],
+        "joint": [(joint.name, comment(joint_in_words(joint))) for joint in names.joints],
+    }
+    return {f"{kind}_enum": _enumerators(f"THENAR_{name}_{kind}".upper(), each) for kind, each in kinds.items()}
 
 
-def _joint_notes(names: Names) -> list[str]:
-    return [comment(f"{joint.name}, {_scale(joint)}") for joint in names.joints]
-
-
-def _scale(joint: Calibration) -> str:
-    if joint.unit == "raw":
-        return "the glove's own codes"
-    return f"code {joint.code_a} = {joint.value_a:g} {joint.unit}, {joint.code_b} = {joint.value_b:g} {joint.unit}"
+def _enumerators(prefix: str, named: Sequence[tuple[str, str]]) -> list[str]:
+    """Return the lines of enumerators, each with what it is; before it where it is too long to follow."""
+    lines = []
+    for number, (word, (_, what)) in enumerate(zip(identifiers([own for own, _ in named]), named, strict=True)):
+        line, more = f"{prefix}_{word} = {number},", f" /**< {what} */"
+        if len(_INDENT + line + more) <= COLUMNS:
+            lines.append(line + more)
+        else:
+            first, *rest = textwrap.wrap(what, COLUMNS - 14, break_long_words=True, break_on_hyphens=False)
+            lines += [f"/** {first}", *(f" *  {each}" for each in rest)]
+            lines[-1] += " */"
+            lines.append(line)
+    return lines

@@ -63,22 +63,24 @@ class Core:
 
 
 CORTEX_M4 = Core(
-    fixed=20,
-    a_class=8,
-    in_parts=7,
+    fixed=22,
+    a_class=6,
+    in_parts=9,
     lookup=0,
     found=5,
     part=0,
-    pair=3,
-    quad=5,
+    pair=2,
+    quad=4,
     quads=2,
-    replaced_pair=6,
-    replaced_quad=19,
+    replaced_pair=8,
+    replaced_quad=21,
     replaced_halves=0,
 )
 """What other cores of 32 bits are taken to be like."""
 
 
+# Of a class where four entries of 8 bits share a word.
+_BIASED_CLASS = 3
 _REPLACING, _REPLACING_PART = 13, 32  # of a row in update(), but for its words; more for each part but the first
 # More than for a code that is looked up directly: a byte clamped below and above, where it can lie there; a code of 16
 # bits clamped; a code searched, and each step of the search.
@@ -86,12 +88,13 @@ _BELOW, _ABOVE, _WIDE = 6, 4, 10
 _SEARCHED, _SEARCH_STEP = 16, 11
 # The distance of a code, looked up or not; in each part all but the products; and of each word of sums, at the end and
 # where entries are upper halves. In update(), the change of a distance; and of it in each part all but the words.
-_DISTANCE_KNOWN, _DISTANCE, _MULTIPLYING, _WORD, _HALVES, _CHANGED, _MOVING = 7, 14, 27, 2, 8, 5, 18
+_DISTANCE_KNOWN, _DISTANCE, _MULTIPLYING, _WORD, _HALVES, _CHANGED, _MOVING = 7, 14, 76, 2, 8, 5, 18
 
 # Of code; where classes are added up in parts, that takes more.
 _BYTES, _BYTES_PARTS, _BYTES_CLASS = 186, 432, 15
 _BYTES_WORD, _BYTES_QUAD, _BYTES_START = 7, 20, 41
 _BYTES_UPDATE, _BYTES_UPDATE_CLASS, _BYTES_UPDATE_PAIR, _BYTES_UPDATE_QUAD = 180, 10, 11, 40
+_BYTES_FINDING, _BYTES_PLACE = 9, 48
 _BYTES_JOINT, _BYTES_CLAMPED, _BYTES_COMPARED, _BYTES_SEARCHED = 11, 35, 11, 55
 _BYTES_MULTIPLYING, _BYTES_PRODUCT, _BYTES_DISTANCE = 150, 30, 24
 # Of what replaces missing inputs, beside the table of their means; instructions that take a field of a port's byte, and
@@ -109,13 +112,19 @@ def word_cost(layout: Layout, core: Core) -> Cost:
     replaced += core.replaced_halves if layout.entry_shift else 0
     adding = parts * (core.part + (core.quads if layout.biased else 0) + words * word)
     replacing = _REPLACING + _REPLACING_PART * (parts - 1) + parts * words * replaced
-    answering = (core.a_class + (core.in_parts if parts > 1 else 0)) * classes + finding + core.fixed
+    a_class = core.a_class + _BIASED_CLASS * layout.biased + (core.in_parts if parts > 1 else 0)
+    answering = a_class * classes + finding + core.fixed
     classify, update = (len(layout.lookups) * (core.lookup + each) + answering for each in (adding, replacing))
     multiplying, moving = _multiplying(layout, core)
     classify, update = classify + multiplying, update + moving
     flash = _flash(layout) + NAME_BYTES * (classes + 1)
     replaced_bytes = _BYTES_UPDATE_QUAD if layout.biased else _BYTES_UPDATE_PAIR
     update_flash = _BYTES_UPDATE + _BYTES_UPDATE_CLASS * classes + words * replaced_bytes
+    # It has code of its own that finds rows.
+    update_flash += _BYTES_FINDING * len(layout.lookups)
+    update_flash += sum(
+        _BYTES_PLACE if len(joint.bins) < 1 << layout.code_bits else _BYTES_JOINT for joint in layout.joints
+    )
     losing = _BYTES_LOSING + layout.means.size * (1 if layout.narrow_means else 2)
     return Cost(classify, update, flash + update_flash + losing, flash, _ram(layout))
 

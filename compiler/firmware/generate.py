@@ -17,7 +17,17 @@ from thenar.runtime.tables import IntegerTables
 from ..publication import check_folder, entries, publish_folder
 from . import FirmwareError
 from .board import Board, keys_of
-from .board_files import board_files, board_makefile, config_of, exits_early, key_ports, readings, switches_of
+from .board_files import (
+    board_files,
+    board_makefile,
+    config_of,
+    exits_early,
+    follows_segments,
+    key_ports,
+    readings,
+    segments_in_words,
+    switches_of,
+)
 from .choose import Fit, fit_for, smallest_fit
 from .classifier import LIBRARY_NAME, Library
 from .layout import Ports, ports_of_scan
@@ -89,6 +99,11 @@ class Firmware:
             return ports_of_scan(self.scan)
         return key_ports(self.board, keys_of(self.board, self.names.switches))
 
+    @property
+    def segments(self) -> str:
+        """Whether the firmware of a glove follows segments, in words; "" where its build has no costs of them."""
+        return segments_in_words(self.board, self.names) if self.mode == "glove" and self.board is not None else ""
+
     def library(self, notes: Sequence[str] = ()) -> Library:
         """Return the classifier alone, with lines for its opening comments."""
         return Library(self.name, self.names, self.fit.choice.layout, self.fit.target.avr, tuple(notes))
@@ -105,10 +120,11 @@ class Firmware:
     def _of_board(self, board: Board, library: Library) -> dict[str, str]:
         name, names, tables = self.name, self.names, self.tables
         switches, glove = keys_of(board, names.switches), self.mode == "glove"
-        config = config_of(board, switches, tables, recognises=glove)
+        segments = glove and follows_segments(board, names)
+        config = config_of(board, switches, tables, recognises=glove, segments=segments)
         files = protocol_files(config) | board_files(name, names, library.layout, board, self.mode)
         if glove:
-            files |= library.files
+            files |= library.whole if segments else library.files
             if exits_early(board, ports := readings(board, switches, tables)):
                 files |= decided_files(name, tables, names.grasps, switches_of(ports))
         return files | {"Makefile": board_makefile(name, board, self.mode, files)}

@@ -19,7 +19,7 @@ so the scores are those of `IntegerTables`, bit for bit. There are three kinds o
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import chain
 from typing import Literal
 
@@ -144,9 +144,10 @@ def ports_of_scan(scan: ScanMap | None) -> Ports | None:
     if scan is None:
         return None
     # Levels are bits of nothing: a device compares, and gives them in the order of their codes.
-    levels = [[level[-1] for level in board] for board in scan.taxels]
+    levels = [[level[-1] for level in board] for board in (*scan.taxels, *(each.levels for each in scan.streams))]
     levels += [[switch for _, switch in port.levels] for port in scan.ports]
-    pairs = (*scan.scanners, *(port.switches for port in scan.ports), *map(enumerate, levels))
+    boards = (*scan.scanners, *(stream.switches for stream in scan.streams))
+    pairs = (*boards, *(port.switches for port in scan.ports), *map(enumerate, levels))
     return tuple(chain(*map(ports_of, pairs)))
 
 
@@ -254,7 +255,7 @@ class Layout:
         """
         return parts_of(self.tables.n_classes - self.tables.relative, self.sum_bits)
 
-    @property
+    @cached_property
     def joints(self) -> tuple[JointLayout, ...]:
         """The joints that have thresholds, in the order of their bins; the others are part of the start."""
         return tuple(joint for lookup in self.lookups for joint in lookup.joints)
@@ -302,11 +303,7 @@ class Layout:
     @property
     def means(self) -> NDArray[np.int64]:
         """What each switch, then each joint, adds to the scores while it is missing, beyond what 0 adds: (s + j, K)."""
-        pairs = zip(self.tables.joint_means, self.tables.joint_rows, strict=True)
-        joints = [mean.astype(np.int64) - rows[0] for mean, rows in pairs]
-        for slope in self.tables.slopes:
-            joints[slope.joint] = joints[slope.joint] - slope.of(np.zeros(1, np.uint16))[0]
-        return np.vstack([self.tables.switch_means.astype(np.int64), *joints])
+        return _means(self.tables)
 
     @property
     def narrow_means(self) -> bool:
@@ -343,6 +340,14 @@ class Layout:
         else:
             held = np.ascontiguousarray(codes, "<u2").view(np.uint8).reshape(len(bits), 2 * codes.shape[1])
         return np.hstack([self.port_bytes(bits), padding, held])
+
+
+@lru_cache(maxsize=8)
+def _means(tables: IntegerTables) -> NDArray[np.int64]:
+    joints = [mean.astype(np.int64) - rows[0] for mean, rows in zip(tables.joint_means, tables.joint_rows, strict=True)]
+    for slope in tables.slopes:
+        joints[slope.joint] = joints[slope.joint] - slope.of(np.zeros(1, np.uint16))[0]
+    return np.vstack([tables.switch_means.astype(np.int64), *joints])
 
 
 Shared = tuple[int | None, tuple[int, ...]]

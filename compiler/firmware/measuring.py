@@ -81,7 +81,7 @@ def measure(library: Library, fit: Fit) -> Measured:
     flash, flash_classify, ram = _size(library, target)
     long_names = _more_for_names(library.names.grasps)
     return Measured(
-        part=target.part,
+        part=target.counted_on,
         time=answers.most,
         update_time=updated.most,
         unit=answers.unit,
@@ -126,14 +126,18 @@ def _size(library: Library, target: Target) -> tuple[int, int, int]:
             f"the target {target.name} names no compiler and no program `size`: nothing can be measured"
         )
     sources = sorted(path for path in library.files if path.endswith((".c", ".S")))
-    kept = [f"-Wl,-u,thenar_{library.name}_{function}" for function in ("classify", "set_switch", "grasp")]
-    with workshop(library.files) as folder:
+    name = f"thenar_{library.name}"
+    called = [f"-Wl,-u,{name}_{function}" for function in ("init", "classify", "set_switch", "grasp")]
+    rest = [f"-Wl,-u,{name}_{function}" for function in ("update", "lose_switch", "lose_joint")]
+    glove = f'#include "{name}.h"\nextern {name} glove;\n{name} glove;\n'
+    with workshop({**library.files, "glove.c": glove}) as folder:
         compiling = [find(target.compiler), *target.flags]
-        call([*compiling, *STRICT, *_SECTIONS, "-c", *sources], folder)
+        call([*compiling, *STRICT, *_SECTIONS, "-c", *sources, "glove.c"], folder)
         # Variables that are common have no place, and no size for `size`, until they are linked.
-        linked = [*compiling, "-r", "-nostdlib", "-Wl,-d", *(path.rsplit(".", 1)[0] + ".o" for path in sources)]
-        call([*linked, "-o", "whole.elf"], folder)
-        call([*linked, *kept, f"-Wl,--gc-sections,-e,thenar_{library.name}_classify", "-o", "classify.elf"], folder)
+        objects = [path.rsplit(".", 1)[0] + ".o" for path in (*sources, "glove.c")]
+        linked = [*compiling, "-r", "-nostdlib", f"-Wl,-d,--gc-sections,-e,{name}_classify,-u,glove", *objects, *called]
+        call([*linked, *rest, "-o", "whole.elf"], folder)
+        call([*linked, "-o", "classify.elf"], folder)
         told = call([find(target.size), "whole.elf", "classify.elf"], folder).decode().splitlines()[1:]
     (text, data, bss), (less_text, less_data, _) = (map(int, line.split()[:3]) for line in told)
     return text + data, less_text + less_data, data + bss

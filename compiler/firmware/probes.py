@@ -5,10 +5,10 @@ Frames are extreme ones, all of a kind, and random ones. With those in C a folde
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from textwrap import wrap
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +80,7 @@ def answers_from(printed: bytes, frames: Frames, layout: Layout) -> Answers:
 def record_files(
     name: str,
     layout: Layout,
-    machine: Literal["host", "cortex", "avr"],
+    machine: Literal["host", "bare", "avr"],
     answer: Literal["classify", "update"],
     *,
     lost: bool = False,
@@ -90,24 +90,40 @@ def record_files(
     For classify() it writes the ports' bytes into the input; for update() it calls set_switch() for every switch. With
     `lost`, frames come as `with_lost` makes them.
     """
-    values = {"name": name, "answer": answer, "lost_bytes": _lost_bytes(layout) if lost else 0}
+    values = record_values(name, layout, answer, lost=lost)
     files = {"main.c": render(f"checking/{machine}_main.c.j2", **values)}
     if machine == "avr" and not lost:
         return files
-    record = render(
-        "checking/record.h.j2",
-        **values,
-        classes=len(layout.start),
-        ports=len(layout.ports),
-        places=[f"{{{port}, {bit}}}" for port, bit in layout.places] if answer == "update" else [],
-        switches=layout.tables.n_switches,
-        padding=layout.padding,
-        joints=layout.tables.n_joints,
-        code_bytes=layout.code_bits // 8,
-        frame_bytes=layout.frame_size + (_lost_bytes(layout) if lost else 0),
-        answers=machine != "avr",
-    )
-    return files | {"record.h": record}
+    values["places"] = [f"{{{port}, {bit}}}" for port, bit in layout.places] if answer == "update" else []
+    return files | {"record.h": render("checking/record.h.j2", **values, answers=machine != "avr")}
+
+
+def record_values(
+    name: str, layout: Layout, answer: Literal["classify", "update"], *, lost: bool = False
+) -> dict[str, Any]:
+    """Return what the template of a program asks for that takes frames and gives answers by `answer`, in any language.
+
+    It reads the file "frames" and writes the file "answers", or stdin and stdout: names, and what `answers_from` reads.
+    """
+    return {
+        "name": name,
+        "answer": answer,
+        "lost_bytes": _lost_bytes(layout) if lost else 0,
+        "classes": len(layout.start),
+        "ports": len(layout.ports),
+        "places": list(layout.places),
+        "switches": layout.tables.n_switches,
+        "padding": layout.padding,
+        "joints": layout.tables.n_joints,
+        "code_bytes": layout.code_bits // 8,
+        "frame_bytes": layout.frame_size + (_lost_bytes(layout) if lost else 0),
+    }
+
+
+def answers_in(printed: bytes, frames: Frames, layout: Layout) -> Answers:
+    """Return the answers that a program wrote, and before them the names. Raises FirmwareError as the other two do."""
+    names, rest = names_in(printed, layout)
+    return replace(answers_from(rest, frames, layout), names=names)
 
 
 def _lost_bytes(layout: Layout) -> int:

@@ -38,6 +38,7 @@ class BoardConfig:
     board          its number                                scan_us from scan to scan, at least `fastest_us`
     state_us, heartbeat_us  from frame to frame, 0: none     press_us, release_us  debouncing, 0: none
     channels       of its converter: with any it speaks version 2 of the protocol
+    segments       whether it tells of segments
 
     Raises FirmwareError where a value is out of its field's range, or there are more keys than `MOST_KEYS`.
     """
@@ -53,6 +54,7 @@ class BoardConfig:
     release_us: int = 0
     fastest_us: int = 100
     channels: int = 0
+    segments: bool = False
 
     def __post_init__(self) -> None:
         for name, (least, most) in _RANGES.items():
@@ -119,7 +121,6 @@ def decided_files(
     values = {
         "name": name,
         "guard": f"THENAR_{name.upper()}",
-        "class_type": "uint8_t" if tables.n_classes <= 256 else "uint16_t",
         "grasps": names,
         "columns": wrap(", ".join(names), _WIDTH),
         "n_ports": len(ports),

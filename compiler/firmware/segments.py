@@ -57,7 +57,7 @@ def segment_files(name: str, model: SegmentModel, *, avr: bool) -> dict[str, str
         "model": model,
         "types": model.n_types,
         "refusal": model.refusal,
-        "lag": min(max(LAG_US // model.tick_us, 1), 250),
+        "lag": _lag(model),
         "states": states,
         "groups": rings,
         "waiting": rings[-1].end if rings else 0,
@@ -75,6 +75,17 @@ def segment_files(name: str, model: SegmentModel, *, avr: bool) -> dict[str, str
         f"thenar_{name}_segments{ending}": render(f"segments/thenar_NAME_segments{ending}.j2", **values)
         for ending in endings
     }
+
+
+def segmenter_bytes(model: SegmentModel) -> int:
+    """Return how many bytes of RAM the decoder's `thenar_NAME_segmenter` takes on an AVR."""
+    K, rings, lag = model.n_types, len({least for least in model.least if least > 1}), _lag(model)
+    waiting = sum(least - 1 for least in model.least)
+    return 4 * (K + 1) + 12 + 2 * max(rings, 1) + 2 * max(waiting, 1) + (4 + 2 * -(-(K + 1) // 8)) * lag
+
+
+def _lag(model: SegmentModel) -> int:
+    return min(max(LAG_US // model.tick_us, 1), 250)
 
 
 def _laid_out(model: SegmentModel) -> tuple[list[_State], list[_Ring]]:

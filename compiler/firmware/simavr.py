@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 
 from . import FirmwareError
+from .assembly import FLAGS, glove_size
 from .layout import Layout
 from .probes import Answers, Frames, Lost, check_frames, record_files, with_lost
 from .tools import AVR_COMPILER, HOST_COMPILER, STRICT, Tool, call, find, lacking, workshop
@@ -104,20 +105,15 @@ def run(
     command = [find(AVR_COMPILER), *STRICT, *flags]
     program = harness("simavr_classify")
     main = record_files(name, layout, "avr", answer, lost=lost is not None)
-    sent, function, held = (
-        with_lost(frames, lost),
-        answer if lost is None else "answer",
-        "input" if lost is None else "record",
-    )
+    sent, function = with_lost(frames, lost), answer if lost is None else "answer"
     with workshop({**files, **main}) as folder:
         sources = sorted(path for path in (*files, *main) if path.endswith((".c", ".S")))
         call([*command, *sources, "-o", "classifier.elf"], folder)
         found = _symbols(folder)
-        spans = (
-            _span(found, f"thenar_{name}_{held}", sent.shape[1]),
-            _span(found, f"thenar_{name}_scores", 2 * len(layout.start)),
-        )
-        places = (hex(_symbol(found, symbol)[0]) for symbol in (f"thenar_{name}_{function}", "_end"))
+        glove, scores = _symbol(found, "glove", glove_size(layout)), 2 * len(layout.start)
+        given = glove + 2 * scores + FLAGS if lost is None else _symbol(found, f"thenar_{name}_record", sent.shape[1])
+        spans = f"{given:#x}:{sent.shape[1]}", f"{glove:#x}:{scores}"
+        places = (hex(_symbol(found, symbol)) for symbol in (f"thenar_{name}_{function}", "_end"))
         printed = call([str(program), part, str(_CLOCK_HZ), "classifier.elf", *places, *spans], folder, sent.tobytes())
     answers = _answers(printed, len(frames), layout)
     return answers if lost is None else replace(answers, cost=None, unit="", stack=None)
@@ -130,17 +126,14 @@ def _symbols(folder: Path) -> dict[str, tuple[int, int]]:
     return {word[0]: (int(word[2], 16), int(word[3], 16) if len(word) > 3 else 0) for word in words}
 
 
-def _symbol(found: Mapping[str, tuple[int, int]], name: str) -> tuple[int, int]:
+def _symbol(found: Mapping[str, tuple[int, int]], name: str, size: int | None = None) -> int:
+    """Return the address of a symbol, which has `size` bytes where that is given. Raises FirmwareError."""
     if name not in found:
         raise FirmwareError(f"the compiled program has no {name}")
-    return found[name]
-
-
-def _span(found: Mapping[str, tuple[int, int]], name: str, size: int) -> str:
-    address, held = _symbol(found, name)
-    if held != size:
+    address, held = found[name]
+    if size not in (None, held):
         raise FirmwareError(f"{name} has {held} bytes in the compiled program, its layout says {size}")
-    return f"{address:#x}:{size}"
+    return address
 
 
 def _answers(printed: bytes, frames: int, layout: Layout) -> Answers:

@@ -2,6 +2,7 @@
 
 import hashlib
 import re
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -96,10 +97,30 @@ def check_name(name: str) -> None:
         )
 
 
+def identifiers(texts: Sequence[str]) -> list[str]:
+    """Return for each text the end of an identifier of C, in capitals, unlike all others: "index tip" is INDEX_TIP."""
+    found: dict[str, None] = {}
+    for number, text in enumerate(texts):
+        plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().upper()
+        word = shown = re.sub(r"[^A-Z0-9]+", "_", plain).strip("_") or str(number)
+        while word in found:
+            word = f"{shown}_{number}" if word == shown else f"{word}_"
+        found[word] = None
+    return list(found)
+
+
 def inputs_in_words(switches: int, joints: int) -> str:
     """Return how many inputs there are, leaving out what there is none of: "31 switches and 1 joint"."""
     counts = ((switches, "switch", "switches"), (joints, "joint", "joints"))
     return " and ".join(f"{count} {one if count == 1 else more}" for count, one, more in counts if count)
+
+
+def joint_in_words(joint: Calibration) -> str:
+    """Return a joint and what its codes mean: "thumb: code 0 = 0 deg, 255 = 90 deg"."""
+    if joint.unit == "raw":
+        return f"{joint.name}: the glove's own codes"
+    first, last = ((joint.code_a, joint.value_a), (joint.code_b, joint.value_b))
+    return f"{joint.name}: code {first[0]} = {first[1]:g} {joint.unit}, {last[0]} = {last[1]:g} {joint.unit}"
 
 
 def switches_in_words(numbers: Sequence[int]) -> str:

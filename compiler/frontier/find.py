@@ -36,13 +36,14 @@ from .equipment import Equipment, equipment_for
 from .finalists import OTHERS, PRICE_S, Close, finalists, look_closely, papers_depth, papers_tables
 from .latency import Pace, latencies
 from .measure import TRIAL_S, measured
+from .moving import Moving
 from .plots import PICTURES, pictures
 from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, Way, frontier_to_bytes
 from .screen import FEWER_JOINTS, OTHER_TRAINERS, QUICK_PRICE_S, Screened, screen, screen_fewer, screen_others
 from .search import JOINTS, TAXEL_LEVELS, Candidate, Search, available_inputs, curve_ways, ways
 from .stream import Stream, stream_of
 from .survey import Cuts, Survey, fit_s, path_s, settle_s
-from .timing.scan_times import records_of, scan_times
+from .timing.scan_times import Records, records_of, scan_times
 from .timing.wirings import Wiring, reads_by_itself, wirings
 from .words import csv_bytes
 
@@ -65,6 +66,8 @@ _MARKED, _DESIGNS, _DIFFERENT, _CHECKED = 3, 2, 0.8, 30
 _WIDER = 3
 # So many placements are tried with fewer joints.
 _FEWER = 5
+# Expected seconds of one core to learn what segments cost, and to play a stream.
+_LEARNT_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,34 +182,53 @@ def find_frontier(
     made = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
         cache = Cache(store, report or _unheard, jobs=jobs, cluster=cluster)
-        try:
-            names = [joint.name for joint in grasp_set.joints]
-            records = records_of(
-                names,
-                joint_us,
-                None if harness is None else harness.cyberglove,
-                wire_only=record_time == "wire",
-                filtered=filtered,
-                masked=not reads_by_itself(target),
-            )
+        with _taken_back_if_refused(made):
+            records = _records(grasp_set, harness, target, joint_us, record_time, filtered)
             equipment = equipment_for(target, _wirings(grasp_set, harness, target), cache, records)
-            untimed = (_UNTIMED.format(list_names(names)),) if records.how == "unknown" else ()
-            renewed = (_RENEWED,) if store.renewed else ()
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
             played = _stream(survey, stream)
             own = () if build is None else (own_build(build, grasp_set, equipment),)
-        except (FrontierError, BuildError, HarnessError):
-            # What was refused before its work began leaves nothing; what came by meanwhile stays.
-            with suppress(OSError):
-                for path in made:
-                    (path.rmdir if path.is_dir() else path.unlink)()
-            raise
         cache.foresee(foreseen(survey))
+        untimed = (_UNTIMED.format(list_names(grasp_set.joint_names)),) if records.how == "unknown" else ()
+        renewed = (_RENEWED,) if store.renewed else ()
         found = _found(survey, played, wanted or Wanted(), own, (*renewed, *untimed, *lacking))
         if output is not None:
             # The store goes into the new folder as the same file, and nobody else may have it meanwhile.
             publish_folder(_documents(found), output, kept_entries, FrontierError)
     return found
+
+
+@contextmanager
+def _taken_back_if_refused(made: Sequence[Path]) -> Iterator[None]:
+    """Take back files and folders that a run has made if what it was asked is refused: it leaves nothing. What came by
+    meanwhile stays.
+    """
+    try:
+        yield
+    except (FrontierError, BuildError, HarnessError):
+        with suppress(OSError):
+            for path in made:
+                (path.rmdir if path.is_dir() else path.unlink)()
+        raise
+
+
+def _records(
+    grasp_set: GraspSet,
+    harness: Harness | None,
+    target: str,
+    joint_us: float | None,
+    record_time: RecordTime,
+    filtered: bool,
+) -> Records:
+    """Return what reading the joints takes, by what is known of it."""
+    return records_of(
+        grasp_set.joint_names,
+        joint_us,
+        None if harness is None else harness.cyberglove,
+        wire_only=record_time == "wire",
+        filtered=filtered,
+        masked=not reads_by_itself(target),
+    )
 
 
 def _samples(grasp_set: GraspSet) -> Samples:
@@ -331,7 +353,7 @@ def foreseen(survey: Survey) -> dict[str, float]:
         "prices": last * PRICE_S,
         "simulations": last * _DESIGNS * TRIAL_S * simulated,
         "checks": _CHECKED * TRIAL_S * simulated,
-        "latencies": last * (2.0 + _DESIGNS),
+        "latencies": last * (2.0 + _DESIGNS * (_LEARNT_S if survey.grasp_set.is_none.any() else 1.0)),
     }
 
 
@@ -391,11 +413,12 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
     set's own test rows does not hold.
     """
     fold, grouped = survey.cuts.screening[0], dict[Candidate, list[Design]]()
+    moving = Moving.of(survey.grasp_set, fold.train, survey.search.seed)
     for design in kept:
         grouped.setdefault(design.close.screened.choice, []).append(design)
     calls = [
         latencies.call(
-            2.0 + len(mine),
+            2.0 + len(mine) * (_LEARNT_S if moving else 1.0),
             survey.read(choice, fold),
             fold.train,
             survey.columns(choice, fold),
@@ -405,6 +428,7 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
                 for design in mine
             ),
             survey.training(choice, fold),
+            moving and moving.reading(survey.elements(choice.levels, fold), survey.joints(choice, fold)),
         )
         for choice, mine in grouped.items()
     ]

@@ -30,6 +30,7 @@ from ..samples import Columns, Samples
 from ..tables.quantise import integer_scores
 from ..trainers.base import Training
 from .cache import stored
+from .moving import Moving
 from .points import DecisionKind, FrontierError, Latency
 from .price import Tabled, tables_of
 from .stream import Stream
@@ -38,6 +39,8 @@ NOTHING = -1
 # So many frames must be left for it to be worth while to work out how many of them decide nothing.
 _WORTHWHILE = 4
 
+# How is decided: by candidates under a policy, or by segments, of a model (None: the usual one).
+Deciding = Policy | SegmentModel | None
 # From a frame's time on, this is decided; None: nothing.
 Decided = tuple[int, int | None]
 
@@ -88,9 +91,9 @@ def stretches(scores: NDArray[np.int32], at_us: NDArray[np.int64], step_us: int)
     return Stretches(scores[kept], np.append(due[kept], due[-1]), step_us)
 
 
-def decisions(tables: IntegerTables, frames: Stretches, policy: Policy | None) -> Decisions:
+def decisions(tables: IntegerTables, frames: Stretches, policy: Deciding) -> Decisions:
     """Return what `thenar run` decides under `policy` on these frames, each whole and seen once, by both devices at the
-    same time; None: which segments it says are held.
+    same time; by segments: which it says are held.
     """
     decider, scorer = decider_of(tables, policy), Scorer(tables)
     found: list[Decided] = []
@@ -105,10 +108,10 @@ def decisions(tables: IntegerTables, frames: Stretches, policy: Policy | None) -
     )
 
 
-def decider_of(tables: IntegerTables, policy: Policy | None) -> Decider:
-    """Return the decider that the live recogniser has under `policy`; None: its segments."""
-    if policy is None:
-        return _Segments(tables)
+def decider_of(tables: IntegerTables, policy: Deciding) -> Decider:
+    """Return the decider that the live recogniser has under `policy`."""
+    if policy is None or isinstance(policy, SegmentModel):
+        return _Segments(tables, policy)
     if policy.error_rate is None:
         return _Hysteresis(Decision(policy.lead_steps(tables.scale), policy.dwell_us, policy.hold_us))
     test = _Test(tables.n_classes, tables.scale, policy.error_rate, policy.hold_us, policy.spacing_us)
@@ -116,10 +119,10 @@ def decider_of(tables: IntegerTables, policy: Policy | None) -> Decider:
 
 
 class _Segments:
-    """Segments of the usual model, with the usual lag. Frames between two ticks change nothing."""
+    """Segments of a model, None: the usual one, with the usual lag. Frames between two ticks change nothing."""
 
-    def __init__(self, tables: IntegerTables) -> None:
-        model = SegmentModel.usual(tables.n_classes, has_none=False, scale=tables.scale)
+    def __init__(self, tables: IntegerTables, model: SegmentModel | None) -> None:
+        model = model or SegmentModel.usual(tables.n_classes, has_none=False, scale=tables.scale)
         self._live = LiveSegments(model, [str(number) for number in range(tables.n_classes)], Policy().lag_us or 0)
 
     def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
@@ -287,17 +290,34 @@ class Pace(Struct, frozen=True):
     asked: float = 1.0
 
 
-@stored(3)
+@stored(4)
 def latencies(
-    samples: Samples, rows: Rows, columns: Columns, stream: Stream, paces: tuple[Pace, ...], training: Training
+    samples: Samples,
+    rows: Rows,
+    columns: Columns,
+    stream: Stream,
+    paces: tuple[Pace, ...],
+    training: Training,
+    moving: Moving | None = None,
 ) -> tuple[tuple[Latency, ...], ...]:
     """Train on some rows, on the switches `columns` and the joints; return how long a stream keeps one waiting at every
     pace, for each of its decisions. The stream holds none of the rows.
+
+    moving  the same rows with those in which nothing is held: segments are decided on by tables that know these, and
+            at costs learnt from them. None: segments have the usual costs
     """
     wanted = tuple(dict.fromkeys(pace.tabled for pace in paces))
     tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, wanted, training)}
+    whole = tuple(dict.fromkeys(pace.tabled for pace in paces if "segments" in pace.decisions))
+    learnt = moving.segmenting(columns, whole, training) if moving and whole else {}
+
+    def of(pace: Pace, kind: DecisionKind) -> Latency:
+        if kind == "segments" and pace.tabled in learnt:
+            return latency(learnt[pace.tabled][0], columns, stream, pace.frame_us, learnt[pace.tabled][1])
+        return latency(tables[pace.tabled], columns, stream, pace.frame_us, POLICIES[kind])
+
     return tuple(
-        tuple(latency(tables[pace.tabled], columns, stream, pace.frame_us, POLICIES[kind]) for kind in pace.decisions)
+        tuple(of(pace, kind) for kind in pace.decisions)
         if pace.slow_us is None
         else (latency_on_demand(tables[pace.tabled], columns, stream, pace),)
         for pace in paces
@@ -314,7 +334,7 @@ class _Held:
 
 
 def latency(
-    tables: IntegerTables, columns: Sequence[int], stream: Stream, frame_us: float, policy: Policy | None
+    tables: IntegerTables, columns: Sequence[int], stream: Stream, frame_us: float, policy: Deciding
 ) -> Latency:
     """Return the latency of tables on a stream whose frames follow one another every frame_us, in whole microseconds.
 
@@ -363,9 +383,9 @@ def latency_on_demand(tables: IntegerTables, columns: Sequence[int], stream: Str
 
 
 def decided_on(
-    tables: IntegerTables, columns: Sequence[int], stream: Stream, step_us: int, policy: Policy | None
+    tables: IntegerTables, columns: Sequence[int], stream: Stream, step_us: int, policy: Deciding
 ) -> Decisions:
-    """Return what is decided under `policy` (None: by segments) on a stream whose frames begin every step_us, the first
+    """Return what is decided under `policy` on a stream whose frames begin every step_us, the first
     with the stream.
     """
     codes = stream.codes[:, : None if tables.n_joints else 0]

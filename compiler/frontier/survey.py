@@ -379,7 +379,7 @@ def rank_joints(samples: Samples, rows: Rows, columns: Columns) -> Columns:
     return joint_order(samples.rows(rows).keeping(columns))
 
 
-@stored(1)
+@stored(2)
 def choose_settings(
     samples: Samples, rows: Rows, columns: Columns, candidates: tuple[Training, ...], seed: int, by_subject: bool
 ) -> Fitting:

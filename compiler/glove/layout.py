@@ -123,13 +123,19 @@ class End:
 
 
 def as_soldered(harness: Harness, boards: Sequence[BoardPins | None]) -> Harness:
-    """Return the harness with the buses of its boards as its own, and without the keys that are read through them."""
+    """Return the harness with the buses of its boards as its own, and without the keys that are read through them; a
+    stream is sent by a board.
+    """
     behind = {number: board.bus for number, board in enumerate(boards) if board is not None and board.bus is not None}
     scanners = tuple(
         replace(scanner, switches=()) if number in behind else scanner
         for number, scanner in enumerate(harness.scanners)
     )
-    return replace(harness, scanners=scanners, buses=(*harness.buses, *behind.values()))
+    senders = tuple(
+        ScannerWiring(port=stream.port, switches=stream.switches, taxels=tuple(stream.taxels))
+        for stream in harness.streams
+    )
+    return replace(harness, scanners=(*scanners, *senders), buses=(*harness.buses, *behind.values()), streams=())
 
 
 def elements_of(harness: Harness, names: Sequence[str]) -> tuple[str, ...]:

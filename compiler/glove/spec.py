@@ -179,11 +179,16 @@ def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) 
 
 def _portable(harness: Harness) -> Harness:
     """Return the harness with the name alone of its calibration: the file belongs beside the spec's glove.toml."""
+
+    def named(path: str | None) -> str | None:
+        return (path or "").replace("\\", "/").rsplit("/", 1)[-1] or None
+
     glove = harness.cyberglove
-    if glove is None or glove.calibration is None:
-        return harness
-    name = glove.calibration.replace("\\", "/").rsplit("/", 1)[-1]
-    return replace(harness, cyberglove=replace(glove, calibration=name or None))
+    return replace(
+        harness,
+        cyberglove=None if glove is None else replace(glove, calibration=named(glove.calibration)),
+        streams=tuple(replace(stream, calibration=named(stream.calibration)) for stream in harness.streams),
+    )
 
 
 def _of_boards(boards: Sequence[BoardPins | None]) -> Iterator[str]:

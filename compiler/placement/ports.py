@@ -113,6 +113,9 @@ def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
         channels = sorted({channel for channel, *_ in levels})
         port_of |= {switch: len(us) + channels.index(channel) for channel, _, switch in levels}
         us += [taxels_us(board, len(channels)) / len(channels) for _ in channels]
+    for stream, read in zip(harness.streams, scan.streams, strict=True):
+        port_of |= {pair[-1]: len(us) for pair in (*read.switches, *read.levels)}
+        us.append(float(stream.period_us))
     lacking = next((name for number, name in enumerate(names) if number not in port_of), None)
     if lacking is not None:
         raise HarnessError(

@@ -60,7 +60,9 @@ class _Grasp:
         """Return whether everything that the session records was read."""
         read = self.switches is not None and not self.switches.lost | self.switches.unread
         read = read and len(self.counts) == len(session.taxels) and None not in self.counts
-        return (read or not (session.switches or session.taxels)) and (self.glove is not None or not session.sensors)
+        # A byte of 0 is a sensor that was not measured.
+        measured = not session.sensors or (self.glove is not None and 0 not in self.glove.sensors)
+        return measured and (read or not (session.switches or session.taxels))
 
 
 @dataclass(slots=True)

@@ -29,7 +29,7 @@ def merge(sets: Mapping[str, GraspSet], each: By | None = None) -> GraspSet:
 
     They have the same switches and joints, in any order; the first set's order counts. Codes are shifted where two
     calibrations differ by whole codes, as those of two imports on one grid do. Taxonomies of the user's own are united.
-    Times are kept where all sets have them.
+    Times are kept where all sets have them; rows that are each a trial of their own need none, and get 0.
 
     Parameters
     ----------
@@ -59,7 +59,9 @@ def merge(sets: Mapping[str, GraspSet], each: By | None = None) -> GraspSet:
         _check_columns(names[0], first, name, other)
     taxonomy = _united(names, own)
     _check_trials(names, own)
-    timed = all(found.times_us.size or not len(found) for found in own)
+    still = [len(np.unique(found.movement_ids)) == len(found) for found in own]
+    timed = all(found.times_us.size or alone for found, alone in zip(own, still, strict=True))
+    timed = timed and any(found.times_us.size for found in own)
     joints, codes = _coded(names, [(found.joints, found.codes) for found in own])
     taxel_columns, taxels = _coded(names, [(found.taxel_columns, found.taxels) for found in own])
     return GraspSet(
@@ -77,8 +79,12 @@ def merge(sets: Mapping[str, GraspSet], each: By | None = None) -> GraspSet:
         independent=first.independent,
         taxels=taxels,
         taxel_columns=taxel_columns,
-        times_us=np.concatenate([found.times_us if timed else found.times_us[:0] for found in own]),
+        times_us=np.concatenate([_times(found) if timed else found.times_us[:0] for found in own]),
     )
+
+
+def _times(found: GraspSet) -> NDArray[np.int64]:
+    return found.times_us if found.times_us.size else np.zeros(len(found), np.int64)
 
 
 def split(grasp_set: GraspSet, by: By) -> dict[str, GraspSet]:

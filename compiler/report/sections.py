@@ -272,6 +272,11 @@ def scan_sentences(content: ReportContent) -> Iterator[str]:
             f"{counted(len(board.switches), 'key')}, {microseconds(scanner_us(board))} µs a bitmap on its line"
             + (f"{codes}." if taxels else ".")
         )
+    for stream, read in zip(harness.streams, scan.streams, strict=True):
+        yield (
+            f"The stream from {stream.port} shows {counted(len(read.switches), 'kept switch', 'kept switches')} and "
+            f"{counted(len(read.levels), 'level')} of taxels, a row every {microseconds(stream.period_us)} µs."
+        )
     if harness.cyberglove is not None and joints:
         us, glove = microseconds(glove_us(harness.cyberglove, joints)), harness.cyberglove
         how = "by the vendor's formula" if glove.record_us is None else "as it was measured"

@@ -31,7 +31,7 @@ _MOST_NATS = 6.0  # a frame tells no more, before its temperature
 # The shortest duration is a half of the shortest seen, and no more than so many ticks.
 _SHORTEST, _LONGEST_LEAST = 0.5, 30
 # Temperatures; nats of a score by which nothing held must lead; nats that a change costs besides.
-TEMPERATURES, LEADS, CHANGES = (0.35, 0.2, 0.1, 0.8), (0.0, 1.0, -1.0), (2.0, 5.0)
+TEMPERATURES, LEADS, CHANGES = (0.35, 0.2, 0.1, 0.8), (0.0, 1.0, -1.0, 2.0, -2.0), (2.0, 5.0)
 # Ticks that are decoded to try a model: of longer streams, the first.
 _TRIED_TICKS = 20_000
 

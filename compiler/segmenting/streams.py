@@ -33,20 +33,29 @@ class Stream:
     start_us: int
 
 
+def moving(grasp_set: GraspSet) -> NDArray[np.bool_]:
+    """Return (n,) which rows are of a whole movement, and no trial of their own."""
+    movements = grasp_set.movement_ids
+    return np.asarray((np.bincount(movements, minlength=1)[movements] > 1) & (not grasp_set.independent))
+
+
 def streams_of(grasp_set: GraspSet, tick_us: int = TICK_US) -> tuple[Stream, ...]:
     """Return the streams of a set, in the order of their first rows.
 
-    A stream ends where the time does not rise, and before a pause. Raises SegmentingError where rows are no movements:
-    where each is a trial of its own.
+    A stream ends where the time does not rise, and before a pause. A row that is a trial of its own, as those of static
+    grasps are, is of no stream. Raises SegmentingError where all rows are.
     """
-    if grasp_set.independent or len(np.unique(grasp_set.movement_ids)) == len(grasp_set):
+    within = moving(grasp_set)
+    if not within.any():
         raise SegmentingError(
             "each row of the set is a trial of its own: segments need whole movements, as `thenar record` and "
             'scenes with rows = "all" make them'
         )
     owner, found = groups(grasp_set.subjects, grasp_set.sessions), []
     for number in range(int(owner.max()) + 1):
-        own = np.flatnonzero(owner == number)
+        own = np.flatnonzero((owner == number) & within)
+        if not len(own):
+            continue
         times = grasp_set.times_us[own] if grasp_set.times_us.size else TICK_US * np.arange(len(own))
         steps = np.diff(times)
         cuts = np.flatnonzero((steps <= 0) | (steps > PAUSE_US)) + 1

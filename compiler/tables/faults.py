@@ -221,6 +221,9 @@ def groups_of(scan: ScanMap | None, sources: Sequence[str], n_joints: int) -> Ma
     for number, (keys, converted) in enumerate(zip(boards, taxels or ((),) * len(boards), strict=True)):
         if own := tuple(switch for *_, switch in (*keys, *converted)):
             found[f"scanner board {number + 1}"] = own
+    for number, stream in enumerate(() if scan is None else scan.streams):
+        if own := tuple(pair[-1] for pair in (*stream.switches, *stream.levels)):
+            found[f"stream {number + 1}"] = own
     if n_joints:
         found["the joints' device"] = tuple(range(len(sources), len(sources) + n_joints))
     return found

@@ -39,7 +39,15 @@ class Logit(Trainer):
         from ..additive.logit import BINS, fit_logit
 
         given = {**settings, "max_bins": settings["max_bins"] or BINS, "linear": bool(settings["linear"])}
-        return fit_logit(samples.inputs, samples.labels, samples.n_classes, **given).score_tables(samples.n_switches)
+        tables = fit_logit(samples.inputs, samples.labels, samples.n_classes, **given, **of_none(samples))
+        return tables.score_tables(samples.n_switches)
+
+
+def of_none(samples: "Samples") -> dict[str, Any]:
+    """Return what the logit is given besides where some rows show nothing held: all switches say that alike, and rows
+    of static grasps do not.
+    """
+    return {"counted": samples.n_switches, "held": samples.given_held} if samples.has_none else {}
 
 
 MEMBER = Logit()

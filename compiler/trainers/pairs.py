@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from .base import Report, Setting, Trainer
 from .logit import MEMBER as LOGIT
+from .logit import of_none
 
 if TYPE_CHECKING:
     from ..samples import Samples
@@ -35,7 +36,9 @@ class Pairs(Trainer):
         from ..additive.pairs import fit_pairs
 
         given = {**settings, "max_bins": settings["max_bins"] or BINS}
-        return fit_pairs(samples.switches, samples.codes, samples.labels, samples.n_classes, **given)
+        return fit_pairs(
+            samples.switches, samples.codes, samples.labels, samples.n_classes, **given, **of_none(samples)
+        )
 
 
 MEMBER = Pairs()

@@ -11,7 +11,9 @@ from ..scanner_protocol import (
     ANALOG,
     ANALOG_VERSION,
     MOST_ASKED,
+    NO_GRASP,
     PROTOCOL,
+    SEGMENTS,
     UNREAD,
     WITHOUT_DIODES,
     Analog,
@@ -28,9 +30,11 @@ from ..scanner_protocol import (
     Mask,
     MessageError,
     Ping,
+    Segment,
     SetChannels,
     SetDebounce,
     SetRate,
+    SetSegments,
     State,
     ToBoard,
     encode,
@@ -72,6 +76,7 @@ class ScannerBoard:
     channels, bits of its converter: it speaks version 2 where there are any
     channel_us     how long a channel takes, its multiplexer's settling included
     codes          what the channels have now, in order, None for one that cannot be read; others have 0
+    segments       whether it follows segments
 
     Without STATEs it sends an EVENT for every change. It does not debounce: what it is told of that it only says again.
     """
@@ -90,6 +95,7 @@ class ScannerBoard:
         channels: int = 0,
         bits: int = 10,
         channel_us: int = 208,
+        segments: bool = False,
     ) -> None:
         self.rows, self.columns, self.diodes, self.clock_us, self.board = rows, columns, diodes, clock_us, board
         self.rate = SetRate(scan_us, state_us, heartbeat_us)
@@ -97,6 +103,8 @@ class ScannerBoard:
         self.analog = Channels(ANALOG_VERSION, 0, bits, 0, 0, channels)
         self.channel_us = channel_us
         self.codes: Sequence[int | None] = ()
+        self.segment = Segment(0, 0, NO_GRASP, 0) if segments else None
+        self._asked = False
         self.overruns = self.refused = self.dropped = 0
         self._closed: Mask = 0
         self._lost: Mask = 0
@@ -155,6 +163,11 @@ class ScannerBoard:
         """Return what it sends of a grasp; a margin beyond what the frame can say is the largest that it can."""
         return [self._sent(Grasp(self._clock(now), grasp, min(margin, _MOST_MARGIN), flags))]
 
+    def segmented(self, number: int, grasp: int, state: int, now: int) -> list[bytes]:
+        """Return what it sends of a segment: nothing before it is asked to."""
+        self.segment = Segment(self._clock(now), number & 0xFFFF, grasp, state)
+        return [self._sent(self.segment)] if self._asked else []
+
     def receive(self, data: bytes, now: int) -> list[bytes]:
         """Return the answers to the frames that `data` completes."""
         answers = []
@@ -180,6 +193,8 @@ class ScannerBoard:
                 self.debounce = message
             case SetChannels():
                 return self._measure(message, now)
+            case SetSegments():
+                return self._tell_segments(bool(message.wanted), now)
         return [self._sent(self._hello(message.token if isinstance(message, Ping) else 0, now))]
 
     def _measure(self, asked: SetChannels, now: int) -> list[bytes]:
@@ -196,6 +211,14 @@ class ScannerBoard:
         self.analog = replace(analog, token=asked.token, analog_us=analog_us, wanted=wanted)
         self._analog_at = now + analog_us
         return [self._sent(self.analog)]
+
+    def _tell_segments(self, wanted: bool, now: int) -> list[bytes]:
+        """Send segments from now on, or none; a board without any does not understand."""
+        if self.segment is None:
+            self.refused += 1
+            return []
+        self._asked, self.segment = wanted, replace(self.segment, time_us=self._clock(now))
+        return [self._sent(self.segment)]
 
     def _keys(self, closed: Mask, unread: Mask, whole: bool, now: int) -> list[bytes]:
         """Take a scan and return what it sends of keys. The first one tells all of them, and has no changes."""
@@ -231,6 +254,7 @@ class ScannerBoard:
 
     def _hello(self, token: int, now: int) -> Hello:
         flags = (0 if self.diodes else WITHOUT_DIODES) | (ANALOG if self.analog.channels else 0)
+        flags |= SEGMENTS if self.segment is not None else 0
         who = (PROTOCOL, flags, token, self.board, 1, 0, 0, self.rows, self.columns)
         rate, debounce = self.rate, self.debounce
         how = (rate.scan_us, rate.state_us, rate.heartbeat_us, debounce.press_us, debounce.release_us)
@@ -302,6 +326,11 @@ class EmulatedScanner(Closing):
         with self._condition:
             self._send(self.board.recognised(grasp, margin, flags, self._now()))
 
+    def segment(self, number: int, grasp: int, state: int) -> None:
+        """Say that the board is in this segment, with the values of SEGMENT's fields, if the host has asked for it."""
+        with self._condition:
+            self._send(self.board.segmented(number, grasp, state, self._now()))
+
     def reboot(self, board: ScannerBoard | None = None) -> None:
         """Start again as after a power cut, as `board` if given: numbers and clock from their beginnings."""
         with self._condition:
@@ -314,6 +343,7 @@ class EmulatedScanner(Closing):
                 channels=old.analog.channels,
                 bits=old.analog.bits,
                 channel_us=old.channel_us,
+                segments=old.segment is not None,
             )
             self._booted_us = monotonic_ns() // 1000
             self._send(self.board.boot(0))

@@ -1,5 +1,6 @@
 """A firmware target of your own: the classifier as one header for C++17, as header-only libraries are."""
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -23,10 +24,11 @@ class SingleHeader(Target):
     """A package of one file, for any part that has a C++ compiler."""
 
     def files(self, library: "Library") -> dict[str, str]:
-        """Return path -> text: the library's header and source in one."""
+        """Return path -> text: the library's header and sources in one."""
         name = f"thenar_{library.name}"
-        declared, defined = library.files[f"{name}.h"], library.files[f"{name}.c"]
-        defined = defined.replace(f'#include "{name}.h"\n', "")
+        declared = library.files[f"{name}.h"]
+        parts = (library.files[f"{name}{part}"] for part in ("_tables.h", "_tables.c", ".c"))
+        defined = re.sub(r'#include "thenar_.*\n', "", "\n".join(parts))
         switch = f"{name.upper()}_IMPLEMENTATION"
         return {f"{name}.hpp": HEADER.format(name=name, switch=switch, declared=declared, defined=defined)}
 

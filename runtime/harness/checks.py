@@ -10,7 +10,7 @@ from thenar.drivers.spi.chips import SPI_CHIPS
 
 from ..names import fault, nearest, shortened
 from ..toml_source import Place, spelled
-from .wiring import BusWiring, ChipWiring, GloveWiring, Harness, SpiWiring
+from .wiring import BusWiring, ChipWiring, GloveWiring, Harness, SpiWiring, StreamWiring
 
 Fault = tuple[Place, str]
 _SENSORS = (18, 22)
@@ -32,6 +32,11 @@ def faults(harness: Harness) -> Iterator[Fault]:
         yield from _of_bus(("bus", number), bus)
     for number, chip in enumerate(harness.spi):
         yield from _of_spi(("spi", number), chip)
+    for number, stream in enumerate(harness.streams):
+        yield from _of_stream(("stream", number), stream)
+    joints = [("stream", number, "joints") for number, stream in enumerate(harness.streams) if stream.joints]
+    for place in joints if harness.cyberglove is not None else joints[1:]:
+        yield place, "another device measures joints already: they come from one"
     yield from _of_elements(harness)
 
 
@@ -48,11 +53,14 @@ def _of_devices(harness: Harness) -> Iterator[Fault]:
     places: list[tuple[Place, str]] = [(("scanner", n, "port"), line.port) for n, line in enumerate(harness.scanners)]
     places += [(("bus", n, "device"), bus.device) for n, bus in enumerate(harness.buses)]
     places += [(("spi", n, "device"), chip.device) for n, chip in enumerate(harness.spi)]
+    places += [(("stream", n, "port"), stream.port) for n, stream in enumerate(harness.streams)]
     if harness.cyberglove is not None:
         places.insert(0, (("cyberglove", "port"), harness.cyberglove.port))
     seen: dict[str, Place] = {}
     for place, device in places:
-        if reason := (device_fault if place[-1] == "device" else port_fault)(device):
+        fault_of = device_fault if place[-1] == "device" else port_fault
+        # The source that opens a stream says what is wrong with its port.
+        if place[0] != "stream" and (reason := fault_of(device)):
             yield place, f"{shortened(repr(device))} {reason}"
         if device in seen:
             yield place, f"{device} is {spelled(seen[device])} already: one device, one entry"
@@ -98,6 +106,35 @@ def _of_spi(place: Place, chip: SpiWiring) -> Iterator[Fault]:
         yield (*place, "clock_hz"), f"{chip.clock_hz} Hz is too fast for the {chip.kind}: at most {chip.chip.most_hz}"
 
 
+def _of_stream(place: Place, stream: StreamWiring) -> Iterator[Fault]:
+    if not stream.used:
+        yield place, "the keys switches, joints and taxels are missing: it has one of them; doctor --line proposes them"
+    known = tuple(filter(None, stream.columns)) or (*stream.used, *([] if stream.time is None else [stream.time]))
+    named: list[tuple[Place, str]] = [(("time",), stream.time)] if stream.time is not None else []
+    named += [(("switches", number), name) for number, name in enumerate(stream.switches)]
+    named += [((kind, name), name) for kind in ("joints", "taxels") for name in getattr(stream, kind)]
+    for where, name in named:
+        if name not in known:
+            yield (*place, *where), f"there is no column {shortened(repr(name))}{nearest(name, known)}"
+        if stream.time == name and where != ("time",):
+            yield (*place, *where), f"{name!r} is the sender's clock"
+    yield from _of_values(place, stream)
+    columns = ((*place, "columns", number) for number in range(len(stream.columns)))
+    yield from _of_names(((where, name) for where, name in zip(columns, stream.columns, strict=True) if name), "column")
+
+
+def _of_values(place: Place, stream: StreamWiring) -> Iterator[Fault]:
+    for name in stream.thresholds:
+        if name not in stream.switches:
+            yield (*place, "thresholds", name), f"there is no switch {name!r}{nearest(name, stream.switches)}"
+    for kind, ranges in (("joints", stream.joints), ("taxels", stream.taxels)):
+        for name, (low, high) in ranges.items():
+            if low == high:
+                yield (*place, kind, name), f"a range from {low} to {high} is none: write the least and the greatest"
+    if stream.calibration is not None and not stream.joints:
+        yield (*place, "calibration"), "it is of joints, and there are none: taxels' are named under [taxels]"
+
+
 def _of_pins(place: Place, chip: ChipWiring | SpiWiring, usable: Sequence[str]) -> Iterator[Fault]:
     for pin in chip.pins:
         if pin not in chip.chip.pins:
@@ -127,6 +164,10 @@ def _of_elements(harness: Harness) -> Iterator[Fault]:
         for number, scanner in enumerate(harness.scanners):
             for key, names in (("switches", scanner.switches), ("taxels", scanner.taxels)):
                 yield from ((("scanner", number, key, place), name) for place, name in enumerate(names) if name)
+        for number, stream in enumerate(harness.streams):
+            yield from ((("stream", number, "switches", place), name) for place, name in enumerate(stream.switches))
+            for key, ranges in (("joints", stream.joints), ("taxels", stream.taxels)):
+                yield from ((("stream", number, key, name), name) for name in ranges)
         chips: list[tuple[Place, ChipWiring | SpiWiring]] = [
             (("bus", n, "chip", m), chip) for n, bus in enumerate(harness.buses) for m, chip in enumerate(bus.chips)
         ]

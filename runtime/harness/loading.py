@@ -41,6 +41,11 @@ def _harness_of(source: TomlText, name: str) -> Harness:
 def _calibrated(harness: Harness, folder: Path) -> Harness:
     """Return the harness with the paths of its calibrations counted from `folder`."""
     glove, taxels = harness.cyberglove, harness.taxel_settings
+    streams = tuple(
+        replace(stream, calibration=str(folder.resolve() / stream.calibration)) if stream.calibration else stream
+        for stream in harness.streams
+    )
+    harness = replace(harness, streams=streams)
     if glove is not None and glove.calibration is not None:
         harness = replace(harness, cyberglove=replace(glove, calibration=str(folder.resolve() / glove.calibration)))
     if taxels.calibration is not None:

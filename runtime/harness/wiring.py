@@ -81,6 +81,52 @@ class ScannerWiring(_Table, frozen=True):
     mux: Literal["cd74hc4067"] | None = None
 
 
+Range = tuple[float, float]
+
+
+class StreamWiring(_Table, frozen=True):
+    """Rows of numbers that a board or another program sends: lines (`thenar.drivers.line_reader`), LSL, a ROS topic.
+
+    columns      the columns in their order, "" for one that nobody uses; (): the sender names them
+    time         the column with the sender's clock, in `time_unit`
+    rate_hz      how many rows come a second
+    switches     the columns that are switches: closed where the number is above the threshold, or, where `closed` is
+                 "low", where it is not; `thresholds` are those of single switches
+    joints       the columns that are joints, and the range of their numbers, which become the codes 1 to 255
+    taxels       the columns that are taxels, and the range of their numbers: of whole numbers, as many codes
+    calibration  path of a calibration of the joints
+    """
+
+    port: Text
+    baud: Baud = 115_200
+    columns: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)] = ()
+    time: Text | None = None
+    time_unit: Literal["s", "ms", "us"] = "ms"
+    rate_hz: Annotated[float, Meta(ge=0.1, le=10_000.0)] = 50.0
+    switches: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)] = ()
+    threshold: float = 0.5
+    thresholds: dict[str, float] = {}
+    closed: Literal["low", "high"] = "high"
+    joints: dict[str, Range] = {}
+    taxels: dict[str, Range] = {}
+    calibration: Text | None = None
+
+    @property
+    def used(self) -> tuple[str, ...]:
+        """The columns that are used, the sender's clock aside."""
+        return (*self.switches, *self.joints, *self.taxels)
+
+    @property
+    def sensor_names(self) -> tuple[str, ...]:
+        """The names of its joints, in the order of the frames' bytes."""
+        return tuple(self.joints)
+
+    @property
+    def period_us(self) -> int:
+        """From one row to the next."""
+        return round(1e6 / self.rate_hz)
+
+
 class MuxChannel(_Table, frozen=True):
     """A place behind a TCA9548A."""
 
@@ -181,22 +227,43 @@ class Harness(_Table, frozen=True):
     scanners: tuple[ScannerWiring, ...] = field(default=(), name="scanner")
     buses: tuple[BusWiring, ...] = field(default=(), name="bus")
     spi: tuple[SpiWiring, ...] = ()
+    streams: tuple[StreamWiring, ...] = field(default=(), name="stream")
     debounce: Debounce = Debounce()
     taxel_settings: TaxelSettings = field(default=TaxelSettings(), name="taxels")
 
     @property
     def switches(self) -> tuple[str, ...]:
-        """The names of all switches that are wired: the boards', then the chips', pin by pin."""
+        """The names of all switches that are wired: the boards', then the chips', pin by pin, then the streams'."""
         keys = (name for scanner in self.scanners for name in scanner.switches if name)
         chips = (chip for bus in self.buses for chip in bus.chips if not chip.measures)
-        return (*keys, *(name for chip in chips for name in chip.numbered_pins.values()))
+        streams = (name for stream in self.streams for name in stream.switches)
+        return (*keys, *(name for chip in chips for name in chip.numbered_pins.values()), *streams)
 
     @property
     def taxel_names(self) -> tuple[str, ...]:
-        """The names of all taxels that are wired: the boards', then the converters', channel by channel."""
+        """The names of all taxels that are wired: the boards', then the converters', channel by channel, then the
+        streams'.
+        """
         boards = (name for scanner in self.scanners for name in scanner.taxels if name)
         chips: list[ChipWiring | SpiWiring] = [chip for bus in self.buses for chip in bus.chips if chip.measures]
-        return (*boards, *(name for chip in (*chips, *self.spi) for name in chip.numbered_pins.values()))
+        streams = (name for stream in self.streams for name in stream.taxels)
+        return (*boards, *(name for chip in (*chips, *self.spi) for name in chip.numbered_pins.values()), *streams)
+
+    @property
+    def joint_device(self) -> GloveWiring | StreamWiring | None:
+        """What measures the joints: the CyberGlove, or a stream that has some."""
+        return self.cyberglove or next((stream for stream in self.streams if stream.joints), None)
+
+    @property
+    def sensor_names(self) -> tuple[str, ...]:
+        """The names of the joints' sensors, in the order of their bytes in a frame."""
+        device = self.joint_device
+        return () if device is None else device.sensor_names
+
+    @property
+    def calibration(self) -> str | None:
+        """The path of the joints' calibration."""
+        return None if self.joint_device is None else self.joint_device.calibration
 
     @property
     def on_chips(self) -> int:
@@ -232,3 +299,14 @@ class Harness(_Table, frozen=True):
         if self.spi or any(scanner.taxels for scanner in self.scanners):
             yield [(scanner.taxels, scanner.mux) for scanner in self.scanners]
             yield [(chip.kind, list(chip.numbered_pins.items())) for chip in self.spi]
+        if self.streams:
+            yield [
+                (
+                    each.switches,
+                    each.threshold,
+                    sorted(each.thresholds.items()),
+                    each.closed,
+                    *map(list, (each.taxels.items(), each.joints.items())),
+                )
+                for each in self.streams
+            ]

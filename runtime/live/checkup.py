@@ -8,7 +8,7 @@ from time import monotonic, perf_counter
 import msgspec
 
 from thenar.drivers.errors import ThenarError
-from thenar.drivers.scanner import BoardGrasp
+from thenar.drivers.scanner import Scanner
 
 from ..frames import SwitchFrame
 from ..harness.wiring import GloveWiring, Harness
@@ -16,8 +16,10 @@ from ..names import list_names
 from ..scanning.ports import whole_scan
 from ..scanning.scanmap import ScanMap
 from ..scanning.timing import ChipTime, glove_us, scan_us
+from ..sources.base import SOURCES
 from ..sources.cyberglove import GloveDevice
 from ..sources.i2c import I2cDevice, PortLevels
+from ..sources.rows import RowSource
 from ..sources.scanner import ScannerDevice
 from ..sources.spi import SpiConverter
 from ..taxels import Taxels, calibration_of
@@ -27,6 +29,8 @@ from .quarantine import Chattering, numbers
 SLOW = 1.5
 _SCANS = 101
 _LISTEN_S = 1.0
+# A board that its port's opening resets needs so long to begin.
+_STARTS_S = 3.0
 # The part that a finding on the record time of all sensors is of.
 RECORD = "a record"
 
@@ -62,6 +66,8 @@ def check_up(
         yield lambda: _glove(glove, sensors)
     for number in range(len(harness.scanners)):
         yield lambda number=number: _scanner(harness, number)  # type: ignore[misc]
+    for number in range(len(harness.streams)):
+        yield lambda number=number: _stream(harness, number)  # type: ignore[misc]
     for bus in sorted({port.bus for port in scan.ports}):
         look = _bus if bus < len(harness.buses) else _spi
         yield lambda bus=bus, look=look: look(harness, bus, scan)  # type: ignore[misc]
@@ -119,7 +125,7 @@ def _scanner(harness: Harness, number: int) -> tuple[Finding, ...]:
         device.close()
         device.open()
         measured = _gap(read)
-        remarks = (*_recognising(device.driver.grasp), *_counted(device), *_wrong(harness.switches, frames))
+        remarks = (*_recognising(device.driver), *_counted(device), *_wrong(harness.switches, frames))
     except ThenarError as wrong:
         return (Finding(device.name, "", False, float(device.period_us), None, (str(wrong),)),)
     finally:
@@ -131,6 +137,34 @@ def _scanner(harness: Harness, number: int) -> tuple[Finding, ...]:
     highest = None if analog is None else (1 << analog.bits) - 1
     wired = [name for name in harness.scanners[number].taxels if name]
     return (_told(found), *taxel_findings(device.name, wired, harness, frames, highest))
+
+
+def _stream(harness: Harness, number: int) -> tuple[Finding, ...]:
+    scan = whole_scan(harness, harness.switches, every_taxel=True)
+    made = (source for kind in SOURCES.values() for source in kind.sources(harness, harness.switches, scan))
+    streams = (source for source in made if isinstance(source, RowSource))
+    device = next(source for source in streams if source.wiring is harness.streams[number])
+    predicted, frames, rows = float(device.wiring.period_us), list[SwitchFrame](), 0
+    end = monotonic() + max(2 * _LISTEN_S, 5 * predicted / 1e6) + _STARTS_S
+    try:
+        device.open()
+        while (now := monotonic()) < end:
+            if (frame := device.read(_LISTEN_S / 10)) is not None:
+                frames += [frame] if isinstance(frame, SwitchFrame) else []
+                end = end if rows else now + max(2 * _LISTEN_S, 5 * predicted / 1e6)
+                rows += 1
+        measured = None if device.watch.hz is None else 1e6 / device.watch.hz
+        wrong = [f"{count.name} {count.value}" for count in device.counts()[2:] if count.value]
+        remarks = (*filter(None, [device.trouble()]), *([f"counted: {', '.join(wrong)}"] if wrong else []))
+        remarks = (*remarks, *_wrong(harness.switches, frames))
+    except ThenarError as error:
+        return (Finding(device.name, "", False, predicted, None, (str(error),)),)
+    finally:
+        device.close()
+    found = Finding(
+        device.name, "rows", bool(rows), predicted, measured, remarks or (() if rows else ("no row comes",))
+    )
+    return (found, *taxel_findings(device.name, tuple(device.wiring.taxels), harness, frames, None))
 
 
 def _wrong(switches: Sequence[str], frames: Sequence[SwitchFrame]) -> Iterator[str]:
@@ -175,12 +209,15 @@ def taxel_findings(
         yield Finding(device, f"taxel {name}", fault in ("", "saturated"), 0.0, None, tuple(remarks))
 
 
-def _recognising(grasp: BoardGrasp | None) -> tuple[str, ...]:
+def _recognising(board: Scanner) -> tuple[str, ...]:
     """Return a remark if the board recognises by itself."""
+    grasp, segment = board.grasp, board.segment
     if grasp is None:
         return ()
-    what = "no grasp type" if grasp.number is None else f"grasp type {grasp.number} of the build that it carries"
-    return (f"it recognises by itself, at last {what}, counted from 0",)
+    number = f"grasp type {grasp.number} of the build that it carries, counted from 0"
+    what = "no grasp type" if grasp.number is None else number
+    follows = "" if segment is None else f"; it follows segments, {segment.number} so far, the newest {segment.state}"
+    return (f"it recognises by itself, at last {what}{follows}",)
 
 
 def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[Finding, ...]:

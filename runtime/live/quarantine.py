@@ -12,8 +12,8 @@ in the same way), and nothing is taken to be less probable than 1/20: people do 
 switch that is stuck and nevertheless moves in a grasp is taken to be 1/32.
 
 If the model holds, the mean of the ratio is at most 1 while the switch works. Then a sum needs, in the mean, at least
-e^h grasps to reach h (G. Lorden, Ann. Math. Stat. 42, 1971). All sums together shall do so once in GRASPS grasps; so
-h is ln(2 * switches * GRASPS).
+e^h observations to reach h (G. Lorden, Ann. Math. Stat. 42, 1971). All sums together shall do so once in GRASPS grasps,
+of two observations each; so h is ln(2 * switches * 2 * GRASPS).
 
 A hand that never closes a switch looks like a switch that never closes. So a switch is called stuck open only after it
 was seen to close: the share of grasps in which it did when it should have, in this run, multiplies the build's share.
@@ -21,8 +21,10 @@ was seen to close: the share of grasps in which it did when it should have, in t
 A fault makes other inputs look wrong. So of several sums that reach h together only the largest counts; then the last
 grasps are weighed again without the switch that it is of.
 
-**A grasp** is one observation, however many frames it lasts: contacts that have not changed by half for SETTLED_US. An
-open hand between grasps is one, too.
+**A grasp** is one observation, however many frames it lasts: contacts that have not changed by half for SETTLED_US. The
+frame with the fewest contacts between two grasps, however short, is one, too, if it differs by half from both. There a
+switch counts as closed that was never seen open in between: a hand that opens opens all of its switches. So next to no
+other contact a switch that works is taken to stay closed in no less than 1/100 of the cases.
 
 **Chatter.** A change of a switch costs 1/20 s. A switch that is a second in debt changes faster than a hand, which is
 what a loose contact does; it behaves again once the debt is paid, at the latest 2 s after the last change.
@@ -54,8 +56,8 @@ WHOLE_US = 50_000
 GRASPS = 1_000
 # Evidence is counted in sixteenths of a nat.
 _NAT = 16
-_SLIPS, _LEAST = 1 / 32, 1 / 20
-# Grasps that are weighed again without a switch once it is found to be stuck.
+_SLIPS, _LEAST, _LEAST_ALONE = 1 / 32, 1 / 20, 1 / 100
+# Observations that are weighed again without a switch once it is found to be stuck.
 _KEPT = 64
 # A switch begins with one grasp in which it closed as it should and one in which it did not (Laplace's rule).
 _DOUBT = 255
@@ -74,7 +76,10 @@ Ints = NDArray[np.int64]
 _WEIGHTS = np.array([round(65535 * math.exp(-i / _NAT)) for i in range(200)])
 # Evidence of being stuck where a switch shows what a stuck one does, and where it does not, by the share of grasps, in
 # 255ths, in which one that works would show the former.
-_SHOWN = np.array([max(round(_NAT * math.log((1 - _SLIPS) / max(q / 255, _LEAST))), 0) for q in range(256)])
+_SHOWN, _ALONE = (
+    np.array([max(round(_NAT * math.log((1 - _SLIPS) / max(q / 255, least))), 0) for q in range(256)])
+    for least in (_LEAST, _LEAST_ALONE)
+)
 _MOVED = np.array([min(round(_NAT * math.log(_SLIPS / max(1 - q / 255, _SLIPS))), 0) for q in range(256)])
 
 
@@ -98,7 +103,7 @@ class StuckTest:
         self._contacts: Ints = (least + most).sum(axis=0)
         self._rows, self._means = (rows.astype(np.int64) for rows in (tables.switch_rows, tables.switch_means))
         self._gain = round(65536 * _NAT / tables.scale)
-        self.limit = math.ceil(_NAT * math.log(2 * len(switches) * GRASPS))
+        self.limit = math.ceil(_NAT * math.log(2 * len(switches) * 2 * GRASPS))
         self.sums = np.zeros((2, len(switches)), np.int64)
         self.stuck: dict[int, int] = {}
         self._due, self._seen = np.zeros(len(switches), np.int64), np.zeros(len(switches), np.int64)
@@ -163,7 +168,9 @@ class StuckTest:
         closes = (255 - shares[1]) * (self._seen + _DOUBT) // (self._due + 2 * _DOUBT)
         shares = np.stack([shares[0], 255 - closes])
         shown = np.stack([grasp.closed, ~grasp.closed])
-        evidence = np.where(shown, _SHOWN[shares], _MOVED[shares])
+        alone = np.count_nonzero(grasp.closed & ~grasp.lost) <= 1
+        sticks = np.stack([(_ALONE if alone else _SHOWN)[shares[0]], _SHOWN[shares[1]]])
+        evidence = np.where(shown, sticks, _MOVED[shares])
         evidence[1] *= held | grasp.closed
         return evidence * grasp.read
 
@@ -197,6 +204,8 @@ class Chattering:
     def frame(self, time_us: int, closed: Mask, read: Mask) -> None:
         """Take a frame in which the switches `read` were read; `switches` are then those that chatter."""
         changed = (closed ^ self._closed) & read
+        if not changed | self.switches:
+            return
         self._closed ^= changed
         for number in numbers(changed | self.switches):
             paid_us = max(self._paid_us[number], time_us)
@@ -280,6 +289,11 @@ class Quarantine:
         self._seen_us = self._joints_us = self._since_us = -1
         self._contacts: Mask = 0
         self._weighed = True
+        self._state: tuple[Mask, Mask, Mask] = 0, 0, 0
+        # Since the last grasp: what stayed closed, and the frame with the fewest contacts, its scores and what is lost.
+        self._before: Mask = 0
+        self._stayed: Mask = self._all
+        self._fewest: tuple[Mask, Mask, Mask, Sequence[int], Mask] | None = None
 
     def left_out(self, lost: Mask, joints_lost: Mask) -> tuple[Mask, Mask]:
         """Return the switches and joints to leave out, when these are lost as well: the first that were found come
@@ -318,13 +332,22 @@ class Quarantine:
         # A scan that ended early leaves open what the others say.
         if stuck is None or frame.unread:
             return
-        contacts = frame.closed & read & ~lost
-        changed, either = (contacts ^ self._contacts).bit_count(), (contacts | self._contacts).bit_count()
-        if changed and 2 * changed >= either:
+        if (state := (frame.closed, read, lost)) == self._state and self._weighed:
+            return
+        self._state, contacts = state, frame.closed & read & ~lost
+        self._stayed &= frame.closed | ~read
+        if self._fewest is None or contacts.bit_count() < self._fewest[0].bit_count():
+            self._fewest = contacts, frame.closed & read, read, lanes, lost
+        if _differ(contacts, self._contacts):
             self._contacts, self._since_us, self._weighed = contacts, time_us, False
         elif not self._weighed and time_us - self._since_us >= SETTLED_US:
             self._contacts, self._weighed = contacts, True
-            stuck.weigh(lanes, frame.closed & read, read & ~self._chattering.switches, lost)
+            quiet = ~self._chattering.switches
+            least, closed, seen, scores, without = self._fewest
+            if _differ(least, contacts) and _differ(least, self._before):
+                stuck.weigh(scores, closed, seen & quiet & ~(closed & ~self._stayed), without)
+            stuck.weigh(lanes, frame.closed & read, read & quiet, lost)
+            self._before, self._stayed, self._fewest = contacts, self._all, None
             self._sort()
 
     def look_at_joints(self, time_us: int, codes: Sequence[int]) -> None:
@@ -344,6 +367,11 @@ class Quarantine:
         if now != self._wrong:
             self._wrong = {which: now[which] for which in (*(each for each in self._wrong if each in now), *now)}
             self._chosen.clear()
+
+
+def _differ(contacts: Mask, others: Mask) -> bool:
+    changed = (contacts ^ others).bit_count()
+    return changed > 0 and 2 * changed >= (contacts | others).bit_count()
 
 
 def _flags(mask: Mask, bits: int) -> Flags:

@@ -6,10 +6,8 @@ from dataclasses import dataclass, replace
 import msgspec
 import numpy as np
 
-from thenar.drivers.calibration import GloveCalibration
-
 from ..build import Build
-from ..calibration import Joints
+from ..calibration import Joints, Meaning
 from ..frames import PERIODS, GloveFrame, Mask, Newest, SwitchFrame
 from ..policy import Policy
 from ..preshape.selector import Preshape
@@ -61,7 +59,7 @@ class LiveRecognizer:
         build: Build,
         *,
         sensor_names: Sequence[str] = (),
-        calibration: GloveCalibration | None = None,
+        calibration: Meaning = None,
         switch_period_us: int | None = None,
         glove_period_us: int | None = None,
         policy: Policy | None = None,
@@ -148,7 +146,7 @@ class LiveRecognizer:
             frame = self._trusted(read, joints_lost)
         else:
             codes, late = None, False
-        dull = self.quarantine.out[1]
+        dull = self.quarantine.out[1] | (self._joints.lost if codes else 0)
         if codes is not self._scored[0] or dull != self._scored[1]:
             self._scores.joints(codes, dull)
             self._scored = codes, dull

@@ -1,18 +1,26 @@
-"""A live recording run through once more."""
+"""A recording run through once more: by its own build, or by another that reads the same inputs."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 from thenar.drivers.errors import SettingError
 
 from ..build import Build
-from ..frames import GloveFrame, SwitchFrame
+from ..frames import GloveFrame, Rewired, SwitchFrame
 from ..harness.loading import parse_harness
+from ..names import list_names
 from ..policy import Policy
 from ..published import LiveGrasp
 from ..recording.reader import Reader
-from .recogniser import Moment
+from ..recording.session import Session
+from ..taxels import Taxels, count_limit
+from .recogniser import LiveRecognizer, Moment
 from .system import System
+
+# A device counts as delivering as often as nineteen of twenty of its frames came.
+_USUALLY = 0.95
 
 
 def replayed(
@@ -48,10 +56,104 @@ def moments(
         warn(fault.message)
 
 
+def recognised(build: Build, recording: Path, warn: Callable[[str], None] = lambda _: None) -> Iterator[Moment]:
+    """Yield all that a build makes of a recording of whatever build, or of none, decided as by default.
+
+    Moments are those of the recorded run; of a recording without one, those at which a frame came. Of another build's,
+    switches and joints are taken by their names, levels of taxels from the recorded counts. `warn` as for `replayed`.
+
+    Raises McapError if it is no recording, SettingError if it lacks an input of the build.
+    """
+    reader = Reader(recording)
+    if reader.session.build == build.manifest.checksum:
+        yield from (moment for _, moment in moments(build, recording, None, warn))
+        return
+    periods, inputs = _periods_us(recording), _Inputs(build, reader)
+    recognizer = inputs.recognizer(*periods)
+    switches: SwitchFrame | None = None
+    glove: GloveFrame | None = None
+    for entry in reader:
+        if isinstance(entry, Session):
+            # Another clock: what came before it is of another time.
+            inputs = _Inputs(build, reader)
+            recognizer, switches, glove = inputs.recognizer(*periods), None, None
+        elif isinstance(entry, SwitchFrame):
+            switches = inputs.of(entry)
+        elif isinstance(entry, GloveFrame):
+            glove = entry
+        session = reader.session
+        if isinstance(entry, LiveGrasp):
+            yield recognizer.step(entry.time_us, entry.unix_us, switches, glove)
+        elif isinstance(entry, SwitchFrame | GloveFrame) and not session.build:
+            yield recognizer.step(entry.time_us, session.clock_ns // 1000 + entry.time_us, switches, glove)
+    for fault in reader.faults():
+        warn(fault.message)
+
+
+def _periods_us(recording: Path) -> tuple[int | None, int | None]:
+    """Return how often switches and records of the glove came in a recording; None where none did."""
+    times: dict[type, list[int]] = {SwitchFrame: [], GloveFrame: []}
+    for entry in Reader(recording):
+        if isinstance(entry, SwitchFrame | GloveFrame):
+            times[type(entry)].append(entry.time_us)
+    steps = [sorted(b - a for a, b in pairwise(each) if b > a) or [0] * len(each[:1]) for each in times.values()]
+    switches, glove = (each[int(_USUALLY * (len(each) - 1))] if each else None for each in steps)
+    return switches, glove
+
+
+class _Inputs:
+    """What a build reads of a recording that is not its own. Raises SettingError if the recording lacks an input."""
+
+    def __init__(self, build: Build, reader: Reader) -> None:
+        self._build, self._session = build, reader.session
+        harness = parse_harness(self._session.harness, reader.path.name)
+        manifest, session, pins = build.manifest, self._session, set(harness.switches)
+        pairs, lacking = list[tuple[int, int]](), list[str]()
+        levels: dict[str, list[tuple[int, int]]] = {name: [] for name in session.taxels}
+        for number, switch in enumerate(manifest.switches):
+            taxel = None if switch.threshold is None or switch.name in pins else switch.threshold
+            if taxel is not None and taxel.taxel.name in levels:
+                levels[taxel.taxel.name].append((count_limit(taxel, session.taxel_calibration), number))
+            elif taxel is None and switch.name in session.switches:
+                pairs.append((session.switches.index(switch.name), number))
+            else:
+                lacking.append(switch.name)
+        lacking += [joint.name for joint in manifest.joints if joint.name not in session.sensors]
+        if lacking:
+            raise SettingError(
+                f"{reader.path.name} was recorded without {list_names(lacking)}, which the build reads: take a build "
+                "of what it holds, or record all that the build reads"
+            )
+        self._turn = Rewired(pairs)
+        self._taxels = Taxels(session.taxels, list(levels.values()), session.taxel_calibration, harness.taxel_settings)
+        self._levels = 0, self._taxels.owned
+
+    def of(self, frame: SwitchFrame) -> SwitchFrame:
+        """Return a recorded frame with the bits of the build's switches; levels are those of the newest counts."""
+        if frame.taxels is not None:
+            self._levels = self._taxels.read(frame.time_us, frame.taxels)
+        turn, (closed, lost) = self._turn, self._levels
+        return replace(
+            frame, closed=turn(frame.closed) | closed, lost=turn(frame.lost) | lost, unread=turn(frame.unread)
+        )
+
+    def recognizer(self, switch_period_us: int | None, glove_period_us: int | None) -> LiveRecognizer:
+        return LiveRecognizer(
+            self._build,
+            sensor_names=self._session.sensors,
+            calibration=self._session.calibration,
+            switch_period_us=switch_period_us,
+            glove_period_us=glove_period_us,
+        )
+
+
 def _system(build: Build, reader: Reader, policy: Policy | None) -> System:
     session = reader.session
     if session.build != build.manifest.checksum:
-        raise SettingError(f"{reader.path.name} was recorded with another build: its frames hold other switches")
+        raise SettingError(
+            f"{reader.path.name} was recorded with another build: replay it with its own, or let "
+            "`thenar segment` find what this one sees"
+        )
     harness = parse_harness(session.harness, reader.path.name)
     scan = System.map_of(build, harness)
     system = System(build, harness, scan, session.sensors, session.calibration, policy or session.policy or Policy())

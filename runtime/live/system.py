@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from thenar.drivers.calibration import GloveCalibration
+from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 
 from ..build import Build
-from ..calibration import Joints, load_calibration
+from ..calibration import Joints, Meaning, Numbers, load_calibration
 from ..frames import Mask
-from ..harness.wiring import Harness
+from ..harness.wiring import Harness, StreamWiring
 from ..policy import Policy
 from ..scanning.decided import EarlyExit
 from ..scanning.plan import check_harness, plan_scan
@@ -40,10 +40,9 @@ class System:
 
         Raises HarnessError if they do not fit, SettingError if the CyberGlove's calibration does not.
         """
-        glove = harness.cyberglove
-        calibration = None if glove is None or glove.calibration is None else load_calibration(Path(glove.calibration))
+        calibration = None if harness.calibration is None else load_calibration(Path(harness.calibration))
         # A source of one's own sends the codes of the build's joints, in their order.
-        names = tuple(joint.name for joint in build.manifest.joints) if glove is None else glove.sensor_names
+        names = harness.sensor_names or tuple(joint.name for joint in build.manifest.joints)
         return cls(build, harness, cls.map_of(build, harness), names, calibration, policy or Policy())
 
     @staticmethod
@@ -77,12 +76,21 @@ class System:
         return LiveRecognizer(
             self.build,
             sensor_names=self.sensor_names,
-            calibration=self.calibration,
+            calibration=self._meaning,
             switch_period_us=slowest_us(self.harness, self.scan, "switches"),
             glove_period_us=slowest_us(self.harness, self.scan, "joints"),
             policy=self.policy,
             on_demand=self.on_demand,
         )
+
+    @property
+    def _meaning(self) -> Meaning:
+        """What the joints' bytes mean: by the calibration, or by the ranges of a stream's numbers."""
+        device = self.harness.joint_device
+        if self.calibration is not None or not isinstance(device, StreamWiring):
+            return self.calibration
+        ends = device.joints.items()
+        return Numbers(tuple(SensorCalibration(name, 1, low, 255, high) for name, (low, high) in ends))
 
     @property
     def on_demand(self) -> bool:
@@ -127,4 +135,4 @@ class System:
         """Return what makes the build's joint codes of the CyberGlove's records."""
         period_us = slowest_us(self.harness, self.scan, "joints")
         grace_us = self.policy.grace_of(period_us or 0)
-        return Joints(self.build.manifest.joints, self.sensor_names, self.calibration, period_us, grace_us)
+        return Joints(self.build.manifest.joints, self.sensor_names, self._meaning, period_us, grace_us)

@@ -10,7 +10,7 @@ from threading import Event, Thread
 from typing import Self
 
 import msgspec
-from msgspec.structs import replace
+from msgspec.structs import astuple, replace
 
 from thenar.drivers.errors import SettingError
 
@@ -102,6 +102,10 @@ _PRIVATE = 0o600
 _json = msgspec.json.Encoder().encode
 
 
+class _Recognition(LiveGrasp, frozen=True, omit_defaults=True):
+    """A recognition as it is recorded: without fields that say nothing, as those of a segment while there is none."""
+
+
 class Recorder:
     """Writes a recording; every message has left the process when its method returns.
 
@@ -153,7 +157,7 @@ class Recorder:
 
     def grasp(self, grasp: LiveGrasp) -> None:
         """Record a recognition; the grasp type also by itself whenever it changes."""
-        self._message(RECOGNITION, grasp.time_us, encode_text(_json(grasp)))
+        self._message(RECOGNITION, grasp.time_us, encode_text(_json(_Recognition(*astuple(grasp)))))
         if grasp.grasp != self._grasp:
             self._grasp = grasp.grasp
             self._message(GRASP, grasp.time_us, encode_text(grasp.grasp.encode()))

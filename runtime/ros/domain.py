@@ -12,6 +12,7 @@ from cyclonedds.core import DDSException
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
+from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
 from thenar.drivers.errors import SettingError
@@ -19,6 +20,8 @@ from thenar.drivers.errors import SettingError
 from .messages import TYPE_HASHES
 
 _DEPTH = 10
+# Of a fast topic, for the time that a thread may be late.
+_READ_DEPTH = 256
 _UNLIMITED = -1
 _MAX_DOMAIN = 232  # above it the ports of DDS would pass 65535
 _MAX_LENGTH = 200
@@ -124,6 +127,18 @@ def writer(participant: DomainParticipant, name: str, kind: Any, *, kept: bool =
         Policy.Userdata(f"typehash={TYPE_HASHES[kind.__idl_typename__]};".encode()),
     ]
     return DataWriter(participant, Topic(participant, dds_topic(name), kind), qos=Qos(*policies))
+
+
+def reader(participant: DomainParticipant, name: str, kind: Any) -> Any:
+    """Return what reads messages of a kind from the ROS topic `name`, of reliable and best-effort writers alike."""
+    policies = [
+        Policy.Reliability.BestEffort,
+        Policy.Durability.Volatile,
+        Policy.History.KeepLast(_READ_DEPTH),
+        Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
+        Policy.Userdata(f"typehash={TYPE_HASHES[kind.__idl_typename__]};".encode()),
+    ]
+    return DataReader(participant, Topic(participant, dds_topic(name), kind), qos=Qos(*policies))
 
 
 def volatile_readers(of: Any) -> frozenset[int]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.annotations import final
-from cyclonedds.idl.types import byte, float64, int32, uint32
+from cyclonedds.idl.types import byte, float32, float64, int32, uint8, uint32
 
 if TYPE_CHECKING:
     from collections.abc import Sequence as sequence  # noqa: N813 - Cyclone's says nothing to a type checker
@@ -19,6 +19,7 @@ else:
 
 from ..preshape.selector import Preshape
 from ..published import Health, JointAngles, LiveGrasp
+from ..task import Progress
 
 # REP-2011: ROS 2 from Iron on looks for it in the endpoint's user data, and warns where it is missing.
 TYPE_HASHES = {
@@ -29,6 +30,12 @@ TYPE_HASHES = {
     ),
     "diagnostic_msgs::msg::dds_::DiagnosticArray_": (
         "RIHS01_5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"
+    ),
+    "std_msgs::msg::dds_::UInt8MultiArray_": (
+        "RIHS01_5687e861b8d307a5e48b7515467ae7a5fc2daf805bd0ce6d8e9e604bade9f385"
+    ),
+    "std_msgs::msg::dds_::Float32MultiArray_": (
+        "RIHS01_0599f6f85b4bfca379873a0b4375a0aca022156bd2d7021275d116ed1fa8bfe0"
     ),
 }
 
@@ -78,6 +85,43 @@ class JointState(IdlStruct, typename="sensor_msgs::msg::dds_::JointState_"):
     position: sequence[float64]
     velocity: sequence[float64]
     effort: sequence[float64]
+
+
+@dataclass
+@final
+class MultiArrayDimension(IdlStruct, typename="std_msgs::msg::dds_::MultiArrayDimension_"):
+    """A dimension of an array."""
+
+    label: str
+    size: uint32
+    stride: uint32
+
+
+@dataclass
+@final
+class MultiArrayLayout(IdlStruct, typename="std_msgs::msg::dds_::MultiArrayLayout_"):
+    """How an array lies in its data."""
+
+    dim: sequence[MultiArrayDimension]
+    data_offset: uint32
+
+
+@dataclass
+@final
+class UInt8MultiArray(IdlStruct, typename="std_msgs::msg::dds_::UInt8MultiArray_"):
+    """Bytes."""
+
+    layout: MultiArrayLayout
+    data: sequence[uint8]
+
+
+@dataclass
+@final
+class Float32MultiArray(IdlStruct, typename="std_msgs::msg::dds_::Float32MultiArray_"):
+    """Numbers."""
+
+    layout: MultiArrayLayout
+    data: sequence[float32]
 
 
 @dataclass
@@ -151,9 +195,26 @@ def segment(name: str, grasp: LiveGrasp) -> DiagnosticArray:
         "margin": str(grasp.margin),
         "lost": ", ".join(grasp.lost),
     }
+    return _diagnosed(grasp.unix_us, LEVELS[grasp.health], name, grasp.grasp, values)
+
+
+def task(name: str, unix_us: int, progress: Progress) -> DiagnosticArray:
+    """Return how far a hand has come in a task as the status of component `name`, at a moment."""
+    values = {
+        "step": str(progress.step),
+        "steps": str(progress.steps),
+        "grasp": progress.grasp,
+        "expected": ", ".join(progress.expected),
+        "deviation": progress.deviation,
+        "detail": progress.detail,
+        "done": "true" if progress.done else "false",
+    }
+    return _diagnosed(unix_us, 1 if progress.deviation else 0, name, progress.text, values)
+
+
+def _diagnosed(unix_us: int, level: int, name: str, message: str, values: dict[str, str]) -> DiagnosticArray:
     pairs = [KeyValue(key, value) for key, value in values.items()]
-    status = DiagnosticStatus(LEVELS[grasp.health], name, grasp.grasp, "", pairs)
-    return DiagnosticArray(_header(grasp.unix_us), [status])
+    return DiagnosticArray(_header(unix_us), [DiagnosticStatus(level, name, message, "", pairs)])
 
 
 def joint_state(unix_us: int, angles: JointAngles) -> JointState:

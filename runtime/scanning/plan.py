@@ -225,7 +225,8 @@ def check_harness(scan: ScanMap, harness: Harness, switch_names: Sequence[str]) 
         for pin, switch in _pins(port, harness)
     }
     conversions = {(port.bus, port.chip, port.reading): port for port in wired.ports if port.levels}
-    right = (scan.scanners, scan.taxels) == (wired.scanners, wired.taxels) and all(
+    boards = (wired.scanners, wired.taxels, wired.streams)
+    right = (scan.scanners, scan.taxels, scan.streams) == boards and all(
         conversions.get((port.bus, port.chip, port.reading)) == port
         if port.levels
         else bool(pins := _pins(port, harness))

@@ -5,10 +5,10 @@ from itertools import combinations
 
 from thenar.drivers.i2c.chips import Chip, Reading
 
-from ..harness.wiring import ChipWiring, Harness, ScannerWiring, SpiWiring
+from ..harness.wiring import ChipWiring, Harness, SpiWiring
 from ..manifest import Switch
 from ..names import level_name, taxel_and_code
-from .scanmap import SCHEMA, BoardLevel, Pair, Port, ScanMap
+from .scanmap import SCHEMA, BoardLevel, Pair, Port, ScanMap, StreamRead
 
 # Of each taxel its levels: (code, number of the switch) pairs, ascending.
 Levels = Mapping[str, tuple[Pair, ...]]
@@ -106,19 +106,21 @@ def whole_scan(harness: Harness, switch_names: Sequence[str], *, every_taxel: bo
     levels = levels_of(harness, switch_names)
     on_taxels = {number for pairs in levels.values() for _, number in pairs}
     numbers = {name: number for number, name in enumerate(switch_names) if number not in on_taxels}
-    scanners = tuple(
-        tuple((key, numbers[name]) for key, name in enumerate(scanner.switches) if name in numbers)
-        for scanner in harness.scanners
+    scanners = tuple(_keys(scanner.switches, numbers) for scanner in harness.scanners)
+    boards = tuple(_board_levels(scanner.taxels, levels) for scanner in harness.scanners)
+    streams = tuple(
+        StreamRead(_keys(each.switches, numbers), _board_levels(tuple(each.taxels), levels)) for each in harness.streams
     )
-    boards = tuple(_board_levels(scanner, levels) for scanner in harness.scanners)
     converted = {taxel: levels.get(taxel, ()) for taxel in harness.taxel_names} if every_taxel else levels
     ports = ports_of(harness, numbers, converted)
-    return ScanMap(SCHEMA, harness.fingerprint, ports, scanners, boards if any(boards) else ())
+    return ScanMap(SCHEMA, harness.fingerprint, ports, scanners, boards if any(boards) else (), streams)
 
 
-def _board_levels(scanner: ScannerWiring, levels: Levels) -> tuple[BoardLevel, ...]:
+def _keys(names: Sequence[str], numbers: Mapping[str, int]) -> tuple[Pair, ...]:
+    return tuple((key, numbers[name]) for key, name in enumerate(names) if name in numbers)
+
+
+def _board_levels(taxels: Sequence[str], levels: Levels) -> tuple[BoardLevel, ...]:
     return tuple(
-        (channel, code, number)
-        for channel, taxel in enumerate(scanner.taxels)
-        for code, number in levels.get(taxel, ())
+        (channel, code, number) for channel, taxel in enumerate(taxels) for code, number in levels.get(taxel, ())
     )

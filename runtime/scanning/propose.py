@@ -128,8 +128,8 @@ def own_joints(joints: Sequence[str]) -> str:
     if not joints or sensors_with(joints) is not None:
         return ""
     return (
-        f"joints {list_names(joints)} have to be read by a source of your own: the converter of a board ([analog] of "
-        "board.toml), or a source that you add (docs/extending.md)"
+        f"joints {list_names(joints)} have to be read by a source of your own: a board that prints them ([[stream]] of "
+        "glove.toml), the converter of a board ([analog] of board.toml), or a source that you add (docs/extending.md)"
     )
 
 

@@ -43,11 +43,20 @@ class Port(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
         return tuple(number for _, number in (*self.switches, *self.levels))
 
 
+class StreamRead(Struct, frozen=True, forbid_unknown_fields=True):
+    """What is read of a stream: (place among its switches, number of the build's switch) pairs, and levels of its
+    taxels by their places.
+    """
+
+    switches: tuple[Pair, ...]
+    levels: tuple[BoardLevel, ...]
+
+
 class ScanMap(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """What to read of a glove, ports in the order in which to read them.
 
     scanners holds, for every board of the harness, (key, number of the build's switch) pairs; taxels, where a board
-    measures levels, for every board its levels.
+    measures levels, for every board its levels; streams, what is read of every stream.
     """
 
     schema: int
@@ -55,13 +64,15 @@ class ScanMap(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     ports: tuple[Port, ...]
     scanners: tuple[tuple[Pair, ...], ...]
     taxels: tuple[tuple[BoardLevel, ...], ...] = ()
+    streams: tuple[StreamRead, ...] = ()
 
     @property
     def switches(self) -> tuple[int, ...]:
-        """The numbers of the build's switches that are read: the boards' first, then port by port."""
+        """The numbers of the build's switches that are read: of the boards, of the ports, of the streams."""
         keys = (switch for pairs in self.scanners for _, switch in pairs)
         levels = (switch for board in self.taxels for *_, switch in board)
-        return (*keys, *levels, *(switch for port in self.ports for switch in port.elements))
+        streams = (pair[-1] for stream in self.streams for pair in (*stream.switches, *stream.levels))
+        return (*keys, *levels, *(switch for port in self.ports for switch in port.elements), *streams)
 
     @property
     def board_channels(self) -> tuple[int, ...]:
@@ -105,10 +116,12 @@ def _check_once(scan: ScanMap, what: str) -> None:
     if len(set(readings)) < len(readings):
         raise BuildError(f"{what} reads a port twice: compile the build again")
     sources = (*scan.scanners, *(pairs for port in scan.ports for pairs in (port.switches, port.levels)))
-    levels = [[(channel, code) for channel, code, _ in board] for board in scan.taxels]
+    sources = (*sources, *(stream.switches for stream in scan.streams))
+    boards = (*scan.taxels, *(stream.levels for stream in scan.streams))
+    levels = [[(channel, code) for channel, code, _ in board] for board in boards]
     for numbers in (scan.switches, *([bit for bit, _ in pairs] for pairs in sources), *levels):
         if len(set(numbers)) < len(numbers):
             raise BuildError(f"{what} reads a bit or a switch twice: compile the build again")
-    for ascending in (*(port.levels for port in scan.ports), *scan.taxels):
+    for ascending in (*(port.levels for port in scan.ports), *boards):
         if list(ascending) != sorted(ascending):
             raise BuildError(f"{what} has levels out of order: compile the build again")

@@ -46,6 +46,7 @@ class LiveSegments:
         # Ticks at which the time of ticks was set, and those times: the newest last.
         self._set: list[tuple[int, int]] = []
         self._tick = -1
+        self._shown: tuple[State, int, int, int] | None = None
         self.newest = Segment()
 
     def due(self, now_us: int) -> bool:
@@ -78,7 +79,7 @@ class LiveSegments:
         newest = self.newest
         self._segments = newest.number - (newest.state == "forming")
         self._decoder, self._next_us, self._tick, self._set = Decoder(self._model, self._lag), None, -1, []
-        self.newest = Segment(number=self._segments)
+        self._shown, self.newest = None, Segment(number=self._segments)
 
     def _push(self, scores: Sequence[int], refused: bool) -> None:
         found, none = self._decoder.push(scores, refused), self._model.n_types
@@ -91,6 +92,9 @@ class LiveSegments:
         else:
             state, number = "forming", number + 1
             of, start = newest
+        if (shown := (state, number, of, start)) == self._shown:
+            return
+        self._shown = shown
         if of == none:
             self.newest = Segment(number=number)
         else:

@@ -62,7 +62,7 @@ class Sink(ABC):
         """Send on how the glove fares, once a second or so."""
 
     def task(self, progress: Progress) -> None:  # noqa: B027
-        """Send on how far the hand has come in a task, whenever that changes."""
+        """Send on how far the hand has come in a task, at the first frame and whenever that changes."""
 
     def report(self) -> SinkReport:
         """Return how the sink itself is doing."""

@@ -4,11 +4,12 @@
     NAMESPACE/segment   diagnostic_msgs/DiagnosticArray  the same with its stamp, probability, state, segment and health
     NAMESPACE/preshape  trajectory_msgs/JointTrajectory  when it changes
     NAMESPACE/angles    sensor_msgs/JointState           the glove's joints, in rad, where they are calibrated
+    NAMESPACE/task      diagnostic_msgs/DiagnosticArray  if a task is followed: its step, when that changes
     NAMESPACE/health    std_msgs/String                  once a second, if asked for: how the glove fares, as JSON
 
 Grasp and segment are published when they change, and they and the angles `rate` times a second. Reliable, the last 10
-kept: that serves reliable and best-effort readers alike. Grasp, segment and preshape are transient local: whoever comes
-later has the newest at once. Nodes of this machine can read, others where CYCLONEDDS_URI or `?public` lets them;
+kept: that serves reliable and best-effort readers alike. Grasp, segment, preshape and task are transient local: whoever
+comes later has the newest at once. Nodes of this machine can read, others where CYCLONEDDS_URI or `?public` lets them;
 ROS_DOMAIN_ID says which domain, as for a ROS 2 node.
 """
 
@@ -22,6 +23,7 @@ from thenar.drivers.errors import SettingError
 from ..names import shortened
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
+from ..task import Progress
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
 RATE_HZ = 20
@@ -52,6 +54,7 @@ class RosTopics(Sink):
             self._grasp = domain.writer(participant, f"{name}/grasp", messages.String, kept=True)
             self._segment = domain.writer(participant, f"{name}/segment", messages.DiagnosticArray, kept=True)
             self._preshape = domain.writer(participant, f"{name}/preshape", messages.JointTrajectory, kept=True)
+            self._task = domain.writer(participant, f"{name}/task", messages.DiagnosticArray, kept=True)
             self._angles = domain.writer(participant, f"{name}/angles", messages.JointState)
             self._health = domain.writer(participant, f"{name}/health", messages.String)
         except DDSException as reason:
@@ -69,16 +72,21 @@ class RosTopics(Sink):
         self._shown: tuple[object, ...] = ()
         self._told: Preshape | None = None
         self._found, self._volatile = 0, frozenset[int]()
-        self._sent = self._lost = 0
+        self._sent = self._lost = self._unix_us = 0
         self._error = ""
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Publish what is news to somebody, and once a period everything."""
+        self._unix_us = grasp.unix_us
         self._try(lambda: self._write(grasp, preshape, angles))
 
     def health(self, report: HealthReport) -> None:
         """Publish how the glove fares."""
         self._try(lambda: self._health.write(self._messages.String(json.encode(report).decode())) is None)
+
+    def task(self, progress: Progress) -> None:
+        """Publish how far the hand has come, with the stamp of the newest frame."""
+        self._try(lambda: self._task.write(self._messages.task(self._name, self._unix_us, progress)) is None)
 
     def _try(self, write: Callable[[], bool]) -> None:
         if self._closed:
@@ -131,7 +139,7 @@ class RosTopics(Sink):
         if not self._closed:
             self._closed = True
             # Each goes with its last name; the domain, which ends what is left in it, goes last.
-            del self._grasp, self._segment, self._preshape, self._angles, self._health
+            del self._grasp, self._segment, self._preshape, self._task, self._angles, self._health
             del self._domain
 
 

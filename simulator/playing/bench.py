@@ -9,11 +9,15 @@ from typing import Self
 import msgspec
 import numpy as np
 
+from thenar.drivers.calibration import SensorCalibration
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c, EmulatedSpi
+from thenar.drivers.emulated.lines import LineSender, lines_like
 from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
 from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, SpiWiring
+from thenar.runtime.calibration import load_calibration
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, SpiWiring, StreamWiring
+from thenar.runtime.sources.rows import joint_number, steps_of
 
 from ..effects import wire_damaged_bytes, wire_lost_bytes
 from ..scenes.scene import Scene
@@ -82,8 +86,10 @@ class Bench:
         adapter: AdapterKind = "any",
         taxel_names: Sequence[str] = (),
         bits: int = 10,
+        joints: Sequence[tuple[str, str]] = (),
     ) -> None:
-        """Start the devices. cable(n) is what happens to the messages of serial line n; boards convert to so many bits.
+        """Start the devices. cable(n) is what happens to the messages of serial line n; boards convert to so many bits;
+        joints are the names and units of those that streams send.
 
         Raises DeviceError if something that emulates is not installed.
         """
@@ -111,8 +117,15 @@ class Bench:
             if harness.buses or harness.spi:
                 spi = [EmulatedSpi(wiring.device, wiring.kind) for wiring in harness.spi]
                 self.i2c = stack.enter_context(EmulatedI2c([_emulated(bus, adapter) for bus in harness.buses], spi))
+            self._joints = {name: (number, unit) for number, (name, unit) in enumerate(joints)}
+            self.streams, ports = list[LineSender](), list[str]()
+            for number, wiring in enumerate(harness.streams):
+                sender, port = self._stream(number, wiring, stack)
+                self.streams.append(sender)
+                ports.append(port)
             self._stack = stack.pop_all()
-        self.harness = _moved(harness, folder)
+        self.harness = _moved(harness, folder, ports)
+        self._lines = [_lines_of(wiring) for wiring in harness.streams]
         self.environment = {} if self.i2c is None else self.i2c.environment
 
     def _line(self, name: str, baud: int, stack: ExitStack) -> PtyLine:
@@ -121,8 +134,50 @@ class Bench:
         self.lines.append(line)
         return line
 
-    def show(self, closed: Sequence[bool], sensors: bytes, taxels: Sequence[int] = ()) -> None:
-        """Put one frame on all devices: switches (s,) that are closed, the glove's sensors, the taxels' counts (t,)."""
+    def _stream(self, number: int, wiring: StreamWiring, stack: ExitStack) -> tuple[LineSender, str]:
+        """Return what sends the rows of a stream, and from which port; those of LSL and ROS as lines, too."""
+        if "://" in wiring.port or wiring.port.startswith(("-", "unix:", "lsl:", "ros:")):
+            way = lines_like(wiring.port, self._folder / f"stream{number}")
+            stack.callback(way.close)
+            send, port = way.send, way.port
+        else:
+            line = self._line(f"stream{number}", wiring.baud, stack)
+            send, port = line.send, str(line.link)
+        time = () if wiring.time is None else (wiring.time,)
+        columns = wiring.columns or (*time, *wiring.used)
+        sender = LineSender(send, columns, wiring.rate_hz, wiring.time, wiring.time_unit)
+        return stack.enter_context(sender), port
+
+    def _numbers_of(
+        self, number: int, closed: Sequence[bool], taxels: Sequence[int], joints: Sequence[float]
+    ) -> dict[str, float]:
+        """Return the numbers of a stream's columns, as its sender has them."""
+        wiring, found = self.harness.streams[number], dict[str, float]()
+        for name in wiring.switches:
+            shut = name in self._numbers and closed[self._numbers[name]]
+            threshold = wiring.thresholds.get(name, wiring.threshold)
+            found[name] = threshold + (0.5 if shut == (wiring.closed == "high") else -0.5)
+        for name, (low, high) in wiring.taxels.items():
+            code = taxels[self._taxels[name]] if name in self._taxels else 0
+            found[name] = low + code * (high - low) / steps_of((low, high))
+        for name, limits in wiring.joints.items():
+            place, unit = self._joints.get(name, (-1, ""))
+            if place >= 0:
+                found[name] = joints[place]
+                if unit == "raw":
+                    found[name] = joint_number(limits, round(joints[place]))
+                elif name in self._lines[number]:
+                    found[name] = joint_number(limits, self._lines[number][name](joints[place]))
+        return found
+
+    def show(
+        self, closed: Sequence[bool], sensors: bytes, taxels: Sequence[int] = (), joints: Sequence[float] = ()
+    ) -> None:
+        """Put one frame on all devices: switches (s,) that are closed, the glove's sensors, the taxels' counts (t,),
+        and the joints (j,) of streams.
+        """
+        for number, sender in enumerate(self.streams):
+            sender.show(self._numbers_of(number, closed, taxels, joints))
         if self.glove is not None:
             self.glove.set(sensors)
         for scanner, wiring in zip(self.scanners, self.harness.scanners, strict=True):
@@ -160,8 +215,19 @@ def _emulated(wiring: BusWiring, adapter: AdapterKind) -> EmulatedBus:
     return EmulatedBus(wiring.device, wiring.clock_hz, adapter, tuple(chips))
 
 
-def _moved(harness: Harness, folder: Path) -> Harness:
-    """Return `harness` with its serial ports in `folder`."""
+def _lines_of(wiring: StreamWiring) -> dict[str, Callable[[float], int]]:
+    """Return what finds the byte of an angle, for the joints that are calibrated."""
+    if wiring.calibration is None:
+        return {}
+
+    def byte_of(line: SensorCalibration) -> Callable[[float], int]:
+        return lambda value: min(range(1, 256), key=lambda raw: abs(line.value(raw) - value))
+
+    return {line.name: byte_of(line) for line in load_calibration(Path(wiring.calibration)).sensors}
+
+
+def _moved(harness: Harness, folder: Path, ports: Sequence[str]) -> Harness:
+    """Return `harness` with its serial ports in `folder`, and its streams at these ports."""
     glove = harness.cyberglove
     return msgspec.structs.replace(
         harness,
@@ -169,5 +235,8 @@ def _moved(harness: Harness, folder: Path) -> Harness:
         scanners=tuple(
             msgspec.structs.replace(wiring, port=str(folder / f"scanner{number}"))
             for number, wiring in enumerate(harness.scanners)
+        ),
+        streams=tuple(
+            msgspec.structs.replace(wiring, port=port) for wiring, port in zip(harness.streams, ports, strict=True)
         ),
     )

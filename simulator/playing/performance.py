@@ -44,6 +44,8 @@ class Performance:
     calibration  what the bytes mean on this subject's hand
     taxels       (F, t) uint16     taxel_names  t names
     taxel_calibration  what the taxels' counts mean; None: counts
+    joints       (F, j) float64    joint_names  j names: the same joints, or more of them, for streams of numbers; in
+                 the units of `joint_units`, of which "raw" are bytes
     """
 
     switches: Bits
@@ -55,8 +57,13 @@ class Performance:
     taxels: Codes = field(default_factory=lambda: np.empty((0, 0), np.uint16))
     taxel_names: tuple[str, ...] = ()
     taxel_calibration: TaxelCalibration | None = None
+    joints: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
+    joint_names: tuple[str, ...] = ()
+    joint_units: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if not self.joint_names:
+            object.__setattr__(self, "joints", np.empty((len(self), 0)))
         if not self.taxel_names:
             object.__setattr__(self, "taxels", np.empty((len(self), 0), np.uint16))
 
@@ -75,9 +82,15 @@ class Performance:
             sensors=np.insert(self.sensors, at, resting(self.calibration), axis=0),
             grasps=np.insert(self.grasps.astype(np.object_), at, NONE).astype(np.str_),
             taxels=np.insert(self.taxels, at, [lines.get(name, 0) for name in self.taxel_names], axis=0),
+            joints=np.insert(self.joints, at, self._open(), axis=0),
         )
 
-    def play(self, show: Callable[[list[bool], bytes, list[int]], None], log: Log, stop: Event) -> bool:
+    def _open(self) -> list[float]:
+        """Return the joints of an open hand: straight where they are angles, and as far back as they went otherwise."""
+        least = self.joints.min(axis=0, initial=np.inf).tolist()
+        return [0.0 if unit == "deg" else end for unit, end in zip(self.joint_units, least, strict=True)]
+
+    def play(self, show: Callable[[list[bool], bytes, list[int], list[float]], None], log: Log, stop: Event) -> bool:
         """Show all frames once, each `period_us` after the one before, whatever showing them takes: lateness does not
         add up. Returns False if `stop` was set before the last one had its time.
         """
@@ -86,7 +99,8 @@ class Performance:
             now_us = monotonic_ns() // 1000
             if stop.wait(max(start_us + row * self.period_us - now_us, 0) / 1e6):
                 return False
-            show(self.switches[row].tolist(), self.sensors[row].tobytes(), self.taxels[row].tolist())
+            joints = self.joints[row].tolist()
+            show(self.switches[row].tolist(), self.sensors[row].tobytes(), self.taxels[row].tolist(), joints)
             log(row, str(self.grasps[row]), monotonic_ns() // 1000)
         return not stop.wait(self.period_us / 1e6)
 
@@ -137,7 +151,19 @@ def of_scene(
         taxel_names=tuple(taxel.name for taxel in grasp_set.taxel_columns),
         taxel_calibration=_taxel_calibration(grasp_set.taxel_columns),
     )
+    found = replace(found, joints=_angles(found), joint_names=SENSORS, joint_units=("deg",) * len(SENSORS))
     return found if moves or rest_us is None else found.with_rests(_ends(grasp_set), rest_us)
+
+
+def _angles(performance: Performance) -> NDArray[np.float64]:
+    """Return what the bytes of its CyberGlove mean."""
+    lines = [
+        [line.value(raw) for raw in range(256)]
+        for name in SENSORS
+        for line in performance.calibration.sensors
+        if line.name == name
+    ]
+    return np.array(lines)[np.arange(len(lines)), performance.sensors]
 
 
 def _ends(grasp_set: GraspSet) -> NDArray[np.intp]:
@@ -147,18 +173,24 @@ def _ends(grasp_set: GraspSet) -> NDArray[np.intp]:
 
 
 def of_set(
-    grasp_set: GraspSet, period_us: int, calibration: GloveCalibration | None = None, rest_us: int | None = None
+    grasp_set: GraspSet,
+    period_us: int,
+    calibration: GloveCalibration | None = None,
+    rest_us: int | None = None,
+    *,
+    cyberglove: bool = True,
 ) -> Performance:
     """Return the rows of `grasp_set`, one after the other, as a glove of this calibration would send them; with
     rest_us, a straight hand after each movement for so long.
 
     A code that no byte of a sensor gives is played as the byte that comes nearest. Sensors that the set does not have
-    rest. Without a calibration: of a typical hand. Raises SceneError where none of its joints is a sensor's.
+    rest. Without a calibration: of a typical hand. Raises SceneError where a `cyberglove` is to play it, and none of
+    its joints is a sensor's.
     """
     meant = calibration or typical()
     known = {sensor.name: sensor for sensor in meant.sensors}
     shared = [joint for joint in grasp_set.joints if joint.name in known]
-    if grasp_set.joints and not shared:
+    if cyberglove and grasp_set.joints and not shared:
         raise SceneError(f"none of the set's joints is a sensor of the CyberGlove: it has {', '.join(sorted(known))}")
     sensors = np.tile(resting(meant), (len(grasp_set), 1))
     raw = np.arange(1, 256)
@@ -178,8 +210,17 @@ def of_set(
         taxels=grasp_set.taxels,
         taxel_names=tuple(taxel.name for taxel in grasp_set.taxel_columns),
         taxel_calibration=_taxel_calibration(grasp_set.taxel_columns),
+        joints=_values(grasp_set),
+        joint_names=grasp_set.joint_names,
+        joint_units=tuple(joint.unit for joint in grasp_set.joints),
     )
     return found if rest_us is None else found.with_rests(_ends(grasp_set), rest_us)
+
+
+def _values(grasp_set: GraspSet) -> NDArray[np.float64]:
+    """Return the joints in their units."""
+    columns = [joint.value(grasp_set.codes[:, place]) for place, joint in enumerate(grasp_set.joints)]
+    return np.array(columns, np.float64).reshape(len(columns), len(grasp_set)).T
 
 
 def _taxel_calibration(columns: tuple[Joint, ...]) -> TaxelCalibration | None:
@@ -264,16 +305,20 @@ def of_recording(path: Path, period_us: int, warn: Callable[[str], None] = lambd
     assert reader.end is not None
     width = len(names) + len(rows[0][1]) + 2 * len(rows[0][2]) + 4 * max(len(grasp) for *_, grasp in rows)
     check_made(f"{path.name}: what it plays", len(rows) * width, reader.end.size)
+    sensors = np.frombuffer(b"".join(sensors for _, sensors, *_ in rows), np.uint8).reshape(len(rows), -1)
     return Performance(
         switches=switch_matrix([closed for closed, *_ in rows], len(names)),
         switch_names=names,
-        sensors=np.frombuffer(b"".join(sensors for _, sensors, *_ in rows), np.uint8).reshape(len(rows), -1),
+        sensors=sensors,
         grasps=np.array([grasp for *_, grasp in rows]),
         period_us=period_us,
         calibration=calibration,
         taxels=np.array([codes for _, _, codes, _ in rows], np.uint16),
         taxel_names=reader.session.taxels,
         taxel_calibration=reader.session.taxel_calibration,
+        joints=sensors.astype(np.float64),
+        joint_names=reader.session.sensors or SENSORS,
+        joint_units=("raw",) * sensors.shape[1],
     )
 
 

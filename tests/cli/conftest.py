@@ -4,6 +4,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import pytest
@@ -52,6 +53,11 @@ def set_file(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> P
     return path
 
 
+@pytest.fixture(scope="session")
+def small_build(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return compile_build(small_set, tmp_path_factory.mktemp("small") / "build", rounds=10, folds=0).folder
+
+
 @pytest.fixture
-def build_folder(small_set: GraspSet, tmp_path: Path) -> Path:
-    return compile_build(small_set, tmp_path / "build", rounds=10, folds=0).folder
+def build_folder(small_build: Path, tmp_path: Path) -> Path:
+    return copytree(small_build, tmp_path / "build")

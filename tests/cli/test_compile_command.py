@@ -102,4 +102,10 @@ def test_it_says_what_the_firmware_in_the_build_is_laid_out_for(thenar: Thenar, 
     assert done.returncode == 0, done.stderr
     assert "\nfirmware for atmega328p: 16-bit entries, " in done.stdout
     made = sorted(path.name for path in (tmp_path / "build" / "firmware").iterdir())
-    assert made == ["thenar_glove.c", "thenar_glove.h", "thenar_glove_avr.S"]
+    assert made == [
+        "thenar_glove.c",
+        "thenar_glove.h",
+        "thenar_glove_avr.S",
+        "thenar_glove_tables.c",
+        "thenar_glove_tables.h",
+    ]

@@ -99,7 +99,7 @@ def test_what_a_build_needs_of_the_calibration_is_found(
     assert thenar("doctor", harness).returncode == 0
     done = thenar("doctor", harness, "--build", build)
     assert done.returncode == 1
-    assert "calibrate the glove (`thenar calibrate`)" in done.stdout
+    assert "calibrate it (`thenar calibrate`)" in done.stdout
     calibrated(harness, "j0", "j1")
     done = thenar("doctor", harness, "--build", build)
     assert done.returncode == 0, done.stdout
@@ -113,13 +113,14 @@ def test_a_harness_without_devices_is_refused(thenar: Thenar, tmp_path: Path) ->
 
 
 class Recognising(ScannerBoard):
-    """A board that recognises grasp type 2 whenever it scans."""
+    """A board that recognises grasp type 2 whenever it scans, held as its seventh grasp."""
 
     def scan(self, closed: int, now: int, *, unread: int = 0, whole: bool = True) -> list[bytes]:
-        return [*super().scan(closed, now, unread=unread, whole=whole), *self.recognised(2, 100, 0, now)]
+        keys = super().scan(closed, now, unread=unread, whole=whole)
+        return [*keys, *self.recognised(2, 100, 0, now), *self.segmented(7, 2, 2, now)]
 
 
-@pytest.mark.parametrize(("board", "remark"), [(Recognising(1, 2), True), (ScannerBoard(1, 2), False)])
+@pytest.mark.parametrize(("board", "remark"), [(Recognising(1, 2, segments=True), True), (ScannerBoard(1, 2), False)])
 def test_of_a_board_that_recognises_by_itself_it_says_so(
     thenar: Thenar, tmp_path: Path, board: ScannerBoard, remark: bool
 ) -> None:
@@ -127,5 +128,8 @@ def test_of_a_board_that_recognises_by_itself_it_says_so(
     with PtyLine(tmp_path / "port", 115200) as line, EmulatedScanner(line, 2, board=board):
         done = thenar("doctor", tmp_path / "glove.toml")
     assert done.returncode == 0, done.stderr
-    said = "it recognises by itself, at last grasp type 2 of the build that it carries, counted from 0"
+    said = (
+        "it recognises by itself, at last grasp type 2 of the build that it carries, counted from 0; "
+        "it follows segments, 7 so far, the newest held"
+    )
     assert (said in " ".join(done.stdout.split())) is remark

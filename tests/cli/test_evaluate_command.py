@@ -40,8 +40,9 @@ def make_set(per_type: int = 8) -> GraspSet:
 def _one_way_to_train() -> Iterator[None]:
     """Let each trainer have one set of settings: how they choose is tested where it is done."""
     with pytest.MonkeyPatch.context() as patched:
-        for name, tried in {"logit": {"max_bins": 4}, "sum": {"rounds": 2, "max_bins": 4}}.items():
-            patched.setattr(TRAINERS[name], "tried", (tried,))
+        few = {"max_bins": 4}
+        for name, more in {"logit": {}, "pairs": {"pairs": 1, "pair_bins": 2}, "sum": {"rounds": 2}}.items():
+            patched.setattr(TRAINERS[name], "tried", (few | more,))
         yield
 
 
@@ -116,7 +117,7 @@ def test_confusion_matrices_are_printed_and_drawn_on_request(
 
 @pytest.mark.parametrize(("by", "said"), [("subject", "one subject left out"), ("block", "4 blocks of trials")])
 def test_other_cuts_say_what_they_are(grasps: str, by: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["evaluate", grasps, *QUICK, "--by", by, "--protocol", "nested"]) == 0
+    assert run(["evaluate", grasps, *QUICK, "--by", by, "--protocol", "nested", "--tables", "compositions"]) == 0
     assert said in capsys.readouterr().out
 
 
@@ -131,7 +132,7 @@ def test_a_grasp_type_too_rare_for_the_folds_is_a_warning_on_stderr(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     make_set(per_type=3).save(tmp_path / "few.grasps")
-    assert run(["evaluate", str(tmp_path / "few.grasps"), *QUICK, "--json"]) == 0
+    assert run(["evaluate", str(tmp_path / "few.grasps"), *QUICK, "--tables", "compositions", "--json"]) == 0
     printed, complaints = capsys.readouterr()
     assert "warning: subject Ann has 3 trial(s) of hook: fewer than the 4 folds" in complaints.replace("\n", " ")
     assert len(json.loads(printed)["warnings"]) == 6

@@ -16,9 +16,11 @@ from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime import Build
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
+# A trainer of which nothing is left to choose.
+SETTLED = ("--trainer", "logitboost", "--shrinkage", 1, "--max-bins", 65536)
 QUICK = (
     *("--target", "host", "--methods", "elimination,id3", "--rivals", "mrmr"),
-    *("--rounds", 6, "--finalists", 2, "--repeats", 1, "--jobs", 1),
+    *("--rounds", 6, "--finalists", 2, "--repeats", 1, "--jobs", 1, *SETTLED),
 )
 pytestmark = pytest.mark.slow
 
@@ -61,7 +63,7 @@ def test_a_record_is_the_vendors_formula_unless_the_wire_alone_is_asked_for(
     few = ("--methods", "id3", "--rivals", "none", "--rounds", 2, "--finalists", 1, "--repeats", 1, "--jobs", 1)
     wire_us = round(5 * 10e6 / 115_200)
     for options, how, us in (((), "formula", 500 + wire_us), (("--record-time", "wire"), "wire", wire_us)):
-        done = thenar("frontier", tmp_path / "set.grasps", "-o", tmp_path / "frontier", *few, *options)
+        done = thenar("frontier", tmp_path / "set.grasps", "-o", tmp_path / "frontier", *few, *SETTLED, *options)
         assert done.returncode == 0, done.stderr
         points = frontier_from_bytes((tmp_path / "frontier" / "frontier.json").read_bytes()).points
         transfers = [point.transfer for point in points if point.setting.inputs != "switches"]
@@ -86,13 +88,14 @@ def test_the_picked_point_is_the_fastest_that_recognises_enough(found: Frontier)
     assert (found.by, picked.rate.what) == ("pooled", "pooled, trials")
 
 
-def test_running_again_asks_nothing_twice(
+def test_running_again_asks_nothing_twice_and_json_is_the_frontier(
     thenar: Thenar, set_file: Path, found_folder: Path, found: Frontier, tmp_path: Path
 ) -> None:
     again = tmp_path / "again"
     shutil.copytree(found_folder, again)
-    done = thenar("frontier", set_file, "-o", again, *QUICK, "--rate", 0.5)
+    done = thenar("frontier", set_file, "-o", again, *QUICK, "--rate", 0.5, "--json")
     assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == json.loads((again / "frontier.json").read_bytes())
     assert (again / "store.jsonl").read_bytes() == (found_folder / "store.jsonl").read_bytes()
     second = frontier_from_bytes((again / "frontier.json").read_bytes())
     assert second.points == found.points
@@ -156,10 +159,3 @@ def test_a_budget_that_nothing_meets_ends_with_a_code(
     assert done.returncode == 1
     assert "no point suits" in done.stderr
     assert (again / "frontier.json").exists()
-
-
-def test_json_is_the_frontier(thenar: Thenar, set_file: Path, found_folder: Path, tmp_path: Path) -> None:
-    again = tmp_path / "again"
-    shutil.copytree(found_folder, again)
-    done = thenar("frontier", set_file, "-o", again, *QUICK, "--rate", 0.5, "--json")
-    assert json.loads(done.stdout) == json.loads((again / "frontier.json").read_bytes())

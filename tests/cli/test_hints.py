@@ -27,6 +27,7 @@ from thenar.simulator.scenes import shipped
         ("place {set} --method eliminaton", "elimination"),
         ("frontier {set} -o new --methods id3,cmin", "cmim"),
         ("frontier {set} -o new --target avr382p", "avr328p"),
+        ("firmware . --target esp23 -o new", "esp32"),
         ("evaluate {set} --tables composition", "compositions"),
         ("verify . {set} --firmware hots", "host"),
         ("simulate quik -o new.grasps", "quick"),
@@ -53,6 +54,15 @@ def test_a_typo_is_answered_with_the_nearest_name(
 def test_where_nothing_is_near_all_names_are_listed(set_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["place", str(set_file), "--method", "foo"]) == 2
     assert f"there is no method 'foo': choose one of {', '.join(METHODS)}." in capsys.readouterr().err
+
+
+def test_a_target_that_is_none_is_answered_with_the_one_for_all_others(capsys: pytest.CaptureFixture[str]) -> None:
+    for wrong, said in (("rp2400", "(did you mean 'rp2040'"), ("z80", ": choose one of host, avr328p")):
+        assert run(["firmware", ".", "--target", wrong, "-o", "new"]) == 2
+        line = capsys.readouterr().err
+        assert f"there is no target '{wrong}'" in line
+        assert said in line
+        assert "`generic` is for any other part that has a C99 compiler" in line
 
 
 def test_help_is_a_command_too(capsys: pytest.CaptureFixture[str]) -> None:

@@ -154,7 +154,9 @@ def test_a_demonstration_follows_its_own_task_to_the_end(
     ]
     done = thenar("run", build, "--replay", demos[0], "--task", task)
     news = progress_of(done)
+    assert news[0].expected == ("cup",)
     assert [(each.step, each.grasp, each.done) for each in news] == [
+        (0, "none", False),
         (1, "cup", False),
         (1, "none", False),
         (2, "pen", False),
@@ -178,7 +180,7 @@ def test_what_deviates_is_said(thenar: Thenar, build: Path, demos: list[Path], t
     ):
         path = record(build, tmp_path / f"{types}.mcap", states(types, held))
         done = thenar("run", build, "--replay", path, "--task", task)
-        ended = [each for each in progress_of(done) if each.grasp == "none"]
+        ended = [each for each in progress_of(done)[1:] if each.grasp == "none"]
         assert [each.deviation for each in ended] == deviations
         assert last in done.stderr
 
@@ -258,8 +260,56 @@ def test_a_recorded_run_is_cut_into_its_grasps(
         assert one["start_s"] == pytest.approx(0.3 + 0.7 * number, abs=0.02)
         assert one["end_s"] == pytest.approx(0.7 + 0.7 * number, abs=0.02)
     assert len((tmp_path / "s.csv").read_text().splitlines()) == 4
-    # Of another build's switches nothing can be said.
-    other = compile_build(_without_pens(), tmp_path / "other", rounds=3, folds=0).folder
-    refused = thenar("segment", demos[0], "-b", other)
-    assert refused.returncode == 2
-    assert "another build" in refused.stderr
+
+
+def collected(path: Path, held: list[int], switches: tuple[str, ...], joint: str = "bend") -> Path:
+    """Record what every device delivers, as no build reads it, 10 ms a frame, before and after the computer restarts.
+
+    Switch i is switches[i]; what is called "s1" is what `readings` has as switch 1.
+    """
+    sensors = (*"bcdefghijklmnopq", joint, "r")
+    session = Session(thenar="0", switches=switches, sensors=sensors, harness=GLOVE)
+    with Recorder(path, session) as recorder:
+        for number, label in enumerate(held):
+            time_us, (closed, code) = 10_000 * number, readings(label)
+            recorder.glove(GloveFrame(time_us, bytes(16) + bytes([code, 0]), 3))
+            bits = sum(1 << at for at, name in enumerate(switches) if closed >> int(name[1:]) & 1)
+            recorder.switches(SwitchFrame(time_us, bits))
+    return path
+
+
+def test_a_recording_of_another_build_or_of_none_is_cut_into_the_same_grasps(
+    thenar: Thenar, build: Path, tmp_path: Path
+) -> None:
+    types = "cprrpc"
+    grasp_set = grasps_of(np.array(states("cprrpcpcr" * 2)))
+    whole = compile_build(grasp_set, tmp_path / "whole", rounds=9, folds=0, placement="elimination", keep=3).folder
+    assert len(Build.load(whole).manifest.switches) > len(Build.load(build).manifest.switches)
+    own = record(build, tmp_path / "own.mcap", states(types))
+    found = json.loads(thenar("segment", own, "-b", build, "--json").stdout)["segments"]
+    assert [one["type"] for one in found] == ["cup", "pen", "rod", "rod", "pen", "cup"]
+    others = (
+        record(whole, tmp_path / "other.mcap", states(types)),
+        collected(tmp_path / "collected.mcap", states(types), ("s9", "s2", "s0", "s1")),
+    )
+    for path in others:
+        done = thenar("segment", path, "-b", build, "--json")
+        assert done.returncode == 0, done.stderr
+        # Of a collection each frame is a moment, of a run those of the run: up to a tick later.
+        assert [one["type"] for one in json.loads(done.stdout)["segments"]] == [one["type"] for one in found]
+        for one, same in zip(json.loads(done.stdout)["segments"], found, strict=True):
+            for key in ("start_s", "end_s"):
+                assert one[key] == pytest.approx(same[key], abs=0.011)
+    assert thenar("teach", *others, "-b", build, "-o", tmp_path / "task.json").returncode == 0
+    assert len(json.loads((tmp_path / "task.json").read_bytes())["steps"]) == len(types)
+
+
+def test_a_recording_that_lacks_an_input_is_refused_by_name(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+    for switches, joint, lacking in (
+        (("s0", "s2"), "bend", "s1"),
+        (("s0", "s1", "s2"), "bent", "bend"),
+    ):
+        path = collected(tmp_path / f"{joint}.mcap", states("c"), switches, joint)
+        refused = thenar("segment", path, "-b", build)
+        assert (refused.returncode, refused.stdout) == (2, "")
+        assert f"{path.name} was recorded without {lacking}, which the build reads" in refused.stderr

@@ -4,9 +4,9 @@ from time import monotonic, monotonic_ns
 
 import pytest
 
-from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
 from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.drivers.scanner import BoardGrasp, Scanner
+from thenar.drivers.scanner import BoardGrasp, BoardSegment, Scanner
 from thenar.drivers.scanner_protocol import DEGRADED, EARLY, NO_GRASP
 
 KEYS = 12
@@ -87,3 +87,27 @@ def test_opening_again_forgets_what_was_recognised_before(board: EmulatedScanner
     until(scanner, lambda: scanner.grasp is not None)
     scanner.open()
     assert scanner.grasp is None
+
+
+def test_segments_are_asked_for_where_the_board_has_them_and_again_after_it_booted(tmp_path: Path) -> None:
+    follows = ScannerBoard(1, KEYS, segments=True)
+    with PtyLine(tmp_path / "board", BAUD) as line, EmulatedScanner(line, KEYS, board=follows) as board:
+        board.segment(1, 4, 2)  # nobody has asked
+        with Scanner(str(line.link), BAUD) as scanner:
+            until(scanner, lambda: scanner.segment is not None)
+            assert scanner.segment is not None
+            assert scanner.segment == BoardSegment(scanner.segment.time_us, 1, 4, "held")
+            board.segment(1, NO_GRASP, 0)
+            until(scanner, lambda: scanner.segment is not None and scanner.segment.state == "none")
+            assert scanner.segment[1:] == (1, None, "none")
+            assert (scanner.counts.gaps, scanner.counts.misfits) == (0, 0)
+            board.reboot()
+            until(scanner, lambda: scanner.segment is None)
+            until(scanner, lambda: scanner.segment is not None)
+            board.segment(1, 2, 1)
+            until(scanner, lambda: scanner.segment is not None and scanner.segment[1:] == (1, 2, "forming"))
+
+
+def test_a_board_without_segments_is_not_asked_for_them(board: EmulatedScanner, scanner: Scanner) -> None:
+    until(scanner, lambda: scanner.counts.frames > 10)
+    assert (scanner.segment, board.board.refused) == (None, 0)

@@ -20,12 +20,14 @@ MAIN = """\
 
 int main()
 {
+    static thenar_glove glove;
+    thenar_glove_init(&glove);
     for (unsigned closed, code; std::cin >> closed >> code;) {
         for (unsigned i = 0; i < THENAR_GLOVE_SWITCHES; ++i)
-            thenar_glove_set_switch(static_cast<thenar_glove_switch>(i), (closed >> i & 1u) != 0);
-        thenar_glove_input.codes[0] = static_cast<thenar_glove_code>(code);
-        std::cout << thenar_glove_grasp(thenar_glove_held(thenar_glove_classify(), 0u));
-        for (int score : thenar_glove_scores)
+            thenar_glove_set_switch(&glove, static_cast<thenar_glove_switch>(i), (closed >> i & 1u) != 0);
+        glove.input.codes[0] = static_cast<thenar_glove_code>(code);
+        std::cout << thenar_glove_grasp(thenar_glove_held(&glove, thenar_glove_classify(&glove), 0u));
+        for (int score : glove.scores)
             std::cout << ' ' << score;
         std::cout << '\\n';
     }

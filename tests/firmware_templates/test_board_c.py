@@ -24,9 +24,11 @@ from thenar.drivers.scanner_protocol import (
     Hello,
     Lost,
     Ping,
+    Segment,
     SetChannels,
     SetDebounce,
     SetRate,
+    SetSegments,
     State,
     frame,
     from_board,
@@ -68,6 +70,7 @@ CONFIGS = {
     "300 keys without diodes": BoardConfig(
         20, 15, diodes=False, scan_us=500, heartbeat_us=7000, press_us=5000, release_us=10_000
     ),
+    "8 keys and segments": BoardConfig(1, 8, heartbeat_us=7000, segments=True),
     "9 channels beside 12 keys": BoardConfig(1, 12, channels=9),
     "122 channels, without diodes": BoardConfig(2, 4, diodes=False, channels=122),
 }
@@ -135,9 +138,14 @@ class Board:
         self.library.thenar_board_grasp(grasp, margin, flags, ctypes.c_uint32(clock_us))
         return self.sent()
 
+    def segment(self, number: int, grasp: int, state: int, clock_us: int) -> bytes:
+        self.library.thenar_board_segment(number, grasp, state, ctypes.c_uint32(clock_us))
+        return self.sent()
+
 
 class Model(ScannerBoard):
-    """The emulated board of a configuration; with the rule for telling a grasp, and a line that can be full.
+    """The emulated board of a configuration; with the rules for telling grasps and segments, and a line that can
+    be full.
 
     What is due, and finds no room, stays due.
     """
@@ -148,12 +156,14 @@ class Model(ScannerBoard):
         super().__init__(**how, clock_us=clock_us)
         self.debounce = SetDebounce(press_us, release_us)
         self.full = False
-        self.beaten = False
+        self.beaten = self.untold = False
         self._grasp = (NO_GRASP, 0)
 
     def _sent(self, message: FromBoard) -> bytes:
         sent = super()._sent(message)
-        self.beaten |= isinstance(message, Heartbeat) and not self.full
+        beats = isinstance(message, Heartbeat) and not self.full
+        self.beaten |= beats
+        self.untold = self.full if isinstance(message, Segment) else self.untold or beats
         self.dropped += self.full
         return b"" if self.full else sent
 
@@ -181,6 +191,12 @@ class Model(ScannerBoard):
             return []
         self._grasp, self.beaten = (grasp, flags & DEGRADED), self.full
         return self.recognised(grasp, margin, flags, now)
+
+    def segmented(self, number: int, grasp: int, state: int, now: int) -> list[bytes]:
+        before = self.segment
+        assert before is not None
+        self.untold |= (number, grasp, state) != (before.number, before.grasp, before.state)
+        return super().segmented(number, grasp, state, now) if self.untold else []
 
 
 @pytest.fixture(scope="module", params=CONFIGS)
@@ -215,6 +231,13 @@ class Recognised:
 
 
 @dataclass(frozen=True)
+class Segmented:
+    number: int
+    grasp: int
+    state: int
+
+
+@dataclass(frozen=True)
 class Overrun:
     pass
 
@@ -224,7 +247,7 @@ class Full:
     full: bool
 
 
-Step = Scan | Received | Recognised | Overrun | Full
+Step = Scan | Received | Recognised | Segmented | Overrun | Full
 PERIODS = st.one_of(
     st.sampled_from([0, 1, 250, 1000, 3000, WRAP - 1]), st.integers(0, 30_000), st.integers(0, WRAP - 1)
 )
@@ -236,6 +259,7 @@ ASKED = st.one_of(
     st.builds(Ping, SHORT),
     st.builds(SetChannels, st.integers(0, 255), PERIODS, st.integers(0, (1 << 128) - 1), st.just(128)),
     st.builds(SetChannels, st.integers(0, 255), PERIODS, st.integers(0, 255), st.just(8)),
+    st.builds(SetSegments, st.integers(0, 2)),
 ).map(lambda message: scanner_protocol.encode(frame(message, 0)))
 UNKNOWN = st.builds(scanner_protocol.Frame, st.integers(0, 0x20), st.just(0), st.binary(max_size=20)).map(
     scanner_protocol.encode
@@ -251,6 +275,7 @@ STEPS: st.SearchStrategy[list[tuple[int, Step]]] = st.lists(
             st.builds(Scan, KEYS, st.sampled_from([0, 1 << 5, -1]) | KEYS, st.booleans()),
             st.builds(Received, st.one_of(ASKED, ASKED, UNKNOWN, st.binary(max_size=30))),
             st.builds(Recognised, st.sampled_from([0, 1, 255]), SHORT, st.integers(0, 3)),
+            st.builds(Segmented, st.integers(0, 2) | SHORT, st.sampled_from([0, 1, 255]), st.integers(0, 3)),
             st.just(Overrun()),
             st.builds(Full, st.booleans()),
         ),
@@ -271,6 +296,8 @@ def stepped(board: Board, model: Model, step: Step, now: int) -> tuple[bytes, li
             return board.receive(data, clock), model.receive(data, now)
         case Recognised(grasp, margin, flags):
             return board.grasp(grasp, margin, flags, clock), model.grasp(grasp, margin, flags, now)
+        case Segmented(number, grasp, state) if board.config.segments:
+            return board.segment(number, grasp, state, clock), model.segmented(number, grasp, state, now)
         case Overrun():
             board.library.thenar_board_overrun()
             model.overruns += 1
@@ -411,6 +438,25 @@ def test_a_grasp_is_told_when_it_changes_and_after_every_heartbeat(eight: Board)
     eight.receive(scanner_protocol.encode(frame(GetState(), 0)), 9)
     assert said(eight.grasp(NO_GRASP, 0xFFFF, EARLY, 10)) == [Grasp(10, NO_GRASP, 0xFFFF, EARLY)]
     assert eight.grasp(NO_GRASP, 0xFFFF, EARLY, 11) == b""
+
+
+def test_segments_are_told_to_those_who_asked_when_they_change_and_after_every_heartbeat(
+    shared_library: SharedLibrary,
+) -> None:
+    board = Board(shared_library, CONFIGS["8 keys and segments"])
+    (hello,) = said(board.boot(0))
+    assert isinstance(hello, Hello)
+    assert hello.has_segments
+    board.scan(0, 0)
+    assert board.segment(1, 3, 1, 1) == b""  # an older host cannot read it
+    ask = scanner_protocol.encode(frame(SetSegments(1), 0))
+    assert said(board.receive(ask, 2)) == [Segment(2, 1, 3, 1)]
+    assert board.segment(1, 3, 1, 3) == b""
+    assert said(board.segment(1, 3, 2, 4)) == [Segment(4, 1, 3, 2)]
+    board.scan(0, 7001)
+    assert said(board.segment(1, 3, 2, 7001)) == [Segment(7001, 1, 3, 2)]
+    assert said(board.receive(scanner_protocol.encode(frame(SetSegments(0), 0)), 7002)) == [Segment(7002, 1, 3, 2)]
+    assert board.segment(2, 3, 2, 7003) == b""
 
 
 def test_a_grasp_that_finds_no_room_is_told_as_soon_as_there_is_some(shared_library: SharedLibrary) -> None:

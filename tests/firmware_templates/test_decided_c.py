@@ -16,15 +16,12 @@ SharedLibrary = Callable[..., ctypes.CDLL]
 Ports = Sequence[Sequence[int]]
 
 # What stands in for the classifier: the scores, written by the test.
-SCORES = """
-#include "thenar_tiny.h"
-
-int16_t thenar_tiny_scores[1024];
-"""
 HEADER = """
+#include <stdbool.h>
 #include <stdint.h>
 
-extern int16_t thenar_tiny_scores[1024];
+typedef uint8_t thenar_tiny_class;
+typedef struct { int16_t scores[1024]; } thenar_tiny;
 """
 
 
@@ -44,9 +41,9 @@ class Decided:
     def __init__(self, shared_library: SharedLibrary, tables: IntegerTables, ports: Ports) -> None:
         grasps = [f"grasp {number}" for number in range(tables.n_classes)]
         files = decided_files("tiny", tables, grasps, ports)
-        self._library = shared_library({**files, "thenar_tiny.h": HEADER, "scores.c": SCORES})
+        self._library = shared_library({**files, "thenar_tiny.h": HEADER})
         self._library.thenar_tiny_decided.restype = ctypes.c_bool
-        self._scores = (ctypes.c_int16 * 1024).in_dll(self._library, "thenar_tiny_scores")
+        self._scores = (ctypes.c_int16 * 1024)()
         self._scorer = Scorer(tables)
         self._width, self._ports = tables.n_switches, ports
 
@@ -63,7 +60,7 @@ class Decided:
             ]
             for grasp, score in enumerate(scores):
                 self._scores[grasp] = score
-            answers.append(bool(self._library.thenar_tiny_decided(number, scores.index(max(scores)))))
+            answers.append(bool(self._library.thenar_tiny_decided(self._scores, number, scores.index(max(scores)))))
         return answers
 
 

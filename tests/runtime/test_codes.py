@@ -62,7 +62,7 @@ def test_halves_are_rounded_to_even_as_the_import_does() -> None:
 def test_bytes_are_codes_only_where_the_build_was_trained_on_bytes() -> None:
     assert CodeTables([raw_joint("a")], ["a"]).codes(b"\xff") == [255]
     for other in (joint(), joint(code_a=1, code_b=256), joint(code_a=0, code_b=255), joint(code_a=7, code_b=7)):
-        with pytest.raises(SettingError, match=r"not in a CyberGlove's bytes: calibrate the glove"):
+        with pytest.raises(SettingError, match=r"not in the glove's bytes: calibrate it"):
             CodeTables([other], ["a"])
 
 

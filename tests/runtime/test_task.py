@@ -32,7 +32,10 @@ def moment(time_us: int, state: State, segment: int, grasp: str, since_us: int |
 
 def played(task: Task, types: str, held_us: int = 500_000) -> list[Progress]:
     """Return the news when these types are grasped one after another, with nothing held in between."""
-    follower, news, now = TaskFollower(task), [], 0
+    follower, news, now = TaskFollower(task), list[Progress | None](), 0
+    first = follower.update(moment(0, "none", 0, "none", None))
+    assert first is not None
+    assert (first.step, first.grasp, first.expected) == (0, "none", task.first)
     for number, grasp in enumerate(types, 1):
         begin = now
         states: list[tuple[State, int]] = [("forming", 10_000), ("held", held_us), ("held", 1), ("releasing", 9_000)]

@@ -57,11 +57,11 @@ class Avr(Target):
 
         name, layout = library.name, library.layout
         values = {"name": name, "part": self.part, "programmer": self.programmer, "objects": library.objects}
-        class_type = "uint8_t" if len(layout.start) <= 255 else "uint16_t"
+        inputs = {"switches": layout.tables.n_switches, "joints": layout.tables.n_joints}
         return {
             **library.whole,
             "Makefile": render("avr_library/Makefile.j2", **values),
-            "main.c": render("avr_library/main.c.j2", name=name, joints=layout.tables.n_joints, class_type=class_type),
+            "main.c": render("avr_library/main.c.j2", name=name, upper=name.upper(), **inputs),
         }
 
     def missing(self) -> str | None:

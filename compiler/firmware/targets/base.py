@@ -96,8 +96,13 @@ class Target:
 
     @property
     def named(self) -> str:
-        """The part with its article: "an atmega328p"."""
-        return f"{'an' if self.part.startswith('a') else 'a'} {self.part}"
+        """The part with its article: "an atmega328p", "an stm32"."""
+        return f"{'an' if self.part[0] in 'aefilmnorsx' else 'a'} {self.part}"
+
+    @property
+    def counted_on(self) -> str:
+        """Where `run` counts, for a sentence: "Measured on atmega328p"."""
+        return self.part
 
     def cost(self, layout: "Layout") -> Cost:
         """Return a bound on what the classifier of that layout costs, or an estimate that is not too low."""
@@ -106,6 +111,10 @@ class Target:
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text of all that is written for it: as it is here, the C99 of the library alone."""
         return dict(library.whole)
+
+    def sources(self, library: "Library") -> dict[str, str]:
+        """Return path -> text of the classifier alone, as `run` takes it: in C, unless the target says otherwise."""
+        return library.files
 
     def missing(self) -> str | None:
         """Return what keeps code from being compiled and run here, and what to install; None if nothing does."""
@@ -123,7 +132,7 @@ class Target:
     ) -> "Answers":
         """Return what the classifier `name` answers to frames (n, F), uint8 as `layout.frame_bytes` makes them.
 
-        files        of `classifier_files(name, names, layout, avr=self.avr)`: file name -> text
+        files        of `sources`: path -> text
         incremental  each answer comes from update(), the change since the frame before, instead of classify()
         lost         (n, s + j) bool: the switches and the joints that are missing in each frame; what answers then take
                      is not counted

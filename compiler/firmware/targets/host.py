@@ -1,7 +1,7 @@
 """The target host, this machine: portable C, run with sanitizers by what gcc or clang makes of it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..tools import HOST_COMPILER, STRICT, call, find, lacking, workshop
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from ..layout import Layout
     from ..probes import Answers, Frames, Lost
 
-_SANITIZE = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+_SANITIZE = ("-g1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +53,7 @@ class Host(Target):
         compiler  "gcc" or "clang"; without it, the first that is installed
         sanitize  with the address and undefined behaviour sanitizers: a finding is an error
         """
-        from ..probes import answers_from, check_frames, names_in, record_files, with_lost
+        from ..probes import answers_in, check_frames, record_files, with_lost
 
         check_frames(frames, layout)
         command = find(HOST_COMPILER if compiler is None else ((compiler,), compiler))
@@ -61,10 +61,9 @@ class Host(Target):
         with workshop({**files, **main}) as folder:
             sources = sorted(path for path in (*files, *main) if path.endswith(".c"))
             call([command, *STRICT, "-O2", *(_SANITIZE if sanitize else ()), *sources, "-o", "classifier"], folder)
-            names, printed = names_in(
-                call([str(folder / "classifier")], folder, with_lost(frames, lost).tobytes()), layout
+            return answers_in(
+                call([str(folder / "classifier")], folder, with_lost(frames, lost).tobytes()), frames, layout
             )
-            return replace(answers_from(printed, frames, layout), names=names)
 
 
 MEMBER = Host(

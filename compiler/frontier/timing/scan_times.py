@@ -191,7 +191,11 @@ def scan_times(
     scan = plan_scan(names, tables, harness, bits[rows], codes[rows])
     wanted = zip(harness.scanners, scan.scanners, scan.board_channels, strict=True)
     boards = [(board, channels) for board, keys, channels in wanted if keys or channels]
-    board_us = max((_board_us(*board) for board in boards), default=0.0)
+    streams = [
+        stream for stream, read in zip(harness.streams, scan.streams, strict=True) if read.switches + read.levels
+    ]
+    rows_us = (float(stream.period_us) for stream in streams)
+    board_us = max((*(_board_us(*board) for board in boards), *rows_us), default=0.0)
     ports = [port.elements for port in scan.ports]
     known = Decided(tables, ports, bits, codes)
     full_us, early_us, early_ports = _bus_us(scan, harness, known, beside) if ports else (0.0, 0.0, 0.0)
@@ -204,7 +208,7 @@ def scan_times(
     return ScanTimes(
         full_us=max(full_us, board_us),
         early_us=max(early_us, board_us),
-        ports=len(scan.ports) + len(boards),
+        ports=len(scan.ports) + len(boards) + len(streams),
         chips=len({(port.bus, port.chip) for port in scan.ports}) + len(boards),
         how="model" if boards or beside.scan_us else "wire",
         early_ports=early_ports,

@@ -10,6 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import block_diag
+from scipy.optimize import minimize
+from scipy.special import logsumexp
 from sklearn.linear_model import LogisticRegression
 
 from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, PENALTY, SMOOTHNESS, ColumnTables, fit_logit
@@ -80,6 +82,42 @@ def test_lines_are_scikit_learns_answer_on_scaled_codes(seed: int, smoothness: f
     beyond[0, 6:], beyond[1, 6:] = np.nan, np.average(X[:, 6:], 0, weights)
     missing, mean = tables.scores(beyond)
     np.testing.assert_allclose(missing, mean, atol=1e-9)
+
+
+@given(SEEDS, st.booleans())
+@settings(max_examples=10, deadline=None)
+def test_counted_bits_and_frames_known_to_be_held_are_scipys_answer(seed: int, weighted: bool) -> None:
+    X, labels = grasps(seed, joints=0)
+    random = np.random.default_rng(seed)
+    held = (labels < 2) & (random.random(len(X)) < 0.7)
+    weights = random.integers(1, 4, len(X)).astype(float) if weighted else np.ones(len(X))
+    tables = fit_logit(
+        X, labels, 3, penalty=0.5, weights=weights if weighted else None, tolerance=1e-10, counted=6, held=held
+    )
+    number = X.sum(axis=1)
+    centred = number - np.average(number, weights=weights)
+    design = np.column_stack([np.ones(len(X)), X, centred])
+    pulls = 0.5 * np.r_[BIAS_SHARE, np.ones(6), BIN_SHARE * np.average(centred**2, weights=weights)]
+    never = np.where(held[:, np.newaxis] & (np.arange(3) == 2), -np.inf, 0.0)
+
+    def loss(flat: Any) -> tuple[float, Any]:
+        rows = flat.reshape(-1, 3)
+        scores = design @ rows + never
+        over = np.exp(scores - logsumexp(scores, axis=1, keepdims=True)) - np.eye(3)[labels]
+        lost = logsumexp(scores, axis=1) - scores[np.arange(len(X)), labels]
+        pulled = pulls[:, np.newaxis] * rows
+        return float(weights @ lost + 0.5 * (pulled * rows).sum()), (
+            design.T @ (weights[:, np.newaxis] * over) + pulled
+        ).ravel()
+
+    theirs = minimize(loss, np.zeros(design.shape[1] * 3), jac=True, options={"gtol": 1e-9, "maxiter": 2000}).x
+    # A count is centred to the half of a 512th of its range, as a line is.
+    np.testing.assert_allclose(tables.scores(X), design @ theirs.reshape(-1, 3), atol=2e-3)
+
+
+def test_a_count_that_says_no_more_than_one_bit_changes_nothing() -> None:
+    X, labels = grasps(3, bits=1)
+    assert numbers(fit_logit(X, labels, 3, counted=1)) == numbers(fit_logit(X, labels, 3))
 
 
 @pytest.mark.parametrize("unit", [1, 1000, 2.0**-20])

@@ -5,17 +5,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from thenar.compiler import Build, GraspSet, compile_build, verify
 from thenar.compiler.artifact import CompileError
-from thenar.compiler.artifact.training import cuts_of, samples_of
+from thenar.compiler.artifact.training import cuts_of, integers_of, rejected_by, samples_of, train
 from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.evaluation.choosing import inner_folds
 from thenar.compiler.recordings.graspset import Joint
+from thenar.compiler.recordings.merging import merge
 from thenar.compiler.recordings.taxonomy import own
+from thenar.compiler.samples import FRAMES as SAMPLED
 from thenar.compiler.samples import Samples
 from thenar.compiler.tables.quantise import integer_scores
-from thenar.runtime.manifest import Options
+from thenar.runtime.manifest import Options, Rejection
 from thenar.runtime.rejection import refused
 
 TYPES, TRIALS, FRAMES = ("pinch", "hook", "disk"), 20, 4
@@ -91,6 +96,22 @@ def test_no_more_rows_of_nothing_held_than_of_grasps_are_trained_on(moved: Grasp
     assert np.array_equal(samples.without_none().balanced(), np.arange(720))
 
 
+@given(st.lists(st.tuples(st.integers(0, 90), st.integers(0, 90)).filter(any), min_size=1, max_size=6))
+def test_of_a_long_movement_some_frames_are_trained_on(parts: list[tuple[int, int]]) -> None:
+    labels = np.concatenate([np.repeat([0, 1], part) for part in parts])
+    movements = np.repeat(np.arange(len(parts)), [sum(part) for part in parts])
+    samples = Samples(labels[:, None] > 0, np.zeros((len(labels), 0), np.uint16), labels, ("a", "none"))
+    rows = replace(samples, movements=movements, has_none=True).balanced()
+    assert (np.diff(rows) > 0).all()
+    held, none = np.bincount(labels, minlength=2)
+    for movement, size in enumerate(np.bincount(movements)):
+        own = rows[movements[rows] == movement]
+        assert len(own) <= SAMPLED
+        if none <= held:
+            assert len(own) == min(size, SAMPLED)
+            assert np.ptp(np.diff(own)) <= 1 if len(own) > 1 else True
+
+
 def test_a_build_without_such_rows_refuses_the_share_that_it_was_asked_for(moved: GraspSet, tmp_path: Path) -> None:
     held = moved.without_none()
     made = compile_build(held, tmp_path / "build", rounds=20, folds=3, refuse=0.02, jobs=1)
@@ -112,6 +133,22 @@ def test_a_build_without_such_rows_refuses_the_share_that_it_was_asked_for(moved
     assert build.rejector.refuses(lost, mask, 0, codes[0].tolist()) == gone[0]
 
 
+def test_frames_are_refused_by_how_far_whole_groups_deviate(moved: GraspSet) -> None:
+    held = moved.without_none()
+    asked = Options(rounds=20, folds=0, refuse=0.02)
+    samples = samples_of(held, asked)
+
+    def rejection(groups: NDArray[np.str_] | None) -> Rejection | None:
+        trained = train(samples, asked, groups=groups)
+        return rejected_by(trained, samples, integers_of(trained, samples, asked), asked, groups)
+
+    people = np.asarray(held.subjects)
+    one, two = np.full(len(held), "S0"), np.where(people == "S2", "S1", people)
+    assert rejection(one) is None
+    # Trials say less: two groups are left out in turn, as three are.
+    assert rejection(two) != rejection(None) is not None
+
+
 def test_without_refusal_the_firmware_says_nothing_of_it(moved: GraspSet, tmp_path: Path) -> None:
     held = moved.without_none()
     for refuse in (0.0, 0.01):
@@ -127,6 +164,34 @@ def test_compiled_classifiers_refuse_the_frames_that_python_does(moved: GraspSet
     found = verify(tmp_path / "build", moved.without_none(), firmware=["host"]).firmware
     assert found is not None
     assert found.holds
+
+
+@pytest.fixture(scope="module")
+def mixed(moved: GraspSet) -> GraspSet:
+    """Movements of one subject, and static grasps of two others."""
+    held = np.flatnonzero(~moved.is_none & (moved.subjects != "S0"))
+    alone = moved.rows(held[np.unique(moved.trial_ids[held], return_index=True)[1]])
+    return merge({"movements": moved.rows(moved.subjects == "S0"), "static": alone})
+
+
+def test_static_grasps_teach_types_and_not_whether_something_is_held(mixed: GraspSet, tmp_path: Path) -> None:
+    samples = Samples.of(mixed)
+    options = Options(trainer="logit", keep=6, placement="mrmr", folds=3, settings={"penalty": 1.0, "smoothness": 2.0})
+    assert (samples.silent == (mixed.subjects != "S0")).all()
+    assert not Samples.of(mixed.rows(mixed.subjects == "S0")).silent.any()
+    assert samples.rows(~samples.is_none).given_held is None
+    report = compile_build(mixed, tmp_path / "build", options, jobs=1)
+    assert report.manifest.segments is not None
+    # Who is tested on the only subject with movements has not learnt what an empty hand is like: that is not counted.
+    new, pooled = (
+        next(each for each in report.manifest.detection if each.held.of == of and each.held.protocol == "nested")
+        for of in ("new subject", "pooled")
+    )
+    assert (new.held.total, new.none) == (2 * 3 * TRIALS, None)
+    assert pooled.none is not None
+    assert pooled.none.correct > 0.8 * pooled.none.total
+    assert report.confusion is not None
+    assert report.confusion.sum() == 2 * 3 * TRIALS
 
 
 @pytest.mark.parametrize("share", [-0.1, 0.5])

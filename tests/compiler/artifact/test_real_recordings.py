@@ -20,6 +20,7 @@ from thenar.runtime.manifest import Inputs, Of, Options
 COLUMNS = Path(__file__).parents[3] / "examples" / "columns"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("table", "columns", "expected"),
     [

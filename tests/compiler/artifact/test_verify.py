@@ -3,6 +3,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from shutil import copytree
 from time import perf_counter
 from typing import Any
 
@@ -31,17 +32,24 @@ from thenar.runtime.tables import IntegerTables, tables_from_bytes, tables_to_by
 Make = Callable[..., GraspSet]
 
 
-@pytest.fixture(params=[*((name, {}) for name in TRAINERS), ("logit", {"linear": 1})], ids=str)
-def folder(grasp_set: GraspSet, tmp_path: Path, request: pytest.FixtureRequest) -> Path:
+@pytest.fixture(scope="module", params=[*((name, {}) for name in TRAINERS), ("logit", {"linear": 1})], ids=str)
+def built(grasp_set: GraspSet, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Path:
     """Return a build of each trainer, its settings given so that nothing is chosen."""
     trainer, changes = request.param
     settings = Training.candidates(Options(trainer=trainer))[0].settings
     given: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
     given |= {"rounds": 15} if "rounds" in given else {}
-    made = compile_build(grasp_set, tmp_path / "build", trainer=trainer, folds=0, refuse=0, **(given | changes))
+    build = tmp_path_factory.mktemp("built") / "build"
+    made = compile_build(grasp_set, build, trainer=trainer, folds=0, refuse=0, **(given | changes))
     assert made.manifest.fit.trainer == trainer
     assert bool(made.tables.slopes) == bool(changes)
     return made.folder
+
+
+@pytest.fixture
+def folder(built: Path, tmp_path: Path) -> Path:
+    """Return a copy of it, to be damaged."""
+    return copytree(built, tmp_path / "build")
 
 
 def _silence(folder: Path, joints: int) -> None:

@@ -1,6 +1,7 @@
 """The fit is chosen inside the training rows: folds that part nothing, the rule, and what options leave open."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -235,3 +236,28 @@ def test_where_all_that_is_compared_is_given_one_candidate_is_left(changes: dict
 def test_what_no_trainer_takes_is_refused(changes: dict[str, Any], because: str) -> None:
     with pytest.raises(TrainerError, match=because):
         Training.candidates(changed(Options(), changes))
+
+
+@pytest.mark.parametrize(("frames", "compared"), [(1, 240), (7, 238), (24, 80)])
+def test_of_trials_of_many_frames_some_are_compared_and_no_trial_is_left_out(
+    monkeypatch: pytest.MonkeyPatch, frames: int, compared: int
+) -> None:
+    monkeypatch.setattr(module, "_COMPARED", 100)
+    seen = list[int]()
+    monkeypatch.setattr(
+        Pointer, "train", lambda self, samples, settings, report=None: _counting(samples, seen, settings)
+    )
+    trainings = _pointing(monkeypatch, {"switch": 0}, {"switch": 1})
+    whole = _samples([], [0], n=240 // frames, idle=0)
+    samples = replace(whole.rows(np.repeat(np.arange(240 // frames), frames)), movements=np.empty(0, np.intp))
+    fitting = choose_training(samples, trainings)
+    assert {found.total for found in fitting.compared} == {240 // frames}
+    # Both ways, in folds whose training rows make up the set but for one.
+    assert sum(seen) == 2 * (fitting.folds - 1) * compared
+
+
+def _counting(samples: Samples, seen: list[int], settings: Mapping[str, Any]) -> ScoreTables:
+    seen.append(len(samples.labels))
+    rows = np.zeros((samples.n_switches, 2))
+    rows[settings["switch"], 1] = 2.0
+    return ScoreTables(np.array([1.0, 0.0]), rows, (), ())

@@ -243,7 +243,7 @@ def test_a_board_that_lacks_a_kept_switch_is_refused(generate: Generate) -> None
 
 def test_early_exit_reads_port_by_port_and_now_and_then_everything(generate: Generate) -> None:
     early = generate(UNO + "early_exit = true\nheartbeat_us = 20_000\nscan_us = 3000\n" + CHIPS_TOML, "glove")
-    assert "thenar_my_hand_decided(port, grasp)" in early["main.c"]
+    assert "thenar_my_hand_decided(&glove, port, grasp)" in early["main.c"]
     assert "#define WHOLE_US UINT32_C(20000)" in early["main.c"]
     assert "decided" not in generate(UNO + "scan_us = 3000\n" + CHIPS_TOML, "glove")["main.c"]
 

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.choose import Option, choose, flash_shares, frontier
+from thenar.compiler.firmware.choose import Choice, Option, choose, flash_shares, frontier
 from thenar.compiler.firmware.costs import Cost
 from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.targets import TARGETS, Target
@@ -27,6 +27,11 @@ def wide_tables(make_tables: MakeTables) -> IntegerTables:
     return make_tables(1, classes=14, switches=33, joints=16, bins=16, reach=300)
 
 
+@pytest.fixture(scope="module")
+def small(tables: IntegerTables) -> Choice:
+    return choose(tables, SMALL)
+
+
 def _scaled(target: Target, flash: int) -> Target:
     return replace(target, flash=flash)
 
@@ -41,8 +46,8 @@ def test_what_is_chosen_is_the_fastest_that_fits_and_costs_what_it_says(tables: 
     assert found.cost == min(fitting, key=lambda cost: cost.cycles)
 
 
-def test_the_frontier_runs_from_fast_and_large_to_slow_and_small(tables: IntegerTables) -> None:
-    costs = [cost for _, cost in choose(tables, SMALL).frontier]
+def test_the_frontier_runs_from_fast_and_large_to_slow_and_small(small: Choice) -> None:
+    costs = [cost for _, cost in small.frontier]
     assert len(costs) > 4
     assert [cost.cycles for cost in costs] == sorted({cost.cycles for cost in costs})
     assert [cost.flash for cost in costs] == sorted({cost.flash for cost in costs}, reverse=True)
@@ -61,8 +66,8 @@ def test_nothing_is_both_faster_and_smaller_than_what_is_on_the_frontier(
         assert (pair in kept) == (not beaten)
 
 
-def test_less_flash_makes_it_slower_until_nothing_fits(tables: IntegerTables) -> None:
-    best = choose(tables, SMALL).frontier
+def test_less_flash_makes_it_slower_until_nothing_fits(tables: IntegerTables, small: Choice) -> None:
+    best = small.frontier
     assert best[0][1].flash > SMALL.flash
     roomy = _scaled(SMALL, 64 << 10)
     for _, cost in (best[0], best[2], best[-1]):
@@ -72,8 +77,10 @@ def test_less_flash_makes_it_slower_until_nothing_fits(tables: IntegerTables) ->
     assert "--table-bits 8" in str(refused.value)
 
 
-def test_half_of_the_flash_is_taken_or_three_quarters_where_less_will_not_do(tables: IntegerTables) -> None:
-    smallest = choose(tables, SMALL).frontier[-1][1].flash
+def test_half_of_the_flash_is_taken_or_three_quarters_where_less_will_not_do(
+    tables: IntegerTables, small: Choice
+) -> None:
+    smallest = small.frontier[-1][1].flash
     assert flash_shares(SMALL) == (16 << 10, 24 << 10)
     assert flash_shares(TARGETS["avr2560"]) == (48 << 10, 48 << 10)
     assert choose(tables, _scaled(SMALL, 2 * smallest)).cost.flash == smallest
@@ -89,9 +96,9 @@ def test_too_little_ram_is_refused(tables: IntegerTables) -> None:
 
 
 def test_narrow_entries_are_chosen_where_the_tables_allow_them_and_they_are_allowed(
-    tables: IntegerTables, wide_tables: IntegerTables
+    tables: IntegerTables, wide_tables: IntegerTables, small: Choice
 ) -> None:
-    assert choose(tables, SMALL).layout.entry_bits == 8
+    assert small.layout.entry_bits == 8
     assert choose(tables, SMALL, flash=30000, entry_bits=16).layout.entry_bits == 16
     assert choose(wide_tables, SMALL, flash=30000).layout.entry_bits == 16
     with pytest.raises(FirmwareError, match="an 8-bit entry holds 255"):
@@ -109,14 +116,16 @@ def test_where_narrow_entries_are_slower_they_are_chosen_for_flash_alone(tables:
     assert choose(tables, target, flash=found.frontier[-1][1].flash).layout.entry_bits == 8
 
 
-def test_builds_of_both_widths_share_a_frontier(tables: IntegerTables, wide_tables: IntegerTables) -> None:
-    both = frontier([*choose(tables, SMALL).frontier, *choose(wide_tables, SMALL, flash=30000).frontier])
+def test_builds_of_both_widths_share_a_frontier(
+    tables: IntegerTables, wide_tables: IntegerTables, small: Choice
+) -> None:
+    both = frontier([*small.frontier, *choose(wide_tables, SMALL, flash=30000).frontier])
     assert {layout.tables is tables for layout, _ in both} == {True}
-    assert [cost for _, cost in both] == [cost for _, cost in choose(tables, SMALL).frontier]
+    assert [cost for _, cost in both] == [cost for _, cost in small.frontier]
 
 
-def test_why_is_said_in_a_sentence(tables: IntegerTables) -> None:
-    found = choose(tables, SMALL)
+def test_why_is_said_in_a_sentence(tables: IntegerTables, small: Choice) -> None:
+    found = small
     assert found.why.startswith("8-bit entries, up to ")
     assert " switches a look-up, codes " in found.why
     times = f"{found.cost.cycles} cycles ({found.cost.update_cycles} by update())"
@@ -145,3 +154,12 @@ def test_builds_that_lack_a_kind_of_input_have_layouts_too(make_tables: MakeTabl
 def test_tables_without_inputs_are_refused(make_tables: MakeTables) -> None:
     with pytest.raises(FirmwareError, match="no switch and no joint"):
         choose(make_tables(1, switches=0, joints=0), SMALL)
+
+
+def test_no_layout_for_an_avr_has_more_rows_than_its_compiler_makes_in_an_array(
+    make_tables: MakeTables,
+) -> None:
+    """Of 47 switches and 15 types, groups of eight need 45 KB; an ATmega2560 has the flash."""
+    many = make_tables(1, classes=15, switches=47, joints=0, reach=300)
+    for layout, _ in choose(many, TARGETS["avr2560"]).frontier:
+        assert layout.n_rows * layout.parts.width * len(layout.parts.firsts) * layout.entry_bits // 8 <= 32767

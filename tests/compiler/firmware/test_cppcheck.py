@@ -91,7 +91,8 @@ def looked_at(program: str, files: Mapping[str, str], folder: Path, options: tup
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text)
     sources = sorted(name for name in files if name.endswith(".c"))
-    command = [program, *OPTIONS, *options, *sources]
+    searched = sorted({f"-I{Path(name).parent}" for name in files if name.endswith(".h")} - {"-I."})
+    command = [program, *OPTIONS, *options, *searched, *sources]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     said = [line.split("\t") for line in done.stderr.splitlines()]
     return {(what, Path(file).name) for what, file, _, _ in said if what != "missingIncludeSystem"}

@@ -44,7 +44,7 @@ BOARDS = {
     ),
 }
 PLATFORM = {target.part: name for name, target in TARGETS.items()}
-COMPILERS = {"avr": "avr-gcc", "cortex": "arm-none-eabi-gcc", "host": "gcc"}
+COMPILERS = {"avr": "avr-gcc", "cortex": "arm-none-eabi-gcc", "rv32": "riscv64-unknown-elf-gcc", "host": "gcc"}
 
 
 @pytest.fixture(scope="session")
@@ -80,7 +80,7 @@ def make(folder: Path, *arguments: str) -> str:
     return done.stdout + done.stderr  # qemu's semihosting prints on the latter
 
 
-@pytest.mark.parametrize("platform", [name for name in TARGETS if name != "arduino"])
+@pytest.mark.parametrize("platform", [name for name in TARGETS if name.startswith(tuple(COMPILERS))])
 def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
     build: Build, platform: str, tmp_path: Path, tool: Tool
 ) -> None:
@@ -88,8 +88,8 @@ def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
     folder = write_folder(classifier(build, platform), tmp_path / "firmware")
     make(folder)
     assert "text" in make(folder, "size")
-    if platform.startswith("cortex"):
-        tool("qemu-system-arm")
+    if platform.startswith(("cortex", "rv32")):
+        tool("qemu-system-arm" if platform.startswith("cortex") else "qemu-system-riscv32")
     if not platform.startswith("avr"):
         assert "\n18 frames, answered as by Python\n" in make(folder, "check")
     make(folder, "clean")
@@ -118,7 +118,8 @@ def test_the_same_request_gives_the_same_files_which_name_no_place_and_no_time(b
 def test_files_are_called_by_the_name_and_no_name_is_rewritten(build: Build, platform: str) -> None:
     request = Firmware(build.tables, build.manifest, platform, name="anne_2")
     files = request.files()
-    assert any(path.endswith("thenar_anne_2.h") for path in files)
+    assert any("thenar_anne_2" in path or "thenar_anne_2" in text for path, text in files.items())
+    assert not any("thenar_glove" in path or "thenar_glove" in text for path, text in files.items())
     with pytest.raises(FirmwareError, match="'Anne' cannot be the name"):
         Firmware(build.tables, build.manifest, platform, name="Anne")
 

@@ -55,6 +55,7 @@ CASES: dict[str, tuple[str, Mode, str | None]] = {
     "avr2560": ("avr2560", "classify", None),
     "cortex-m0plus": ("cortex-m0plus", "classify", None),
     "cortex-m4": ("cortex-m4", "classify", None),
+    "rv32imac": ("rv32imac", "classify", None),
     "arduino": ("arduino", "classify", None),
     "scan-avr328p": ("avr328p", "scan", SCAN_BOARD),
     "glove-avr2560": ("avr2560", "glove", GLOVE_BOARD),

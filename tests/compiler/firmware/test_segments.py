@@ -11,8 +11,9 @@ from msgspec.structs import replace
 
 from thenar.compiler.firmware import FirmwareError, simavr
 from thenar.compiler.firmware.generate import Firmware
-from thenar.compiler.firmware.segments import segment_files
+from thenar.compiler.firmware.segments import segment_files, segmenter_bytes
 from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.firmware.targets.package import Package
 from thenar.compiler.firmware.tools import call, workshop
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.segmenting.model import SegmentModel
@@ -121,15 +122,19 @@ def test_on_an_avr_a_tick_of_14_types_and_none_takes_the_cycles_and_the_memory_t
         run = runs.run_avr(model, lanes, refused, LAG)
         assert run.cycles.max() <= most
         assert run.flash <= 3000
-        assert run.ram == 15 + 4 * 15 + 2 * sum(least - 1 for least in model.least) + LAG * (4 + 2 * 2)
+        assert run.ram == segmenter_bytes(model)
         assert run.stack <= 40
+
+
+# The modules in Python and Rust have no decoder.
+WITHOUT_DECODER = {"micropython", "rust"}
 
 
 def _learnt(tables: IntegerTables, describe: Callable[[IntegerTables], Manifest]) -> Manifest:
     return replace(describe(tables), segments=SegmentModel.usual(tables.n_classes, False, tables.scale))
 
 
-@pytest.mark.parametrize("target", sorted(TARGETS))
+@pytest.mark.parametrize("target", sorted(TARGETS.keys() - WITHOUT_DECODER))
 def test_firmware_of_a_build_that_has_costs_of_segments_brings_the_decoder_along(
     make_tables: Callable[..., IntegerTables],
     describe: Callable[[IntegerTables], Manifest],
@@ -143,12 +148,17 @@ def test_firmware_of_a_build_that_has_costs_of_segments_brings_the_decoder_along
     plain = Firmware(tables, describe(tables), target).files()
     more = {path.rsplit("/", 1)[-1] for path in files.keys() - plain.keys()}
     assert more >= {"thenar_glove_segments.h", "thenar_glove_segments.c"}
-    if target == "arduino":
+    if isinstance(TARGETS[target], Package):
+        assert "/src/thenar_glove_segments.c\n" in files["CMakeLists.txt"]
         assert "thenar_glove_segment_push\tKEYWORD2" in files["keywords.txt"]
         return
     with workshop(files) as folder:
         call(["make", "all"], folder)
-        assert (folder / "thenar_glove_segments.o").is_file()
+        if target == "wasm":
+            assert "class Segmenter" in files["thenar_glove.js"]
+            assert b"segment_push" in (folder / "thenar_glove.wasm").read_bytes()
+        else:
+            assert (folder / "thenar_glove_segments.o").is_file()
 
 
 def test_more_types_than_a_byte_numbers_are_refused() -> None:

@@ -27,30 +27,31 @@ Compare = Callable[[Answers, IntegerTables, Probes], None]
 SMALL, LARGE = TARGETS["avr328p"], TARGETS["avr2560"]
 HEADER = """
 #include <stdint.h>
-typedef struct { uint8_t switches[1]; } thenar_test_frame;
-extern thenar_test_frame thenar_test_input;
-extern int16_t thenar_test_scores[2];
-uint8_t thenar_test_classify(void);
-uint8_t thenar_test_update(void);
+typedef struct { int16_t scores[2], start[2]; uint8_t flags[2], switches[1], rest[4]; } thenar_test;
+void thenar_test_init(thenar_test *glove);
+uint8_t thenar_test_classify(thenar_test *glove);
+uint8_t thenar_test_update(thenar_test *glove);
 """
 # A hundred turns more where the switch is closed; eight bytes on the stack. The grasp is the switch.
 SOURCE = """
 #include "thenar_test.h"
-thenar_test_frame thenar_test_input;
-int16_t thenar_test_scores[2];
-uint8_t thenar_test_classify(void)
+void thenar_test_init(thenar_test *glove)
 {
-    const uint8_t closed = thenar_test_input.switches[0];
+    glove->flags[0] = 0;
+}
+uint8_t thenar_test_classify(thenar_test *glove)
+{
+    const uint8_t closed = glove->switches[0];
     uint8_t turns = (uint8_t)(1u + 100u * closed);
     __asm__ volatile (".rept 8\\n push r0\\n .endr\\n .rept 8\\n pop r0\\n .endr\\n"
                       "1: dec %0\\n brne 1b" : "+r" (turns));
-    thenar_test_scores[0] = closed;
-    thenar_test_scores[1] = -2;
+    glove->scores[0] = closed;
+    glove->scores[1] = -2;
     return closed;
 }
-uint8_t thenar_test_update(void)
+uint8_t thenar_test_update(thenar_test *glove)
 {
-    return thenar_test_classify();
+    return thenar_test_classify(glove);
 }
 """
 BY_HAND = {"thenar_test.h": HEADER, "thenar_test.c": SOURCE}
@@ -186,11 +187,11 @@ def children_s() -> float:
     ("changed", "said"),
     [
         ({"thenar_test.c": "int unused(void) { int x; return 0; }"}, "unused variable"),
-        ({"thenar_test.h": HEADER.replace("switches[1]", "switches[2]")}, "thenar_test_input has 2 bytes"),
-        ({"thenar_test.c": SOURCE.replace("thenar_test_scores", "other")}, "thenar_test_scores"),
+        ({"thenar_test.h": HEADER.replace("switches[1]", "switches[2]")}, "glove has 16 bytes"),
+        ({"thenar_test.c": SOURCE.replace("thenar_test_classify", "other")}, "thenar_test_classify"),
         ({"thenar_test.c": SOURCE.replace("brne", "rjmp")}, "does not return within"),
     ],
-    ids=["warning", "another frame", "no scores", "hangs"],
+    ids=["warning", "another frame", "no classify", "hangs"],
 )
 def test_files_that_are_no_such_classifier_are_an_error(changed: dict[str, str], said: str) -> None:
     layout = arrange(one_switch())

@@ -336,9 +336,10 @@ def test_an_unknown_rival_is_told(tmp_path: Path, make_set: Make) -> None:
 
 def test_two_workers_of_a_cluster_find_the_same(tmp_path: Path, make_set: Make) -> None:
     grasp_set = make_set(subjects=2)
-    here = found_of(asked(tmp_path / "here", grasp_set, target="avr328p"))
+    few = {"methods": ("id3",), "rivals": (), "target": "avr328p"}
+    here = found_of(asked(tmp_path / "here", grasp_set, **few))
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0") as cluster:
-        there = found_of(asked(tmp_path / "there", grasp_set, target="avr328p", cluster=cluster.scheduler_address))
+        there = found_of(asked(tmp_path / "there", grasp_set, **few, cluster=cluster.scheduler_address))
     assert _timeless(there) == _timeless(here)
 
 

@@ -195,7 +195,10 @@ def test_times_and_rows_in_which_nothing_is_held_are_merged(small: GraspSet) -> 
     merged = merge({"a": timed, "b": other})
     assert merged.times_us.tolist() == [*timed.times_us.tolist()] * 2
     assert merged.is_none.tolist() == [True, *[False] * 5] * 2
-    assert not merge({"a": timed, "b": replace(other, times_us=np.empty(0, np.int64))}).times_us.size
+    frames = replace(other, trials=np.ones(6, np.int64), times_us=np.empty(0, np.int64))
+    assert not merge({"a": timed, "b": frames}).times_us.size
+    static = replace(frames, trials=np.arange(6), grasps=small.grasps)
+    assert merge({"a": timed, "b": static}).times_us.tolist() == [*timed.times_us.tolist(), *[0] * 6]
     assert merge({"a": timed, "b": small.rows([])}).times_us.tolist() == timed.times_us.tolist()
 
 

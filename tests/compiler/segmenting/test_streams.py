@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.merging import merge
 from thenar.compiler.segmenting.streams import PAUSE_US, SegmentingError, streams_of
 
 Make = Callable[..., GraspSet]
@@ -63,3 +64,18 @@ def test_rows_that_are_trials_of_their_own_are_no_movements(make_movements: Make
         streams_of(held)
     with pytest.raises(SegmentingError, match="trial of its own"):
         streams_of(replace(grasp_set, independent=True))
+
+
+def test_static_grasps_beside_movements_are_of_no_stream(make_movements: Make) -> None:
+    grasp_set = make_movements()
+    held = grasp_set.without_none()
+    single = held.rows(np.unique(held.trial_ids, return_index=True)[1])
+    numbers = 100 + np.arange(len(single))
+    for subjects in (np.full(len(single), "C"), single.subjects):
+        static = replace(single, subjects=subjects, trials=numbers, times_us=np.zeros(0, np.int64))
+        mixed = merge({"static": static, "movements": grasp_set})
+        found = streams_of(mixed)
+        assert [stream.subject for stream in found] == ["A", "B"]
+        for one, alone in zip(found, streams_of(grasp_set), strict=True):
+            assert one.start_us == alone.start_us
+            np.testing.assert_array_equal(one.rows - len(static), alone.rows)

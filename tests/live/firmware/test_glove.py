@@ -9,14 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from thenar.compiler.firmware.board import parse_board
 from thenar.compiler.firmware.one_hand import for_one_hand
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.drivers.scanner import BoardGrasp, Scanner
+from thenar.drivers.scanner import BoardGrasp, BoardSegment, Scanner
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Recognised, Switch
+from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 pytestmark = pytest.mark.slow
@@ -25,6 +27,7 @@ MOST_S = 20.0
 # From a change until every GRASP is of it: records of the glove, a scan, and what a busy simulation is behind.
 SETTLE_US = 150_000
 BAUD = 1_000_000
+PINS = ("D2", "D3", "D4", "D5", "D6", "D7", "B0", "B1", "B2", "B3", "B4", "B5")
 
 
 def grasp_after(board: Scanner, time_us: int, *, wanted: bool = False) -> BoardGrasp:
@@ -152,3 +155,44 @@ def test_a_glove_with_chips_and_voltages_tells_the_builds_answers_and_which_chip
     assert (build.grasps[found.number or 0], found.margin, found.degraded) == (without.grasp, without.margin, True)
     found = grasp_after(scanner, board.do("replug 0x21").time_us, wanted=True)
     assert found.number == number
+
+
+def told(board: Scanner, state: str, time_us: int) -> BoardSegment:
+    """Return the first segment of this state that the board told after that moment."""
+    end = monotonic() + MOST_S
+    while monotonic() < end:
+        board.read(0.05)
+        segment = board.segment
+        if segment is not None and segment.time_us >= time_us and segment.state == state:
+            return segment
+    raise AssertionError(f"no segment {state!r}; the last one: {board.segment}, {board.faults}")
+
+
+@pytest.mark.parametrize("part", ["atmega328p", "atmega2560"])
+def test_a_glove_tells_the_segments_that_the_build_finds(
+    flash: Callable[..., Any], stack: ExitStack, tmp_path: Path, part: str
+) -> None:
+    """None held, a grasp that is held, let go, another: on the smallest part, too."""
+    build, switches = random_build(joints=0), [f"s{number}" for number in range(12)]
+    grasps = (*build.grasps[:-1], "none")
+    model = SegmentModel.usual(len(grasps) - 1, True, build.tables.scale)
+    build = Build(replace(build.manifest, grasps=grasps, segments=model), build.tables)
+    rng = np.random.default_rng(6)
+    rows = {answer_of(build, bits, np.empty(0))[0]: bits for bits in rng.random((400, 12)) < 0.4}
+    pins = "".join(f'{name} = "P{port}"\n' for name, port in zip(switches, PINS, strict=True))
+    board = flash(build, parse_board(f'part = "{part}"\n[pins]\n{pins}'), "glove", switches)
+    scanner = stack.enter_context(Scanner(str(tmp_path / "port"), BAUD))
+    assert scanner.hello is not None
+    assert scanner.hello.has_segments
+    none, now_us = len(grasps) - 1, board.set_keys(rows[len(grasps) - 1].tolist()).time_us
+    assert told(scanner, "none", now_us + SETTLE_US).grasp is None
+    for number, grasp in enumerate((2, 0, 2), 1):
+        now_us = board.set_keys(rows[grasp].tolist()).time_us
+        assert told(scanner, "forming", now_us)[1:3] == (number, grasp)
+        held = told(scanner, "held", now_us)
+        assert held[1:3] == (number, grasp)
+        # The lag, three certain frames, and what a busy simulation is behind.
+        assert held.time_us - now_us >= 150_000 - 2 * model.tick_us
+        now_us = board.set_keys(rows[none].tolist()).time_us
+        assert told(scanner, "releasing", now_us)[1:3] == (number, grasp)
+        assert told(scanner, "none", now_us)[1:3] == (number, None)

@@ -133,6 +133,21 @@ def test_a_switch_that_is_stuck_closed_is_lost_soon_and_used_again_when_it_opens
     assert (last.health, last.lost) == ("ok", ())
 
 
+def test_a_switch_that_opens_with_the_hand_is_never_stuck_closed(make_build: MakeBuild) -> None:
+    """Whatever its owner does: here every grasp closes a switch that no recording shows closed. If it stays closed
+    while the hand is open, it is found by the third grasp.
+    """
+    shares = closing()
+    shares[3] = 0.004
+    hand, grasps = Hand(exact(make_build, shares)), iter(drawn(shares, 100, 4))
+    for _ in range(60):
+        hand.grasp(next(grasps) | 8)
+        assert [*hand.found] == []
+    for _ in range(3):
+        hand.grasp(next(grasps), stuck=8)
+    assert hand.found == (Quarantined("s3", STUCK_CLOSED),)
+
+
 def test_a_switch_that_was_seen_to_close_and_never_does_again_is_stuck_open(make_build: MakeBuild) -> None:
     shares = np.full((SWITCHES, CLASSES), 0.05)
     for label in range(CLASSES):

@@ -84,14 +84,15 @@ def definition(build: Build, arrivals: list[Arrival]) -> dict[str, Any]:
     lost = flags((1 << SWITCHES) - 1) if no_switches else flags(switches.lost)
     bits = flags(0) if no_switches else flags(switches.closed)
     codes = [0, 0, 0] if no_glove else [glove.sensors[SENSORS.index(f"j{number}")] for number in range(JOINTS)]
-    lanes = Scorer(tables).lanes_without(bits, codes, lost, np.full(JOINTS, no_glove))
+    absent = np.array([code == 0 for code in codes])  # a byte of 0 is a sensor that was not measured
+    lanes = Scorer(tables).lanes_without(bits, codes, lost, absent)
     weights = [np.abs(row.astype(int)).sum() for row in tables.switch_rows]
-    joints = sum(np.ptp(rows.astype(int), axis=0).sum() for rows in tables.joint_rows)
-    weight_lost = sum(np.array(weights)[lost]) + joints * no_glove
-    unknown = bool(weight_lost > 0.5 * (sum(weights) + joints)) or bool(lost.all() and no_glove)
+    joints = np.array([np.ptp(rows.astype(int), axis=0).sum() for rows in tables.joint_rows])
+    weight_lost = sum(np.array(weights)[lost]) + sum(joints[absent])
+    unknown = bool(weight_lost > 0.5 * (sum(weights) + sum(joints))) or bool(lost.all() and absent.all())
     best = int(np.argmax(lanes))
     odds = np.exp((np.array(lanes) - max(lanes)) / tables.scale)
-    names = [f"s{number}" for number in np.flatnonzero(lost)] + ["j0", "j1", "j2"] * no_glove
+    names = [f"s{number}" for number in np.flatnonzero(lost)] + [f"j{number}" for number in np.flatnonzero(absent)]
     return {
         "grasp": UNKNOWN if unknown else build.grasps[best],
         "candidate": UNKNOWN if unknown else build.grasps[best],

@@ -36,6 +36,10 @@ MSG = {
     "trajectory_msgs/msg/JointTrajectory": (
         "std_msgs/Header header\nstring[] joint_names\ntrajectory_msgs/JointTrajectoryPoint[] points"
     ),
+    "std_msgs/msg/MultiArrayDimension": "string label\nuint32 size\nuint32 stride",
+    "std_msgs/msg/MultiArrayLayout": "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset",
+    "std_msgs/msg/UInt8MultiArray": "std_msgs/MultiArrayLayout layout\nuint8[] data",
+    "std_msgs/msg/Float32MultiArray": "std_msgs/MultiArrayLayout layout\nfloat32[] data",
     "diagnostic_msgs/msg/KeyValue": "string key\nstring value",
     "diagnostic_msgs/msg/DiagnosticStatus": (
         "byte level\nstring name\nstring message\nstring hardware_id\ndiagnostic_msgs/KeyValue[] values"
@@ -47,9 +51,11 @@ PUBLISHED = (
     "sensor_msgs/msg/JointState",
     "trajectory_msgs/msg/JointTrajectory",
     "diagnostic_msgs/msg/DiagnosticArray",
+    "std_msgs/msg/UInt8MultiArray",
+    "std_msgs/msg/Float32MultiArray",
 )
 # type_description_interfaces/msg/FieldType: 48 more is an array, 144 more an unbounded sequence.
-FIELD_TYPES = {"int32": 6, "uint32": 7, "float64": 11, "byte": 16, "string": 17}
+FIELD_TYPES = {"uint8": 3, "float32": 10, "int32": 6, "uint32": 7, "float64": 11, "byte": 16, "string": 17}
 NESTED, SEQUENCE = 1, 144
 
 strings = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)

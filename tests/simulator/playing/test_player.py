@@ -21,7 +21,7 @@ def performance(frames: int, period_us: int) -> Performance:
 
 def test_every_frame_is_shown_once_in_order_and_never_early() -> None:
     played, shown, log = performance(20, 2000), list[tuple[list[bool], bytes]](), list[tuple[int, str, int]]()
-    assert played.play(lambda bits, raw, _: shown.append((bits, raw)), lambda *line: log.append(line), Event())
+    assert played.play(lambda bits, raw, *_: shown.append((bits, raw)), lambda *line: log.append(line), Event())
     assert [bits for bits, _ in shown] == played.switches.tolist()
     assert [raw for _, raw in shown] == [row.tobytes() for row in played.sensors]
     assert [(row, grasp) for row, grasp, _ in log] == list(enumerate(played.grasps.tolist()))

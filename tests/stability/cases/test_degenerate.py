@@ -77,7 +77,7 @@ def test_evaluate_gives_rates_or_a_reason(
     name: str, path: Path, cut: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = path.with_suffix(".json")
-    code, _, _ = command(capsys, "evaluate", path, *cut, "--rounds", 2, "--repeats", 2, "--jobs", 1, "-o", out)
+    code, _, _ = command(capsys, "evaluate", path, *cut, "--rounds", 2, "--repeats", 1, "--jobs", 1, "-o", out)
     if code == 0:
         for table in json.loads(out.read_bytes())["tables"]:
             for row in table["rows"]:

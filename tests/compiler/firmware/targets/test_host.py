@@ -3,8 +3,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import classifier_files
@@ -86,38 +84,6 @@ def test_so_it_is_for_builds_of_any_shape(
     same_as_python(HOST.run(files(layout), "hand", layout, sent, incremental=incremental), tables, frames)
 
 
-@given(
-    seed=st.integers(0, 2**32 - 1),
-    classes=st.integers(2, 20),
-    switches=st.integers(0, 20),
-    joints=st.integers(0, 4),
-    group_size=st.integers(2, 6),
-    entry_bits=st.sampled_from([8, 16]),
-    bins=st.sampled_from(["direct", "trimmed", "search"]),
-    incremental=st.booleans(),
-)
-@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_so_it_is_for_every_arrangement(
-    make_tables: MakeTables,
-    files: Files,
-    probed: Probed,
-    same_as_python: SameAsPython,
-    seed: int,
-    classes: int,
-    switches: int,
-    joints: int,
-    group_size: int,
-    entry_bits: int,
-    bins: str,
-    incremental: bool,
-) -> None:
-    tables = make_tables(seed, classes, switches, max(joints, int(switches == 0)))
-    layout = arrange(tables, group_size=group_size, entry_bits=entry_bits, bins=bins)  # type: ignore[arg-type]
-    frames = probed(tables, 100)
-    sent = layout.frame_bytes(frames.bits, frames.codes)
-    same_as_python(HOST.run(files(layout), "hand", layout, sent, incremental=incremental), tables, frames)
-
-
 STAND_IN = {
     "thenar_hand.h": """
 #include <stdbool.h>
@@ -125,22 +91,21 @@ STAND_IN = {
 typedef uint8_t thenar_hand_class;
 typedef uint8_t thenar_hand_switch;
 typedef struct { uint8_t switches[2]; uint8_t codes[3]; } thenar_hand_frame;
-extern thenar_hand_frame thenar_hand_input;
-extern int16_t thenar_hand_scores[5];
-uint8_t thenar_hand_classify(void);
-uint8_t thenar_hand_update(void);
-void thenar_hand_set_switch(thenar_hand_switch number, bool closed);
+typedef struct { int16_t scores[5]; thenar_hand_frame input; } thenar_hand;
+void thenar_hand_init(thenar_hand *glove);
+uint8_t thenar_hand_classify(thenar_hand *glove);
+uint8_t thenar_hand_update(thenar_hand *glove);
+void thenar_hand_set_switch(thenar_hand *glove, thenar_hand_switch number, bool closed);
 const char *thenar_hand_grasp(thenar_hand_class grasp);
 """,
     "thenar_hand.c": """
 #include "thenar_hand.h"
-thenar_hand_frame thenar_hand_input;
-int16_t thenar_hand_scores[5];
-uint8_t thenar_hand_classify(void) { thenar_hand_scores[0]++; return 3; }
-uint8_t thenar_hand_update(void) { thenar_hand_scores[1]--; return 4; }
-void thenar_hand_set_switch(thenar_hand_switch number, bool closed)
+void thenar_hand_init(thenar_hand *glove) { glove->scores[0] = 0; }
+uint8_t thenar_hand_classify(thenar_hand *glove) { glove->scores[0]++; return 3; }
+uint8_t thenar_hand_update(thenar_hand *glove) { glove->scores[1]--; return 4; }
+void thenar_hand_set_switch(thenar_hand *glove, thenar_hand_switch number, bool closed)
 {
-    if (number == 1 && closed) thenar_hand_scores[2]++;
+    if (number == 1 && closed) glove->scores[2]++;
 }
 const char *thenar_hand_grasp(thenar_hand_class grasp) { return grasp == 4 ? "last" : ""; }
 """,
@@ -189,7 +154,7 @@ def test_a_warning_is_an_error_that_shows_it(make_tables: MakeTables, files: Fil
 def test_a_sanitizer_s_finding_is_an_error_that_shows_it(make_tables: MakeTables, files: Files) -> None:
     layout = arrange(make_tables())
     made = files(layout)
-    head = "_classify(void)\n{\n"
+    head = "_classify(thenar_hand *glove)\n{\n"
     broken = made | {"thenar_hand.c": made["thenar_hand.c"].replace(head, head + OVERFLOW)}
     assert broken != made
     HOST.run(broken, "hand", layout, np.zeros((1, 5), np.uint8), sanitize=False)

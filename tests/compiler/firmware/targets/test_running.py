@@ -17,6 +17,10 @@ UNITS = {
     "avr2560": "cycles",
     "cortex-m0plus": "instructions",
     "cortex-m4": "instructions",
+    "rp2040": "instructions",
+    "rp2350": "instructions",
+    "esp32": "instructions",
+    "rv32imac": "instructions",
 }
 
 
@@ -49,6 +53,8 @@ NEEDED = {
     "host": "gcc or clang not found; Debian: apt-get install gcc",
     "cortex-m4": "arm-none-eabi-gcc and qemu-system-arm not found; "
     "Debian: apt-get install gcc-arm-none-eabi qemu-system-arm",
+    "rv32imac": "riscv64-unknown-elf-gcc and qemu-system-riscv32 not found; "
+    "Debian: apt-get install gcc-riscv64-unknown-elf qemu-system-misc",
     "avr328p": "avr-gcc and gcc or clang and make not found; Debian: apt-get install gcc-avr avr-libc gcc make",
 }
 

@@ -175,7 +175,7 @@ def test_every_target_says_what_its_scans_hold_beside_the_wire(target: str) -> N
     beside = beside_wire(target)
     assert len(beside.what) > 20
     assert (beside.scan_us > 0) == target.startswith("avr")
-    assert (beside.call_us > 0) == (not target.startswith("cortex"))
+    assert (beside.call_us > 0) == (not target.startswith(("cortex", "rv32")))
 
 
 def test_a_system_call_is_timed() -> None:

@@ -1,14 +1,15 @@
-/* A program around the classifier, to start from. Where the glove is read, give every kept switch to
-   thenar_glove_set_switch(number, closed),
-   and every joint's code to thenar_glove_input.codes[joint].
-   Their order is that of build.json. */
+/* A program around the classifier, to start from: read the glove where the comment is. */
 #include "thenar_glove.h"
 
-static volatile uint8_t recognised; /* for whoever shows or sends it */
+static thenar_glove glove;
+static volatile thenar_glove_class recognised; /* for whoever shows or sends it */
 
 int main(void)
 {
+    thenar_glove_init(&glove);
     for (;;) {
-        recognised = thenar_glove_update();
+        /* thenar_glove_set_switch(&glove, THENAR_GLOVE_SWITCH_..., closed); */
+        /* glove.input.codes[THENAR_GLOVE_JOINT_...] = code; */
+        recognised = thenar_glove_update(&glove);
     }
 }

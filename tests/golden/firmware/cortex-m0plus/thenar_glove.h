@@ -1,9 +1,13 @@
-/* thenar_glove.h: recognises 3 grasp types from 6 switches and 2 joints of a glove.
-   Layout for cortex-m0plus: 16-bit entries, up to 6 switches a look-up, codes looked up in 256 bytes a joint, up to
-   2 joints a look-up: the fastest of 54 layouts in 65536 bytes of flash, about 106 instructions (156 by update())
-   and 2171 bytes.
-
-   From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.h.j2. */
+/**
+ * @file thenar_glove.h
+ * @brief Recognises 3 grasp types from 6 switches and 2 joints of a glove.
+ *
+ * Layout for cortex-m0plus: 16-bit entries, up to 6 switches a look-up, codes looked up in 256 bytes a joint, up to
+ * 2 joints a look-up: the fastest of 54 layouts in 65536 bytes of flash, about 90 instructions (156 by update()) and
+ * 2211 bytes.
+ *
+ * From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.h.j2.
+ */
 #ifndef THENAR_GLOVE_H
 #define THENAR_GLOVE_H
 
@@ -14,48 +18,109 @@
 extern "C" {
 #endif
 
-#define THENAR_GLOVE_CLASSES 3u
-#define THENAR_GLOVE_SWITCHES 6u
-#define THENAR_GLOVE_PORTS 1u
-#define THENAR_GLOVE_JOINTS 2u
+#define THENAR_GLOVE_CLASSES 3u /**< Grasp types. */
+#define THENAR_GLOVE_SWITCHES 6u /**< Kept switches. */
+#define THENAR_GLOVE_PORTS 1u /**< Bytes that hold them. */
+#define THENAR_GLOVE_JOINTS 2u /**< Joints. */
 
-/* Number of a grasp type, of a switch; a joint's code, in the units of the recordings. */
+/** The number of a grasp type. */
 typedef uint8_t thenar_glove_class;
-typedef uint8_t thenar_glove_switch;
-typedef uint8_t thenar_glove_code; /* of codes above 255: 255 */
 
-/* What is classified: the bytes of ports as they come. Bit b of switches[p] is 1 while the switch in place b is
-   closed; bits without a switch mean nothing.
-     switches[0]: thumb tip, index tip, index middle, middle tip, palm radial, palm ulnar
-     codes[0]: thumb_rotation, the glove's own codes
-     codes[1]: index_pij, the glove's own codes
-*/
+/** The grasp types. */
+enum {
+    THENAR_GLOVE_GRASP_POWER_GRIP = 0, /**< power grip */
+    THENAR_GLOVE_GRASP_TIP_PINCH = 1, /**< tip pinch */
+    THENAR_GLOVE_GRASP_LATERAL_PINCH = 2, /**< lateral pinch */
+};
+
+/** The number of a switch. */
+typedef uint8_t thenar_glove_switch;
+
+/** The switches, and where the input has them. */
+enum {
+    THENAR_GLOVE_SWITCH_THUMB_TIP = 0, /**< thumb tip: switches[0], 0x01 */
+    THENAR_GLOVE_SWITCH_INDEX_TIP = 1, /**< index tip: switches[0], 0x02 */
+    THENAR_GLOVE_SWITCH_INDEX_MIDDLE = 2, /**< index middle: switches[0], 0x04 */
+    THENAR_GLOVE_SWITCH_MIDDLE_TIP = 3, /**< middle tip: switches[0], 0x08 */
+    THENAR_GLOVE_SWITCH_PALM_RADIAL = 4, /**< palm radial: switches[0], 0x10 */
+    THENAR_GLOVE_SWITCH_PALM_ULNAR = 5, /**< palm ulnar: switches[0], 0x20 */
+};
+
+/** A joint's code, in the units of the recordings. Of codes above 255: 255. */
+typedef uint8_t thenar_glove_code;
+
+/** The joints, and what their codes mean. */
+enum {
+    THENAR_GLOVE_JOINT_THUMB_ROTATION = 0, /**< thumb_rotation: the glove's own codes */
+    THENAR_GLOVE_JOINT_INDEX_PIJ = 1, /**< index_pij: the glove's own codes */
+};
+
+/** What is read of a glove. */
 typedef struct {
+    /** The bytes of the ports. A bit is 1 while its switch is closed; one without a switch means nothing. */
     uint8_t switches[THENAR_GLOVE_PORTS];
+    /** The joints' codes, by their numbers. */
     thenar_glove_code codes[THENAR_GLOVE_JOINTS];
 } thenar_glove_frame;
 
-/* Written by the caller before classify() or update(), which alone read it. */
-extern thenar_glove_frame thenar_glove_input;
+/** What is in the sums; private. */
+typedef struct {
+    const uint32_t *rows[2];
+} thenar_glove_seen;
 
-/* The scores of what was classified last, equal to Python's; before, those of all switches open and all codes 0. */
-extern int16_t thenar_glove_scores[THENAR_GLOVE_CLASSES];
+/** One glove. A program has as many as it likes; a copy is a glove of its own. */
+typedef struct {
+    int16_t scores[THENAR_GLOVE_CLASSES]; /**< Of the last answer, equal to Python's. */
+    uint32_t sums[1][2]; /* private, as are all members without a description */
+    uint32_t start[1][2];
+    bool missing;
+    bool begun;
+    thenar_glove_frame input; /**< Written by the caller, read by classify() and update(). */
+    thenar_glove_seen seen;
+    uint8_t lost_switches[THENAR_GLOVE_PORTS];
+    uint8_t lost_joints[(THENAR_GLOVE_JOINTS + 7u) / 8u];
+    uint16_t n_lost;
+} thenar_glove;
 
-/* Say in the input whether a switch is closed; numbers from THENAR_GLOVE_SWITCHES on are ignored. */
-void thenar_glove_set_switch(thenar_glove_switch number, bool closed);
+/** Begin: all switches open, all codes 0, nothing missing. */
+void thenar_glove_init(thenar_glove *glove);
 
-/* Say that an input cannot be read, or can be read again; numbers beyond the last are ignored. While it is missing the
-   mean of its rows stands in for it, as in Python: classify() and update() open its switch, or make its code 0. */
-void thenar_glove_lose_switch(thenar_glove_switch number, bool lost);
-void thenar_glove_lose_joint(uint16_t number, bool lost);
+/** Say in the input whether a switch is closed. Numbers from THENAR_GLOVE_SWITCHES on are ignored. */
+void thenar_glove_set_switch(thenar_glove *glove, thenar_glove_switch number, bool closed);
 
-/* Score the input, and return the first of the grasp types whose score is largest. */
-thenar_glove_class thenar_glove_classify(void);
+/**
+ * Say that a switch cannot be read, or can be read again. While it is missing, classify() and update() open it, and the
+ * mean of its rows stands in for it, as in Python. Numbers from THENAR_GLOVE_SWITCHES on are ignored.
+ */
+void thenar_glove_lose_switch(thenar_glove *glove, thenar_glove_switch number, bool lost);
 
-/* The same answer by what has changed since the last classify() or update(), either of which may come first. */
-thenar_glove_class thenar_glove_update(void);
+/**
+ * Say that a joint cannot be read, or can be read again. While it is missing, classify() and update() make its code 0,
+ * and the mean of its rows stands in for it, as in Python. Numbers from THENAR_GLOVE_JOINTS on are ignored.
+ */
+void thenar_glove_lose_joint(thenar_glove *glove, uint16_t number, bool lost);
 
-/* The name of a grasp type in UTF-8, "" for a number that is none. */
+/**
+ * Score the input.
+ *
+ * @return the first of the grasp types whose score is largest
+ */
+thenar_glove_class thenar_glove_classify(thenar_glove *glove);
+
+/** The same answer, by what has changed since the last update(). After init(), classify() or a loss it begins anew. */
+thenar_glove_class thenar_glove_update(thenar_glove *glove);
+
+/** By how many steps the best score leads the second best. */
+uint16_t thenar_glove_margin(const thenar_glove *glove);
+
+/**
+ * How probable a grasp type is: the softmax of the scores in integers, the same as Python's.
+ *
+ * @return 0 to 65535, which is certain; 0 for a number that is no grasp type
+ */
+uint16_t thenar_glove_probability(const thenar_glove *glove, thenar_glove_class grasp);
+
+/** The name of a grasp type in UTF-8, "" for a number that is none. */
 const char *thenar_glove_grasp(thenar_glove_class grasp);
 
 #ifdef __cplusplus

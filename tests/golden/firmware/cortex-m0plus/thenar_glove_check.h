@@ -237,15 +237,15 @@ static const char *const thenar_glove_grasps[3] = {
 };
 
 /* Fill in the input. */
-static void thenar_glove_take(unsigned check)
+static void thenar_glove_take(thenar_glove *glove, unsigned check)
 {
     for (unsigned number = 0u; number < 6u; ++number) {
         const unsigned eight = thenar_glove_checks[check].closed[number / 8u];
 
-        thenar_glove_set_switch((thenar_glove_switch)number, ((eight >> (number % 8u)) & 1u) != 0u);
+        thenar_glove_set_switch(glove, (thenar_glove_switch)number, ((eight >> (number % 8u)) & 1u) != 0u);
     }
     for (unsigned joint = 0u; joint < 2u; ++joint) {
-        thenar_glove_input.codes[joint] = thenar_glove_checks[check].codes[joint];
+        glove->input.codes[joint] = thenar_glove_checks[check].codes[joint];
     }
 }
 
@@ -259,12 +259,12 @@ static bool thenar_glove_same(const char *one, const char *other)
     return one[at] == other[at];
 }
 
-static bool thenar_glove_agrees(unsigned check, uint16_t grasp)
+static bool thenar_glove_agrees(const thenar_glove *glove, unsigned check, uint16_t grasp)
 {
     bool same = grasp == thenar_glove_checks[check].grasp;
 
     for (unsigned k = 0u; k < 3u; ++k) {
-        same = same && (thenar_glove_scores[k] == thenar_glove_checks[check].scores[k]);
+        same = same && (glove->scores[k] == thenar_glove_checks[check].scores[k]);
     }
     return same;
 }
@@ -273,13 +273,15 @@ static bool thenar_glove_agrees(unsigned check, uint16_t grasp)
    types are called otherwise. */
 static unsigned thenar_glove_check(void)
 {
+    static thenar_glove glove;
     unsigned wrong = 0u;
 
+    thenar_glove_init(&glove);
     for (unsigned check = 0u; check < THENAR_GLOVE_CHECKS; ++check) {
-        thenar_glove_take(check);
-        const bool updated = thenar_glove_agrees(check, thenar_glove_update());
+        thenar_glove_take(&glove, check);
+        const bool updated = thenar_glove_agrees(&glove, check, thenar_glove_update(&glove));
 
-        if (!updated || !thenar_glove_agrees(check, thenar_glove_classify())) {
+        if (!updated || !thenar_glove_agrees(&glove, check, thenar_glove_classify(&glove))) {
             wrong++;
         }
     }

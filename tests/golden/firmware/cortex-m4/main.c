@@ -1,6 +1,5 @@
 /* The self test of the classifier on a Cortex-M4: "make check" runs it in qemu, a debugger with semihosting on the
-   part itself. A glove's own main() takes its place, fills thenar_glove_input
-   and calls thenar_glove_classify(). */
+   part itself. A glove's own main() takes its place. */
 #include "semihosting.h"
 #include "thenar_glove_check.h"
 

@@ -30,6 +30,8 @@
 #error "the classifier's ports are more than the bytes of the board's keys"
 #endif
 
+static thenar_glove glove;
+
 /* What was there at the last scan: keys, and joints. */
 static uint8_t known_before[THENAR_BITMAP_BYTES];
 static bool joints_before = true;
@@ -44,7 +46,7 @@ bool thenar_port_send(const uint8_t *frame, uint8_t length)
 /* Show the classifier which keys are closed: the bytes of its ports are the first of their bitmap. */
 static void show(const uint8_t *closed)
 {
-    (void)memcpy(thenar_glove_input.switches, closed, THENAR_GLOVE_PORTS);
+    (void)memcpy(glove.input.switches, closed, THENAR_GLOVE_PORTS);
 }
 
 static bool is_known(uint16_t number, const uint8_t *known)
@@ -64,28 +66,15 @@ static void lose(const uint8_t *known, bool joints)
             const bool lost = !is_known(number, known);
 
             switches_lost = (uint16_t)(switches_lost + (lost ? 1u : 0u));
-            thenar_glove_lose_switch((thenar_glove_switch)number, lost);
+            thenar_glove_lose_switch(&glove, (thenar_glove_switch)number, lost);
         }
     }
     if (joints != joints_before) {
         joints_before = joints;
         for (uint16_t joint = 0u; joint < THENAR_GLOVE_JOINTS; joint++) {
-            thenar_glove_lose_joint(joint, !joints);
+            thenar_glove_lose_joint(&glove, joint, !joints);
         }
     }
-}
-
-/* Return by how many steps a grasp type leads the second. */
-static uint16_t margin(uint8_t grasp)
-{
-    int16_t second = INT16_MIN;
-
-    for (uint8_t other = 0u; other < THENAR_GLOVE_CLASSES; other++) {
-        if ((other != grasp) && (thenar_glove_scores[other] > second)) {
-            second = thenar_glove_scores[other];
-        }
-    }
-    return (uint16_t)((uint16_t)thenar_glove_scores[grasp] - (uint16_t)second);
 }
 
 static void tell_grasp(uint8_t grasp, uint8_t flags, uint32_t now_us)
@@ -96,7 +85,11 @@ static void tell_grasp(uint8_t grasp, uint8_t flags, uint32_t now_us)
     if (nothing || (grasp == THENAR_NO_GRASP)) {
         thenar_board_grasp(THENAR_NO_GRASP, 0u, THENAR_GRASP_DEGRADED, now_us);
     } else {
-        thenar_board_grasp(grasp, margin(grasp), (uint8_t)(flags | (degraded ? THENAR_GRASP_DEGRADED : 0u)), now_us);
+        const uint8_t held = grasp;
+
+        const uint8_t all = (uint8_t)(flags | (degraded ? THENAR_GRASP_DEGRADED : 0u));
+
+        thenar_board_grasp(held, thenar_glove_margin(&glove), all, now_us);
     }
 }
 
@@ -121,7 +114,7 @@ static bool whole_is_due(uint32_t now_us)
    missing, everything is read. */
 static void scan(uint32_t now_us)
 {
-    const bool joints = thenar_joints_read(now_us);
+    const bool joints = thenar_joints_read(&glove, now_us);
     bool complete = joints && (switches_lost == 0u);
     const bool whole = whole_is_due(now_us) || !complete;
     bool decided = false;
@@ -134,21 +127,23 @@ static void scan(uint32_t now_us)
     for (uint8_t port = 0u; (port < THENAR_KEYS_PORTS) && !decided; port++) {
         complete = thenar_keys_read(port, closed, known) && complete;
         show(closed);
-        grasp = thenar_glove_update();
-        decided = complete && !whole && (port < (THENAR_KEYS_PORTS - 1u)) && thenar_glove_decided(port, grasp);
+        grasp = thenar_glove_update(&glove);
+        decided = complete && !whole && (port < (THENAR_KEYS_PORTS - 1u))
+            && thenar_glove_decided(&glove, port, grasp);
     }
     thenar_board_found(known);
     thenar_debounce(closed, known, now_us);
     thenar_board_scanned(closed, known, !decided, now_us);
     if (!decided) {
         lose(known, joints);
-        grasp = thenar_glove_update();
+        grasp = thenar_glove_update(&glove);
     }
     tell_grasp(grasp, decided ? THENAR_GRASP_EARLY : 0u, now_us);
 }
 
 int main(void)
 {
+    thenar_glove_init(&glove);
     thenar_uart0_begin();
     thenar_clock_begin();
     sei();

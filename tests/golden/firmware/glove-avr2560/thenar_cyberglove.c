@@ -11,10 +11,10 @@
 #include "thenar_joints.h"
 
 #include <avr/pgmspace.h>
+#include <string.h>
 
 #include "thenar_clock.h"
 #include "thenar_uart1.h"
-#include "thenar_glove.h"
 
 #define SENSORS 18u
 #define JOINTS 2u
@@ -51,6 +51,7 @@ static uint8_t told;       /* messages so far */
 static uint32_t told_us;   /* when the last one was sent, or a record came in */
 static uint32_t record_us; /* when the newest record came in */
 static bool fresh;         /* it is one to go by */
+static uint8_t codes[JOINTS]; /* of the newest record */
 
 /* Return whether the piece is a record, with `es` or `eg` before its end or not. */
 static bool is_record(void)
@@ -69,7 +70,7 @@ static void take_piece(uint32_t now_us)
         record_us = now_us;
         fresh = (size == RECORD) || (piece[RECORD + 1u] == (uint8_t)'s');
         for (uint8_t at = 0u; fresh && (at < JOINTS); at++) {
-            thenar_glove_input.codes[at] = piece[pgm_read_byte(&places[at])];
+            codes[at] = piece[pgm_read_byte(&places[at])];
         }
     }
 }
@@ -120,8 +121,9 @@ void thenar_joints_attend(uint32_t now_us)
     tell(now_us);
 }
 
-bool thenar_joints_read(uint32_t now_us)
+bool thenar_joints_read(thenar_glove *glove, uint32_t now_us)
 {
+    (void)memcpy(glove->input.codes, codes, sizeof codes);
     fresh = fresh && ((now_us - record_us) <= LOST_US);
     return fresh;
 }

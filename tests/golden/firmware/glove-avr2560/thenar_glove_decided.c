@@ -12,8 +12,6 @@
 #define READ(place) (place)
 #endif
 
-#include "thenar_glove.h"
-
 #define CLASSES 3u
 #define LAST_PORT (THENAR_GLOVE_SCANNED_PORTS - 1u)
 
@@ -34,16 +32,17 @@ static const uint16_t hurdles[LAST_PORT][CLASSES][CLASSES] IN_FLASH = {
     },
 };
 
-bool thenar_glove_decided(uint8_t port, uint8_t leader)
+bool thenar_glove_decided(
+    const thenar_glove *glove, uint8_t port, thenar_glove_class leader)
 {
     bool decided = true;
 
     if (port < LAST_PORT) {
-        const uint16_t best = (uint16_t)thenar_glove_scores[leader];
+        const uint16_t best = (uint16_t)glove->scores[leader];
         const uint16_t *needed = hurdles[port][leader];
 
         for (uint16_t rival = 0u; decided && (rival < CLASSES); rival++) {
-            const uint16_t lead = (uint16_t)(best - (uint16_t)thenar_glove_scores[rival]);
+            const uint16_t lead = (uint16_t)(best - (uint16_t)glove->scores[rival]);
 
             decided = lead >= READ(needed[rival]);
         }

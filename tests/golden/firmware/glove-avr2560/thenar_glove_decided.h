@@ -4,8 +4,7 @@
 #ifndef THENAR_GLOVE_DECIDED_H
 #define THENAR_GLOVE_DECIDED_H
 
-#include <stdbool.h>
-#include <stdint.h>
+#include "thenar_glove.h"
 
 #define THENAR_GLOVE_SCANNED_PORTS 2u
 
@@ -17,6 +16,7 @@
    port 0: switches 4, 5
    port 1: switches 0, 1, 2, 3
 */
-bool thenar_glove_decided(uint8_t port, uint8_t leader);
+bool thenar_glove_decided(
+    const thenar_glove *glove, uint8_t port, thenar_glove_class leader);
 
 #endif

@@ -4,8 +4,7 @@
 #ifndef THENAR_JOINTS_H
 #define THENAR_JOINTS_H
 
-#include <stdbool.h>
-#include <stdint.h>
+#include "thenar_glove.h"
 
 /* Start to measure. */
 void thenar_joints_begin(void);
@@ -13,7 +12,7 @@ void thenar_joints_begin(void);
 /* Take some of what has come in, as often as can be. */
 void thenar_joints_attend(uint32_t now_us);
 
-/* Put the newest codes into thenar_glove_input. Return false if there are none, or none that is new enough. */
-bool thenar_joints_read(uint32_t now_us);
+/* Put the newest codes into the glove's input. Return false if there are none, or none that is new enough. */
+bool thenar_joints_read(thenar_glove *glove, uint32_t now_us);
 
 #endif

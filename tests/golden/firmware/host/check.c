@@ -1,4 +1,4 @@
-/* The self test of the classifier on this machine: "make check" compiles and runs it. */
+/* The self test of the classifier, for a machine with a console: a few frames whose answers Python computed. */
 #include <stdio.h>
 #include "thenar_glove_check.h"
 

@@ -1,6 +1,8 @@
 /* Recognises grasps and prints each new one at 115200 baud: switches on digital pins, joints on analog pins. */
 #include <thenar_glove.h>
 
+static thenar_glove glove;
+
 #if NUM_DIGITAL_PINS - NUM_ANALOG_INPUTS < 8
 #error "this board has too few pins for every switch: read a matrix or an expander in read_switches()"
 #endif
@@ -18,7 +20,7 @@ static const uint8_t switch_pins[] = {
 static void read_switches()
 {
     for (uint8_t i = 0; i < sizeof switch_pins; ++i) {
-        thenar_glove_set_switch(i, digitalRead(switch_pins[i]) == LOW);
+        thenar_glove_set_switch(&glove, i, digitalRead(switch_pins[i]) == LOW);
     }
 }
 
@@ -26,21 +28,31 @@ static void read_switches()
 #error "this board has too few analog inputs for every joint: read a multiplexer in read_joints()"
 #endif
 
-/* The pin of each joint. Its codes must be those of the recordings: the same sensor, the same code for a posture. */
+/* A joint's code, of what analogRead() gives. The build was made of the codes of its recordings and knows nothing of
+   your sensors: the same posture must have the same code.
+     0: thumb_rotation: the glove's own codes
+     1: index_pij: the glove's own codes
+*/
+#ifndef CODE_OF
+#error "say what the code of a joint is: #define CODE_OF(joint, reading), from the list above; a reading alone is none"
+#endif
+
+/* The pin of each joint. */
 static const uint8_t joint_pins[] = {
-    A0, /* thumb_rotation */
-    A1, /* index_pij */
+    A0, /* thumb_rotation: the glove's own codes */
+    A1, /* index_pij: the glove's own codes */
 };
 
 static void read_joints()
 {
     for (uint8_t i = 0; i < sizeof joint_pins; ++i) {
-        thenar_glove_input.codes[i] = (uint8_t)(analogRead(joint_pins[i]) >> 2);
+        glove.input.codes[i] = (thenar_glove_code)CODE_OF(i, analogRead(joint_pins[i]));
     }
 }
 
 void setup()
 {
+    thenar_glove_init(&glove);
     Serial.begin(115200);
     for (uint8_t i = 0; i < sizeof switch_pins; ++i) {
         pinMode(switch_pins[i], INPUT_PULLUP);
@@ -54,7 +66,7 @@ void loop()
     read_switches();
     read_joints();
 
-    const thenar_glove_class grasp = thenar_glove_update();
+    const thenar_glove_class grasp = thenar_glove_update(&glove);
     if (grasp != shown) {
         shown = grasp;
         Serial.println((const __FlashStringHelper *)thenar_glove_grasp(grasp));

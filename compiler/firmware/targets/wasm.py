@@ -1,0 +1,108 @@
+"""WebAssembly: the C in a .wasm, with a module of JavaScript around it that needs nothing of any runtime but that."""
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..tools import WASM_COMPILER, WASM_LINKER, WASM_RUNTIME, call, find, lacking, workshop
+from .base import Target
+
+if TYPE_CHECKING:
+    from ..classifier import Library
+    from ..layout import Layout
+    from ..probes import Answers, Frames, Lost
+
+_MAKE = (("make",), "make")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wasm(Target):
+    """Browsers, node, and whatever else runs WebAssembly."""
+
+    def files(self, library: "Library") -> dict[str, str]:
+        """Return path -> text: the library, the module in JavaScript with its types, and what makes the .wasm."""
+        from thenar.firmware_templates.rendering import render
+        from thenar.runtime.published import NONE
+
+        from ..words import answers_of, inputs_in_words
+
+        name, names, files = library.name, library.names, library.whole
+        inputs = inputs_in_words(len(names.switches), len(names.joints))
+        sentence = f"Recognises {len(names.grasps)} grasp types from {inputs} of a glove."
+        answers = answers_of(names)
+        values = {
+            "name": name,
+            "opening": f"thenar_{name}: {sentence} From the tables {names.tables_sha256[:16]}.",
+            "sentence": sentence,
+            "classes": len(names.grasps),
+            "switches": len(names.switches),
+            "joints": len(names.joints),
+            "rejection": names.rejection is not None,
+            "none": len(answers) - 1 if answers[-1] == NONE else None,
+            "segments": names.segments is not None,
+            "highest_code": (1 << library.layout.code_bits) - 1,
+            "grasps": _array(names.grasps),
+            "names": _array(answers),
+            "switch_names": _array(switch.name for switch in names.switches),
+            "joint_names": _array(joint.name for joint in names.joints),
+            "sources": [*(path for path in files if path.endswith(".c")), f"thenar_{name}_wasm.c"],
+            "headers": [path for path in files if path.endswith(".h")],
+        }
+        own = [f"thenar_NAME{ending}" for ending in ("_wasm.c", ".js", ".d.ts")]
+        return {
+            **files,
+            **{
+                of.replace("NAME", name): render(f"wasm/{of}.j2", **values) for of in (*own, "Makefile", "package.json")
+            },
+        }
+
+    def sources(self, library: "Library") -> dict[str, str]:
+        """Return all files: it is the module in JavaScript that is run."""
+        return self.files(library)
+
+    def missing(self) -> str | None:
+        """Return what is missing of compiler, linker and node."""
+        return lacking(WASM_COMPILER, WASM_LINKER, WASM_RUNTIME, _MAKE)
+
+    def run(
+        self,
+        files: Mapping[str, str],
+        name: str,
+        layout: "Layout",
+        frames: "Frames",
+        *,
+        incremental: bool = False,
+        lost: "Lost | None" = None,
+    ) -> "Answers":
+        """Return the answers to frames (n, F) of the module in JavaScript, as the base says, in node."""
+        from thenar.firmware_templates.rendering import render
+
+        from ..probes import answers_in, check_frames, record_values, with_lost
+
+        check_frames(frames, layout)
+        make, node = find(_MAKE), find(WASM_RUNTIME)
+        values = record_values(name, layout, "update" if incremental else "classify", lost=lost is not None)
+        values["places"] = json.dumps(values["places"])
+        main = render("checking/record.mjs.j2", **values)
+        with workshop({**files, "main.mjs": main, "frames": with_lost(frames, lost).tobytes()}) as folder:
+            call([make, "CFLAGS=-O2 -Werror"], folder)
+            call([node, "main.mjs"], folder)
+            return answers_in((folder / "answers").read_bytes(), frames, layout)
+
+
+def _array(texts: Iterable[str]) -> str:
+    """Return an array of strings in JavaScript's words, which cannot be changed."""
+    return f"Object.freeze({json.dumps(list(texts), indent=4)})"
+
+
+MEMBER = Wasm(
+    name="wasm",
+    part="wasm",
+    title="WebAssembly",
+    help="a module for browsers and node: WebAssembly, a wrapper in JavaScript and its types",
+    next_step="`make -C {folder}` compiles it",
+    rank=41,
+    own_layout=False,
+    kind="wasm",
+)

@@ -1,0 +1,189 @@
+"""A board, or a program, that sends rows of numbers as lines: over a pty, TCP, UDP, a Unix socket or a WebSocket."""
+
+import contextlib
+import socket
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from threading import Event, Lock, Thread
+from time import monotonic
+from typing import TYPE_CHECKING
+
+from ..closing import Closing
+from ..errors import DeviceError, SettingError
+
+if TYPE_CHECKING:
+    from websockets.sync.server import ServerConnection
+
+_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
+# Who does not take a line within it is let go of.
+_SEND_S = 0.2
+
+
+class LineSender(Closing):
+    """Sends the values that are shown, `rate_hz` times a second, to `send`: numbers in the order of the columns, with
+    the sender's clock in the column `time`, which counts from the start in `unit`.
+    """
+
+    def __init__(
+        self, send: Callable[[bytes], None], columns: Sequence[str], rate_hz: float, time: str | None, unit: str
+    ) -> None:
+        self._send, self._columns, self._time, self._scale = send, tuple(columns), time, _UNITS[unit]
+        self._period_s, self._began = 1 / rate_hz, monotonic()
+        self._values = dict.fromkeys(columns, 0.0)
+        self._stop = Event()
+        self._thread = Thread(target=self._run, name="line sender", daemon=True)
+        self._thread.start()
+
+    def show(self, values: dict[str, float]) -> None:
+        """Send these values of columns from now on."""
+        self._values = self._values | values
+
+    def line(self, now_s: float) -> bytes:
+        """Return the line that is sent so many seconds after the start."""
+        values = self._values
+        clock = {} if self._time is None else {self._time: now_s * self._scale}
+        numbers = (clock.get(name, values.get(name, 0.0)) for name in self._columns)
+        return ",".join(f"{round(number, 6):.10g}" for number in numbers).encode() + b"\n"
+
+    def close(self) -> None:
+        """Send no more."""
+        self._stop.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        due = self._began
+        while not self._stop.wait(max(0.0, due - monotonic())):
+            self._send(self.line(monotonic() - self._began))
+            due = max(due + self._period_s, monotonic() - self._period_s)
+
+
+class SocketLines(Closing):
+    """A server of lines on loopback (`tcp://127.0.0.1:PORT`) or at a path (`unix:PATH`) for all who connect to it.
+
+    port  where it is: what a `[[stream]]` calls its port
+    """
+
+    def __init__(self, path: Path | None = None) -> None:
+        family = socket.AF_INET if path is None else socket.AF_UNIX
+        self._listener, self._path = socket.socket(family, socket.SOCK_STREAM), path
+        try:
+            if path is not None:
+                path.unlink(missing_ok=True)
+            self._listener.bind(("127.0.0.1", 0) if path is None else str(path))
+        except OSError as reason:
+            self._listener.close()
+            raise DeviceError(f"no socket can be made at {path}: {reason.strerror or reason}") from reason
+        self._listener.listen()
+        self.port = f"tcp://127.0.0.1:{self._listener.getsockname()[1]}" if path is None else f"unix:{path}"
+        self._clients: list[socket.socket] = []
+        self._lock = Lock()
+        self._thread = Thread(target=self._accept, name=f"lines at {self.port}", daemon=True)
+        self._thread.start()
+
+    def send(self, data: bytes) -> None:
+        """Send to all who are connected."""
+        with self._lock:
+            for client in tuple(self._clients):
+                try:
+                    client.sendall(data)
+                except OSError:
+                    client.close()
+                    self._clients.remove(client)
+
+    def close(self) -> None:
+        """Hang up."""
+        with contextlib.suppress(OSError):
+            self._listener.shutdown(socket.SHUT_RDWR)
+        self._listener.close()
+        self._thread.join()
+        for client in self._clients:
+            client.close()
+        if self._path is not None:
+            self._path.unlink(missing_ok=True)
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                client, _ = self._listener.accept()
+            except OSError:
+                return
+            client.settimeout(_SEND_S)
+            with self._lock:
+                self._clients.append(client)
+
+
+class DatagramLines(Closing):
+    """A sender of datagrams to a free port of this computer."""
+
+    def __init__(self) -> None:
+        self._line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+            free.bind(("127.0.0.1", 0))
+            self.to: tuple[str, int] = free.getsockname()
+        self.port = f"udp://127.0.0.1:{self.to[1]}"
+
+    def send(self, data: bytes) -> None:
+        """Send a datagram; nobody may be there."""
+        with contextlib.suppress(OSError):
+            self._line.sendto(data, self.to)
+
+    def close(self) -> None:
+        """Send no more."""
+        self._line.close()
+
+
+class WebLines(Closing):
+    """A WebSocket on loopback for all who connect to it."""
+
+    def __init__(self) -> None:
+        try:
+            from websockets.sync.server import serve
+        except ImportError:
+            raise SettingError('WebSockets need a package: pip install "thenar[ws]"') from None
+        self._clients: set[ServerConnection] = set()
+        self._lock, self._closing = Lock(), Event()
+        self._server = serve(self._serve, "127.0.0.1", 0, compression=None)
+        self.port = f"ws://127.0.0.1:{self._server.socket.getsockname()[1]}/"
+        self._thread = Thread(target=self._server.serve_forever, name=f"lines at {self.port}", daemon=True)
+        self._thread.start()
+
+    def send(self, data: bytes) -> None:
+        """Send a message to all who are connected."""
+        with self._lock:
+            clients = tuple(self._clients)
+        for client in clients:
+            with contextlib.suppress(Exception):  # it is gone, which its own thread finds out
+                client.send(data.decode())
+
+    def close(self) -> None:
+        """Hang up."""
+        self._closing.set()
+        self._server.shutdown()
+        with self._lock:
+            clients = tuple(self._clients)
+        for client in clients:
+            client.close()
+        self._thread.join()
+
+    def _serve(self, client: "ServerConnection") -> None:
+        with self._lock:
+            self._clients.add(client)
+        try:
+            for _ in client:  # what it says means nothing; the iteration ends when it is gone
+                pass
+        finally:
+            with self._lock:
+                self._clients.discard(client)
+
+
+def lines_like(port: str, path: Path) -> SocketLines | DatagramLines | WebLines:
+    """Return what sends lines by the way that `port` names, on loopback; where that is none of a network, at the Unix
+    socket `path`.
+    """
+    if port.startswith("tcp:"):
+        return SocketLines()
+    if port.startswith("udp:"):
+        return DatagramLines()
+    if port.startswith(("ws:", "wss:")):
+        return WebLines()
+    return SocketLines(path)

@@ -1,0 +1,233 @@
+"""Where lines come from: a serial port, TCP, UDP, a Unix socket, stdin or a WebSocket, all read alike.
+
+/dev/ttyUSB0          a serial port, also rfc2217://HOST:PORT
+tcp://HOST:PORT       a server that sends lines to whoever connects
+udp://HOST:PORT       datagrams that come to this port; HOST is this computer's own address: 127.0.0.1, or 0.0.0.0
+for all; a datagram holds one line or more
+unix:PATH             a Unix socket that somebody listens on
+ws://HOST:PORT/PATH   a WebSocket, also wss://; needs the extra `ws`
+-                     standard input
+"""
+
+import os
+import re
+import select
+import socket
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from contextlib import ExitStack
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+from .closing import Closing
+from .errors import DeviceError, SettingError
+from .lines import LONGEST, LineCounts, LineParser, Row
+from .names import shortened
+from .ports import port_fault
+from .serial_line import SerialLine
+
+if TYPE_CHECKING:
+    from websockets.sync.client import ClientConnection
+
+_CHUNK = 65_536
+_CONNECT_S = 2.0
+_NET = re.compile(r"(tcp|udp)://(\[[0-9A-Fa-f:.%]+\]|[A-Za-z0-9._-]+):(\d{1,5})/?")
+_WAYS = (
+    "lines come from a serial port such as /dev/ttyUSB0, tcp://HOST:PORT, udp://HOST:PORT, unix:PATH, "
+    "ws://HOST:PORT/PATH or - (standard input)"
+)
+
+
+class RowReader(Closing, ABC):
+    """What delivers rows of numbers. It may be opened again after it was closed.
+
+    odd  the last of what came that was no row, to be shown; "" if all was
+    """
+
+    odd = ""
+
+    @abstractmethod
+    def open(self) -> None:
+        """Open it. Raises DeviceError where another try may help, SettingError where none does."""
+
+    @abstractmethod
+    def read(self, timeout_s: float) -> Sequence[Row]:
+        """Return the rows that come in; wait for some until the timeout. Raises DeviceError when it is gone."""
+
+    def counts(self) -> LineCounts:
+        """Return what came that was no row."""
+        return LineCounts()
+
+
+class LineReader(RowReader):
+    """Rows of the lines that come from `port`. Its constructor opens nothing."""
+
+    def __init__(self, port: str, baud: int = 115_200) -> None:
+        self.port, self._baud = port, baud
+        self._line: Closing | None = None
+        self._parser = LineParser()
+
+    def open(self) -> None:
+        """Open the port."""
+        if reason := line_port_fault(self.port):
+            raise SettingError(f"{shortened(repr(self.port))} {reason}")
+        self._parser.begin()
+        self._line = _opened(self.port, self._baud)
+
+    def read(self, timeout_s: float) -> Sequence[Row]:
+        """Return the rows that came in."""
+        assert isinstance(self._line, SerialLine | _Descriptor | _WebSocket)
+        rows = self._parser.feed(self._line.read(timeout_s))
+        self.odd = self._parser.odd
+        return rows
+
+    def counts(self) -> LineCounts:
+        """Return what came that was no row."""
+        return self._parser.counts
+
+    def close(self) -> None:
+        """Close the port."""
+        if self._line is not None:
+            self._line.close()
+            self._line = None
+
+
+def line_port_fault(port: str) -> str:
+    """Return why no lines can come from `port`, or nothing."""
+    if port == "-":
+        return ""
+    if port.startswith("unix:"):
+        path = port.removeprefix("unix:")
+        return "" if path and path.isprintable() else f"names no socket: {_WAYS}"
+    if port.startswith(("tcp:", "udp:")):
+        found = _NET.fullmatch(port)
+        return "" if found and 0 < int(found[3]) < 65536 else f"is no address: {_WAYS}"
+    if port.startswith(("ws:", "wss:")):
+        return "" if _is_web(port) else f"is no address: {_WAYS}"
+    if "://" in port and not port.startswith(("rfc2217://", "socket://")):
+        return f"is no port that is opened: {_WAYS}"
+    return port_fault(port)
+
+
+def _is_web(port: str) -> bool:
+    if not (port.isascii() and port.isprintable()):
+        return False
+    try:
+        parts = urlsplit(port)
+        return bool(parts.hostname and port.partition("://")[1]) and parts.port != 0
+    except ValueError:
+        return False
+
+
+def _opened(port: str, baud: int) -> "SerialLine | _Descriptor | _WebSocket":
+    if port == "-":
+        return _Descriptor(port, None)
+    if port.startswith(("ws:", "wss:")):
+        return _WebSocket(port)
+    try:
+        if port.startswith("unix:"):
+            return _Descriptor(port, _connected(socket.AF_UNIX, port.removeprefix("unix:")))
+        if found := _NET.fullmatch(port):
+            host, number = found[2].strip("[]"), int(found[3])
+            return _Descriptor(port, _bound(host, number) if found[1] == "udp" else _tcp(host, number))
+    except OSError as reason:
+        raise DeviceError(f"{port}: {_advice(port, reason)}") from reason
+    return SerialLine(port, baud)
+
+
+def _advice(port: str, reason: OSError) -> str:
+    said = reason.strerror or str(reason)
+    if port.startswith("udp:"):
+        return f"{said}: its host is an address of this computer, and no other program may have the port"
+    return f"{said}: is the sender there, and does it listen?"
+
+
+def _connected(family: socket.AddressFamily, path: str) -> socket.socket:
+    line = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        line.settimeout(_CONNECT_S)
+        line.connect(path)
+    except OSError:
+        line.close()
+        raise
+    return line
+
+
+def _tcp(host: str, port: int) -> socket.socket:
+    line = socket.create_connection((host, port), _CONNECT_S)
+    line.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    return line
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    line = socket.socket(family, socket.SOCK_DGRAM)
+    try:
+        line.bind((host, port))
+    except OSError:
+        line.close()
+        raise
+    return line
+
+
+class _Descriptor(Closing):
+    """A socket, or standard input where there is none."""
+
+    def __init__(self, port: str, line: socket.socket | None) -> None:
+        self._port, self._line = port, line
+        if line is None and sys.stdin is None:
+            raise SettingError("standard input is closed: no lines come from there")
+        self._descriptor = sys.stdin.fileno() if line is None else line.fileno()
+        self._datagrams = line is not None and line.type == socket.SOCK_DGRAM
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return what has come in until the timeout. Raises DeviceError when the other end is gone."""
+        try:
+            ready, _, _ = select.select([self._descriptor], [], [], max(0.0, timeout_s))
+            if not ready:
+                return b""
+            data = os.read(self._descriptor, _CHUNK)
+        except (OSError, ValueError) as reason:  # the latter: closed meanwhile
+            raise DeviceError(f"{self._port}: it is gone ({reason})") from reason
+        if self._datagrams:
+            return data + b"\n"
+        if not data:
+            raise DeviceError(f"{self._port}: {'the input has ended' if self._line is None else 'the sender hung up'}")
+        return data
+
+    def close(self) -> None:
+        """Close the socket; standard input stays open."""
+        if self._line is not None:
+            self._line.close()
+
+
+class _WebSocket(Closing):
+    """A WebSocket's messages, each of which ends a line."""
+
+    def __init__(self, port: str) -> None:
+        try:
+            from websockets.sync.client import connect
+        except ImportError:
+            raise SettingError(f'{port}: WebSockets need a package: pip install "thenar[ws]"') from None
+        self._port = port
+        try:
+            self._open = ExitStack()
+            line = connect(port, open_timeout=_CONNECT_S, close_timeout=0.2, max_size=4 * LONGEST, proxy=None)
+            self._line: ClientConnection = self._open.enter_context(line)
+        except Exception as reason:  # the library's and the socket's errors, of many kinds
+            raise DeviceError(f"{port}: {reason}: is the sender there, and does it listen?") from reason
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return the next message. Raises DeviceError when the other end is gone."""
+        try:
+            message = self._line.recv(timeout_s)
+        except TimeoutError:
+            return b""
+        except Exception as reason:
+            raise DeviceError(f"{self._port}: the sender hung up ({reason})") from reason
+        return (message.encode() if isinstance(message, str) else message) + b"\n"
+
+    def close(self) -> None:
+        """Close it."""
+        self._open.close()

@@ -1,0 +1,189 @@
+"""Lines of text that hold rows of numbers, as makers' boards print them: CSV, JSON, or `name:value` pairs.
+
+    12,0,1,1023                          numbers in the order of the columns; also parted by ; tabs or blanks
+    ms,thumb,index,flex                  a header: names of the columns of the lines that follow
+    ms:12,thumb:0,flex:1023              names with their values, as the Arduino IDE's plotter reads them
+    {"ms": 12, "thumb": 0, "flex": 1023} a JSON object, or a JSON list of numbers in the order of the columns
+
+A line that holds anything else is a misfit. A value that is no number, such as nan, is None; the rest of it counts.
+"""
+
+import json
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from .names import LONGEST_SHOWN, shortened
+
+# A row of two thousand columns of five digits is shorter.
+LONGEST = 16_384
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
+_NO_NUMBER = re.compile(r"|[+-]?nan|[+-]?inf(inity)?|null|none|na|-", re.IGNORECASE)
+_NAME = re.compile(r"[^\W\d][^,;:\t\"{}\[\]]*")
+_DIGITS = 400
+
+
+class Row(NamedTuple):
+    """What one line holds: values, None where one is no number; and their names, None where only their order says.
+
+    `time_s` is the sender's clock where what carries the row says it, and not a column.
+    """
+
+    names: tuple[str, ...] | None
+    values: tuple[float | None, ...]
+    time_s: float | None = None
+
+
+class Header(NamedTuple):
+    """A line that names the columns of those that follow."""
+
+    names: tuple[str, ...]
+
+
+class Splitter:
+    """Splits a stream of bytes at line feeds.
+
+    A line of more than LONGEST bytes is dropped and counted in `overlong`: a stream without line feeds never fills the
+    memory.
+    """
+
+    def __init__(self) -> None:
+        self.overlong = 0
+        self._rest, self._dropping = b"", False
+
+    def feed(self, chunk: bytes) -> list[bytes]:
+        """Return the lines that `chunk` ends, without their ends and without empty ones."""
+        pieces = chunk.split(b"\n")
+        pieces[0] = self._rest + pieces[0]
+        self._rest = pieces.pop()
+        if self._dropping and pieces:
+            pieces, self._dropping = pieces[1:], False
+        if self._dropping:
+            self._rest = b""
+        elif len(self._rest) > LONGEST:
+            self._rest, self._dropping = b"", True
+            self.overlong += 1
+        lines = [line.strip() for line in pieces if len(line) <= LONGEST]
+        self.overlong += len(pieces) - len(lines)
+        return [line for line in lines if line]
+
+
+def parsed(line: bytes) -> Row | Header | None:
+    """Return what a line holds; None for a misfit."""
+    try:
+        text = line.decode("utf-8")
+    except UnicodeDecodeError:
+        return None
+    text = text.strip("\ufeff \r\t\0")
+    if text[:1] in ("{", "["):
+        return _of_json(text)
+    fields = _fields(text)
+    if any(":" in field for field in fields):
+        return _of_pairs(fields)
+    # Words parted by blanks are a message.
+    worded = len(fields) == 1 or len(text.split()) < len(fields) or not set(text).isdisjoint(",;\t")
+    if worded and all(map(_NAME.fullmatch, fields)) and not all(map(_NO_NUMBER.fullmatch, fields)):
+        return Header(tuple(fields)) if _sound(fields) else None
+    return _row(None, fields)
+
+
+def _fields(text: str) -> list[str]:
+    if ";" in text:  # where a comma is the decimal point
+        return [field.strip().replace(",", ".") for field in text.split(";")]
+    if "," in text or "\t" in text:
+        return [field.strip().strip('"') for field in re.split("[,\t]", text)]
+    return text.split()
+
+
+def _of_pairs(fields: Sequence[str]) -> Row | None:
+    pairs = [field.rpartition(":") for field in fields]
+    return _row(tuple(name.strip() for name, _, _ in pairs), [value.strip() for _, _, value in pairs])
+
+
+def _row(names: tuple[str, ...] | None, fields: Sequence[str]) -> Row | None:
+    """Return the row of these texts; None where one of them is neither a number nor a spelling of a missing one."""
+    if not fields or not all(_NUMBER.fullmatch(field) or _NO_NUMBER.fullmatch(field) for field in fields):
+        return None
+    if names is not None and not _sound(names):
+        return None
+    return Row(names, tuple(_number(field) for field in fields))
+
+
+def _number(field: str) -> float | None:
+    return finite(float(field)) if len(field) < _DIGITS and _NUMBER.fullmatch(field) else None
+
+
+def finite(value: float) -> float | None:
+    """Return a finite number as it is, and None in place of any other."""
+    return value if math.isfinite(value) else None
+
+
+def _of_json(text: str) -> Row | None:
+    try:
+        found: Any = json.loads(text)  # which takes NaN, as Python's own sends it
+    except (ValueError, RecursionError):
+        return None
+    names = tuple(found) if isinstance(found, dict) else None
+    values = tuple(map(_of_value, found if names is None else found.values()))
+    return Row(names, values) if values and (names is None or _sound(names)) else None
+
+
+def _of_value(value: Any) -> float | None:
+    if not isinstance(value, int | float):  # a bool is an int
+        return None
+    try:
+        return finite(float(value))
+    except OverflowError:
+        return None
+
+
+def _sound(names: Sequence[str]) -> bool:
+    """Return whether the names of columns are all there and all different."""
+    return len(set(names)) == len(names) and "" not in names
+
+
+@dataclass(slots=True)
+class LineCounts:
+    """What came of lines, since the driver was made.
+
+    misfits   lines that hold no row: garbage, half a line, a debug message
+    overlong  lines longer than any row
+    """
+
+    misfits: int = 0
+    overlong: int = 0
+
+
+class LineParser:
+    """Makes rows of chunks of bytes; odd is the last misfit, to be shown."""
+
+    def __init__(self) -> None:
+        self.counts, self.odd = LineCounts(), ""
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin anew: half a line that was under way is forgotten, and so are the names of columns."""
+        self._splitter = Splitter()
+        self._names: tuple[str, ...] | None = None
+
+    def feed(self, chunk: bytes) -> list[Row]:
+        """Return the rows whose lines `chunk` ends, named where a header came before them."""
+        rows = []
+        before = self._splitter.overlong
+        for line in self._splitter.feed(chunk):
+            found = parsed(line)
+            if isinstance(found, Header):
+                self._names = found.names
+            elif found is None:
+                self.counts.misfits += 1
+                self.odd = shortened(repr(line[: LONGEST_SHOWN + 1].decode("utf-8", "replace")))
+            else:
+                rows.append(self._with_names(found))
+        self.counts.overlong += self._splitter.overlong - before
+        return rows
+
+    def _with_names(self, row: Row) -> Row:
+        names = self._names
+        return row._replace(names=names) if row.names is None and names and len(names) == len(row.values) else row

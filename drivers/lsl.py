@@ -1,0 +1,23 @@
+"""The package of the Lab Streaming Layer, which only those who use it need (extra `lsl`)."""
+
+import os
+from typing import TYPE_CHECKING
+
+from .errors import SettingError
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+_THIS_MACHINE = b"[multicast]\nResolveScope=machine\nListenAddress=127.0.0.1\n[ports]\nIPv6=disable\n[log]\nlevel=-3\n"
+
+
+def load_pylsl(place: str) -> "ModuleType":
+    """Return pylsl. Raises SettingError where it, or the library that it wraps, is not installed."""
+    try:
+        import pylsl
+        import pylsl.util
+    except (ImportError, RuntimeError, OSError) as reason:  # the library itself may be missing
+        raise SettingError(f'{place}: LSL needs a package: pip install "thenar[lsl]" ({reason})') from None
+    if "LSLAPICFG" not in os.environ:
+        pylsl.lib.lib.lsl_set_config_content(_THIS_MACHINE)  # which counts before the first stream of a process
+    return pylsl  # type: ignore[no-any-return]

@@ -1,0 +1,218 @@
+"""What an unknown sender of rows sends, and a proposal of the `[[stream]]` that reads it."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from math import ceil, floor, log10
+from statistics import median
+
+import msgspec
+
+from thenar.drivers.errors import DeviceError, SettingError
+from thenar.drivers.line_reader import RowReader
+from thenar.drivers.lines import Row
+
+from ..frames import now_us
+from ..harness.wiring import Range, StreamWiring
+from ..names import fault, nearest, shortened
+from ..sources.base import SOURCES
+from ..sources.rows import RowKind
+
+# Boards that are reset by the opening of their port start their program within it.
+_PATIENCE_US = 6_000_000
+_MOST_ROWS = 100_000
+_WAIT_S = 0.1
+_JOINT = re.compile(r"flex|bend|joint|angle|deg|enc|mcp|mpj|pip|pij|dip|dij|abduct|wrist|pitch|roll|yaw", re.IGNORECASE)
+_TAXEL = re.compile(r"fsr|pad|force|press|taxel|adc|analog|raw|newton", re.IGNORECASE)
+_TIME = re.compile(r"^(t|ts|ms|us|s)$|time|milli|micro|stamp|clock|sec", re.IGNORECASE)
+_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
+_HIGHEST = (255, 1023, 4095, 16_383, 32_767, 65_534)
+_PARTS = (1.0, 3.3, 5.0, 10.0, 100.0, 180.0, 360.0)
+# A joint that moved over such a share of its converter's range was moved on purpose.
+_MOVED = 0.1
+# In less time rows come at no rate: they were waiting somewhere.
+_LEAST_S = 0.3
+_NO_RATE = "the rows came all at once: write into rate_hz how many come a second"
+
+
+class Heard(msgspec.Struct, frozen=True):
+    """A column as it was heard: its least and greatest number, and what it is taken for."""
+
+    column: str
+    least: float | None
+    greatest: float | None
+    taken_for: str
+
+
+class Proposal(msgspec.Struct, frozen=True):
+    """The stream that fits a sender, its columns, and remarks on what was odd, in sentences."""
+
+    stream: StreamWiring
+    columns: tuple[Heard, ...]
+    rows: int
+    remarks: tuple[str, ...]
+
+
+def reader_of(port: str, baud: int) -> RowReader:
+    """Return what reads rows from `port`. Raises SettingError if nothing does."""
+    wiring = StreamWiring(port=port, baud=baud)
+    for kind in SOURCES.values():
+        if isinstance(kind, RowKind) and kind.reader is not None and kind.takes(port):
+            return kind.reader(wiring)
+    raise SettingError(f"{shortened(repr(port))} is no port that rows come from{nearest(port, ['lsl:', 'ros:'])}")
+
+
+def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str] = ()) -> Proposal:
+    """Return the stream that fits what comes from `port` within so many seconds after the first row; `columns` name
+    those that the sender does not.
+
+    Raises SettingError about a port that cannot be, DeviceError where no rows come.
+    """
+    with reader_of(port, baud) as reader:
+        reader.open()
+        came = list(_listened(reader, listen_s))
+        counts, odd = reader.counts(), reader.odd
+    if not came:
+        what = f"what comes holds no rows: {odd}; is {baud} its baud rate?" if odd else "nothing comes"
+        raise DeviceError(f"{port}: {what}")
+    remarks = []
+    if wrong := counts.misfits + counts.overlong:
+        remarks.append(f"{wrong} lines were no rows" + (f", such as {odd}" if odd else ""))
+    return _proposed(StreamWiring(port=port, baud=baud, columns=tuple(columns)), came, remarks)
+
+
+def _listened(reader: RowReader, listen_s: float) -> Iterator[tuple[int, Row]]:
+    end_us, first, count = now_us() + _PATIENCE_US, True, 0
+    while (time_us := now_us()) < end_us and count < _MOST_ROWS:
+        try:
+            rows = reader.read(_WAIT_S)
+        except DeviceError:
+            if first:
+                raise
+            return
+        for row in rows:
+            if first:
+                first, end_us = False, time_us + round(listen_s * 1e6)
+            count += 1
+            yield now_us(), row
+
+
+def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], remarks: list[str]) -> Proposal:
+    (names, width), most = Counter((row.names, len(row.values)) for _, row in came).most_common(1)[0]
+    if most < len(came):
+        remarks.append(f"{len(came) - most} of {len(came)} rows had other columns")
+    alike = [(time_us, row) for time_us, row in came if (row.names, len(row.values)) == (names, width)]
+    given = bare.columns or (("",) * width if names is None else names)
+    if len(given) != width:
+        raise SettingError(f"{len(given)} columns are named, and rows have {width}: name every one, in their order")
+    columns = tuple(_sound(name, place) for place, name in enumerate(names or given, start=1))
+    values = {name: [row.values[place] for _, row in alike] for place, name in enumerate(columns)}
+    span_s = (alike[-1][0] - alike[0][0]) / 1e6
+    time, unit, by_clock_s = _clock(values, span_s)
+    if span_s < _LEAST_S:
+        span_s = by_clock_s
+        remarks.append("the rows came all at once: rate_hz is by their clock" if by_clock_s else _NO_RATE)
+    rate_hz = _rounded((len(alike) - 1) / span_s) if span_s > 0 and len(alike) > 1 else bare.rate_hz
+    stamped = alike[0][1].time_s is not None
+    heard, kinds = [], {"switch": [], "joint": [], "taxel": []}  # type: tuple[list[Heard], dict[str, list[str]]]
+    for name, found in values.items():
+        numbers = [value for value in found if value is not None]
+        kind = f"the sender's clock, in {unit}" if name == time else _kind(name, numbers)
+        kinds.get(kind, []).append(name)
+        heard.append(Heard(name, min(numbers, default=None), max(numbers, default=None), kind))
+        if len(numbers) < len(found):
+            remarks.append(f"{name}: {len(found) - len(numbers)} of {len(found)} values were no numbers")
+    gaps = [later - earlier for (earlier, _), (later, _) in pairwise(alike)]
+    if gaps and max(gaps) > max(4 * median(gaps), 100_000):
+        remarks.append(f"the longest break between two rows was {max(gaps) / 1000:.0f} ms")
+    if time is None and not stamped:
+        remarks.append("no column is a clock: rows are timed when they arrive; a column of millis() is better")
+    stream = msgspec.structs.replace(
+        bare,
+        columns=tuple(
+            name if name in (*kinds["switch"], *kinds["joint"], *kinds["taxel"], time) else "" for name in columns
+        ),
+        time=time,
+        time_unit=unit,
+        rate_hz=min(max(rate_hz, 0.1), 10_000.0),
+        switches=tuple(kinds["switch"]),
+        joints={name: _joint_range([value for value in values[name] if value is not None]) for name in kinds["joint"]},
+        taxels={name: _range([value for value in values[name] if value is not None]) for name in kinds["taxel"]},
+    )
+    return Proposal(stream, tuple(heard), len(came), tuple(remarks))
+
+
+def _sound(name: str, place: int) -> str:
+    return f"c{place}" if fault(name) else name
+
+
+def _rounded(rate_hz: float) -> float:
+    """Return a rate of two digits."""
+    step: float = 10.0 ** (floor(log10(rate_hz)) - 1)
+    return float(f"{round(rate_hz / step) * step:.6g}")
+
+
+def _clock(values: dict[str, list[float | None]], span_s: float) -> tuple[str | None, str, float]:
+    """Return the column that is a clock, one so named before another, its unit, and how far it went, in seconds."""
+    for named in (True, False):
+        for name, found in values.items():
+            numbers = [value for value in found if value is not None]
+            steps = [later - earlier for earlier, later in pairwise(numbers)]
+            if bool(_TIME.search(name)) != named or not _rises(numbers) or (not named and set(steps) == {1.0}):
+                continue
+            going = sum(step for step in steps if 0 < step <= 10 * median(steps)) or 1.0
+            for unit, scale in _UNITS.items():
+                if span_s < _LEAST_S:
+                    fits = name == "s" if unit == "s" else unit in name.lower()
+                else:
+                    fits = 0.5 < going / scale / span_s < 2.0
+                if fits:
+                    return name, unit, going / scale
+    return None, "ms", 0.0
+
+
+def _rises(numbers: Sequence[float]) -> bool:
+    """Return whether numbers rise, from nearly every row to the next: no finger does."""
+    steps = [later - earlier for earlier, later in pairwise(numbers)]
+    return len(steps) > 3 and sum(step < 0 for step in steps) < 2 and sum(step > 0 for step in steps) > 0.9 * len(steps)
+
+
+def _kind(name: str, numbers: Sequence[float]) -> str:
+    if not numbers:
+        return "nothing: no number came"
+    if _rises(numbers):
+        return "nothing: it only rises, as a count does"
+    if _JOINT.search(name):
+        return "joint"
+    if _TAXEL.search(name):
+        return "taxel"
+    return "switch" if {0.0, 1.0} >= set(numbers) else "taxel"
+
+
+def _range(numbers: Sequence[float]) -> Range:
+    """Return the range of the converter, or the scale, that such numbers are usually of."""
+    least, greatest = min(numbers), max(numbers)
+    whole = all(number.is_integer() for number in numbers)
+    top = max(abs(least), abs(greatest))
+    ends = _HIGHEST if whole else _PARTS
+    if (end := next((float(end) for end in ends if top <= end), None)) is not None:
+        return (0.0 if least >= 0 else -end, end)
+    return _widened(least, greatest)
+
+
+def _joint_range(numbers: Sequence[float]) -> Range:
+    """Return what a joint moved over, widened, or the whole range where it was not moved: its codes are 255."""
+    low, high = _range(numbers)
+    least, greatest = min(numbers), max(numbers)
+    if greatest - least < _MOVED * (high - low):
+        return low, high
+    near = _widened(least, greatest)
+    return max(low, near[0]), min(high, near[1])
+
+
+def _widened(least: float, greatest: float) -> Range:
+    span = max(greatest - least, 1e-3)
+    step = 10.0 ** (floor(log10(span)) - 1)
+    ends = floor((least - span / 4) / step) * step, ceil((greatest + span / 4) / step) * step
+    return float(f"{ends[0]:.6g}"), float(f"{ends[1]:.6g}")

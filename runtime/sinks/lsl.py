@@ -1,0 +1,74 @@
+"""Streams of the Lab Streaming Layer (extra `lsl`), for recorders and stimulus programs.
+
+    NAME         a text, "Markers": the grasp type, when it changes, "unknown" and "none" included
+    NAME-angles  numbers, "MoCap": the glove's joints in rad, where they are calibrated, whenever they are measured
+
+A stamp is the time of the moment on the clock of LSL, which is this computer's monotonic clock; of a replay, the time
+at which it is sent. The streams are announced on this machine, unless LSL's own configuration (LSLAPICFG) says
+otherwise; LSL asks nobody who connects for anything.
+"""
+
+from typing import Any
+
+from thenar.drivers.errors import SettingError
+from thenar.drivers.lsl import load_pylsl
+from thenar.drivers.names import fault
+
+from ..preshape.selector import Preshape
+from ..published import JointAngles, LiveGrasp
+from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
+
+
+class LslStreams(Sink):
+    """Publishes streams under a name. Raises SettingError about a name that cannot be, SinkError if LSL refuses."""
+
+    def __init__(self, name: str, *, stamped: bool = True) -> None:
+        self._lsl, self._name, self._stamped = load_pylsl(f"lsl:{name}"), name, stamped
+        if reason := fault(name):
+            raise SettingError(f"lsl:{name!r} is no name of a stream: it {reason}")
+        self._grasps = self._outlet(name, "Markers", ("grasp",), "string", 0.0)
+        self._angles: Any = None
+        self._joints: tuple[str, ...] = ()
+        self._measured: JointAngles | None = None
+        self._shown, self._sent, self._closed = "", 0, False
+
+    def _outlet(self, name: str, kind: str, labels: tuple[str, ...], form: str, rate_hz: float) -> Any:
+        lsl = self._lsl
+        try:
+            info = lsl.StreamInfo(name, kind, len(labels), rate_hz, form, f"thenar {name}")
+            info.set_channel_labels(list(labels))
+            return lsl.StreamOutlet(info)
+        except (RuntimeError, ValueError, OSError) as reason:
+            raise SinkError(f"lsl:{name} cannot be opened: {reason}") from None
+
+    def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
+        """Send what is news."""
+        if self._closed:
+            return
+        stamp = grasp.time_us / 1e6 if self._stamped else 0.0
+        if grasp.grasp != self._shown:
+            self._shown = grasp.grasp
+            self._grasps.push_sample([grasp.grasp], stamp)
+            self._sent += 1
+        if angles is not None and angles is not self._measured:
+            self._measured = angles
+            if self._angles is None:
+                self._joints = angles.names
+                self._angles = self._outlet(f"{self._name}-angles", "MoCap", angles.names, "float32", 0.0)
+            if angles.names == self._joints:
+                self._angles.push_sample(list(angles.positions_rad), stamp)
+
+    def report(self) -> SinkReport:
+        """Return how this sink is doing."""
+        return SinkReport(f"lsl:{self._name}", None, self._sent, 0)
+
+    def close(self) -> None:
+        """End the streams."""
+        self._closed, self._grasps, self._angles = True, None, None
+
+
+def _open(where: SinkPlace) -> Sink:
+    return LslStreams(where.place, stamped=not where.wait)
+
+
+MEMBER = SinkKind("lsl", "NAME", "grasp types and joints as streams of the Lab Streaming Layer", _open, rank=5)

@@ -1,0 +1,104 @@
+"""Topics of ROS 2 as rows, through Eclipse Cyclone DDS (extra `ros`), without a ROS installation.
+
+    ros:/TOPIC                         sensor_msgs/JointState: columns are the names of the joints, by their positions
+    ros:/TOPIC?type=UInt8MultiArray    std_msgs: columns in the order of `columns`
+    ros:/TOPIC?type=Float32MultiArray  the same
+
+A JointState's stamp is the sender's clock, unless it is zero. Nodes of this machine are heard, others where
+CYCLONEDDS_URI or `&public` lets them; ROS_DOMAIN_ID says in which domain.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from thenar.drivers.errors import DeviceError, SettingError
+from thenar.drivers.line_reader import RowReader
+from thenar.drivers.lines import LineCounts, Row, finite
+from thenar.drivers.names import shortened
+
+from ..harness.wiring import StreamWiring
+from .rows import row_kinds
+
+_TYPES = ("JointState", "UInt8MultiArray", "Float32MultiArray")
+_PORT = re.compile(rf"ros:(/[^?]*)(?:\?(?:type=({'|'.join(_TYPES)})&?)?(public)?)?")
+_MOST = 256
+_ANY = 0xFFFFFFFF  # samples, views and instances of all states
+
+
+class RosReader(RowReader):
+    """Rows of the messages of a topic. Its constructor opens nothing."""
+
+    def __init__(self, port: str) -> None:
+        self._port, self._counts = port, LineCounts()
+        self._reader: Any = None
+        self._waiting: Any = None
+        self._domain: Any = None
+
+    def open(self) -> None:
+        """Subscribe; whether somebody publishes shows later."""
+        found = _PORT.fullmatch(self._port)
+        if found is None:
+            ways = f"ros:/TOPIC, and behind it ?type= one of {', '.join(_TYPES)}, or ?public"
+            raise SettingError(f"{shortened(repr(self._port))} names no topic: write {ways}")
+        try:
+            from cyclonedds.core import DDSException, ReadCondition, WaitSet
+
+            from ..ros import domain, messages
+        except ImportError as reason:
+            raise SettingError(
+                f"{self._port}: ROS topics need a package: pip install 'thenar[ros]' ({reason})"
+            ) from None
+        number, name = domain.domain(), domain.namespace(found[1])
+        try:
+            self._domain, participant = domain.join(number, public=bool(found[3]))
+            self._reader = domain.reader(participant, name, getattr(messages, found[2] or _TYPES[0]))
+            self._waiting = WaitSet(participant)
+            self._waiting.attach(ReadCondition(self._reader, _ANY))
+        except (DDSException, OSError) as reason:
+            raise DeviceError(f"{self._port} cannot be opened in domain {number}: {reason}") from None
+
+    def read(self, timeout_s: float) -> Sequence[Row]:
+        """Return the rows of the messages that came in."""
+        from cyclonedds.core import DDSException
+
+        try:
+            self._waiting.wait(timeout=max(1, round(timeout_s * 1e9)))
+            return list(self._rows(self._reader.take(N=_MOST)))
+        except DDSException as reason:
+            raise DeviceError(f"{self._port}: {reason}") from None
+
+    def _rows(self, samples: Sequence[Any]) -> Iterator[Row]:
+        for sample in samples:
+            if hasattr(sample, "position"):
+                names, stamp = tuple(sample.name), sample.header.stamp
+                if not names or len(names) != len(sample.position) or len(set(names)) < len(names):
+                    self._counts.misfits += 1
+                    self.odd = f"a JointState of {len(names)} names and {len(sample.position)} positions"
+                    continue
+                time_s = stamp.sec + stamp.nanosec / 1e9 if stamp.sec or stamp.nanosec else None
+                yield Row(names, tuple(map(finite, sample.position)), time_s)
+            elif hasattr(sample, "data"):  # and no word of a writer that has gone
+                yield Row(None, tuple(finite(float(value)) for value in sample.data))
+
+    def counts(self) -> LineCounts:
+        """Return how many messages were no rows."""
+        return self._counts
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self._reader = self._waiting = None
+        self._domain = None
+
+
+def _reader(wiring: StreamWiring) -> RosReader:
+    return RosReader(wiring.port)
+
+
+MEMBER = row_kinds(
+    "ros",
+    "A topic of ROS 2, JointState, UInt8MultiArray or Float32MultiArray: [[stream]] from ros:/TOPIC.",
+    lambda port: port.startswith("ros:"),
+    _reader,
+    5,
+)

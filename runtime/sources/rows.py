@@ -1,0 +1,383 @@
+"""Rows of numbers, whatever carries them, as frames: which column is a switch, a joint or a taxel says `[[stream]]`."""
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+from thenar.drivers.line_reader import RowReader
+from thenar.drivers.lines import Row
+
+from ..frames import PERIODS, GloveFrame, Mask, Pauses, SwitchFrame, now_us
+from ..harness.wiring import Harness, Range, StreamWiring
+from ..names import list_names, shortened
+from ..published import Count
+from ..scanning.scanmap import ScanMap
+from ..taxels import Level, Taxels, calibration_of
+from .base import SHORTEST_US, Source, SourceKind, counted, debouncer_of, pause_us
+
+# Codes of joints are bytes, as a CyberGlove's; 0 is a joint of which nothing came. A taxel's whole numbers are its
+# codes; numbers that lie closer are coded in so many steps.
+_JOINT_CODES = (1, 255)
+_TAXEL_STEPS, _FEWEST_STEPS, _MOST_STEPS = 4095, 255, 65_534
+_UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0}
+# A clock that goes back further, or ahead of ours by more, has begun anew.
+_BACK_US, _AHEAD_US = 1_000_000, 10_000_000
+# The quickest row of so many periods, twice as many at most, sets a sender's clock against ours. Resonators of boards
+# are off by half a percent: over more rows that alone would make new rows old.
+_WINDOW = 10
+# A break in what arrives is none before it is longer: serial adapters and radios hand rows over in bunches.
+_BUNCH_US = 50_000
+_SLOW = 0.75
+# A serial adapter, or a radio, may hold a row back for so long though all is well.
+_WAY_US = 20_000
+# What a column may become of a frame.
+_LATE = -1
+
+
+class SenderClock:
+    """The time of this computer at which a sender stamped a row: no later than it came, and by the quickest of the last
+    rows, which come every `period_us`.
+    """
+
+    def __init__(self, period_us: int) -> None:
+        self._window_us = _WINDOW * period_us
+        self.last_us: float | None = None
+        self._came_us = self._shown_us = self._until_us = 0
+        self._offsets = [0.0, 0.0]
+
+    def host_us(self, sent_us: float, came_us: int) -> int | None:
+        """Return the time of a row that was stamped `sent_us` by its sender; _LATE if it comes after a later one, None
+        if its clock has begun anew, and this clock with it.
+        """
+        last = self.last_us
+        if last is not None:
+            step = sent_us - last
+            if -_BACK_US < step < 0:
+                return _LATE
+            if step < 0 or step > came_us - self._came_us + _AHEAD_US:
+                self.last_us = None
+                return None
+        offset = came_us - sent_us
+        if last is None or came_us > self._until_us:
+            self._offsets = [offset, offset if last is None else self._offsets[0]]
+            self._until_us = came_us + self._window_us
+        self._offsets[0] = min(self._offsets[0], offset)
+        self.last_us, self._came_us = sent_us, came_us
+        self._shown_us = max(self._shown_us, min(came_us, round(sent_us + min(self._offsets))))
+        return self._shown_us
+
+
+@dataclass(slots=True)
+class RowCounts:
+    """What came of a sender's rows, since the source was made.
+
+    wrong_columns  rows without the columns that are used, or of another number of them
+    missing        values that were no number, of columns that are used; a row without its clock is left out
+    out_of_range   values beyond the range that glove.toml gives, held to it
+    repeated       rows that came twice
+    late           rows that came after a later one, and were left out
+    restarts       how often the sender's clock began anew
+    gaps, lost     breaks between two rows, and the rows that are lacking there
+    """
+
+    rows: int = 0
+    wrong_columns: int = 0
+    missing: int = 0
+    out_of_range: int = 0
+    repeated: int = 0
+    late: int = 0
+    restarts: int = 0
+    gaps: int = 0
+    lost: int = 0
+
+
+@dataclass(slots=True)
+class RowWatch:
+    """How rows come: gaps and the rate, by the sender's clock where there is one."""
+
+    period_us: int
+    counts: RowCounts = field(default_factory=RowCounts)
+    hz: float | None = None
+    _last_us: float | None = None
+    _since_us: int | None = None
+    _rows: int = 0
+
+    def begin(self) -> None:
+        """Begin anew, after a break that is no gap between rows."""
+        self._last_us = self._since_us = None
+
+    def row(self, came_us: int, sent_us: float | None) -> None:
+        """Take a row that counts."""
+        self.counts.rows += 1
+        time_us = came_us if sent_us is None else sent_us
+        longest_us = 1.5 * self.period_us if sent_us is not None else max(2 * self.period_us, _BUNCH_US)
+        if self._last_us is not None and time_us - self._last_us > longest_us:
+            self.counts.gaps += 1
+            self.counts.lost += max(round((time_us - self._last_us) / self.period_us) - 1, 0)
+        self._last_us = time_us
+        if self._since_us is None:
+            self._since_us, self._rows = came_us, 0
+            return
+        self._rows += 1
+        if came_us - self._since_us >= max(1_000_000, 4 * self.period_us):
+            self.hz = self._rows * 1e6 / (came_us - self._since_us)
+            self._since_us, self._rows = came_us, 0
+
+
+class Columns:
+    """Finds the columns that are used in rows that are named, or in the order of glove.toml."""
+
+    def __init__(self, wanted: Sequence[str], columns: Sequence[str], time: str | None) -> None:
+        self._wanted, self._columns, self._time = tuple(wanted), tuple(columns), time
+        self._names: tuple[str, ...] | None = None
+        self._places: tuple[int | None, ...] | None = None
+        self.found: tuple[str, ...] | None = None
+
+    def of(self, row: Row) -> tuple[float | None, ...] | None:
+        """Return the values of the columns wanted, None for one that is not there; None for a row of other columns."""
+        if self._places is None or row.names != self._names:
+            self._names, self._places = row.names, self._placed(row.names)
+        if self._places is not None and (row.names is not None or len(row.values) == len(self._columns)):
+            return tuple([None if place is None else row.values[place] for place in self._places])
+        self.found = row.names or tuple(f"column {number + 1}" for number in range(len(row.values)))
+        return None
+
+    def _placed(self, names: tuple[str, ...] | None) -> tuple[int | None, ...] | None:
+        if names is not None and set(names).isdisjoint(self._wanted) and len(names) == len(self._columns):
+            names = None  # a header, or a message taken for one, of other names: their order counts
+        order = self._columns if names is None else names
+        places = {name: place for place, name in enumerate(order) if name}
+        found = tuple(places.get(name) for name in self._wanted)
+        # One that lacks a sensor counts; one that lacks its clock, or most of what is used, is no row of this glove.
+        clocked = self._time is None or self._time in places
+        return found if clocked and 2 * found.count(None) < len(found) else None
+
+
+class RowSource(Source):
+    """Stream number `number` of a harness: switches as `scan` has them, all joints, all taxels."""
+
+    def __init__(self, reader: RowReader, harness: Harness, number: int, names: Sequence[str], scan: ScanMap) -> None:
+        wiring, read = harness.streams[number], scan.streams[number]
+        self.name = f"stream from {wiring.port}"
+        self.reader, self.wiring = reader, wiring
+        self.period_us = stream_period_us(wiring)
+        self.longest_us = PERIODS * self.period_us
+        wanted = (*wiring.used, *([] if wiring.time is None else [wiring.time]))
+        self._columns = Columns(wanted, wiring.columns, wiring.time)
+        low = wiring.closed == "low"
+        self._switches = [
+            (place, wiring.thresholds.get(wiring.switches[place], wiring.threshold), low, 1 << switch)
+            for place, switch in read.switches
+        ]
+        first = len(wiring.switches)
+        self._joints = [_Grid(limits, *_JOINT_CODES) for limits in wiring.joints.values()]
+        self._first_joint, self._first_taxel = first, first + len(self._joints)
+        self._grids = [_Grid(limits, 0, steps_of(limits)) for limits in wiring.taxels.values()]
+        self._taxel_names, self._everything = tuple(wiring.taxels), harness.taxel_names
+        self._places = [self._everything.index(name) for name in self._taxel_names]
+        levels: dict[int, list[Level]] = {}
+        for place, limit, switch in read.levels:
+            levels.setdefault(place, []).append((limit, switch))
+        self._settings, self._calibration = harness.taxel_settings, calibration_of(harness.taxel_settings)
+        self._levels = [levels.get(place, []) for place in range(len(self._taxel_names))]
+        self.owned: Mask = sum(bit for *_, bit in self._switches)
+        self.owned |= sum(1 << switch for each in self._levels for _, switch in each)
+        self._sends_switches = bool(self.owned or self._taxel_names)
+        self._debounce = harness.debounce
+        self.watch = RowWatch(wiring.period_us)
+        self._ready = deque[SwitchFrame | GloveFrame]()
+        self._begin()
+
+    def _begin(self) -> None:
+        self._clock = SenderClock(self.wiring.period_us)
+        self._last: tuple[float, Sequence[float | None]] | None = None
+        self._ready.clear()
+        self.watch.begin()
+        self._debouncer, self._pauses = debouncer_of(self._debounce), Pauses(pause_us(self._debounce))
+        self._taxels = [
+            Taxels([name], [levels], self._calibration, self._settings, grid.last)
+            for name, levels, grid in zip(self._taxel_names, self._levels, self._grids, strict=True)
+        ]
+
+    def open(self) -> None:
+        """Open the reader."""
+        self.reader.open()
+        self._begin()
+
+    def read(self, timeout_s: float) -> SwitchFrame | GloveFrame | None:
+        """Return the next frame; a row with joints and switches is two."""
+        if not self._ready:
+            rows = self.reader.read(timeout_s)
+            came_us = now_us()
+            for row in rows:
+                self._take(row, came_us)
+        return self._ready.popleft() if self._ready else None
+
+    def _take(self, row: Row, came_us: int) -> None:
+        values, counts = self._columns.of(row), self.watch.counts
+        if values is None:
+            counts.wrong_columns += 1
+            return
+        counts.missing += values.count(None)
+        if self.wiring.time is not None and values[-1] is None:
+            return  # nobody knows when it was
+        time_us, sent_us = came_us, self._sent_us(row, values)
+        if sent_us is not None:
+            if (sent_us, values) == self._last:
+                counts.repeated += 1
+                return
+            known_us = self._clock.host_us(sent_us, came_us)
+            if known_us is None:
+                counts.restarts += 1
+                self.watch.begin()
+                known_us = self._clock.host_us(sent_us, came_us)
+            if known_us is None or known_us == _LATE:
+                counts.late += 1
+                return
+            time_us, self._last = known_us, (sent_us, values)
+        self.watch.row(came_us, sent_us)
+        self._make_frames(time_us, values)
+
+    def _sent_us(self, row: Row, values: Sequence[float | None]) -> float | None:
+        if self.wiring.time is not None:
+            return None if (sent := values[-1]) is None else sent * _UNITS_US[self.wiring.time_unit]
+        return None if row.time_s is None else row.time_s * 1e6
+
+    def _make_frames(self, time_us: int, values: Sequence[float | None]) -> None:
+        joints = values[self._first_joint : self._first_taxel]
+        glove = None
+        if any(value is not None for value in joints):
+            codes = (self._code(grid, value) or 0 for grid, value in zip(self._joints, joints, strict=True))
+            glove = GloveFrame(time_us, bytes(codes))
+        if self._sends_switches:
+            self._ready.append(self._switch_frame(time_us, values, glove))
+        if glove is not None:
+            self._ready.append(glove)
+
+    def _switch_frame(self, time_us: int, values: Sequence[float | None], glove: GloveFrame | None) -> SwitchFrame:
+        """Return the switches and taxels of a row, and its joints: no moment joins them with those of another row."""
+        closed = known = 0
+        for place, threshold, low, bit in self._switches:
+            if (value := values[place]) is not None:
+                known |= bit
+                closed |= bit if (value > threshold) != low else 0
+        row: list[int | None] = [None] * len(self._everything)
+        measured = values[self._first_taxel : self._first_taxel + len(self._grids)]
+        for taxels, grid, place, value in zip(self._taxels, self._grids, self._places, measured, strict=True):
+            row[place] = code = self._code(grid, value)
+            pressed, lost = taxels.read(time_us, (code,))
+            closed, known = closed | pressed, known | taxels.owned & ~lost
+        if self._debouncer is not None:
+            if over := self._pauses.over(time_us, known):
+                self._debouncer.forget(over)
+            closed = self._debouncer.update(time_us, closed, known) & known
+        return SwitchFrame(time_us, closed, self.owned & ~known, 0, glove, tuple(row) if self._grids else None)
+
+    def _code(self, grid: "_Grid", value: float | None) -> int | None:
+        if value is None:
+            return None
+        code = grid.code(value)
+        held = min(max(code, grid.first), grid.last)
+        self.watch.counts.out_of_range += held != code
+        return held
+
+    def counts(self) -> tuple[Count, ...]:
+        """Return how many rows come, and what was wrong with some."""
+        rate = Count("rows a second", round(self.watch.hz or 0))
+        return (rate, *counted(self.watch.counts), *counted(self.reader.counts()))
+
+    def trouble(self) -> str:
+        """Return what is wrong though rows, or lines, come; "" if nothing is."""
+        counts, found, hz = self.watch.counts, self._columns.found, self.watch.hz
+        if not counts.rows and found is not None:
+            wanted = list_names([name for name in self.wiring.columns if name] or self.wiring.used)
+            has = list_names([shortened(name) for name in found])
+            return f"its rows have other columns than glove.toml: {has}, not {wanted}"
+        if not counts.rows and (odd := self.reader.odd):
+            return f"what comes holds no rows: {odd}"
+        if hz is not None and hz < _SLOW * self.wiring.rate_hz:
+            return f"{hz:.3g} rows a second come, glove.toml says {self.wiring.rate_hz:g}: write rate_hz = {hz:.2g}"
+        faulty = [f"{each.names[0]}: {each.faults[0]}" for each in self._taxels if each.faults[0] not in ("", "silent")]
+        return f"taxels with faults: {list_names(faulty)}" if faulty else ""
+
+    def close(self) -> None:
+        """Close the reader."""
+        self.reader.close()
+
+
+class _Grid:
+    """The grid that numbers of a range are coded on: the code of its one end is `first`, of the other `last`."""
+
+    __slots__ = ("_factor", "_low", "first", "last")
+
+    def __init__(self, limits: Range, first: int, last: int) -> None:
+        self._low, high = limits
+        self.first, self.last = first, last
+        self._factor = (last - first) / (high - self._low)
+
+    def code(self, value: float) -> int:
+        """Return the code of a number, beyond first and last where it is out of the range."""
+        far = (value - self._low) * self._factor
+        return self.first + round(min(max(far, -1e6), 1e6))
+
+
+def steps_of(limits: Range) -> int:
+    """Return how many steps the range of a taxel is coded in: as many as there are whole numbers in it, if it has whole
+    ends and enough of them.
+    """
+    span = abs(limits[1] - limits[0])
+    whole = all(float(end).is_integer() for end in limits) and _FEWEST_STEPS <= span <= _MOST_STEPS
+    return int(span) if whole else _TAXEL_STEPS
+
+
+def joint_number(limits: Range, code: int) -> float:
+    """Return a number that a joint's range codes as `code`, 1 to 255."""
+    first, last = _JOINT_CODES
+    return limits[0] + (code - first) * (limits[1] - limits[0]) / (last - first)
+
+
+def stream_period_us(wiring: StreamWiring) -> int:
+    """Return how often a stream should deliver at least, the way that a row takes on a good line included."""
+    return max(SHORTEST_US, wiring.period_us) + _WAY_US // PERIODS
+
+
+@dataclass(frozen=True, slots=True)
+class RowKind(SourceKind):
+    """A kind of source that delivers rows.
+
+    takes   whether it opens a port of this text; of several kinds the first by rank does
+    reader  what reads the rows of a stream; its constructor opens nothing
+    """
+
+    takes: Callable[[str], bool] = lambda _port: False
+    reader: Callable[[StreamWiring], RowReader] | None = None
+
+
+def row_kinds(
+    name: str, help_: str, takes: Callable[[str], bool], reader: Callable[[StreamWiring], RowReader], rank: int
+) -> tuple[RowKind, RowKind]:
+    """Return a kind for streams with switches or taxels, and one for those of joints alone."""
+
+    def of(joints: bool) -> Callable[[Harness, Sequence[str], ScanMap], Iterator[Source]]:
+        def sources(harness: Harness, names: Sequence[str], scan: ScanMap) -> Iterator[Source]:
+            for number, wiring in enumerate(harness.streams):
+                if takes(wiring.port) and joints != bool(wiring.switches or wiring.taxels):
+                    yield RowSource(reader(wiring), harness, number, names, scan)
+
+        return sources
+
+    return (
+        RowKind(name, help_, "switches", of(False), partial(_switch_periods_us, takes), rank, takes, reader),
+        RowKind(f"{name} of joints", help_, "joints", of(True), partial(_joint_periods_us, takes), rank, takes, reader),
+    )
+
+
+def _switch_periods_us(takes: Callable[[str], bool], harness: Harness, scan: ScanMap) -> Iterator[int]:
+    rows = zip(harness.streams, scan.streams, strict=True)
+    read = (wiring for wiring, read in rows if read.switches or read.levels)
+    return (stream_period_us(wiring) for wiring in read if takes(wiring.port))
+
+
+def _joint_periods_us(takes: Callable[[str], bool], harness: Harness, _scan: ScanMap) -> Iterator[int]:
+    return (stream_period_us(wiring) for wiring in harness.streams if wiring.joints and takes(wiring.port))

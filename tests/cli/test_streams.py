@@ -1,0 +1,259 @@
+"""A glove that sends lines, from `thenar doctor --line` to `thenar run`, by every way that lines come."""
+
+import json
+import math
+import os
+import pty
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from threading import Event, Thread
+from time import monotonic
+
+import numpy as np
+import pytest
+
+from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.recordings.graspset import Joint
+from thenar.drivers.emulated.lines import LineSender, SocketLines
+from thenar.runtime import Build
+from thenar.runtime.harness.loading import load_harness
+from thenar.runtime.live.replay import replayed
+
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
+
+STREAM = """name = "maker"
+[[stream]]
+port = "{port}"
+columns = ["ms", "s0", "s1", "s2", "s3", "s4", "s5", "j0", "j1"]
+time = "ms"
+rate_hz = 100
+switches = ["s0", "s1", "s2", "s3", "s4", "s5"]
+joints = {joints}
+"""
+PORTS = [
+    "/dev/ttyUSB0",
+    "tcp://glove.local:3333",
+    "udp://0.0.0.0:3333",
+    "unix:/run/glove",
+    "ws://glove.local/rows",
+    "-",
+]
+
+
+@pytest.fixture
+def moving(tmp_path: Path) -> Iterator[SocketLines]:
+    """Yield a sender of a clock, a count, two switches, a pad and a flex sensor, which all move."""
+    columns, done = ("ms", "n", "thumb", "index", "pad_tip", "flex_mcp"), Event()
+    with SocketLines(tmp_path / "line") as lines, LineSender(lines.send, columns, 100, "ms", "ms") as sender:
+
+        def move() -> None:
+            n = 0
+            while not done.wait(0.005):
+                n += 1
+                sender.show({"n": n, "thumb": n // 20 % 2, "index": n // 30 % 2})
+                sender.show({"pad_tip": 400 + round(300 * math.sin(n / 9)), "flex_mcp": 1500 + 9 * (n % 80)})
+
+        mover = Thread(target=move)
+        mover.start()
+        yield lines
+        done.set()
+        mover.join()
+
+
+@pytest.mark.slow
+def test_doctor_shows_what_comes_and_proposes_a_harness_that_it_then_finds_sound(
+    thenar: Thenar, moving: SocketLines, tmp_path: Path
+) -> None:
+    path = tmp_path / "glove.toml"
+    done = thenar("doctor", "--line", moving.port, "--seconds", "2", "--propose", path, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert [one["taken_for"] for one in found["columns"][:1]] == ["the sender's clock, in ms"]
+    stream = load_harness(path).streams[0]
+    assert (stream.time, stream.time_unit) == ("c1", "ms")
+    assert stream.switches == ("c3", "c4")
+    assert stream.taxels == {"c5": (0, 1023), "c6": (0, 4095)}
+    assert 80 <= stream.rate_hz <= 110
+    done = thenar("doctor", path, "--json")
+    assert done.returncode == 0, done.stdout
+    rows, *taxels = json.loads(done.stdout)
+    assert rows["present"]
+    assert 0.8 < rows["measured_us"] / 10_000 < 1.3
+    assert [one["part"] for one in taxels] == ["taxel c5", "taxel c6"]
+    named = thenar("doctor", "--line", moving.port, "--seconds", "1", "--names", "ms,n,thumb,index,fsr,flex", "--json")
+    stream = json.loads(named.stdout)["stream"]
+    assert (stream["switches"], list(stream["joints"]), list(stream["taxels"])) == (
+        ["thumb", "index"],
+        ["flex"],
+        ["fsr"],
+    )
+    low, high = stream["joints"]["flex"]
+    assert 1000 < low < 1700 < 2000 < high < 3000
+    done = thenar("doctor", "--line", moving.port, "--seconds", "0.5", "--names", "ms,n")
+    assert (done.returncode, "2 columns are named, and rows have 6" in done.stderr) == (2, True)
+
+
+def test_names_that_the_sender_gives_say_what_columns_are(thenar: Thenar, tmp_path: Path) -> None:
+    rows = "".join(
+        json.dumps({"t_ms": 20 * n, "fsr_palm": 0, "flex_ring": 100 + n % 9, "thumb": n % 2, "off": None})
+        + "\nboot it\n"
+        for n in range(30)
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "thenar.cli", "doctor", "--line", "-", "--seconds", "0.5", "--json"],
+        input=rows, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert {one["column"]: one["taken_for"] for one in found["columns"]} == {
+        "t_ms": "the sender's clock, in ms",
+        "fsr_palm": "taxel",
+        "flex_ring": "joint",
+        "thumb": "switch",
+        "off": "nothing: no number came",
+    }
+    assert found["stream"]["rate_hz"] == 50
+    assert [text.split(", ")[0] for text in found["remarks"]] == [
+        "30 lines were no rows",
+        "the rows came all at once: rate_hz is by their clock",
+        "off: 30 of 30 values were no numbers",
+    ]
+
+
+def test_a_line_where_nothing_comes_or_nothing_can_is_said(thenar: Thenar, tmp_path: Path) -> None:
+    for port, said in (
+        ("spy://x", "is no port that is opened"),
+        ("/dev/none", "there is no such port"),
+        (f"unix:{tmp_path}/none", "is the sender there"),
+    ):
+        done = thenar("doctor", "--line", port)
+        assert done.returncode == 2
+        assert said in done.stderr
+        assert "Traceback" not in done.stderr
+    assert "name a glove.toml, or the --line" in thenar("doctor").stderr
+
+
+def right(log: Path, lines: Path) -> float:
+    """Return the share of moments in which what was played, for 50 ms at least, was recognised."""
+    played = [json.loads(line) for line in log.read_text().splitlines()]
+    times = np.array([one["time_us"] for one in played])
+    found = []
+    for grasp in map(json.loads, lines.read_text().splitlines()):
+        at = int(np.searchsorted(times, grasp["time_us"])) - 1
+        if at >= 0 and grasp["time_us"] - times[at] > 50_000 and grasp["health"] != "unknown":
+            found.append(grasp["candidate"] == played[at]["grasp"])
+    assert len(found) > 20
+    return float(np.mean(found))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("port", PORTS)
+def test_an_emulated_sender_is_recognised_by_every_way_and_replays_alike(
+    thenar: Thenar, build_folder: Path, set_file: Path, tmp_path: Path, port: str
+) -> None:
+    (tmp_path / "mine.toml").write_text(STREAM.format(port=port, joints="{ j0 = [0, 127.5], j1 = [127.5, 0] }"))
+    out, log, recording = tmp_path / "out.jsonl", tmp_path / "log.jsonl", tmp_path / "run.mcap"
+    command = [sys.executable, "-m", "thenar.cli", "run", build_folder, "--glove", "{glove}"]
+    command += ["--frames", "150", "--sink", f"jsonl:{out}", "--record", recording]
+    done = thenar(
+        "emulate", set_file, "--glove", tmp_path / "mine.toml", "--dir", tmp_path / "emulated",
+        "--period-ms", "150", "--repeat", "--log", log, "--", *command,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert right(log, out) >= 0.9
+    again = list(replayed(Build.load(build_folder), recording))
+    assert [now for _, now in again] == [then for then, _ in again]
+
+
+@pytest.mark.slow
+def test_a_broken_sender_spoils_no_answer_and_is_counted(thenar: Thenar, build_folder: Path, tmp_path: Path) -> None:
+    odd = [
+        b"\xff\xfe\x00\n",
+        b"1,2\n",
+        b'{"ms": \n',
+        b"8" * 200_000 + b"\n",
+        b"[" * 9000 + b"\n",
+        b"ms,s0\n",
+        b"nan\n" * 9,
+    ]
+    out, done, said = tmp_path / "out.jsonl", Event(), '[[stream]]\nrate_hz = 50\nswitches = ["s0", "s1", "s2", "s3", '
+    said += '"s4", "s5"]\njoints = { j0 = [0, 127.5], j1 = [0, 127.5] }\ntime = "ms"\n'
+    with SocketLines(tmp_path / "s") as lines:
+        (tmp_path / "mine.toml").write_text(f'{said}port = "{lines.port}"\n')
+        values = {f"s{number}": number % 2 for number in range(6)} | {"j0": 60.0, "j1": 35.0}
+
+        def send() -> None:
+            began = monotonic()
+            while not done.wait(0.015):
+                now = round(1000 * (monotonic() - began))
+                lines.send(json.dumps({"ms": now} | values).encode() + b"\n" + odd[now % len(odd)])
+                lines.send(json.dumps({"ms": now - 50} | values).encode() + b"\n")
+
+        sender = Thread(target=send)
+        sender.start()
+        command = ["run", build_folder, "--glove", tmp_path / "mine.toml", "--frames", "150", "--status"]
+        finished = thenar(*command, "--sink", f"jsonl:{out}")
+        done.set()
+        sender.join()
+    assert finished.returncode == 0, finished.stderr
+    found = [json.loads(line) for line in out.read_text().splitlines()]
+    grasps = [one for one in found if one["kind"] == "grasp"][10:]
+    assert len({one["grasp"] for one in grasps}) == 1
+    assert sum(one["health"] == "ok" for one in grasps) >= 0.9 * len(grasps)
+    (device,) = [one for one in found if one["kind"] == "health"][-1]["devices"]
+    counts = {count["name"]: count["value"] for count in device["counts"]}
+    assert min(counts[name] for name in ("rows", "late", "misfits", "overlong", "wrong columns")) > 0
+    assert counts["program faults"] == counts["restarts"] == 0
+
+
+@pytest.mark.slow
+def test_joints_alone_of_bytes_are_recognised_as_they_were_recorded(thenar: Thenar, tmp_path: Path) -> None:
+    high = {"cup": (200, 30), "pen": (30, 200), "rod": (200, 200)}
+    labels = np.arange(60) % 3
+    from thenar.compiler.recordings.taxonomy import own
+
+    recorded = GraspSet(
+        switches=np.zeros((60, 0), bool), switch_names=(), codes=np.array(list(high.values()), np.uint16)[labels],
+        joints=tuple(Joint(f"flex_{number}", "raw", 1, 1.0, 255, 255.0) for number in (1, 2)),
+        grasps=np.array(list(high))[labels], taxonomy=own(list(high)), subjects=np.full(60, "A"),
+        objects=np.full(60, "thing"), trials=np.arange(60),
+    )  # fmt: skip
+    recorded.save(tmp_path / "set.grasps")
+    build = compile_build(recorded, tmp_path / "build", rounds=10, folds=0, inputs="joints").folder
+    (tmp_path / "mine.toml").write_text(
+        '[[stream]]\nport = "udp://0.0.0.0:1"\nrate_hz = 100\njoints = { flex_1 = [0, 4095], flex_2 = [3000, 10] }\n'
+        'columns = ["flex_1", "flex_2"]\n'
+    )
+    out, log = tmp_path / "out.jsonl", tmp_path / "log.jsonl"
+    command = [sys.executable, "-m", "thenar.cli", "run", build, "--glove", "{glove}", "--frames", "100"]
+    done = thenar(
+        "emulate", tmp_path / "set.grasps", "--glove", tmp_path / "mine.toml", "--dir", tmp_path / "emulated",
+        "--period-ms", "150", "--repeat", "--log", log, "--", *command, "--sink", f"jsonl:{out}",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert right(log, out) == 1.0
+
+
+@pytest.mark.slow
+def test_calibrate_asks_for_the_joints_of_a_stream(tmp_path: Path) -> None:
+    path, out = tmp_path / "glove.toml", tmp_path / "anna.toml"
+    with SocketLines(tmp_path / "s") as lines, LineSender(lines.send, ("flex",), 100, None, "ms") as sender:
+        path.write_text(f'[[stream]]\nport = "{lines.port}"\njoints = {{ flex = [0, 1000] }}\ncolumns = ["flex"]\n')
+        master, slave = pty.openpty()
+        command = [sys.executable, "-m", "thenar.cli", "calibrate", str(path), "-o", str(out), "--hold", "0.1"]
+        with subprocess.Popen(command, stdin=slave, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            assert process.stderr is not None
+            for value in (100.0, 700.0):
+                while b"Enter" not in process.stderr.readline():
+                    pass
+                sender.show({"flex": value})
+                Event().wait(0.05)
+                os.write(master, b"\n")
+            assert process.wait(20) == 0
+    os.close(slave)
+    os.close(master)
+    text = out.read_text()
+    assert "raw_a = 26" in text
+    assert "value_b = 90.0" in text

@@ -1,0 +1,285 @@
+"""The classifier in other languages than C: every score, margin and probability is Python's, whatever the tables."""
+
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from msgspec import structs
+
+from thenar.compiler.firmware.classifier import Library
+from thenar.compiler.firmware.layout import Layout, arrange
+from thenar.compiler.firmware.probes import Answers, Probes, lost_inputs
+from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.firmware.tools import call, find
+from thenar.runtime.manifest import Manifest, Rejection
+from thenar.runtime.softmax import Softmax
+from thenar.runtime.tables import IntegerTables, Pair, Slope
+
+MakeTables = Callable[..., IntegerTables]
+Describe = Callable[[IntegerTables], Manifest]
+Probed = Callable[[IntegerTables, int], Probes]
+SameAsPython = Callable[..., None]
+
+LANGUAGES = ("micropython", "rust", "wasm")
+SHAPES: dict[str, dict[str, int]] = {
+    "small": {"classes": 7, "switches": 12, "joints": 4},
+    "switches_only": {"joints": 0},
+    "joints_only_wide_codes": {"switches": 0, "highest": 4095},
+    "wide_codes_after_an_odd_byte": {"switches": 11, "highest": 65535},
+    "more_than_256_classes": {"classes": 261, "reach": 3},
+    "many_bins": {"bins": 40},
+}
+
+
+@pytest.fixture(params=LANGUAGES)
+def language(request: pytest.FixtureRequest, tool: Callable[[str], str]) -> str:
+    if missing := TARGETS[request.param].missing():
+        tool(missing.split()[0])
+    return str(request.param)
+
+
+def answers(language: str, layout: Layout, manifest: Manifest, frames: Probes, **how: Any) -> Answers:
+    target = TARGETS[language]
+    sent = layout.frame_bytes(frames.bits, frames.codes)
+    return target.run(target.sources(Library("hand", manifest, layout, avr=False)), "hand", layout, sent, **how)
+
+
+@pytest.mark.parametrize("incremental", [False, True], ids=["classify", "update"])
+def test_every_score_is_python_s_with_inputs_missing_too(
+    make_tables: MakeTables,
+    describe: Describe,
+    probed: Probed,
+    same_as_python: SameAsPython,
+    language: str,
+    incremental: bool,
+) -> None:
+    tables = make_tables(**SHAPES["small"])
+    frames = probed(tables, 500)
+    lost = lost_inputs(tables, len(frames), 3) if incremental else None
+    found = answers(language, arrange(tables), describe(tables), frames, incremental=incremental, lost=lost)
+    same_as_python(found, tables, frames, lost)
+    assert found.names == describe(tables).grasps
+
+
+def with_slopes(tables: IntegerTables) -> IntegerTables:
+    row = np.arange(-3, tables.n_classes - 3, dtype=np.int8)
+    return replace(tables, slopes=(Slope(1, 20, 220, 0, row), Slope(2, 3, 50, 2, -row), Slope(3, 9, 250, -3, row)))
+
+
+def with_pairs(tables: IntegerTables) -> IntegerTables:
+    steps = np.array([9, 40, 254], np.uint16), np.array([77], np.uint16)
+    random = np.random.default_rng(3)
+    rows = [random.integers(-20, 21, (4, 2, tables.n_classes)).astype(np.int16) for _ in range(2)]
+    return replace(tables, pairs=(Pair((0, 3), steps, rows[0]), Pair((1, 2), steps, rows[1])))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lost", [False, True], ids=["whole", "missing"])
+@pytest.mark.parametrize("shape", [*list(SHAPES)[1:], "slopes", "pairs"])
+def test_so_it_is_for_tables_of_any_shape(
+    make_tables: MakeTables,
+    describe: Describe,
+    probed: Probed,
+    same_as_python: SameAsPython,
+    language: str,
+    shape: str,
+    lost: bool,
+) -> None:
+    tables = make_tables(**SHAPES.get(shape, SHAPES["small"]))
+    tables = {"slopes": with_slopes, "pairs": with_pairs}.get(shape, lambda same: same)(tables)
+    frames = probed(tables, 60)
+    gone = lost_inputs(tables, len(frames), 3) if lost else None
+    for entry_bits, bins in ((16, "search"), (8, "trimmed")) if "wide" not in shape else ((16, "search"),):
+        layout = arrange(tables, entry_bits=entry_bits, bins=bins)  # type: ignore[arg-type]
+        found = answers(language, layout, describe(tables), frames, incremental=lost, lost=gone)
+        same_as_python(found, tables, frames, gone)
+
+
+MORE = {
+    "micropython": """
+import thenar_hand as library
+glove = library.Glove()
+for number in range(0, {switches}, 3):
+    glove.set_switch(number, True)
+for joint in range({joints}):
+    glove.set_code(joint, 40 * joint)
+grasp = glove.classify()
+print(glove.margin(), *[glove.probability(k) for k in range({classes})], glove.held(grasp), glove.held(grasp, 1))
+""",
+    "rust": """
+use thenar_hand::*;
+fn main() {{
+    let mut glove = Glove::new();
+    for number in (0..{switches}).step_by(3) {{
+        glove.set_switch(Switch::ALL[number], true);
+    }}
+    for joint in 0..{joints} {{
+        glove.input.codes[joint] = 40 * joint as Code;
+    }}
+    let grasp = glove.classify();
+    println!("{{}} {{}} {{}} {{}}", glove.margin(),
+        Grasp::ALL.map(|each| glove.probability(each).to_string()).join(" "),
+        glove.held(grasp, 0).map_or(CLASSES, |held| held as usize),
+        glove.held(grasp, 1).map_or(CLASSES, |held| held as usize));
+}}
+""",
+    "wasm": """
+import {{ readFileSync }} from "node:fs";
+import {{ load }} from "./thenar_hand.js";
+const {{ Glove }} = await load(readFileSync("thenar_hand.wasm"));
+const other = Array.from({{ length: 1000 }}, () => new Glove()); // more than one page of memory
+const glove = new Glove();
+for (let number = 0; number < {switches}; number += 3) {{
+    glove.setSwitch(number, true);
+}}
+for (let joint = 0; joint < {joints}; joint++) {{
+    glove.setCode(joint, 40 * joint);
+}}
+other.forEach((each) => each.classify());
+const grasp = glove.classify();
+const shares = Array.from({{ length: {classes} }}, (_, k) => Math.round(glove.probability(k) * 65535));
+console.log(glove.margin(), ...shares, glove.held(grasp), glove.held(grasp, 1));
+""",
+}
+
+
+def printed(language: str, files: Mapping[str, str], program: str, folder: Path) -> str:
+    """Return what a program around the classifier prints."""
+    place = {"micropython": "main.py", "rust": "examples/more.rs", "wasm": "main.mjs"}[language]
+    for path, text in {**files, place: program}.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text)
+    if language == "wasm":
+        call([find((("make",), "make"))], folder)
+    command = {
+        "micropython": [sys.executable, "-m", "micropython_unix", place],
+        "rust": ["cargo", "run", "--quiet", "--offline", "--example", "more"],
+        "wasm": ["node", place],
+    }
+    done = subprocess.run(command[language], cwd=folder, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_margin_probability_and_refusal_are_python_s(
+    make_tables: MakeTables, describe: Describe, language: str, tmp_path: Path
+) -> None:
+    tables = make_tables(**SHAPES["small"])
+    bits = np.arange(tables.n_switches)[np.newaxis] % 3 == 0
+    codes = 40 * np.arange(tables.n_joints, dtype=np.uint16)[np.newaxis]
+    layout = arrange(tables)
+    scores = layout.scores(bits, codes)[0]
+    best = int(scores.argmax())
+    k, j = tables.n_classes, tables.n_joints
+    least = [32767 if each == best else -32768 for each in range(k)]  # refused for its score alone
+    rejection = Rejection(0.05, tuple(least), ((0, 12),) * k, (((0, 65535),) * j,) * k, 0)
+    manifest = structs.replace(describe(tables), rejection=rejection)
+    files = TARGETS[language].sources(Library("hand", manifest, layout, avr=False))
+    program = MORE[language].format(switches=tables.n_switches, joints=j, classes=k)
+    margin, *shares = map(int, printed(language, files, program, tmp_path).split())
+    assert margin == scores.max() - np.sort(scores)[-2]
+    assert shares == [*Softmax(tables.scale).probabilities(scores.tolist()), k, best]
+
+
+def test_a_crate_is_free_of_warnings_and_tests_itself(
+    tool: Callable[[str], str],
+    make_tables: MakeTables,
+    describe: Describe,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("RUSTFLAGS", "-D warnings")
+    tables = make_tables(**SHAPES["small"])
+    for path, text in TARGETS["rust"].files(Library("hand", describe(tables), arrange(tables), avr=False)).items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text(text)
+    done = subprocess.run(
+        [tool("cargo"), "test", "--offline", "--tests"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "test every_frame_is_answered_as_by_python ... ok" in done.stdout
+
+
+# What the module in C uses of MicroPython, as its documentation and headers declare it: no registry has its sources.
+PY = """
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+typedef void *mp_obj_t;
+typedef const void *mp_const_obj_t, *mp_rom_obj_t;
+typedef intptr_t mp_int_t;
+typedef uintptr_t mp_uint_t;
+typedef unsigned char byte;
+typedef struct { int flags; const void *slots[4]; } mp_obj_type_t;
+typedef struct { const mp_obj_type_t *type; } mp_obj_base_t;
+typedef struct { mp_obj_base_t base; size_t len; mp_rom_obj_t items[]; } mp_rom_obj_tuple_t;
+typedef struct { mp_obj_base_t base; size_t hash, len; const byte *data; } mp_obj_str_t;
+typedef struct { mp_rom_obj_t key, value; } mp_rom_map_elem_t;
+typedef struct { mp_obj_base_t base; size_t used; const mp_rom_map_elem_t *table; } mp_obj_dict_t;
+typedef struct { mp_obj_base_t base; mp_obj_dict_t *globals; } mp_obj_module_t;
+typedef struct {
+    mp_obj_base_t base;
+    mp_obj_t (*one)(mp_obj_t);
+    mp_obj_t (*two)(mp_obj_t, mp_obj_t);
+    mp_obj_t (*three)(mp_obj_t, mp_obj_t, mp_obj_t);
+    mp_obj_t (*more)(size_t, const mp_obj_t *);
+} mp_obj_fun_t;
+extern const mp_obj_type_t mp_type_tuple, mp_type_str, mp_type_module, mp_type_IndexError, mp_type_fun, mp_type_dict;
+#define MP_OBJ_TO_PTR(o) ((void *)o)
+#define MP_OBJ_FROM_PTR(p) ((mp_obj_t)p)
+#define MP_OBJ_NEW_SMALL_INT(n) ((mp_obj_t)((((mp_uint_t)(n)) << 1) | 1))
+#define MP_ROM_QSTR(q) ((mp_rom_obj_t)(uintptr_t)((((mp_uint_t)(q)) << 3) | 2))
+#define MP_ROM_PTR(p) (p)
+#define MP_ROM_INT(n) ((mp_rom_obj_t)((((mp_uint_t)(n)) << 1) | 1))
+#define MP_ERROR_TEXT(text) (text)
+#define MP_TYPE_FLAG_NONE 0
+#define MP_DEFINE_CONST_FUN_OBJ_1(o, f) const mp_obj_fun_t o = {.base = {&mp_type_fun}, .one = f}
+#define MP_DEFINE_CONST_FUN_OBJ_2(o, f) const mp_obj_fun_t o = {.base = {&mp_type_fun}, .two = f}
+#define MP_DEFINE_CONST_FUN_OBJ_3(o, f) const mp_obj_fun_t o = {.base = {&mp_type_fun}, .three = f}
+#define MP_DEFINE_CONST_FUN_OBJ_VAR_BETWEEN(o, least, most, f) \\
+    const mp_obj_fun_t o = {.base = {&mp_type_fun}, .more = f}
+#define MP_DEFINE_CONST_DICT(d, t) const mp_obj_dict_t d = {{&mp_type_dict}, sizeof(t) / sizeof(t[0]), t}
+#define MP_DEFINE_STR_OBJ(o, str) mp_obj_str_t o = {{&mp_type_str}, 0, sizeof(str) - 1, (const byte *)str}
+#define MP_DEFINE_CONST_OBJ_TYPE(t, q, flags, slot, new, other, dict) \\
+    const mp_obj_type_t t = {flags, {(const void *)new, dict}}
+#define MP_REGISTER_MODULE(q, m)
+#define mp_const_none ((mp_obj_t)&mp_type_tuple)
+mp_int_t mp_obj_get_int(mp_const_obj_t o);
+bool mp_obj_is_true(mp_obj_t o);
+void mp_raise_msg(const mp_obj_type_t *type, const char *text) __attribute__((noreturn));
+void mp_arg_check_num(size_t n_args, size_t n_kw, size_t least, size_t most, bool keywords);
+void *mp_obj_malloc_helper(size_t bytes, const mp_obj_type_t *type);
+#define mp_obj_malloc(s, t) ((s *)mp_obj_malloc_helper(sizeof(s), t))
+"""
+
+
+@pytest.mark.parametrize("shape", ["small", "switches_only", "joints_only_wide_codes"])
+def test_the_user_module_in_c_compiles_without_a_warning_against_what_it_uses_of_micropython(
+    c_compiler: str, make_tables: MakeTables, describe: Describe, tmp_path: Path, shape: str
+) -> None:
+    tables = make_tables(**SHAPES[shape])
+    files = TARGETS["micropython"].files(Library("hand", describe(tables), arrange(tables, bins="search"), avr=True))
+    folder = tmp_path / "modules" / "thenar_hand"
+    (folder / "py").mkdir(parents=True)
+    for path, text in files.items():
+        (tmp_path / path).write_text(text)
+    words = sorted(set(re.findall(r"MP_QSTR_\w+", (folder / "mod_hand.c").read_text())))
+    (folder / "py/obj.h").write_text(PY + f"enum {{ {', '.join(words)} }};\n")
+    for header in ("objstr", "objtuple", "runtime"):
+        (folder / f"py/{header}.h").write_text("")
+    strict = ["-std=gnu99", "-Wall", "-Wextra", "-Werror", "-Wno-unused-const-variable", "-c"]
+    named = re.findall(r"/(\w+\.c)$", (folder / "micropython.mk").read_text(), re.MULTILINE)
+    assert sorted(named) == sorted(path.name for path in folder.glob("*.c"))
+    done = subprocess.run([c_compiler, *strict, "-I.", *named], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

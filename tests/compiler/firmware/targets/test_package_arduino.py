@@ -1,0 +1,187 @@
+"""The package as a library for Arduino, compiled by Arduino's own builder, and its example, run in simavr."""
+
+import re
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from thenar.compiler.firmware.classifier import Library as Files
+from thenar.compiler.firmware.layout import Layout, arrange
+from thenar.compiler.firmware.targets import TARGETS
+from thenar.runtime.build import Build
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.tables import IntegerTables
+
+# Compilers and simulators of whole programs: minutes, together.
+pytestmark = pytest.mark.slow
+
+MakeTables = Callable[..., IntegerTables]
+Describe = Callable[[IntegerTables], Manifest]
+
+ARDUINO = Path("/usr/share/arduino/hardware")
+BUILDER = Path("/usr/share/arduino-builder")  # where Debian's package says where the IDE's tools are
+BOARDS = {"uno": ("atmega328p", "arduino:avr:uno"), "mega": ("atmega2560", "arduino:avr:mega:cpu=atmega2560")}
+CODES = "-DCODE_OF(joint,reading)=((reading)>>2)"
+
+# As many as the board has pins for, but for simavr, in which inputs 12 to 14 of the larger part read full scale.
+ON_A_BOARD = {
+    "uno": {"seed": 1, "switches": 11, "joints": 6},
+    "mega": {"seed": 1, "classes": 14, "switches": 33, "joints": 12},
+}
+
+
+@pytest.fixture
+def library(describe: Describe, tmp_path: Path) -> Callable[..., Path]:
+    """Return what writes the library "hand" of a layout."""
+
+    def library(layout: Layout, avr: bool = True) -> Path:
+        for name, text in TARGETS["arduino"].files(Files("hand", describe(layout.tables), layout, avr)).items():
+            path = tmp_path / "thenar_hand" / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+        return tmp_path / "thenar_hand"
+
+    return library
+
+
+@pytest.fixture
+def sketch(tool: Callable[[str], str], tmp_path: Path, cores: Path) -> Callable[..., Path]:
+    """Return what has Arduino's builder compile a library and its example for a board, without a warning about them."""
+    if not ARDUINO.is_dir():
+        tool("arduino-core-avr")
+
+    def sketch(library: Path, board: str, given: str = CODES) -> Path:
+        out = tmp_path / "out"
+        out.mkdir(exist_ok=True)
+        hardware = [f"-hardware={folder}" for folder in (BUILDER, ARDUINO)]
+        # <float.h> of avr-g++ 5.4 lacks what the core asks for.
+        flags = f"-DDECIMAL_DIG=__DECIMAL_DIG__ {given}"
+        options = ["-tools=/usr/bin", f"-prefs=compiler.cpp.extra_flags={flags}", "-warnings=all"]
+        where = [f"-libraries={library.parent}", f"-build-path={out}", f"-build-cache={cores}"]
+        example = library / "examples/Recognise/Recognise.ino"
+        command = [tool("arduino-builder"), *hardware, *options, *where, f"-fqbn={BOARDS[board][1]}", str(example)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+        assert done.returncode == 0, done.stderr
+        assert "thenar" not in done.stderr
+        return out / "Recognise.ino.elf"
+
+    return sketch
+
+
+@pytest.fixture(scope="session")
+def cores(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return where the builder keeps Arduino's cores, once compiled."""
+    return tmp_path_factory.mktemp("cores")
+
+
+Library = Callable[..., Path]
+Sketch = Callable[..., Path]
+
+
+@pytest.mark.parametrize("entry_bits", [16, 8])
+@pytest.mark.parametrize("board", list(BOARDS))
+def test_the_example_prints_the_grasp_that_python_finds(
+    tool: Callable[[str], str],
+    make_tables: MakeTables,
+    describe: Describe,
+    library: Library,
+    sketch: Sketch,
+    board: str,
+    entry_bits: int,
+) -> None:
+    tables = make_tables(**ON_A_BOARD[board])
+    elf = sketch(library(arrange(tables, entry_bits=entry_bits)), board)
+    build = Build(describe(tables), tables)
+    # Nothing is wired: pulled up, every switch is open; the simulator's analog inputs are at 0 V.
+    wanted = build.classify(np.zeros(tables.n_switches, bool), np.zeros(tables.n_joints, np.uint16))
+    assert wanted != build.classify(np.ones(tables.n_switches, bool), np.zeros(tables.n_joints, np.uint16))
+    assert first_line(tool("simavr"), elf, BOARDS[board][0]) == wanted
+
+
+def first_line(simavr: str, elf: Path, part: str) -> str:
+    """Return the first line that a program prints at its UART: simavr repeats it in colours, on standard output."""
+    command = [simavr, "-m", part, "-f", "16000000", str(elf)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        assert process.stdout is not None
+        try:
+            lines = (re.sub(r"\x1b\[[0-9;]*m", "", line).strip() for line in process.stdout)
+            return next(line.rstrip(".") for line in lines if line.startswith("grasp"))
+        finally:
+            process.kill()
+
+
+@pytest.mark.parametrize(
+    ("inputs", "said"),
+    [({"switches": 12, "joints": 6}, "too few pins"), ({"switches": 2, "joints": 7}, "too few analog inputs")],
+    ids=["switches", "joints"],
+)
+def test_an_example_for_more_inputs_than_the_board_has_says_so(
+    make_tables: MakeTables, library: Library, sketch: Sketch, inputs: dict[str, int], said: str
+) -> None:
+    made = library(arrange(make_tables(**inputs)))
+    with pytest.raises(AssertionError, match=f"#error .this board has {said} for every"):
+        sketch(made, "uno")
+
+
+@pytest.mark.parametrize(
+    "inputs", [{"switches": 0}, {"joints": 0, "switches": 17}], ids=["joints_only", "switches_only"]
+)
+def test_a_build_without_switches_or_without_joints_has_an_example_too(
+    make_tables: MakeTables, library: Library, sketch: Sketch, inputs: dict[str, int]
+) -> None:
+    sketch(library(arrange(make_tables(**inputs))), "uno")
+
+
+def test_a_mega_takes_33_switches_and_16_joints(make_tables: MakeTables, library: Library, sketch: Sketch) -> None:
+    sketch(library(arrange(make_tables(classes=14, switches=33, joints=16))), "mega")
+
+
+def test_it_refuses_readings_of_which_nothing_is_known(
+    make_tables: MakeTables, library: Library, sketch: Sketch
+) -> None:
+    made = library(arrange(make_tables(highest=1000), bins="search"))
+    assert "0: j0: code 0 = 0 deg, 100 = 50 deg" in (made / "examples/Recognise/Recognise.ino").read_text()
+    sketch(made, "uno", "-DCODE_OF(joint,reading)=(reading)")
+    with pytest.raises(AssertionError, match=r"#error .say what the code of a joint is: #define CODE_OF"):
+        sketch(made, "uno", "")
+
+
+def test_the_properties_are_those_that_the_specification_asks_for(make_tables: MakeTables, library: Library) -> None:
+    lines = (library(arrange(make_tables())) / "library.properties").read_text().splitlines()
+    fields = dict(line.split("=", 1) for line in lines)
+    # The page that `url` names is whoever's who publishes the library: one that is empty is worse than none.
+    given = ["name", "version", "author", "maintainer", "sentence", "paragraph", "category", "architectures"]
+    assert [*fields] == [*given, "includes"]
+    assert re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_. -]{,62}", fields["name"])
+    assert re.fullmatch(r"\d+\.\d+\.\d+", fields["version"])
+    assert (fields["architectures"], fields["includes"], fields["category"]) == ("*", "thenar_hand.h", "Sensors")
+    assert fields["sentence"] == "Recognises 5 grasp types from 9 switches and 3 joints of a glove."
+
+
+def test_keywords_are_words_of_the_header_a_tab_and_a_kind(make_tables: MakeTables, library: Library) -> None:
+    made = library(arrange(make_tables()))
+    header = (made / "src" / "thenar_hand.h").read_text()
+    rows = [line.split("\t") for line in (made / "keywords.txt").read_text().splitlines()]
+    assert {kind for _, kind in rows} == {"KEYWORD1", "KEYWORD2", "LITERAL1"}
+    assert all(re.search(rf"\b{word}\b", header) for word, _ in rows)
+    assert ["thenar_hand_classify", "KEYWORD2"] in rows
+
+
+def test_names_that_are_no_words_of_c_do_no_harm(
+    make_tables: MakeTables, describe: Describe, library: Library, sketch: Sketch, tmp_path: Path
+) -> None:
+    tables = make_tables(switches=2, joints=1)
+    layout = arrange(tables)
+    manifest = describe(tables)
+    names = ["*/ int \\", "tip\n#error \u00e9"]
+    switches = tuple(replace(switch, name=name) for switch, name in zip(manifest.switches, names, strict=True))
+    joints = (replace(manifest.joints[0], name="roll ??/"),)
+    made = library(layout)
+    named = replace(manifest, switches=switches, joints=joints)
+    odd = TARGETS["arduino"].files(Files("hand", named, layout, avr=True))
+    (made / "examples/Recognise/Recognise.ino").write_text(odd["examples/Recognise/Recognise.ino"])
+    sketch(made, "uno")

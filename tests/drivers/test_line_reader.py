@@ -1,0 +1,114 @@
+"""Every way by which lines come, against an emulated sender at its other end."""
+
+import contextlib
+import os
+import socket
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from time import monotonic
+
+import pytest
+
+from thenar.drivers.emulated.lines import DatagramLines, LineSender, SocketLines, lines_like
+from thenar.drivers.emulated.serial_line import PtyLine
+from thenar.drivers.errors import DeviceError, SettingError
+from thenar.drivers.line_reader import LineReader, line_port_fault
+from thenar.drivers.lines import Row
+
+LONG_S = 10.0
+Send = Callable[[bytes], None]
+
+
+@pytest.fixture(params=["serial", "tcp://h:1", "udp://h:1", "unix:x", "ws://h:1"])
+def way(request: pytest.FixtureRequest, tool: Callable[[str], str], tmp_path: Path) -> Iterator[tuple[str, Send]]:
+    if request.param.startswith("ws") and find_spec("websockets") is None:
+        tool("websockets of PyPI")
+    if request.param == "serial":
+        with PtyLine(tmp_path / "port") as line:
+            yield str(line.link), line.send
+        return
+    with contextlib.closing(lines_like(request.param, tmp_path / "s")) as sender:
+        yield sender.port, sender.send
+
+
+def heard(reader: LineReader, rows: int) -> list[Row]:
+    end, found = monotonic() + LONG_S, list[Row]()
+    while len(found) < rows:
+        assert monotonic() < end
+        found += reader.read(0.1)
+    return found
+
+
+def test_the_same_rows_come_by_every_way(way: tuple[str, Send]) -> None:
+    port, send = way
+    with LineReader(port) as reader, LineSender(send, ("ms", "a", "b"), 200, "ms", "ms") as sender:
+        reader.open()
+        sender.show({"a": 1, "b": 0.25})
+        last = heard(reader, 20)[-1]
+        assert (last.names, last.values[1:]) == (None, (1, 0.25))
+        reader.close()
+        reader.open()
+        assert heard(reader, 2)
+
+
+def test_a_datagram_holds_several_lines_and_its_last_needs_no_end() -> None:
+    with DatagramLines() as sender, LineReader(sender.port) as reader:
+        reader.open()
+        sender.send(b"1,2\n3,4")
+        sender.send(b"5,6")
+        assert [row.values for row in heard(reader, 3)] == [(1, 2), (3, 4), (5, 6)]
+
+
+def test_half_a_line_before_a_break_does_not_spoil_the_first_one_after_it(tmp_path: Path) -> None:
+    with LineReader(f"unix:{tmp_path}/s") as reader:
+        for last in (b"1,2\n77,", b"3,4\n"):
+            with SocketLines(tmp_path / "s") as server:
+                reader.open()
+                while not server._clients:
+                    pass
+                server.send(last)
+                assert heard(reader, 1)[0].values == tuple(map(float, last.split(b"\n")[0].split(b",")))
+            with pytest.raises(DeviceError, match="the sender hung up"):
+                heard(reader, 2)
+            reader.close()
+
+
+def test_standard_input_is_read_and_its_end_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    out, into = os.pipe()
+    with os.fdopen(out) as stdin, LineReader("-") as reader:
+        monkeypatch.setattr("sys.stdin", stdin)
+        reader.open()
+        os.write(into, b"1,2\n")
+        os.close(into)
+        assert heard(reader, 1) == [Row(None, (1, 2))]
+        with pytest.raises(DeviceError, match="the input has ended"):
+            reader.read(LONG_S)
+
+
+def test_nobody_there_is_a_device_error_that_says_what_to_look_at(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    taken = DatagramLines()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(taken.to)
+        for where, said in (
+            (f"tcp://127.0.0.1:{port}", "is the sender there"),
+            (f"ws://127.0.0.1:{port}/", "is the sender there"),
+            (f"unix:{tmp_path}/none", "is the sender there"),
+            (f"unix:{tmp_path}/{'x' * 200}", "too long"),
+            (taken.port, "no other program may have the port"),
+        ):
+            with pytest.raises(DeviceError, match=said):
+                LineReader(where).open()
+    taken.close()
+
+
+@pytest.mark.parametrize(
+    "port",
+    ["", "tcp://:80", "tcp://h", "udp://h:0", "udp://h:99999", "unix:", "ws://", "ws://h:x/", "spy://x", "http://h:1"],
+)
+def test_what_is_no_port_is_refused_before_anything_is_opened(port: str) -> None:
+    assert line_port_fault(port)
+    with pytest.raises(SettingError):
+        LineReader(port).open()

@@ -1,0 +1,45 @@
+/* thenar_glove_tables.h: what the library's own files know of the tables; no program needs it.
+
+   From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME_tables.h.j2. */
+#ifndef THENAR_GLOVE_TABLES_H
+#define THENAR_GLOVE_TABLES_H
+
+#include "thenar_glove.h"
+
+#define CLASSES THENAR_GLOVE_CLASSES
+#define INPUTS 8u
+#define PARTS 1u
+#define ROWS 76u
+#define LOOKUPS 2u
+#define LANES 2u /* words of two sums */
+
+#define IN_FLASH
+#define READ_BYTE(place) (place)
+#define READ_WORD(place) (place)
+
+/* A word holds the entries of two classes, as one sum: they are added up at once. */
+#define WORDS 2u
+typedef uint32_t thenar_glove_row[WORDS];
+
+extern const thenar_glove_row thenar_glove_rows[PARTS * ROWS];
+extern const uint8_t thenar_glove_bins[512];
+extern const char thenar_glove_names[4][14];
+
+/* Where the input has a switch: byte and bit. */
+typedef struct {
+    uint8_t port;
+    uint8_t bit;
+} thenar_glove_place;
+extern const thenar_glove_place thenar_glove_places[THENAR_GLOVE_SWITCHES];
+
+/* What an input adds while it is missing, beyond what it does open or at code 0: switches, then joints. */
+typedef int16_t thenar_glove_mean;
+extern const thenar_glove_mean thenar_glove_means[INPUTS][CLASSES];
+
+/* 2 to the power of 15 - i / 64. */
+extern const uint16_t thenar_glove_powers[65];
+
+/* What scores begin with, before any row is added. */
+extern const uint32_t thenar_glove_start[PARTS][LANES];
+
+#endif

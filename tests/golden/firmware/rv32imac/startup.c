@@ -1,0 +1,75 @@
+/* Start-up of a RISC-V core with one hart: stack and traps, .data and .bss, then main(). No C library is needed. */
+#include <stddef.h>
+#include <stdint.h>
+
+extern const uint32_t thenar_data_load[];                     /* link.ld: the initial values of .data in flash, */
+extern uint32_t thenar_data_start[], thenar_data_end[];       /* where they belong in RAM, */
+extern uint32_t thenar_bss_start[], thenar_bss_end[];         /* what starts as zero, */
+extern uint32_t thenar_stack_top[];                           /* and the end of RAM */
+
+int main(void);
+void thenar_reset(void);
+void thenar_fault(void);
+void *memcpy(void *to, const void *from, size_t size);
+void *memset(void *to, int byte, size_t size);
+
+void thenar_reset(void)
+{
+    const uint32_t *from = thenar_data_load;
+
+    for (uint32_t *to = thenar_data_start; to != thenar_data_end; ++to) {
+        *to = *from;
+        ++from;
+    }
+    for (uint32_t *to = thenar_bss_start; to != thenar_bss_end; ++to) {
+        *to = 0u;
+    }
+    (void)main();
+    thenar_fault(); /* firmware has nowhere to return to */
+}
+
+/* An exception, or an interrupt that nobody handles: a debugger stops here, and without one the core stays here. A
+   program may have a thenar_fault() of its own. */
+__attribute__((weak)) void thenar_fault(void)
+{
+    for (;;) {
+        __asm volatile("ebreak");
+    }
+}
+
+/* The compiler may call these two whatever the program does (GCC manual, "Standards"). */
+__attribute__((weak)) void *memcpy(void *to, const void *from, size_t size)
+{
+    uint8_t *into = to;
+    const uint8_t *out_of = from;
+
+    for (size_t at = 0u; at < size; ++at) {
+        into[at] = out_of[at];
+    }
+    return to;
+}
+
+__attribute__((weak)) void *memset(void *to, int byte, size_t size)
+{
+    uint8_t *into = to;
+
+    for (size_t at = 0u; at < size; ++at) {
+        into[at] = (uint8_t)byte;
+    }
+    return to;
+}
+
+/* The first instructions in flash: where reset begins. */
+__attribute__((naked, section(".vectors"), used)) static void first(void)
+{
+    __asm volatile(".option push\n"
+                   ".option norelax\n"
+                   "la gp, __global_pointer$\n"
+                   "la sp, thenar_stack_top\n"
+                   "la t0, 1f\n"
+                   "csrw mtvec, t0\n"
+                   ".option pop\n"
+                   "j thenar_reset\n"
+                   ".balign 4\n" /* as mtvec requires */
+                   "1: j thenar_fault");
+}

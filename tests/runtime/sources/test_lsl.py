@@ -1,0 +1,115 @@
+"""Streams of LSL, out of one outlet of this process and into another, on this machine alone."""
+
+import time
+from collections.abc import Callable
+from importlib.util import find_spec
+from itertools import count
+from types import ModuleType
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from thenar.drivers.errors import DeviceError, SettingError
+from thenar.drivers.lsl import load_pylsl
+from thenar.runtime.frames import SwitchFrame
+from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.published import JointAngles, LiveGrasp
+from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.sinks import open_sink
+from thenar.runtime.sources.base import SOURCES
+from thenar.runtime.sources.lsl import LslReader
+
+names = count()
+LONG_S = 20.0
+GLOVE = """
+[debounce]
+enabled = false
+[[stream]]
+port = "lsl:{name}"
+columns = ["thumb", "pad"]
+switches = ["thumb"]
+taxels = {{ pad = [0, 1] }}
+"""
+
+
+@pytest.fixture(scope="module")
+def lsl(tool: Callable[[str], str]) -> ModuleType:
+    if find_spec("pylsl") is None:
+        tool("pylsl of PyPI")
+    return load_pylsl("test")
+
+
+@pytest.fixture
+def name() -> str:
+    return f"thenar {time.monotonic_ns()} {next(names)}"
+
+
+Outlet = Callable[..., Any]
+
+
+@pytest.fixture
+def outlet(lsl: ModuleType, name: str) -> Outlet:
+    def made(channels: int, labels: list[str] | None = None, form: str = "float32") -> Any:
+        info = lsl.StreamInfo(name, "Glove", channels, 100, form, name)
+        if labels is not None:
+            info.set_channel_labels(labels)
+        return lsl.StreamOutlet(info)
+
+    return made
+
+
+@pytest.mark.parametrize("labels", [None, ["pad", "thumb"]])
+def test_samples_are_rows_on_their_senders_clock(
+    lsl: ModuleType, outlet: Outlet, name: str, labels: list[str] | None
+) -> None:
+    sender = outlet(2, labels)
+    harness = parse_harness(GLOVE.format(name=name), "glove.toml")
+    scan = whole_scan(harness, harness.switches, every_taxel=True)
+    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, harness.switches, scan))
+    source.open()
+    frames: list[SwitchFrame] = []
+    began, end = lsl.local_clock(), time.monotonic() + LONG_S
+    while len(frames) < 5:
+        assert time.monotonic() < end
+        sample = [1.0, 0.5] if labels is None else [0.5, 1.0]
+        sender.push_sample(sample, began + len(frames) / 100)
+        frame = source.read(0.05)
+        frames += [frame] if isinstance(frame, SwitchFrame) else []
+    assert {(frame.closed, frame.taxels) for frame in frames} == {(1, (2048,))}
+    source.close()
+
+
+def test_a_stream_that_is_not_there_or_holds_texts_is_said(outlet: Outlet, name: str) -> None:
+    with pytest.raises(DeviceError, match="no LSL stream of this name"):
+        LslReader(f"lsl:{name}").open()
+    texts = outlet(1, None, "string")
+    with pytest.raises(SettingError, match="a stream of texts"):
+        LslReader(f"lsl:{name}").open()
+    del texts
+    with pytest.raises(SettingError, match="names no stream"):
+        LslReader("lsl:").open()
+
+
+def test_grasps_and_angles_go_out_as_streams(lsl: ModuleType, name: str, make_grasp: Callable[..., LiveGrasp]) -> None:
+    sink = open_sink(f"lsl:{name}")
+    grasp, angles = make_grasp(100, "cup"), JointAngles(("index", "ring"), (0.5, 0.25))
+    sink.publish(grasp, None, angles)
+    inlets = []
+    for called in (name, f"{name}-angles"):
+        (found,) = lsl.resolve_byprop("name", called, 1, LONG_S)
+        inlets.append(lsl.StreamInlet(found, recover=False))
+        inlets[-1].open_stream(LONG_S)
+    assert inlets[1].info().get_channel_labels() == ["index", "ring"]
+    for number, held in enumerate(("pen", "pen", "rod"), start=1):
+        now = replace(grasp, grasp=held, time_us=grasp.time_us + 1000 * number)
+        sink.publish(now, None, JointAngles(angles.names, (0.5, 0.25 * number)))
+    got = [inlets[0].pull_sample(LONG_S) for _ in range(2)]
+    assert [(sample[0], round(stamp * 1e6)) for sample, stamp in got] == [
+        ("pen", grasp.time_us + 1000),
+        ("rod", grasp.time_us + 3000),
+    ]
+    assert [inlets[1].pull_sample(LONG_S)[0] for _ in range(3)] == [[0.5, 0.25], [0.5, 0.5], [0.5, 0.75]]
+    sink.close()
+    with pytest.raises(SettingError, match="is no name of a stream"):
+        open_sink("lsl:a\x1bb")

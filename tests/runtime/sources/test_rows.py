@@ -1,0 +1,232 @@
+"""Rows as frames: what a column becomes, on which grid, at what time; and what a broken sender does."""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.drivers.line_reader import RowReader
+from thenar.drivers.lines import LineCounts, LineParser, Row
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.sources import rows as module
+from thenar.runtime.sources.base import slowest_us
+from thenar.runtime.sources.rows import RowSource, joint_number, steps_of
+
+GLOVE = """
+[debounce]
+enabled = false
+[[stream]]
+port = "x"
+columns = ["ms", "thumb", "", "index", "pad", "flex", "bend"]
+time = "ms"
+rate_hz = 100
+switches = ["thumb", "index"]
+thresholds = { index = 512 }
+[stream.joints]
+flex = [0, 4095]
+bend = [1.0, -1.0]
+[stream.taxels]
+pad = [0, 1023]
+"""
+NAMES = ("index", "pad>700", "thumb", "pad>300")
+
+
+class Script(RowReader):
+    """Rows that come chunk by chunk, at times of a clock of the test's own."""
+
+    def __init__(self, chunks: Sequence[bytes]) -> None:
+        self._chunks, self._parser = list(chunks), LineParser()
+
+    def open(self) -> None:
+        self._parser.begin()
+
+    def read(self, timeout_s: float) -> Sequence[Row]:
+        rows = self._parser.feed(self._chunks.pop(0))
+        self.odd = self._parser.odd
+        return rows
+
+    def counts(self) -> LineCounts:
+        return self._parser.counts
+
+    def close(self) -> None:
+        pass
+
+
+Frames = list[SwitchFrame | GloveFrame]
+Play = Callable[..., tuple[RowSource, Frames]]
+
+
+@pytest.fixture
+def play(monkeypatch: pytest.MonkeyPatch) -> Play:
+    def played(
+        chunks: Sequence[tuple[int, bytes]], text: str = GLOVE, names: Sequence[str] = NAMES
+    ) -> tuple[RowSource, Frames]:
+        harness = parse_harness(text, "glove.toml")
+        source = RowSource(Script([chunk for _, chunk in chunks]), harness, 0, names, whole_scan(harness, names))
+        source.open()
+        frames: Frames = []
+        for time_us, _ in chunks:
+            monkeypatch.setattr(module, "now_us", lambda time_us=time_us: time_us)
+            frame = source.read(0)
+            while frame is not None:
+                frames.append(frame)
+                frame = source.read(0) if source._ready else None
+        return source, frames
+
+    return played
+
+
+def counted(source: RowSource) -> dict[str, int]:
+    return {count.name: count.value for count in source.counts() if count.value}
+
+
+def test_a_row_is_switches_levels_taxels_and_joints_of_one_moment(play: Play) -> None:
+    source, frames = play([(1_000_000, b"5,1,99,512,701,4095,1\n")])
+    glove = GloveFrame(1_000_000, bytes((255, 1)))
+    assert frames == [SwitchFrame(1_000_000, 0b1110, 0, 0, glove, (701,)), glove]
+    assert source.owned == 0b1111
+    assert counted(source) == {"rows": 1}
+
+
+@given(st.integers(0, 4095), st.integers(1, 255))
+def test_grids_are_those_that_are_stated(number: int, code: int) -> None:
+    assert steps_of((0, 4095)) == 4095
+    assert steps_of((0, 3.3)) == 4095
+    assert steps_of((0, 65535)) == 4095
+    assert steps_of((0, 1)) == 4095
+    grid = module._Grid((0, 4095), 0, steps_of((0, 4095)))
+    assert grid.code(number) == number
+    for limits in ((0.0, 4095.0), (3.3, 0.0), (-90.0, 90.0)):
+        assert module._Grid(limits, 1, 255).code(joint_number(limits, code)) == code
+
+
+def test_values_that_are_no_numbers_lose_their_inputs_and_no_others(play: Play) -> None:
+    source, frames = play([(1_000_000, b"5,nan,0,600,,x?,0\n5,nan,0,600,,,0\n")])
+    glove = GloveFrame(1_000_000, bytes((0, 128)))
+    assert frames == [SwitchFrame(1_000_000, 0b0001, 0b1110, 0, glove, (None,)), glove]
+    assert counted(source) == {"rows": 1, "missing": 3, "misfits": 1}
+
+
+def test_columns_by_name_in_any_order_and_by_a_header(play: Play) -> None:
+    whole = SwitchFrame(0, 0b0100, 0, 0, GloveFrame(0, b"\x01\x80"), (0,))
+    for line in (
+        b'{"bend": 0, "flex": 0, "index": 0, "thumb": true, "more": 7, "pad": 0, "ms": 1}\n',
+        b"bend:0,flex:0,index:0,thumb:1,pad:0,ms:1\n",
+        b"thumb;pad;index;flex;bend;ms\n1;0;0;0;0,0;1\n",
+        b"other,names,than,those,of,glove,toml\n1,1,7,0,0,0,0\n",
+    ):
+        _, frames = play([(0, line)])
+        assert frames[0] == whole
+
+
+def test_the_senders_clock_times_rows_by_the_quickest_of_them(play: Play) -> None:
+    late = [0, 40_000, 3_000, 90_000, 0, 7_000]
+    chunks = [(10_000 * n + 5_000 + by, b"%d,0,0,0,0,0,0\n" % (10 * n)) for n, by in enumerate(late)]
+    _, frames = play(chunks)
+    times = [frame.time_us for frame in frames if isinstance(frame, SwitchFrame)]
+    assert times == [5_000 + 10_000 * n for n in range(6)]
+
+
+@given(st.lists(st.tuples(st.integers(0, 50), st.integers(0, 10_000_000)), min_size=1, max_size=30))
+def test_no_frame_is_of_the_future_and_none_goes_back(steps: list[tuple[int, int]]) -> None:
+    clock, came_us, shown = module.SenderClock(10_000), 0, [0]
+    for wait_ms, sent in steps:
+        came_us += 1000 * wait_ms
+        time_us = clock.host_us(float(sent), came_us)
+        if time_us is not None and time_us != module._LATE:
+            assert shown[-1] <= time_us <= came_us
+            shown.append(time_us)
+
+
+@pytest.mark.parametrize("slow", [-0.02, -0.005, 0.005, 0.02])
+def test_a_clock_that_runs_wrong_makes_no_row_old(play: Play, slow: float) -> None:
+    chunks = [(10_000 * n, b"%.3f,0,0,0,0,0,0\n" % (10 * n * (1 - slow))) for n in range(1000)]
+    _, frames = play(chunks)
+    times = [frame.time_us for frame in frames if isinstance(frame, SwitchFrame)]
+    assert all(0 <= 10_000 * n - time_us <= 5_000 for n, time_us in enumerate(times))
+    assert len(times) == 1000
+
+
+def test_a_row_without_its_clock_is_left_out_and_one_without_a_sensor_is_not(play: Play) -> None:
+    chunks = (b"1,1,0,0,0,0,0\n", b"nan,1,0,0,0,0,0\nms,thumb\n7,1\n", b'{"ms": 11, "thumb": 1}\n')
+    last = b'{"ms": 11, "thumb": 1, "pad": 3, "flex": 7, "index": 0}\n'
+    source, frames = play([(10_000, chunk) for chunk in (*chunks, last)])
+    assert counted(source) == {"rows": 2, "missing": 2, "wrong columns": 2}
+    glove = GloveFrame(10_000, bytes((1, 0)))
+    assert frames[-2:] == [SwitchFrame(10_000, 0b0100, 0, 0, glove, (3,)), glove]
+
+
+def test_what_comes_twice_late_or_not_at_all_is_counted(play: Play) -> None:
+    def row(ms: int) -> bytes:
+        return b"%d,0,0,0,0,0,0\n" % ms
+
+    sent = [0, 10, 20, 20, 40, 30, 50, 100, 110, 5, 15]
+    source, frames = play([(10_000 * n, row(ms)) for n, ms in enumerate(sent)])
+    assert counted(source) == {"rows": 7, "repeated": 1, "late": 3, "gaps": 2, "lost": 5}
+    source, frames = play([(10_000 * n, row(ms)) for n, ms in enumerate([5000, 5010, 0, 10, 20])])
+    assert counted(source) == {"rows": 5, "restarts": 1}
+    times = [frame.time_us for frame in frames if isinstance(frame, SwitchFrame)]
+    assert all(0 < later - earlier <= 10_000 for earlier, later in pairwise(times))
+
+
+def test_garbage_loses_nothing_but_itself(play: Play) -> None:
+    good = [b"%d,1,0,600,0,0,0\n" % (10 * n) for n in range(6)]
+    bad = [b"\xff\x00\n", b"1,2\n", b"{]\n", b"8" * 3_000_000 + b"\n", b'{"q": 1}\n', b"1e400,nan,nan,nan,,,\n"]
+    mixed = [piece for pair in zip(good, bad, strict=True) for piece in pair]
+    source, frames = play([(10_000 * n, piece) for n, piece in enumerate(mixed)])
+    assert sum(isinstance(frame, SwitchFrame) and frame.closed == 0b0101 for frame in frames) == 6
+    found = counted(source)
+    assert (found["misfits"], found["wrong columns"], found["overlong"]) == (2, 2, 1)
+
+
+def test_what_is_wrong_with_all_rows_is_said(play: Play) -> None:
+    source, _ = play([(0, b"1,2,3\n")])
+    assert source.trouble() == "its rows have other columns than glove.toml: column 1, column 2, column 3, not " + (
+        "ms, thumb, index, pad, flex and 1 more"
+    )
+    source, _ = play([(0, b"rst:0x10\n")])
+    assert source.trouble() == "what comes holds no rows: 'rst:0x10'"
+    source, _ = play([(100_000 * n, b"%d,0,0,0,0,0,0\n" % (100 * n)) for n in range(12)])
+    assert source.trouble() == "10 rows a second come, glove.toml says 100: write rate_hz = 10"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("index = 512", "inde = 512"), "no switch 'inde'"),
+        (('switches = ["thumb", "index"]', 'switches = ["thumb", "ring"]'), "no column 'ring'"),
+        (('time = "ms"', 'time = "us"'), "no column 'us'"),
+        (('time = "ms"', 'time = "pad"'), "'pad' is the sender's clock"),
+        (("[0, 4095]", "[7, 7]"), "a range from 7"),
+        (('"ms", "thumb", ""', '"ms", "thumb", "pad"'), "column 'pad' is stream"),
+        (('switches = ["thumb", "index"]', 'switches = ["thumb", "index", "pad"]'), "'pad' is stream"),
+    ],
+)
+def test_what_cannot_be_is_said_with_its_line(change: tuple[str, str], said: str) -> None:
+    with pytest.raises(HarnessError, match=said):
+        parse_harness(GLOVE.replace(*change), "glove.toml")
+
+
+def test_joints_come_from_one_device() -> None:
+    with pytest.raises(HarnessError, match="another device measures joints already"):
+        parse_harness(GLOVE + '[cyberglove]\nport = "y"\n', "glove.toml")
+
+
+def test_a_harness_is_written_as_it_was_read_and_its_ranges_are_part_of_its_wiring() -> None:
+    harness = parse_harness(GLOVE, "glove.toml")
+    assert parse_harness(harness_to_toml(harness), "glove.toml") == harness
+    assert parse_harness(GLOVE.replace('"x"', '"tcp://h:1"'), "glove.toml").fingerprint == harness.fingerprint
+    for change in (("4095", "1023"), ("512", "511"), ("1023", "4095"), ('["thumb", "index"]', '["index", "thumb"]')):
+        assert parse_harness(GLOVE.replace(*change), "glove.toml").fingerprint != harness.fingerprint
+
+
+def test_a_stream_counts_as_what_it_has() -> None:
+    harness = parse_harness(GLOVE, "glove.toml")
+    assert [slowest_us(harness, whole_scan(harness, NAMES), kind) for kind in ("switches", "joints")] == [20_000] * 2
+    assert slowest_us(harness, whole_scan(harness, ()), "switches") is None
