@@ -14,9 +14,10 @@ from thenar.compiler.recordings.taxonomy import Taxonomy
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.errors import HarnessError
-from thenar.runtime.frames import now_us
+from thenar.runtime.frames import SwitchFrame, now_us
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.sources import NOT_YET, DeviceState, Sources, Taken
+from thenar.runtime.names import list_names
 from thenar.runtime.recording.guide import Guide, Journal, Stage, Trial
 from thenar.runtime.recording.session import Collection, Session
 from thenar.runtime.recording.writer import Recorder
@@ -51,12 +52,12 @@ def collect(
     harness: Harness,
     file: Path,
     collection: Collection,
-    left: Sequence[Trial],
+    trials: Sequence[Trial],
     recording: Path,
     journal: Journal | None,
     countdown_s: float,
 ) -> int:
-    """Lead through the trials that are `left`; return how many were accepted.
+    """Lead through those of the `trials` that the journal lacks; return how many are accepted, all in all.
 
     Raises SettingError or DeviceError if a device cannot serve, click.ClickException if the recording cannot go on.
     """
@@ -80,27 +81,43 @@ def collect(
         )
         if journal is not None:
             _check_same_glove(journal, session)
-        _meet(sources, stop)
+        _meet(sources, len(switches), stop)
+        accepted = () if journal is None else journal.accepted
         if stop.is_set():
-            return 0
+            return len(accepted)
         with Recorder(recording, session, tail=None if journal is None else journal.tail) as recorder:
-            guide = Guide(left, recorder, round(countdown_s * 1e6))
-            done = 0 if journal is None else len(journal.accepted)
-            view = GuideView(err(), _taxonomy(collection), len(left) + done, done)
-            lead(guide, sources, recorder, view, stop)
+            guide = Guide(trials, recorder, round(countdown_s * 1e6), accepted)
+            lead(guide, sources, recorder, GuideView(err(), _taxonomy(collection)), stop)
     if recorder.failure is not None:
         raise click.ClickException(f"{recorder.failure}; make room, and the same command goes on")
-    return guide.accepted
+    return guide.done
 
 
-def _meet(sources: Sources, stop: Event) -> None:
-    """Wait until every device is there, or `stop` is set. Raises DeviceError or SettingError about one that is not."""
+def _meet(sources: Sources, switches: int, stop: Event) -> None:
+    """Wait until every device is there and something is read, or `stop` is set.
+
+    Raises DeviceError or SettingError about a device that is not there, DeviceError where all are silent: a port may
+    well be opened without anybody at its other end.
+    """
     end = now_us() + _PATIENCE_US
-    while not stop.is_set() and (missing := [device for device in sources.devices() if not device.connected]):
+    read = False
+    while not stop.is_set():
+        missing = [device for device in sources.devices() if not device.connected]
+        if read and not missing:
+            return
         sources.raise_settings()
-        if now_us() > end and all(device.error != NOT_YET for device in missing):
+        if now_us() > end and missing and all(device.error != NOT_YET for device in missing):
             raise DeviceError(f"{of_device(missing[0].name, missing[0].error)}; nothing is recorded")
-        sources.take(_WAIT_US)
+        if now_us() > end and not missing:
+            names = list_names([device.name for device in sources.devices()])
+            raise DeviceError(f"{names}: nothing came in {_PATIENCE_US // 1_000_000} s; nothing is recorded")
+        taken = sources.take(_WAIT_US)
+        read = read or taken.glove is not None or (taken.switches is not None and _is_read(taken.switches, switches))
+
+
+def _is_read(frame: SwitchFrame, switches: int) -> bool:
+    """Return whether the frame holds a switch, of so many, or a taxel that could be read."""
+    return bool((1 << switches) - 1 & ~frame.lost) or any(code is not None for code in frame.taxels or ())
 
 
 def lead(guide: Guide, devices: Devices, recorder: Recorder, view: GuideView, stop: Event) -> None:

@@ -91,11 +91,11 @@ def command(
     wanted = Collection(subject, types.name, types.types, tasks, repetitions, drawn)
     if journal is not None:
         wanted = _resumed(journal, wanted, seed)
-    accepted = frozenset() if journal is None else journal.accepted
     trials = planned(wanted)
-    left = [trial for trial in trials if trial.number not in accepted]
-    more = collect(harness, glove, wanted, left, recording, journal, countdown) if left else 0
-    _write(recording, output, len(accepted) + more, len(trials))
+    accepted = 0 if journal is None else len(journal.accepted)
+    if accepted < len(trials):
+        accepted = collect(harness, glove, wanted, trials, recording, journal, countdown)
+    _write(recording, output, accepted, len(trials))
 
 
 def _resumed(journal: "Journal", wanted: "Collection", seed: int | None) -> "Collection":
