@@ -1,0 +1,1 @@
+"""Pages in a browser: the hand that they share (pages/hand.js)."""
