@@ -70,7 +70,7 @@ def _pose(thumb: tuple[float, ...], fingers: list[tuple[float, ...]]) -> list[fl
 
 def drawn_pose() -> HandDrawing:
     """Return the drawing of a hand that poses show themselves on: joints, and no switch."""
-    joints = [Calibration(f"{digit} {moves}", "deg", 0, 0.0, 1, 1.0) for digit, moves in POSED]
+    joints = [Calibration(at, f"{digit} {moves}", "deg", 0, 0.0, 90, 90.0) for at, (digit, moves) in enumerate(POSED)]
     return HandDrawing(view="", placed=False, radius_mm=1.0, switches=(), taxels=(), joints=drawn_joints(joints))
 
 
@@ -104,7 +104,7 @@ def drawn_glove(session: Session) -> HandDrawing:
     return HandDrawing(
         switches=tuple(DrawnSwitch(name, x, y, bit) for bit, (name, (x, y)) in enumerate(spots[:n])),
         taxels=tuple(DrawnTaxel(name, x, y) for name, (x, y) in spots[n:]),
-        joints=drawn_joints([_joint(name, session) for name in session.sensors]),
+        joints=drawn_joints([_joint(at, session) for at in range(len(session.sensors))]),
         **drawn,
     )
 
@@ -113,12 +113,13 @@ def _line(points: Any) -> tuple[tuple[float, float], ...]:
     return tuple((x, y) for x, y in points.round(1).tolist())
 
 
-def _joint(name: str, session: Session) -> Calibration:
+def _joint(number: int, session: Session) -> Calibration:
     """Return a sensor as a joint of the drawing: in degrees where it is calibrated, else by its byte."""
+    name = session.sensors[number]
     for line in () if session.calibration is None else session.calibration.sensors:
         if line.name == name:
-            return Calibration(name, "deg", line.raw_a, line.value_a, line.raw_b, line.value_b)
-    return Calibration(name, "raw", 1, 1.0, 255, 255.0)
+            return Calibration(number, name, "deg", line.raw_a, line.value_a, line.raw_b, line.value_b)
+    return Calibration(number, name, "raw", 1, 1.0, 255, 255.0)
 
 
 @dataclass(frozen=True, slots=True)
