@@ -1,21 +1,18 @@
 """The page of a guided collection: what it shows of the Guide, and the keys that are pressed there.
 
-Every browser that is open shows the same, and the same keys count in each. A press says at which step of the Guide it
-was meant: one that comes too late, because another browser was quicker or a grasp was just captured, does nothing.
+Every browser that is open shows the same, and the same keys count in each.
 """
 
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Self
-
-from thenar.drivers.errors import SettingError
 
 from ..frames import GloveFrame, Mask, SwitchFrame
 from ..live.sources import DeviceState
 from ..published import NONE
 from ..recording.guide import Guide, Key, Trial
 from ..recording.session import Session
+from .presses import Presses
 from .server import Server, message
 
 # So often the page is told of a hand that moves. A change of stage is told at once.
@@ -58,7 +55,7 @@ class GuidePage:
         calibrated = () if session.calibration is None else session.calibration.sensors
         lines = {line.name: line for line in calibrated}
         self._lines = [lines.get(name) for name in session.sensors]
-        self._pressed: deque[tuple[int, Key]] = deque(maxlen=64)
+        self._presses = Presses(Key)
         self._due_us, self._step = 0, -1
         first = message(
             "collection",
@@ -69,15 +66,13 @@ class GuidePage:
             taxels=session.taxels,
         )
         self._first = (first, message("hands", hands))
-        self._server = Server("collect", address, token=token, on_message=self._take, hello=lambda: self._first)
+        self._server = Server("collect", address, token=token, on_message=self._presses.take, hello=lambda: self._first)
         self.url = self._server.url
 
     def press(self, now_us: int, guide: Guide) -> None:
         """Press what was pressed on a page since the last call and was meant for what `guide` is at."""
-        while self._pressed:
-            step, key = self._pressed.popleft()
-            if step == guide.step:
-                guide.press(now_us, key)
+        for key in self._presses.due(lambda: guide.step):
+            guide.press(now_us, key)
 
     def show(self, now_us: int, guide: Guide, devices: Sequence[DeviceState]) -> None:
         """Show where `guide` stands, if it is time to, or news."""
@@ -122,12 +117,6 @@ class GuidePage:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-    def _take(self, asked: Mapping[str, object]) -> None:
-        step = asked.get("step")
-        if asked["do"] not in {key.value for key in Key} or type(step) is not int:
-            raise SettingError("a page presses accept, redo, undo, skip, pause or quit, at a step")
-        self._pressed.append((step, Key(asked["do"])))
 
     def _seen(self, switches: SwitchFrame | None, glove: GloveFrame | None) -> dict[str, object]:
         """Return what the glove sees: a character a switch, "1" closed, "0" open, "x" not read; the joints' values, in

@@ -1,6 +1,6 @@
 // The page of a guided collection: which grasp to take next, the countdown, what the glove sees, and the keys.
 import { drawHand } from "./hand.js";
-import { keys } from "./keys.js";
+import { keys, leaving } from "./keys.js";
 import { connect, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
@@ -39,15 +39,9 @@ const send = connect({
   study: studied,
 });
 
-const offer = keys($("keys"), LETTERS, (key) => {
-  if (key === "quit") $("leaving").showModal();
-  else if (now) send({ do: key, step: now.step });
-});
-$("leave").addEventListener("click", () => {
-  $("leaving").close();
-  if (now) send({ do: "quit", step: now.step });
-});
-$("stay").addEventListener("click", () => $("leaving").close());
+const press = (key) => now && send({ do: key, step: now.step });
+const offer = keys($("keys"), LETTERS, (key) => (key === "quit" ? $("leaving").showModal() : press(key)));
+leaving($("leaving"), $("leave"), $("stay"), () => press("quit"));
 
 function link(words, is) {
   say($("link"), words);

@@ -46,3 +46,12 @@ export function keys(bar, letters, press) {
     }
   };
 }
+
+/** Let a dialog ask before somebody leaves. */
+export function leaving(dialog, leave, stay, then) {
+  leave.addEventListener("click", () => {
+    dialog.close();
+    then();
+  });
+  stay.addEventListener("click", () => dialog.close());
+}

@@ -1,17 +1,13 @@
 """`thenar record --web` in real browsers, on emulated devices, by keyboard alone."""
 
-import os
-import signal
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from thenar.cli import run
 from thenar.compiler import GraspSet
 from thenar.compiler.evaluation.sofar import recognition_so_far
-from thenar.runtime.recording.guide import read_journal
 
 from .conftest import ENTER, Browser, Command, Wearer
 
