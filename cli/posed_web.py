@@ -70,9 +70,26 @@ def calibrate_on_page(
     return said
 
 
+# How hand.js draws a hand of which nothing is asked, and what a pose needs besides to look like itself, in degrees.
+_RELAXED = {
+    "thumb_rotation": 20.0,
+    "thumb_abduction": 25.0,
+    "middle_index_abduction": 5.0,
+    "ring_middle_abduction": 5.0,
+    "little_ring_abduction": 6.0,
+}
+_BESIDES = {
+    "fist": {"thumb_rotation": 75.0, "thumb_abduction": 30.0, "thumb_mpj": 45.0, "thumb_ij": 45.0},
+    "thumb across": {"thumb_abduction": 15.0, "thumb_mpj": 45.0, "thumb_ij": 25.0},
+}
+
+
 def drawn_poses() -> tuple[HandDrawing, dict[str, list[float]]]:
     """Return a hand with the joints of a CyberGlove of 22 sensors, and their angles in each pose."""
     joints = [Calibration(at, name, "deg", 0, 0.0, 90, 90.0) for at, name in enumerate(SENSORS_22)]
     hand = HandDrawing(view="", placed=False, radius_mm=1.0, switches=(), taxels=(), joints=drawn_joints(joints))
-    pictures = {pose.name: [pose.degrees.get(name, 0.0) for name in SENSORS_22] for pose in (FLAT, *POSES)}
+    pictures = {}
+    for pose in (FLAT, *POSES):
+        angles = {**_RELAXED, **_BESIDES.get(pose.name, {}), **pose.degrees}
+        pictures[pose.name] = [angles.get(name, 0.0) for name in SENSORS_22]
     return hand, pictures

@@ -196,7 +196,7 @@ class Guide:
         if self._past:
             found[Key.UNDO] = f"undo the last ({self._past[-1][0].grasp})"
         if self._left:
-            found[Key.QUIT] = "leave, and go on another time"
+            found[Key.QUIT] = "leave, and go on another time" if self.stage in _WAITING else "leave"
         return found
 
     def seconds_left(self, now_us: int) -> float:

@@ -55,6 +55,7 @@ function row(name) {
   const meter = document.createElement("meter"), number = document.createElement("span");
   meter.max = 255;
   meter.setAttribute("aria-label", name);
+  byte.className = "byte";
   byte.append(meter, " ", number);
   made.append(head, byte, flat, state);
   return { row: made, meter, number, flat, state };

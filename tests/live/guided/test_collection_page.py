@@ -1,5 +1,7 @@
 """`thenar record --web` in real browsers, on emulated devices, by keyboard alone."""
 
+import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,6 +10,7 @@ import pytest
 from thenar.cli import run
 from thenar.compiler import GraspSet
 from thenar.compiler.evaluation.sofar import recognition_so_far
+from thenar.runtime.recording.guide import read_journal
 
 from .conftest import ENTER, Browser, Command, Wearer
 
@@ -74,3 +77,77 @@ def test_a_whole_collection_by_keyboard(
     assert (tmp_path / "again.grasps").read_bytes() == (tmp_path / "set.grasps").read_bytes()
     complaints = [one for one in page.complaints() if "WebSocket" not in one["message"]]
     assert complaints == []
+
+
+def test_undo_skip_and_pause_in_two_browsers_and_a_kill(
+    record: Callable[..., Command], wearer: Wearer, browser: Browser, other: Browser, tmp_path: Path
+) -> None:
+    going = record("--no-none", "--countdown", 1.5)
+    page = browser.open(going.url, 400, 800, "dark")
+    page.until("ready")
+    assert page.offered()[0] == "start the countdown Enter"
+    page.press("s")
+    assert page.text("count") == "0 of 6 trials done, 1 skipped"
+    captured(page)
+    page.picture("collect-review-400-dark")
+    assert page.overflow() == 0
+    page.press(ENTER)
+    second = other.open(going.url)
+    page.until("review")
+    # Both show the same, and a key counts in either, once.
+    second.until("review")
+    assert [one.text("title") for one in (page, second)] == [page.text("title")] * 2
+    assert [one.text("count") for one in (page, second)] == ["1 of 6 trials done, 1 skipped"] * 2
+    step = second.step()
+    second.press(ENTER)
+    page.wait(lambda: page.text("count") == "2 of 6 trials done, 1 skipped")
+    assert page.step() != step
+    # Text that would be a tag is text.
+    for one in (page, second):
+        assert one.script("return document.querySelectorAll('main script').length") == 0
+    page.until("review")
+    page.press("u")
+    page.press("p")
+    assert page.text("stage") == "paused; nothing is recorded meanwhile"
+    second.until("paused")
+    assert second.text("count") == "1 of 6 trials done, 1 skipped"
+    # Who closes the browser in the middle of a trial loses nothing.
+    second.type(ENTER)
+    page.until("countdown", "review")
+    for one in (page, second):
+        one.driver.get("about:blank")
+    back = browser.open(going.url, 1400, 1000, "dark")
+    if back.until("review", "ready") == "ready":
+        captured(back)
+    back.picture("collect-review-1400-dark")
+    back.press(ENTER)
+    assert back.text("count") == "2 of 6 trials done, 1 skipped"
+    os.killpg(going.process.pid, signal.SIGKILL)
+    going.process.wait()
+    back.wait(lambda: back.text("link") == "not connected")
+    assert back.offered() == []
+    assert len(read_journal(tmp_path / "set.mcap").accepted) == 2
+
+    again = record("--no-none")
+    back.open(again.url)
+    assert back.text("count") == "2 of 6 trials done"
+    back.type("q")
+    back.wait(lambda: back.script("return document.getElementById('leaving').open"))
+    back.type(ENTER)
+    assert again.finish() == 0, again.said
+    assert sorted(GraspSet.load(tmp_path / "set.grasps").trials.tolist()) == sorted(
+        read_journal(tmp_path / "set.mcap").accepted
+    )
+
+
+def test_without_devices_there_is_neither_a_page_nor_a_file(
+    record: Callable[..., Command], wearer: Wearer, tmp_path: Path
+) -> None:
+    wearer.scanner.close()
+    wearer.glove.close()
+    (tmp_path / "glove.toml").write_text('name = "gone"\n[cyberglove]\nport = "nowhere"\n')
+    going = record("--no-none")
+    assert going.finish() == 2
+    assert "there is no such port" in going.said
+    assert "the page is at" not in going.said
+    assert not list(tmp_path.glob("set.*"))
