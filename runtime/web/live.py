@@ -43,6 +43,11 @@ class LivePage:
     recordings : Path
         The one folder into which a page can record.
 
+    Attributes
+    ----------
+    server : Server
+        What serves it; `server.url` is its address.
+
     Raises
     ------
     BuildError
@@ -72,24 +77,23 @@ class LivePage:
             ),
             message("hand", hand),
         )
-        self._server = Server("live", address, token=token, on_message=self._recordings.take, hello=self._hello)
-        self.url = self._server.url
+        self.server = Server("live", address, token=token, on_message=self._recordings.take, hello=self._hello)
         self._tell_recording()
 
     def show(self, moment: Moment) -> None:
         """Show what the glove has just published, and do what pages asked for. For the thread of the run."""
         grasp, glove = moment.grasp, self._glove
-        self._server.publish("frame", partial(self._frames, moment))
+        self.server.publish("frame", partial(self._frames, moment))
         if grasp.time_us >= self._due_us:
             self._due_us = grasp.time_us + _STEP_US
             self._past.append(grasp)
         if glove.health is not self._health and glove.health is not None:
             self._health = glove.health
-            self._server.publish("health", partial(message, "health", self._health))
+            self.server.publish("health", partial(message, "health", self._health))
             self._tell_recording()
         if glove.follower is not None and glove.follower.progress is not self._progress:
             self._progress = glove.follower.progress
-            self._server.publish("task", partial(message, "task", text=glove.follower.progress.text))
+            self.server.publish("task", partial(message, "task", text=glove.follower.progress.text))
         self._recordings.step()
 
     @property
@@ -99,7 +103,7 @@ class LivePage:
 
     def close(self) -> None:
         """End the page, and a recording that it began."""
-        self._server.close()
+        self.server.close()
         self._recordings.close()
 
     def __enter__(self) -> Self:
@@ -111,7 +115,7 @@ class LivePage:
         self.close()
 
     def _tell_recording(self) -> None:
-        self._server.publish("recording", message("recording", self._recordings.state))
+        self.server.publish("recording", message("recording", self._recordings.state))
 
     def _hello(self) -> Sequence[bytes]:
         return (*self._first, past(tuple(self._past)))
