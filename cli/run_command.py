@@ -238,7 +238,7 @@ def _page(folder: Path, address: str, token: str | None, recordings: Path, glove
     from thenar.runtime.web.live import LivePage
 
     page = LivePage(glove, folder, address, token=token, recordings=recordings)
-    say_page(page.url)
+    say_page(page.server.url)
     return page
 
 
