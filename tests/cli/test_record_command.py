@@ -294,6 +294,27 @@ def test_a_trial_is_undone_another_skipped_and_a_pause_is_one(
     assert grasp_set.switches.tolist() == [[True, False, False]] * 2
 
 
+def test_with_a_page_the_terminal_is_still_one(folder: Path, start: Start) -> None:
+    terminal = start("--no-none", "--web", "127.0.0.1:0")
+    terminal.until(rb"the page is at http://127.0.0.1:\d+/")
+    terminal.until(rb"Enter: start the countdown")
+    terminal.press(b"\r")
+    reviewed(terminal, 1)
+    terminal.press(b"\r")
+    terminal.until(rb"2 of 4: ")
+    terminal.press(b"q")
+    code, said = terminal.finish()
+    assert code == 0, said
+    assert "1 of 4 trials are done" in said
+
+
+def test_a_page_that_cannot_be_served_leaves_no_file(folder: Path, start: Start) -> None:
+    code, said = start("--no-none", "--web", "0.0.0.0:0").finish()
+    assert code == 2
+    assert "add --web-token" in " ".join(said.split())
+    assert not list(folder.glob("set.*"))
+
+
 def test_a_port_without_anybody_at_its_other_end_is_no_device(folder: Path) -> None:
     (folder / "glove.toml").write_text(
         f'name = "bench"\n[[stream]]\nport = "unix:{folder}/rows"\nswitches = ["a", "b"]\n'

@@ -69,7 +69,8 @@ function show(guide) {
   if (guide.trial?.none) stages.countdown = "move so in";
   say($("stage"), guide.stage === "done" && guide.skipped ? "no trial is left; the skipped ones come another time" : stages[guide.stage]);
   const counts = guide.stage === "countdown" || guide.stage === "moving";
-  say($("number"), counts ? String(Math.ceil(guide.left_s)) : guide.stage === "review" ? "✓" : "");
+  say($("number"), counts ? String(Math.ceil(guide.left_s)) : "✓");
+  $("number").hidden = !counts && guide.stage !== "review";
   say($("problem"), guide.problem ? `not captured: ${guide.problem}` : "");
   tell(guide, stages[guide.stage]);
   sees(guide);

@@ -108,7 +108,7 @@ def test_a_recording_is_read_while_it_is_written(tmp_path: Path) -> None:
             recorder.glove(GloveFrame(10 * number, bytes((100 + 50 * (number % 2),))))
             name, thing = (("pen", "biro"), ("cup", "mug"))[number % 2]
             for event in ("begun", "captured", "accepted"):
-                recorder.label(Label(10 * number, event, number, name, "A", thing))  # type: ignore[arg-type]
+                recorder.label(Label(10 * number, event, number, name, "A", thing))
             found = recording_so_far(path)
             assert (found is None) == (number == 1)
     assert found is not None

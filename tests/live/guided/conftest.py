@@ -16,12 +16,14 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
-from selenium.webdriver.support.wait import WebDriverWait
 
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.scanner import EmulatedScanner
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.simulator.playing.performance import Performance
+
+from ..web.conftest import FLAGS
+from ..web.conftest import Browser as PageBrowser
 
 PATIENCE_S = 60
 GLOVE = """name = "bench"
@@ -34,38 +36,17 @@ switches = {switches}
 """
 
 
-class Browser:
+class Browser(PageBrowser):
     """A browser with one page open, used by keyboard alone."""
 
-    def __init__(self, driver: webdriver.Chrome) -> None:
-        self.driver = driver
-
-    def open(self, url: str, width: int = 1400, height: int = 1000, scheme: str = "light") -> "Browser":
-        self.driver.execute_cdp_cmd(
-            "Emulation.setDeviceMetricsOverride",
-            {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500},
-        )
-        features = [{"name": "prefers-color-scheme", "value": scheme}]
-        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
-        self.driver.get(url)
+    def see(self, url: str, *, width: int = 1400, scheme: str = "light") -> "Browser":
+        """Open a page, and wait until it is connected."""
+        self.open(url, width=width, scheme=scheme)
         self.wait(lambda: self.text("link") == "connected")
         return self
 
-    def text(self, name: str) -> str:
-        found = self.script("return document.getElementById(arguments[0])?.textContent ?? ''", name)
-        assert isinstance(found, str)
-        return found
-
-    def script(self, text: str, *arguments: object) -> object:
-        return self.driver.execute_script(text, *arguments)
-
-    def wait(self, until: Callable[[], object]) -> None:
-        WebDriverWait(self.driver, PATIENCE_S, poll_frequency=0.02).until(lambda _: until())
-
     def stage(self) -> str:
-        found = self.script("return document.getElementById('task').dataset.stage")
-        assert isinstance(found, str)
-        return found
+        return str(self.script("return document.getElementById('task').dataset.stage"))
 
     def until(self, *stages: str) -> str:
         """Wait for one of these stages, and return which it is."""
@@ -88,9 +69,9 @@ class Browser:
         """Return the keys that do something now, as their buttons say."""
         return [button.text for button in self.driver.find_elements(By.CSS_SELECTOR, "nav button") if button.text]
 
-    def complaints(self) -> list[dict[str, Any]]:
-        found: list[dict[str, Any]] = self.driver.get_log("browser")  # type: ignore[no-untyped-call]
-        return found
+    def faults(self) -> list[str]:
+        """Return what the page complained of, but that the command and its server have ended."""
+        return [one["message"] for one in self.complaints() if "WebSocket connection to" not in one["message"]]
 
     def overflow(self) -> object:
         """Return by how many pixels the page is wider than its window."""
@@ -114,7 +95,8 @@ def drivers(tool: Callable[[str], str]) -> Iterator[Callable[[int], Browser]]:
         def browser(number: int) -> Browser:
             while len(made) <= number:
                 options = webdriver.ChromeOptions()
-                for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1400,1000"):
+                options.binary_location = tool("chromium")
+                for flag in FLAGS:
                     options.add_argument(flag)
                 options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
                 driver = webdriver.Chrome(options=options, service=Service(tool("chromedriver")))

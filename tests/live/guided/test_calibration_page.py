@@ -35,7 +35,7 @@ def test_all_poses_make_the_calibration_that_the_terminal_makes(
     calibrate: Callable[..., Command], wearer: Wearer, browser: Browser, tmp_path: Path
 ) -> None:
     going = calibrate("--subject", "<b>Anna</b>")
-    page = browser.open(going.url, 400, 800, "dark")
+    page = browser.see(going.url, width=400, scheme="dark")
     page.until("ready")
     assert page.text("subject") == "<b>Anna</b>"
     for number, pose in enumerate(ALL):
@@ -49,6 +49,7 @@ def test_all_poses_make_the_calibration_that_the_terminal_makes(
         if number == 1:
             page.picture("calibrate-fist-400-dark")
             assert page.overflow() == 0
+            assert page.axe() == []
         held(page, wearer, [60 + 20 * number] * 18)
     page.until("done")
     assert page.text("title") == "All poses are taken"
@@ -62,7 +63,7 @@ def test_all_poses_make_the_calibration_that_the_terminal_makes(
         (number,) = [number for number, pose in enumerate(ALL) if sensor.name in pose.degrees]
         assert (sensor.raw_a, sensor.value_a) == (60, 0.0)
         assert (sensor.raw_b, sensor.value_b) == (60 + 20 * number, ALL[number].degrees[sensor.name])
-    assert [one for one in page.complaints() if "WebSocket" not in one["message"]] == []
+    assert page.faults() == []
 
 
 def test_saturated_and_dead_sensors_are_told_and_nothing_is_written_by_who_leaves(
@@ -70,7 +71,7 @@ def test_saturated_and_dead_sensors_are_told_and_nothing_is_written_by_who_leave
 ) -> None:
     (tmp_path / "anna.toml").write_text("old")
     going = calibrate("--overwrite")
-    page = browser.open(going.url)
+    page = browser.see(going.url)
     page.until("ready")
     held(page, wearer, [60] * 18)
     index, middle = SENSORS_18.index("index_mpj"), SENSORS_18.index("middle_mpj")
@@ -83,6 +84,7 @@ def test_saturated_and_dead_sensors_are_told_and_nothing_is_written_by_who_leave
         "middle_mpj is at the end of its range (255): does the glove fit, is the sensor whole?",
     ]
     page.picture("calibrate-doubted-1400-light")
+    assert page.axe() == []
     page.press("k")
     assert page.text("title") == "bent thumb"
 

@@ -42,7 +42,7 @@ def test_a_whole_collection_by_keyboard(
     record: Callable[..., Command], wearer: Wearer, browser: Browser, tmp_path: Path
 ) -> None:
     going = record("--none")
-    page = browser.open(going.url)
+    page = browser.see(going.url)
     page.until("ready")
     page.picture("collect-ready-1400-light")
     assert page.text("subject") == "A"
@@ -64,6 +64,7 @@ def test_a_whole_collection_by_keyboard(
     assert any(title.startswith("Nothing held: ") for title in seen)
     page.wait(lambda: "of 9 trials" in page.text("study"))
     page.picture("collect-done-1400-light")
+    assert page.axe() == []
     told = page.text("study"), page.script("return document.querySelectorAll('#types tr').length")
     page.type(ENTER)
     assert going.finish() == 0, going.said
@@ -75,15 +76,14 @@ def test_a_whole_collection_by_keyboard(
     assert told[1] == len(so_far.types) == 3
     assert run(["import", str(tmp_path / "set.mcap"), "-o", str(tmp_path / "again.grasps")]) == 0
     assert (tmp_path / "again.grasps").read_bytes() == (tmp_path / "set.grasps").read_bytes()
-    complaints = [one for one in page.complaints() if "WebSocket" not in one["message"]]
-    assert complaints == []
+    assert page.faults() == []
 
 
 def test_undo_skip_and_pause_in_two_browsers_and_a_kill(
     record: Callable[..., Command], wearer: Wearer, browser: Browser, other: Browser, tmp_path: Path
 ) -> None:
     going = record("--no-none", "--countdown", 1.5)
-    page = browser.open(going.url, 400, 800, "dark")
+    page = browser.see(going.url, width=400, scheme="dark")
     page.until("ready")
     assert page.offered()[0] == "start the countdown Enter"
     page.press("s")
@@ -91,8 +91,9 @@ def test_undo_skip_and_pause_in_two_browsers_and_a_kill(
     captured(page)
     page.picture("collect-review-400-dark")
     assert page.overflow() == 0
+    assert page.axe() == []
     page.press(ENTER)
-    second = other.open(going.url)
+    second = other.see(going.url)
     page.until("review")
     # Both show the same, and a key counts in either, once.
     second.until("review")
@@ -116,7 +117,7 @@ def test_undo_skip_and_pause_in_two_browsers_and_a_kill(
     page.until("countdown", "review")
     for one in (page, second):
         one.driver.get("about:blank")
-    back = browser.open(going.url, 1400, 1000, "dark")
+    back = browser.see(going.url, scheme="dark")
     if back.until("review", "ready") == "ready":
         captured(back)
     back.picture("collect-review-1400-dark")
@@ -129,7 +130,7 @@ def test_undo_skip_and_pause_in_two_browsers_and_a_kill(
     assert len(read_journal(tmp_path / "set.mcap").accepted) == 2
 
     again = record("--no-none")
-    back.open(again.url)
+    back.see(again.url)
     assert back.text("count") == "2 of 6 trials done"
     back.type("q")
     back.wait(lambda: back.script("return document.getElementById('leaving').open"))
