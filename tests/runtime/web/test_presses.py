@@ -1,3 +1,4 @@
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -49,3 +50,19 @@ def test_the_pages_of_the_server_press(serve: Callable[..., Any], hear: Callable
         live.send('{"do": "dance", "step": 9}')
         assert hear(live)["do"] == "dance"
     assert list(presses.due(lambda: 9)) == [Key.SKIP]
+
+
+def test_the_last_that_is_published_before_the_end_is_shown(
+    serve: Callable[..., Any], hear: Callable[..., Any]
+) -> None:
+    """A page says how it ended, however soon the server ends then."""
+    client = serve("collect")
+    with client.open() as live:
+        client.server.publish("guide", b'{"topic":"guide","number":0}')
+        assert hear(live)["number"] == 0
+        for number in range(1, 200):
+            client.server.publish("guide", b'{"topic":"guide","number":%d}' % number)
+        client.server.close()
+        while (told := hear(live))["number"] < 199:
+            assert told["number"] > 0
+        assert {json.loads(text)["number"] for text in live} <= {199}
