@@ -103,7 +103,8 @@ def drawn_glove(session: Session) -> HandDrawing:
     spots = list(zip(names, places, strict=True))
     return HandDrawing(
         switches=tuple(DrawnSwitch(name, x, y, bit) for bit, (name, (x, y)) in enumerate(spots[:n])),
-        taxels=tuple(DrawnTaxel(name, x, y) for name, (x, y) in spots[n:]),
+        # One level each, by which hand.js draws how far a taxel is pressed; no frame has a bit for it.
+        taxels=tuple(DrawnTaxel(name, x, y, ((0, n + at),)) for at, (name, (x, y)) in enumerate(spots[n:])),
         joints=drawn_joints([_joint(at, session) for at in range(len(session.sensors))]),
         **drawn,
     )

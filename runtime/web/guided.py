@@ -55,6 +55,7 @@ class GuidePage:
         calibrated = () if session.calibration is None else session.calibration.sensors
         lines = {line.name: line for line in calibrated}
         self._lines = [lines.get(name) for name in session.sensors]
+        self._pads = _Pads(session)
         self._presses = Presses(Key)
         self._due_us, self._step = 0, -1
         first = message(
@@ -120,7 +121,7 @@ class GuidePage:
 
     def _seen(self, switches: SwitchFrame | None, glove: GloveFrame | None) -> dict[str, object]:
         """Return what the glove sees: a character a switch, "1" closed, "0" open, "x" not read; the joints' values, in
-        degrees where they are calibrated, null where they are not measured; the taxels' codes.
+        degrees where they are calibrated, null where they are not measured; how far each taxel is pressed, 0 to 1.
         """
         joints: list[float | None] = []
         if glove is not None and glove.plugged:
@@ -131,7 +132,7 @@ class GuidePage:
         return {
             "closed": "" if switches is None else _letters(switches, self._switches),
             "joints": joints,
-            "taxels": () if switches is None else switches.taxels or (),
+            "taxels": () if switches is None else self._pads.pressed(switches.taxels or ()),
         }
 
 
@@ -140,3 +141,30 @@ def _letters(frame: SwitchFrame, switches: int) -> str:
     return "".join(
         "x" if unknown >> number & 1 else "1" if frame.closed >> number & 1 else "0" for number in range(switches)
     )
+
+
+class _Pads:
+    """How far taxels are pressed: from rest to press where they are calibrated, else in the range seen here."""
+
+    def __init__(self, session: Session) -> None:
+        given = session.taxel_calibration
+        self._ends: list[list[int] | None] = []
+        for name in session.taxels:
+            line = None if given is None else given.line(name)
+            self._ends.append(None if line is None else [line.rest, line.press])
+        self._fixed = [ends is not None for ends in self._ends]
+
+    def pressed(self, codes: Sequence[int | None]) -> list[float | None]:
+        """Return the share of each taxel, 0 to 1; None of one that was not read."""
+        found: list[float | None] = []
+        for place, code in enumerate(codes):
+            if code is None:
+                found.append(None)
+                continue
+            ends = self._ends[place] or [code, code]
+            if not self._fixed[place]:
+                ends = [min(ends[0], code), max(ends[1], code)]
+            self._ends[place] = ends
+            rest, press = ends
+            found.append(0.0 if rest == press else round(min(max((code - rest) / (press - rest), 0.0), 1.0), 3))
+        return found

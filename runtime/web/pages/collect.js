@@ -106,6 +106,7 @@ function sees(guide) {
   const closed = [...guide.closed], parts = [];
   if (glove) {
     glove.setClosed(closed.map((letter) => letter === "1"), closed.map((letter) => letter === "x"));
+    glove.setTaxels(guide.taxels);
     glove.setPose(guide.joints);
   }
   if (names.switches.length) {
@@ -113,7 +114,12 @@ function sees(guide) {
     const lost = names.switches.filter((_, bit) => closed[bit] === "x");
     if (lost.length) parts.push(`not read: ${listed(lost)}`);
   }
-  if (names.taxels.length) parts.push(`taxels ${listed(names.taxels.map((name, at) => `${name} ${guide.taxels[at] ?? "–"}`))}`);
+  if (names.taxels.length) {
+    const pressed = guide.taxels.filter((share) => share !== null && share >= 0.5).length;
+    parts.push(`${pressed} of ${names.taxels.length} taxels pressed`);
+    const lost = names.taxels.filter((_, at) => (guide.taxels[at] ?? null) === null);
+    if (lost.length) parts.push(`not read: ${listed(lost)}`);
+  }
   if (names.sensors.length) parts.push(guide.joints.length ? `${guide.joints.filter((value) => value !== null).length} of ${names.sensors.length} joints measured` : "no joint measured");
   say($("sees"), parts.join("; "));
   while ($("devices").children.length > guide.devices.length) $("devices").lastChild.remove();
