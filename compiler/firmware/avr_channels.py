@@ -2,9 +2,9 @@
 
 from math import ceil
 
+from .avr_inputs import CONVERSION_CYCLES, avr_of, channel_number, disabled_inputs, needs_jtag_off, prescaler_of, text
 from .board import Board
-from .board_inputs import CONVERSION_CYCLES, channel_number, disabled_inputs, needs_jtag_off, pair, prescaler_of
-from .words import comment
+from .board_inputs import channels_header, taxel_rows
 
 
 def channels_files(board: Board) -> dict[str, str]:
@@ -12,17 +12,13 @@ def channels_files(board: Board) -> dict[str, str]:
     taxels = board.taxels
     if taxels is None:
         return {}
-    part, prescaler = board.microcontroller, prescaler_of(board.clock_hz)
+    part, prescaler = avr_of(board), prescaler_of(board.clock_hz)
     # A conversion that is begun by hand waits for the converter's next clock.
     conversion_us = (CONVERSION_CYCLES + 1) * 2**prescaler * 1e6 / board.clock_hz
     pins = [part.analog[channel] for channel in taxels.inputs]
-    return pair(
-        "thenar_channels",
-        taxels=[
-            {"channel": number, "name": comment(name), "place": _place(taxels.inputs, number, taxels.per_input)}
-            for number, name in enumerate(taxels.names)
-            if name
-        ],
+    source = text(
+        "thenar_channels.c",
+        taxels=taxel_rows(taxels),
         inputs=[channel_number(channel) for channel in taxels.inputs],
         select=taxels.select,
         wide=len(part.analog) > 8,
@@ -33,9 +29,4 @@ def channels_files(board: Board) -> dict[str, str]:
         settle_us=taxels.settle_us,
         settling=ceil(taxels.settle_us / conversion_us) if taxels.select else 0,
     )
-
-
-def _place(inputs: tuple[str, ...], number: int, per_input: int) -> str:
-    """Return where a channel is, in words: "C3 of the multiplexer at ADC0"."""
-    at = inputs[number // per_input]
-    return at if per_input == 1 else f"C{number % per_input} of the multiplexer at {at}"
+    return {"thenar_channels.h": channels_header("AVCC"), "thenar_channels.c": source}
