@@ -186,7 +186,7 @@ def _grid(name: str, limits: Range, first: int, last: int) -> Grid:
 
 
 def codes_files(name: str, sensors: Sensors, *, code_bits: int, avr: bool) -> dict[str, str]:
-    """Return the texts of thenar_`name`_codes.h and .c, which go with the classifier; none without sensors."""
+    """Return the texts of thenar_`name`_codes.h and .c, which go with the classifier; none of a build of switches."""
     if not sensors.every:
         return {}
     values = {
