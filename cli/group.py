@@ -36,6 +36,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "ros": ("cyclonedds",),
     "ws": ("websockets",),
     "lsl": ("pylsl",),
+    "web": ("aiohttp",),
 }
 
 
