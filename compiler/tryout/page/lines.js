@@ -3,7 +3,7 @@
 const LONGEST = 16384;
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?$/;
 const NO_NUMBER = /^([+-]?nan|[+-]?inf(inity)?|null|none|na|-|)$/i;
-const NAME = /^(?!_)[\p{L}\p{N}_][^,;:\t"{}[\]]*$/u;
+const NAME = /^[\p{L}_][^,;:\t"{}[\]]*$/u;
 
 const number = (field) => (NUMBER.test(field) && Number.isFinite(Number(field)) ? Number(field) : null);
 const sound = (names) => new Set(names).size === names.length && !names.includes("");
@@ -40,7 +40,7 @@ export function parsedLine(line) {
     return rowOf(names, fields.map((field, at) => field.slice(cut[at] + 1).trim()));
   }
   const worded = fields.length === 1 || text.split(/\s+/).length < fields.length || /[,;\t]/.test(text);
-  const named = fields.every((field) => NAME.test(field) && !/^\p{N}/u.test(field));
+  const named = fields.every((field) => NAME.test(field));
   if (worded && named && !fields.every((field) => NO_NUMBER.test(field))) return sound(fields) ? { header: fields } : null;
   return rowOf(null, fields);
 }

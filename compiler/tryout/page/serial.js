@@ -153,7 +153,7 @@ class LineReader {
   get said() {
     const { misfits, odd } = this.parser;
     if (!this.rows && this.strange) return "rows come, but their columns are none of the build's: name them, or send them in its order";
-    return `${this.rows} rows, ${misfits} lines that hold none${misfits ? `, such as "${odd}"` : ""}`;
+    return `${this.rows} rows; lines that hold none: ${misfits}${misfits ? `, such as "${odd}"` : ""}`;
   }
 }
 

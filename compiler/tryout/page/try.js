@@ -179,7 +179,7 @@ function readTable(text, name) {
   const [head, ...body] = parseCsv(text);
   if (!head || !body.length) throw new Error(`${name} holds no rows: its first line names the columns`);
   if (body.length > MOST) throw new Error(`${name} has ${body.length} rows: there may be ${MOST}`);
-  const places = new Map(head.map((column, place) => [column.trim(), place]));
+  const places = new Map(head.map((column, place) => [column.trim().replace(/^'(?=[=+\-@])/, ""), place]));
   const label = LABELS.find((each) => places.has(each)), missing = [];
   for (const input of [...switches.map((each) => each.taxel ?? each), ...joints]) {
     if (!places.has(input.name)) missing.push(input.name);
