@@ -164,6 +164,7 @@ class Glove:
                 sinks.append(open_sink(sink) if isinstance(sink, str) else sink)
                 opening.callback(sinks[-1].close)
             self._fanout = Fanout(sinks)
+            self._fanout.begin(self.system.build)
             if self._record is not None:
                 self.recorder = opening.enter_context(Recorder(Path(self._record), self._session()))
             if self.feed is self.sources:
@@ -196,6 +197,7 @@ class Glove:
         progress = None if self.follower is None else self.follower.update(grasp)
         moment.angles = self._angles_of(taken.measured)
         self._fanout.publish(grasp, moment.preshape, moment.angles)
+        self._fanout.moment(moment)
         if progress is not None:
             self._fanout.task(progress)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None, moment.codes)
