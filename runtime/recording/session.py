@@ -68,6 +68,13 @@ class Label(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     object: str
 
 
+class Mark(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A moment that somebody marked while it was recorded, on the host's monotonic clock, and what they wrote to it."""
+
+    time_us: Number
+    text: Annotated[str, msgspec.Meta(max_length=200)] = ""
+
+
 class Session(msgspec.Struct, frozen=True, kw_only=True):
     """One stretch of recording.
 

@@ -76,6 +76,8 @@ class Server:
     ----------
     url : str
         What to open, the token included.
+    thread : Thread
+        On which all of it happens.
 
     Raises
     ------
@@ -109,8 +111,8 @@ class Server:
         self._latest: dict[str, Message] = {}
         self._pages: list[_Page] = []
         self._started = Event()
-        self._thread = Thread(target=self._run, name="thenar web", daemon=True)
-        self._thread.start()
+        self.thread = Thread(target=self._run, name="thenar web", daemon=True)
+        self.thread.start()
         self._started.wait()
 
     def publish(self, topic: str, message: Message) -> None:
@@ -126,9 +128,9 @@ class Server:
 
     def close(self) -> None:
         """End; may be called again."""
-        if self._thread.is_alive():
+        if self.thread.is_alive():
             self._loop.call_soon_threadsafe(self._closing.set)
-            self._thread.join()
+            self.thread.join()
 
     def __enter__(self) -> Self:
         return self
