@@ -37,6 +37,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "ws": ("websockets",),
     "lsl": ("pylsl",),
     "web": ("aiohttp",),
+    "foxglove": ("foxglove",),
 }
 
 

@@ -19,8 +19,10 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
+from thenar.runtime.calibration import codes_of_bytes
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.manifest import Calibration as BuildCalibration
 from thenar.runtime.names import SHOWN, shortened
 from thenar.runtime.published import NONE
 from thenar.runtime.recording.guide import FRESH_US
@@ -408,7 +410,13 @@ def _joint(
     calibrated = grasps[0][0].session.calibration is not None
     values = np.array([_value(name, part, grasp) for part, grasp in grasps], np.float64)
     scale = _HALF_DEGREES if calibrated else _BYTES
-    return code_joint(name, JointColumns((name,), unit, codes=not calibrated, calibration=scale), values, trials)
+    columns = JointColumns((name,), unit, codes=not calibrated, calibration=scale)
+    codes, joint, cost = code_joint(name, columns, values, trials)
+    if calibrated:  # as live bytes are coded, halves between two codes included
+        coded = BuildCalibration(0, name, unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
+        parts = {id(part): codes_of_bytes(coded, part.session.calibration) for part, _ in grasps}
+        codes = np.array([parts[id(part)][_raw(name, part, grasp)] for part, grasp in grasps], np.uint16)
+    return codes, joint, cost
 
 
 def _taxel(place: int, grasps: Sequence[tuple[_Part, _Grasp]]) -> tuple[list[int], Joint]:
@@ -431,9 +439,13 @@ def _line(session: Session, place: int) -> TaxelLine | None:
     return None if session.taxel_calibration is None else session.taxel_calibration.line(session.taxels[place])
 
 
-def _value(name: str, part: _Part, grasp: _Grasp) -> float:
+def _raw(name: str, part: _Part, grasp: _Grasp) -> int:
     assert grasp.glove is not None
-    raw = grasp.glove.sensors[part.session.sensors.index(name)]
+    return grasp.glove.sensors[part.session.sensors.index(name)]
+
+
+def _value(name: str, part: _Part, grasp: _Grasp) -> float:
+    raw = _raw(name, part, grasp)
     calibration = part.session.calibration
     if calibration is None:
         return raw

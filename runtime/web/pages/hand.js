@@ -102,11 +102,11 @@ class Glove {
   // Open: a ring. Closed: a full square, larger, on a corner. Lost: a cross in a dashed ring.
   #switch(each, onSwitch) {
     const group = this.#place(each, "spot"), r = this.radius;
-    if (onSwitch) this.#button(group, each.name, () => onSwitch(each.bit, !this.closed[each.bit]));
     element("circle", { class: "open", r: 1.25 * r }, group);
     element("path", { class: "shut", d: `M0 ${-2 * r}L${2 * r} 0L0 ${2 * r}L${-2 * r} 0Z` }, group);
     element("path", { class: "cross", d: cross(r) }, group);
     named(group, each.name);
+    if (onSwitch) this.#button(group, each.name, () => onSwitch(each.bit, !this.closed[each.bit]));
     this.switches.push({ bit: each.bit, group });
   }
 
@@ -118,6 +118,11 @@ class Glove {
     }
     const group = this.#place(each, "spot"), r = this.radius, side = 1.35 * r;
     const found = { levels: each.levels, name: each.name, group, count: 0, value: null };
+    element("rect", { class: "open", x: -side, y: -side, width: 2 * side, height: 2 * side }, group);
+    found.disc = element("circle", { class: "press", r: 0 }, group);
+    element("path", { class: "shut", d: `M${-side} ${-side}H${side}V${side}H${-side}Z` }, group);
+    element("path", { class: "cross", d: cross(r) }, group);
+    named(group, each.name);
     if (onSwitch) {
       this.#button(group, each.name, () => {
         // From level to level, and from the last to none.
@@ -127,11 +132,6 @@ class Glove {
         });
       });
     }
-    element("rect", { class: "open", x: -side, y: -side, width: 2 * side, height: 2 * side }, group);
-    found.disc = element("circle", { class: "press", r: 0 }, group);
-    element("path", { class: "shut", d: `M${-side} ${-side}H${side}V${side}H${-side}Z` }, group);
-    element("path", { class: "cross", d: cross(r) }, group);
-    named(group, each.name);
     this.taxels.push(found);
   }
 
