@@ -19,7 +19,7 @@ from thenar.runtime.frames import SwitchFrame, now_us
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.sources import NOT_YET, DeviceState, Sources, Taken
 from thenar.runtime.names import list_names
-from thenar.runtime.recording.guide import Guide, Journal, Stage, Trial
+from thenar.runtime.recording.guide import Guide, Journal, Key, Stage, Trial
 from thenar.runtime.recording.session import Collection, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.scanning.ports import whole_scan
@@ -177,6 +177,10 @@ def lead(guide: Guide, devices: Devices, recorder: Recorder, faces: Sequence[Fac
         for face in faces:
             face.press(now_us(), guide)
             face.show(now_us(), guide, devices.devices())
+    # Whatever ended it, a page shows that it has.
+    guide.press(now_us(), Key.QUIT)
+    for face in faces:
+        face.show(now_us(), guide, devices.devices())
 
 
 def _check_same_glove(journal: Journal, session: Session) -> None:

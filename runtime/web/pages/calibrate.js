@@ -23,6 +23,7 @@ const send = connect({
     offer({});
   },
   sensors: (told) => {
+    end = "";
     say($("subject"), told.subject);
     rows = told.names.map(row);
     $("sensors").replaceChildren(...rows.map((one) => one.row));

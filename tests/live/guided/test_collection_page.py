@@ -141,6 +141,21 @@ def test_undo_skip_and_pause_in_two_browsers_and_a_kill(
     )
 
 
+def test_a_signal_ends_it_and_the_page_says_so(
+    record: Callable[..., Command], browser: Browser, tmp_path: Path
+) -> None:
+    going = record("--no-none")
+    page = browser.see(going.url)
+    page.until("ready")
+    captured(page)
+    page.press(ENTER)
+    going.process.send_signal(signal.SIGTERM)
+    assert going.finish() == 0, going.said
+    page.wait(lambda: page.text("link") == "ended")
+    assert page.text("stage") == "the collection has ended"
+    assert len(GraspSet.load(tmp_path / "set.grasps")) == 1
+
+
 def test_without_devices_there_is_neither_a_page_nor_a_file(
     record: Callable[..., Command], wearer: Wearer, tmp_path: Path
 ) -> None:
