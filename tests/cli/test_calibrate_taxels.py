@@ -5,6 +5,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from threading import Event
 
+import pytest
+
+from thenar.cli import run
 from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine, load_taxel_calibration
@@ -68,4 +71,12 @@ def test_where_nothing_moves_nothing_is_written(tmp_path: Path) -> None:
     code, said = calibrated(tmp_path, [REST])
     assert code == 2
     assert "no taxel moved" in said
+    assert not (tmp_path / "pads.toml").exists()
+
+
+def test_presses_have_no_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "glove.toml").write_text('[[scanner]]\nport = "nowhere"\ntaxels = ["p0"]\n')
+    asked = ["calibrate", str(tmp_path / "glove.toml"), "--taxels", "-o", str(tmp_path / "pads.toml"), "--web"]
+    assert run([*asked, "127.0.0.1:0"]) == 2
+    assert "leave it out with --taxels" in capsys.readouterr().err
     assert not (tmp_path / "pads.toml").exists()
