@@ -257,6 +257,7 @@ extern const mp_obj_type_t mp_type_tuple, mp_type_str, mp_type_module, mp_type_I
 #define mp_const_none ((mp_obj_t)&mp_type_tuple)
 mp_int_t mp_obj_get_int(mp_const_obj_t o);
 bool mp_obj_is_true(mp_obj_t o);
+mp_obj_t mp_obj_new_bool(mp_int_t x);
 void mp_raise_msg(const mp_obj_type_t *type, const char *text) __attribute__((noreturn));
 void mp_arg_check_num(size_t n_args, size_t n_kw, size_t least, size_t most, bool keywords);
 void *mp_obj_malloc_helper(size_t bytes, const mp_obj_type_t *type);
