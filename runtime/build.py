@@ -31,8 +31,9 @@ class Recognition:
     """What was recognised in a frame, and how surely.
 
     probability is the softmax of the scores of all answers, of nothing held too where the build may refuse a frame, as
-    a number that is published; a board's, in integers and of the grasp types alone, is `Build.softmax`'s. margin is the lead over the second best in integer steps; degraded says that
-    a switch or a joint was missing and its mean contribution was added for it.
+    it is published; a board's, in integers and of the grasp types alone, is that of `Build.softmax`. margin is the lead
+    over the second best in integer steps; degraded says that a switch or a joint was missing and its mean contribution
+    was added for it.
     """
 
     grasp: str
