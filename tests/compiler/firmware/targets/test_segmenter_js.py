@@ -60,11 +60,11 @@ def test_every_state_of_two_streams_is_python_s(
     if knows_none:
         manifest = replace(manifest, grasps=(*manifest.grasps[:-1], NONE))
     random = np.random.default_rng(8)
-    ticks = 400
+    ticks = 1200
     # A hand that holds still for a while, and trembles.
-    bits = np.repeat(random.random((2, ticks // 20, tables.n_switches)) < 0.4, 20, axis=1)
-    bits ^= random.random(bits.shape) < 0.03
-    codes = np.repeat(random.integers(0, 256, (2, ticks // 20, tables.n_joints)), 20, axis=1)
+    bits = np.repeat(random.random((2, ticks // 40, tables.n_switches)) < 0.4, 40, axis=1)
+    bits ^= random.random(bits.shape) < 0.02
+    codes = np.repeat(random.integers(0, 256, (2, ticks // 40, tables.n_joints)), 40, axis=1)
     refused = (random.random((2, ticks)) < 0.3) & (not knows_none)
     frames = [
         [{"bits": one.tolist(), "codes": other.tolist()} for one, other in zip(*stream, strict=True)]
