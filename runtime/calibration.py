@@ -86,7 +86,10 @@ class CodeTables:
         if len(sensors) != self._sensors:
             raise FrameError(f"a CyberGlove record of {len(sensors)} sensors, {self._sensors} are named")
         self._last, self._last_codes = sensors, list(map(getitem, self._tables, picked := self._pick(sensors)))
-        self.lost = sum(1 << joint for joint, byte in enumerate(picked[: len(self._tables)]) if not byte)
+        whole = all(picked)
+        self.lost = (
+            0 if whole else sum(1 << joint for joint, byte in enumerate(picked[: len(self._tables)]) if not byte)
+        )
         return self._last_codes
 
 

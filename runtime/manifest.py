@@ -391,6 +391,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     zero_gain_nodes  decisions of the placement's tree at which no switch gained anything alone; left out if there are
                      none
     scan_sha256      of scan.json; left out where the build was compiled for no harness
+    hand_sha256      of hand.json; None in builds of older versions
     fitting          how the fit was chosen; left out where the options leave no choice
     faults           what faults of inputs leave of the rows trained on; None in builds of older versions
     detection        how surely the build says whether something is held, of the rows trained on and of folds
@@ -418,6 +419,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     detection: tuple[Detected, ...] = ()
     rejection: Rejection | None = None
     segments: SegmentModel | None = None
+    hand_sha256: Digest | None = None
 
     @property
     def answers(self) -> tuple[str, ...]:

@@ -19,7 +19,6 @@ from . import FirmwareError
 from .board import Board, keys_of
 from .board_files import (
     board_files,
-    board_makefile,
     config_of,
     exits_early,
     follows_segments,
@@ -27,6 +26,7 @@ from .board_files import (
     readings,
     segments_in_words,
     switches_of,
+    whole_folder,
 )
 from .choose import Fit, fit_for, smallest_fit
 from .classifier import LIBRARY_NAME, Library
@@ -130,7 +130,7 @@ class Firmware:
             files |= library.files | (library.segments if segments else {})
             if exits_early(board, ports := readings(board, switches, tables)):
                 files |= decided_files(name, tables, names.grasps, switches_of(ports))
-        return files | {"Makefile": board_makefile(name, board, self.mode, files)}
+        return whole_folder(name, board, self.mode, files)
 
 
 SUMS = "SHA256SUMS"

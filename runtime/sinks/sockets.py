@@ -301,11 +301,23 @@ def open_tcp(place: str, *, public: bool = False, clock: Callable[[], float] = m
     free one. Raises SinkError, or SettingError where `place` is not such an address.
     """
     where = f"tcp-public:{place}" if public else f"tcp:{place}"
-    family, address = _resolve(place, where)
+    family, address = resolve(place, where, "tcp:127.0.0.1:7777")
     if not public and not ipaddress.ip_address(address[0].partition("%")[0]).is_loopback:
         raise SettingError(
             f"{where}: other machines could read along there: take 127.0.0.1, or write tcp-public:{place} to let them"
         )
+    return SocketLines(_listener(family, address, where), where, clock=clock)
+
+
+def listen(place: str, where: str, example: str) -> socket.socket:
+    """Return a socket that listens at `place`, as `open_tcp` has it; `where` and `example` are how the user writes it.
+
+    Raises SinkError, or SettingError where `place` is no address.
+    """
+    return _listener(*resolve(place, where, example), where)
+
+
+def _listener(family: socket.AddressFamily, address: tuple[str, int], where: str) -> socket.socket:
     listener = socket.socket(family, socket.SOCK_STREAM)
     try:
         # Without it the port stays taken for a minute after its last reader.
@@ -316,13 +328,17 @@ def open_tcp(place: str, *, public: bool = False, clock: Callable[[], float] = m
         listener.close()
         hint = ": another process serves that port; take another" if reason.errno == errno.EADDRINUSE else ""
         raise SinkError(f"{where} cannot be opened: {reason.strerror}{hint}") from None
-    return SocketLines(listener, where, clock=clock)
+    return listener
 
 
-def _resolve(place: str, where: str) -> tuple[socket.AddressFamily, tuple[str, int]]:
+def resolve(place: str, where: str, example: str) -> tuple[socket.AddressFamily, tuple[str, int]]:
+    """Return the family and the address, host and port first, of HOST:PORT, [HOST]:PORT or a PORT of 127.0.0.1.
+
+    Raises SettingError, with `where` and `example` as in `listen`.
+    """
     found = re.fullmatch(r"(?:(?:\[([^][]+)\]|([^][:]+)):)?([0-9]{1,5})", place)
     if not found or int(found[3]) > 65535:
-        raise SettingError(f"{where} is no address: write it as tcp:127.0.0.1:7777, with a port from 0 to 65535")
+        raise SettingError(f"{where} is no address: write it as {example}, with a port from 0 to 65535")
     host = found[1] or found[2] or "127.0.0.1"
     try:
         family, _, _, _, address = socket.getaddrinfo(host, int(found[3]), type=socket.SOCK_STREAM)[0]

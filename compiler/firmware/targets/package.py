@@ -6,7 +6,7 @@ Layout and fields of the Arduino library are those of its specification, revisio
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..costs import Core
 from ..tools import XTENSA_COMPILER, XTENSA_EMULATOR
@@ -100,6 +100,8 @@ class Package(Target):
         run = super().run if self.like is None else self.like.run
         return run(files, name, layout, frames, incremental=incremental, lost=lost)
 
+
+P = TypeVar("P", bound=Package)
 
 _BESIDE = (
     "library.properties",
@@ -195,7 +197,7 @@ def _example(library: "Library") -> dict[str, object]:
     }
 
 
-_M0PLUS, _M4 = _CORTEX_M
+M0PLUS, _M4 = _CORTEX_M
 # It takes within 3 % what a Cortex-M4 takes.
 _M33 = replace(
     _M4,
@@ -206,7 +208,7 @@ _M33 = replace(
 )
 # The Xtensa core whose compiler and emulator Debian has: an ESP8266's, without an ESP32's windows of registers.
 # Numbers are fitted to what qemu counts, as in `costs`, for 3 to 30 classes and 3 to 27 look-ups: 1 to 47 % above.
-_XTENSA = Bare(
+XTENSA = Bare(
     architecture="xtensa",
     prefix="xtensa-lx106-elf-",
     emulator=XTENSA_EMULATOR,
@@ -241,12 +243,11 @@ _NEXT = "{folder}/README.md says how each ecosystem takes it"
 _MOST = 64 << 10
 
 
-def _family(name: str, like: Target, what: str, **given: Any) -> Package:
+def family(shape: type[P], name: str, like: Target, what: str, **given: Any) -> P:
     """Return a package for parts whose core is that of another target, which is simulated."""
     tools = {"compiler": like.compiler, "size": like.size, "flags": like.flags, "next_step": _NEXT}
-    return Package(
-        name=name, part=name, help=what, like=like, most_flash=_MOST, **{"core": like.core, **tools, **given}
-    )
+    values = {"name": name, "part": name, "help": what, "like": like, "most_flash": _MOST, "core": like.core}
+    return shape(**{**values, **tools, **given})
 
 
 # Flash is that of a family's largest usual part, RAM that of its smallest.
@@ -260,32 +261,17 @@ MEMBER = (
         own_layout=False,
         any_part=True,
     ),
-    _family(
-        "esp32",
-        _XTENSA,
-        "a package for ESP-IDF, Arduino, PlatformIO, Zephyr: ESP32, S2, S3 (Xtensa), C3, C6, H2 (RISC-V)",
-        rank=31,
-        flash=16 << 20,
-        ram=256 << 10,
-        kind="xtensa",
-    ),
-    _family(
-        "rp2040",
-        _M0PLUS,
-        "a package for pico-sdk, Arduino, PlatformIO, Zephyr: Raspberry Pi Pico, Cortex-M0+",
-        rank=32,
-        flash=16 << 20,
-        ram=256 << 10,
-    ),
-    _family(
+    family(
+        Package,
         "rp2350",
         _M33,
-        "the same: Raspberry Pi Pico 2, Cortex-M33 or RISC-V",
+        "a package as for rp2040: Raspberry Pi Pico 2, Cortex-M33 or RISC-V",
         rank=33,
         flash=16 << 20,
         ram=512 << 10,
     ),
-    _family(
+    family(
+        Package,
         "nrf52",
         _M4,
         "a package for Zephyr (nRF Connect), Arduino, PlatformIO: nRF52832, nRF52840, Cortex-M4F",
@@ -293,7 +279,8 @@ MEMBER = (
         flash=1 << 20,
         ram=64 << 10,
     ),
-    _family(
+    family(
+        Package,
         "stm32",
         _M4,
         "a package for STM32CubeIDE and any CMSIS project, Zephyr, Arduino, PlatformIO; counted as Cortex-M4",
@@ -301,5 +288,7 @@ MEMBER = (
         flash=2 << 20,
         ram=20 << 10,
     ),
-    _family("generic", _M4, "a package for any other part that has a C99 compiler; counted as Cortex-M4", rank=36),
+    family(
+        Package, "generic", _M4, "a package for any other part that has a C99 compiler; counted as Cortex-M4", rank=36
+    ),
 )

@@ -1,4 +1,4 @@
-"""cppcheck, with its MISRA add-on, says nothing of the C of any target and mode but what docs/misra.md explains."""
+"""cppcheck, with its MISRA add-on, says nothing of the C of any target and mode but what misra.md explains."""
 
 import re
 import subprocess
@@ -28,7 +28,7 @@ Finding = tuple[str, str]  # what cppcheck calls it, and the file's name
 
 pytestmark = pytest.mark.slow
 
-EXPLAINED = Path(__file__).resolve().parents[3] / "docs" / "misra.md"
+EXPLAINED = Path(__file__).with_name("misra.md")
 OPTIONS = ("--enable=all", "--addon=misra", "--std=c99", "--quiet", "--template={id}\t{file}\t{line}\t{message}")
 DEFINED = {
     "atmega328p": ("--platform=avr8", "-D__AVR__", "-D__AVR_ATmega328P__"),
