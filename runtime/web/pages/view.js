@@ -46,9 +46,7 @@ export class View {
     $("types").replaceChildren();
     for (const grasp of build.grasps) this.#row(grasp);
     $("preshape").hidden = !build.preshapes;
-    // A stream says nothing of single switches, or of how likely the other types are.
     $("hand-panel").hidden = Boolean(build.partial);
-    $("types-say").hidden = !build.partial;
     this.answers = build.grasps;
   }
 
@@ -148,6 +146,8 @@ export class View {
     const news = this.shown?.grasp !== frame.grasp;
     this.shown = frame;
     this.#now(frame);
+    // Some streams say nothing of single switches, or of how likely the other types are.
+    $("types-say").hidden = frame.closed !== undefined;
     this.#hand(frame);
     this.#bars(frame);
     this.timeline.draw();
