@@ -204,8 +204,8 @@ export class View {
       const value = frame.probabilities?.[at] ?? (grasp === frame.grasp ? frame.probability : null);
       say(share, value === null ? "–" : `${(100 * value).toFixed(value > 0.9995 || value < 0.0005 ? 0 : 1)} %`);
     }
-    const sure = frame.grasp === "unknown" ? "" : `${(100 * frame.probability).toFixed(0)} % in this frame`;
-    const held = frame.segment_us === null ? "" : `segment ${frame.segment}, ${frame.state} for ${((frame.time_us - frame.segment_us) / 1e6).toFixed(1)} s`;
+    const sure = frame.grasp === "unknown" ? "" : `${(100 * frame.probability).toFixed(0)}\u00a0% in this frame`;
+    const held = frame.segment_us === null ? "" : `segment ${frame.segment}, ${frame.state} for ${((frame.time_us - frame.segment_us) / 1e6).toFixed(1)}\u00a0s`;
     say($("segment"), [sure, held].filter(Boolean).join(" · "));
     if (!$("preshape").hidden) say($("preshape"), `Preshape: ${frame.preshape?.name ?? "none yet"}`);
     const closed = this.closed.filter(Boolean).length;

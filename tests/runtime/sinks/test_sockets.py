@@ -308,13 +308,13 @@ def test_details_follow_their_grasps_for_those_who_asked_and_a_hundred_times_a_s
     with closing(open_unix(str(tmp_path / "grasps"), detail=detail)) as sink:
         sink.begin(build)
         reader = Reader(sink)
-        for number in range(50):
+        for number in range(20):
             grasp = replace(make_grasp(number), time_us=1_000_000 + 2_500 * number)
             sink.publish(grasp, None, None)
             sink.moment(Moment(grasp, None, None, None))
     with closing(reader):
         lines = [json.decode(line, type=Line | DetailLine) for line in reader.lines]
     details = [line for line in lines if isinstance(line, DetailLine)]
-    assert [line.number for line in details] == (list(range(0, 50, 4)) if detail else [])
+    assert [line.number for line in details] == (list(range(0, 20, 4)) if detail else [])
     assert {line.build for line in details} <= {build.manifest.checksum}
-    assert len(lines) == 50 + len(details)
+    assert len(lines) == 20 + len(details)
