@@ -12,7 +12,7 @@ const SHOWN = 8;
 const MEANS = {
   ok: "everything is read",
   changing: "everything is read, and the hand changes",
-  degraded: "means stand in for what is lost",
+  degraded: "means stand in for what is lost, or a record is late",
   unknown: "too little can be read",
 };
 
