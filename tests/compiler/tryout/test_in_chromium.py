@@ -5,6 +5,7 @@ import csv
 import io
 import json
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.export import to_csv
+from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.tryout import writing
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
@@ -32,7 +34,7 @@ from thenar.drivers.emulated.scanner import ScannerBoard
 from thenar.drivers.lines import Header, parsed
 from thenar.drivers.scanner_protocol import Frame, FrameDecoder, encode
 from thenar.runtime import Build
-from thenar.runtime.calibration import CodeTables, code_of_value, codes_of_bytes
+from thenar.runtime.calibration import CodeTables, codes_of_bytes
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.tables import PAIRED, PLAIN, SLOPED
 from thenar.simulator.handmaps.handmap import hand_map
@@ -129,7 +131,13 @@ ASK = "return arguments[0].map(([bits, codes, lost, dull]) => thenar.recognise(b
 
 def rows_of(build: Build, grasp_set: GraspSet) -> tuple[np.ndarray, np.ndarray]:
     """Return the bits and the codes of all rows of a set, as the build reads them."""
-    bits = grasp_set.switches[:, [switch.column for switch in build.manifest.switches]]
+    columns = [
+        grasp_set.switches[:, switch.column]
+        if switch.threshold is None
+        else grasp_set.taxels[:, switch.threshold.taxel.column] > switch.threshold.code
+        for switch in build.manifest.switches
+    ]
+    bits = np.stack(columns, axis=1)
     return bits, grasp_set.codes[:, [joint.column for joint in build.manifest.joints]]
 
 
@@ -377,6 +385,46 @@ def test_a_lost_switch_counts_by_its_mean(opened: Trier, folder: Path) -> None:
     assert opened.text("margin").startswith(
         f"{100 * found.probability:.1f} %, ahead by {found.margin} steps; degraded: 1 input is lost"
     )
+
+
+def test_a_taxel_goes_from_level_to_level_and_recorded_values_are_levels(
+    trier: Trier, make_set: Make, tmp_path: Path
+) -> None:
+    made = make_set()
+    held = np.where(made.switches[:, 2:4], 2500, 300) + np.random.default_rng(3).integers(0, 1200, (len(made), 2))
+    padded = replace(
+        made,
+        switches=made.switches[:, :2],
+        switch_names=("a", "b"),
+        taxels=held.astype(np.uint16),
+        taxel_columns=(Joint("pad", "N", 0, 0.0, 4095, 20.0), Joint("pull-up", "V", 0, 5.0, 4095, 0.0)),
+    )
+    build = compiled(padded, tmp_path / "build", rounds=8, levels=4)
+    taxels = Counter(switch.source for switch in build.manifest.switches if switch.threshold is not None)
+    name, levels = max(taxels.items(), key=lambda each: each[1])
+    assert levels > 1
+    trier.open(tmp_path / "build" / "try.html")
+    button = trier.one(f"#hand [role=button][aria-label^='{name}']")
+    rising = sorted(
+        (switch.threshold.code, bit)
+        for bit, switch in enumerate(build.manifest.switches)
+        if switch.threshold is not None and switch.source == name
+    )
+    for press in range(1, levels + 2):
+        button.find_element(By.CSS_SELECTOR, ".area").click()
+        closed = press % (levels + 1)
+        assert button.get_attribute("aria-label") == f"{name}, {closed} of {levels} levels closed"
+        bits = np.zeros(build.tables.n_switches, np.intp)
+        bits[[bit for _, bit in rising[:closed]]] = 1
+        assert (trier.text("grasp"), trier.text("margin")) == said_of(build, bits.tolist(), codes_now(trier))
+    (tmp_path / "rows.csv").write_text(to_csv(padded))
+    trier.one("#file").send_keys(str(tmp_path / "rows.csv"))
+    right = sum(
+        build.classify(*row) == truth for *row, truth in zip(*rows_of(build, padded), padded.grasps, strict=True)
+    )
+    said = f"rows.csv: 96 rows, of 96 with a known grasp {right} are recognised."
+    trier.wait(lambda: trier.text("rows-said") == said)
+    assert trier.log("browser") == []
 
 
 @pytest.mark.parametrize("width", [1400, 400])
@@ -644,7 +692,8 @@ def test_values_and_bytes_become_the_codes_that_python_makes_of_them(parts: Trie
         coded = {name: getattr(joint, name) for name in ("name", "unit", "code_a", "value_a", "code_b", "value_b")}
         values = [*random.uniform(-400, 400, 200).tolist(), *np.arange(-30, 30, 0.25).tolist()]
         told = parts.script("return arguments[1].map((value) => parts.codeOf(arguments[0], value))", coded, values)
-        assert told == [code_of_value(joint, value) for value in values]
+        recorded = Joint(joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
+        assert told == np.clip(recorded.code(np.array(values)), 0, 65535).astype(int).tolist()
         line = SensorCalibration("a", 31, -12.5, 222, 95.25)
         meaning = GloveCalibration(sensors=(line,))
         ends = {name: getattr(line, name) for name in ("raw_a", "value_a", "raw_b", "value_b")}
