@@ -32,7 +32,19 @@ from thenar.drivers.cyberglove_protocol import SENSORS_22
 from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts, GloveState
 from thenar.drivers.emulated.scanner import ScannerBoard
 from thenar.drivers.lines import Header, parsed
-from thenar.drivers.scanner_protocol import Frame, FrameDecoder, encode
+from thenar.drivers.scanner_protocol import (
+    WITHOUT_DIODES,
+    Event,
+    Frame,
+    FrameDecoder,
+    FromBoard,
+    Heartbeat,
+    Hello,
+    Lost,
+    encode,
+    frame,
+)
+from thenar.drivers.scanner_state import ambiguous
 from thenar.runtime import Build
 from thenar.runtime.calibration import CodeTables, codes_of_bytes
 from thenar.runtime.manifest import Calibration
@@ -206,6 +218,12 @@ def test_a_build_with_a_class_of_none_and_one_that_refuses_say_none_as_python_do
         # Nothing closed, everything closed: unlike all grasps.
         s, j = build.tables.n_switches, build.tables.n_joints
         frames += [[[bit] * s, [code] * j, [0] * s, [0] * j] for bit in (0, 1) for code in (0, 65535)]
+        # Of grasps, more and more switches lost, down to none that is known to be closed.
+        frames += [
+            [bits, codes, [1] * lost + [0] * (s - lost), dull]
+            for lost in range(s + 1)
+            for bits, codes, _, dull in frames[:9]
+        ]
         answers = trier.script(ASK, frames)
         assert differing(build, frames, answers) == []
         assert "none" in {answer["grasp"] for answer in answers}
@@ -581,6 +599,8 @@ def test_a_cyberglove_is_asked_what_it_is_and_its_bytes_become_codes(
         trier.wait(lambda said=said: trier.text("margin").startswith(said))  # type: ignore[misc]
     state.plugged = False
     wire.until(lambda: "unplugged" in trier.text("serial-said"), turn)
+    inputs = build.tables.n_switches + build.tables.n_joints
+    trier.wait(lambda: f"degraded: {inputs} inputs are lost" in trier.text("margin"))
     assert trier.log("browser") == []
 
 
@@ -631,7 +651,7 @@ def test_lines_of_numbers_are_rows_of_the_build(gloved_trier: Trier, folder: Pat
 
 PARTS = (
     *("parseCalibration", "codeOf", "codesOfBytes", "rounded"),
-    *("parsedLine", "parseCsv", "encodeFrame", "FrameDecoder"),
+    *("parsedLine", "parseCsv", "encodeFrame", "FrameDecoder", "ScannerBoard"),
 )
 
 
@@ -680,6 +700,48 @@ def test_frames_of_a_board_are_encoded_and_decoded_as_by_the_driver(parts: Trier
                 wrong = bytes([wire[0], wire[1] ^ 32, *wire[2:]])
                 assert [frame.payload for frame in FrameDecoder().feed(wrong)] == []
                 assert parts.script(again, list(wrong)) == [None]
+
+
+HEAR = """const [board, sent] = [globalThis.board, globalThis.sent];
+    const found = board.received(Uint8Array.from(arguments[0]));
+    return [found && found.closed.map(Number), found && found.known.map(Number), sent.splice(0).map((one) => one[1])]"""
+
+
+def test_keys_are_known_while_nothing_is_missing_of_what_the_board_told(parts: Trier) -> None:
+    parts.script("globalThis.sent = []; globalThis.board = new parts.ScannerBoard((bytes) => sent.push([...bytes]))")
+    hello = Hello(1, 0, 0, 7, 1, 0, 0, 1, 3, 1000, 0, 50_000, 0, 0, 0)
+
+    def hear(*messages: tuple[FromBoard, int]) -> tuple[list[int] | None, list[int] | None]:
+        wire = b"".join(encode(frame(message, number)) for message, number in messages)
+        closed, known, _ = parts.script(HEAR, list(wire))
+        return closed, known
+
+    assert hear((Heartbeat(0, 1, 3), 9)) == (None, None)
+    assert hear((hello, 10)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(5, 0b101, 3), 11)) == ([1, 0, 1], [1, 1, 1])
+    assert hear((Event(6, 1, 1), 12)) == ([1, 1, 1], [1, 1, 1])
+    # A frame is missing, which may have been an EVENT or a LOST: a HEARTBEAT alone does not say that all can be read.
+    assert hear((Event(7, 1, 0), 14)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(8, 0b100, 3), 16)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(9, 0b100, 3), 17)) == ([0, 0, 1], [1, 1, 1])
+    assert hear((Lost(0b100, 3), 18), (Heartbeat(9, 0b101, 3), 19)) == ([1, 0, 0], [1, 1, 0])
+    # A sound frame that such a board cannot send: nothing holds any more.
+    assert hear((Heartbeat(9, 0b1101, 4), 20), (Event(9, 7, 1), 21)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(9, 0b1, 3), 22)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(9, 0b1, 3), 23)) == ([1, 0, 0], [1, 1, 1])
+    assert parts.script(HEAR, list(b"\x05damaged\x00"))[1] == [0, 0, 0]
+
+
+def test_ghosts_of_a_matrix_without_diodes_are_unknown(parts: Trier) -> None:
+    parts.script("globalThis.sent = []; globalThis.board = new parts.ScannerBoard((bytes) => sent.push([...bytes]))")
+    hello = Hello(1, WITHOUT_DIODES, 0, 7, 1, 0, 0, 3, 4, 1000, 0, 50_000, 0, 0, 0)
+    random = np.random.default_rng(8)
+    parts.script(HEAR, list(encode(frame(hello, 0))))
+    for number in range(1, 40):
+        closed = int(random.integers(0, 1 << 12) & random.integers(0, 1 << 12))
+        _, known, _ = parts.script(HEAR, list(encode(frame(Heartbeat(0, closed, 12), number))))
+        wanted = ~ambiguous(closed, 3, 4)
+        assert known == [wanted >> key & 1 for key in range(12)]
 
 
 def test_values_and_bytes_become_the_codes_that_python_makes_of_them(parts: Trier) -> None:
