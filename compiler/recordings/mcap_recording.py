@@ -413,7 +413,7 @@ def _joint(
     columns = JointColumns((name,), unit, codes=not calibrated, calibration=scale)
     codes, joint, cost = code_joint(name, columns, values, trials)
     if calibrated:  # as live bytes are coded, halves between two codes included
-        coded = BuildCalibration(0, name, unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
+        coded = _coded(joint)
         parts = {id(part): codes_of_bytes(coded, part.session.calibration) for part, _ in grasps}
         codes = np.array([parts[id(part)][_raw(name, part, grasp)] for part, grasp in grasps], np.uint16)
     return codes, joint, cost
@@ -430,9 +430,14 @@ def _taxel(place: int, grasps: Sequence[tuple[_Part, _Grasp]]) -> tuple[list[int
     for part, grasp in grasps:
         count, own = grasp.counts[place], _line(part.session, place)
         assert count is not None
-        code = count if own is None or own == line else round(float(taxel.code(own.at(count))))
+        code = count if own is None or own == line else own.codes(_coded(taxel)).code(count)
         codes.append(min(max(code, 0), CODES - 1))
     return codes, taxel
+
+
+def _coded(joint: Joint) -> BuildCalibration:
+    """Return what the codes of a joint or a taxel mean, as a build has it."""
+    return BuildCalibration(0, joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
 
 
 def _line(session: Session, place: int) -> TaxelLine | None:

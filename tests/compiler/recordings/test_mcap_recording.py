@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
@@ -161,11 +161,16 @@ def test_nothing_of_one_session_is_captured_in_the_next(write: Write) -> None:
     assert "dropped rows" in [warning.kind for warning in report.warnings]
 
 
-@given(st.lists(st.integers(1, 255), min_size=2, max_size=20))
+# Of 56 counts for 90 degrees, the half degrees of every seventh byte lie midway between two codes.
+HALVES = GloveCalibration(sensors=tuple(SensorCalibration(name, 40, 0.0, 96, 90.0) for name in SENSORS))
+
+
+@given(st.lists(st.integers(1, 255), min_size=2, max_size=20), st.sampled_from([CALIBRATION, HALVES]))
+@example([40 + 7 * n for n in range(-5, 16)], HALVES)
 def test_a_calibrated_glove_has_the_codes_that_the_live_recogniser_gives_it(
-    tmp_path_factory: pytest.TempPathFactory, raws: list[int]
+    tmp_path_factory: pytest.TempPathFactory, raws: list[int], calibration: GloveCalibration
 ) -> None:
-    session = replace(SESSION, calibration=CALIBRATION)
+    session = replace(SESSION, calibration=calibration)
     with Recorder(tmp_path_factory.mktemp("mcap") / "a.mcap", session) as recorder:
         for trial, raw in enumerate(raws, start=1):
             do(recorder, trial, "captured", trial, sensors=bytes((raw, raw, 1, 1)))
@@ -175,7 +180,7 @@ def test_a_calibrated_glove_has_the_codes_that_the_live_recogniser_gives_it(
         Calibration(number, joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
         for number, joint in enumerate(grasp_set.joints)
     ]
-    live = CodeTables(joints, SENSORS, CALIBRATION)
+    live = CodeTables(joints, SENSORS, calibration)
     assert grasp_set.codes.tolist() == [live.codes(bytes((raw, raw, 1, 1))) for raw in raws]
     assert {(joint.unit, joint.step) for joint in grasp_set.joints} == {("deg", 0.5)}
     assert all(cost.largest_error <= 0.25 + 1e-9 for cost in report.coding)
