@@ -284,14 +284,20 @@ def served(client: Any) -> bool:
         return False
 
 
-@pytest.mark.parametrize("sent", [b"", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: "])
+ASKED = b"GET /view.js HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+
+
+@pytest.mark.parametrize("sent", [b"", ASKED + b"X-Slow: ", 1000 * (ASKED + b"\r\n")], ids=["silent", "slow", "deaf"])
 def test_who_only_holds_a_place_loses_it(
     serve: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, sent: bytes
 ) -> None:
     monkeypatch.setattr(server, "_FETCH_S", 0.2)
     client = serve()
-    with client.open() as live, connection(client, sent) as held:
-        assert ended(held)
+    with client.open() as live, connection(client) as held:
+        held.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        held.sendall(sent)
+        eventually(lambda: len(client.server._server.connections) == 2)
+        eventually(lambda: len(client.server._server.connections) == 1)
         # The page is another matter.
         client.server.publish("frame", message("frame"))
         assert live.recv(timeout=PATIENCE_S) == '{"topic":"frame"}'
@@ -301,6 +307,8 @@ def test_a_browser_that_stops_reading_is_dropped_and_others_see_all(
     serve: Callable[..., Any], hear: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(server, "HANGING_S", 0.3)
+    # Not by the system, which notices it later.
+    monkeypatch.setattr(server, "_GONE_MS", 600_000)
     client = serve()
     key = b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
     ask = f"GET /live HTTP/1.1\r\nHost: 127.0.0.1:{client.port}\r\nOrigin: {client.origin}\r\n".encode()
