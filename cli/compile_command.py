@@ -202,9 +202,10 @@ def command(
 ) -> None:
     """Choose the switches of SET.grasps, train on them, and write the build: integer tables with their proof.
 
-    The folder holds build.json, tables.bin and ensemble.bin, the classifier in C in firmware/, and with --glove
-    scan.json. report.html shows all of it in a browser; spec/ describes the reduced glove to cut, solder and run. The
-    same recordings, options and wiring give the same bytes.
+    The folder holds build.json, tables.bin and ensemble.bin, the classifier in C in firmware/, with --glove scan.json,
+    and in hand.json where its switches lie. report.html shows all of it in a browser; spec/ describes the reduced glove
+    to cut, solder and run; try.html recognises in a browser what is closed and bent there. The same recordings,
+    options, wiring and layout give the same bytes.
 
     \b
     Example:
@@ -225,14 +226,13 @@ def command(
 
     _check_proposal(propose, chip, glove)
     _check_point(context, from_frontier, point)
-    for name, value in (("--hand-length", hand_length), ("--layout", layout)):
-        if value is not None and not report and not (name == "--layout" and asked["apart_mm"]):
-            raise click.UsageError(f"{name} is of the hand in spec/, which --no-report leaves out: give one of them.")
+    if hand_length is not None and not report:
+        raise click.UsageError("--hand-length is of the hand in spec/, which --no-report leaves out: give one of them.")
     keep_apart(recordings, layout, glove, propose, from_frontier)
     options = asked_settings(context, asked) | _placed(context, asked)
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
-    hand = fitted_hand(layout, grasp_set.element_names, None) if report or asked["apart_mm"] else None
+    hand = fitted_hand(layout, grasp_set.element_names, None)
     if hand_length is not None:
         fitted_hand(layout, grasp_set.element_names, hand_length)
     chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)

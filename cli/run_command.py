@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
+from functools import partial
 from itertools import islice
 from operator import eq
 from pathlib import Path
@@ -14,17 +15,31 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from .common import Number, OutputFile, err, existing_file, existing_folder, of_device, out, overwrite_flag, warning
+from .common import (
+    Number,
+    OutputFile,
+    OutputFolder,
+    err,
+    existing_file,
+    existing_folder,
+    of_device,
+    out,
+    overwrite_flag,
+    warning,
+)
 from .lines import echo
+from .web_options import say_page, token_for, web_options
 
 if TYPE_CHECKING:
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime import Build, Glove
+    from thenar.runtime.live.recogniser import Moment
     from thenar.runtime.policy import Policy
     from thenar.runtime.preshape import Preshape, PreshapeSelector
     from thenar.runtime.published import HealthReport, LiveGrasp
     from thenar.runtime.sinks import SinkReport
     from thenar.runtime.task import TaskFollower
+    from thenar.runtime.web.live import LivePage
 
     from .live_view import LiveView
 
@@ -75,6 +90,10 @@ class _SinkOption(click.Option):
     "--record", metavar="FILE.mcap", type=OutputFile(".mcap"), help="Record the raw frames, and what came of them."
 )
 @overwrite_flag
+@web_options
+@click.option(
+    "--recordings", type=OutputFolder(), metavar="FOLDER", help="Where the page records.  [default: recordings]"
+)
 @click.option("--full-scan", is_flag=True, help="Read all ports in every scan, even when the rest cannot matter.")
 @click.option("--status", is_flag=True, help="Once a second, how the glove fares: in the view, and to all sinks.")
 @click.option("--frames", metavar="N", type=click.IntRange(1), help="Stop after N frames.")
@@ -102,6 +121,9 @@ def command(
     change_while_held: bool,
     task: Path | None,
     record: Path | None,
+    web: str | None,
+    web_token: bool,
+    recordings: Path | None,
     full_scan: bool,
     status: bool,
     frames: int | None,
@@ -124,6 +146,7 @@ def command(
     Example:
         thenar run build/ --glove glove.toml --status
         thenar run build/ --glove glove.toml --sink unix:/run/grasps --preshape barrett_bh8 --record run.mcap
+        thenar run build/ --glove glove.toml --web
         thenar run build/ --replay run.mcap | head -3
         thenar run build/ --glove glove.toml --task task.json
         thenar run build/ --replay set.grasps --sink jsonl:grasps.jsonl --preshape parallel_gripper
@@ -153,9 +176,11 @@ def command(
         viewed = sys.stdout is not None and sys.stdout.isatty() and "jsonl:-" not in sinks
         asked: dict[str, Any] = {"preshapes": preshape, "record": record, "full_scan": full_scan, "status": status}
         asked |= {"change_while_held": change_while_held, "task": task}
-        _run_live(
-            loaded, glove, viewed, frames, sinks=sinks or (() if viewed else ("jsonl:-",)), policy=policy, **asked
-        )
+        asked |= {"sinks": sinks or (() if viewed else ("jsonl:-",)), "policy": policy, "recordable": web is not None}
+        page = None
+        if web is not None:
+            page = partial(_page, build, web, token_for(web_token), recordings or Path("recordings"))
+        _run_live(loaded, glove, viewed, page, frames, **asked)
     elif replay.suffix == ".mcap":
         selecting = _selecting(loaded, preshape, segments=True, change_while_held=change_while_held)
         follower = None if task is None else TaskFollower.of(task, loaded.grasps)
@@ -164,7 +189,8 @@ def command(
         _replay_set(loaded, replay, sinks, _selecting(loaded, preshape, segments=False), frames, period_us)
 
 
-_LIVE = ("record", "full_scan", "status")
+_WEB = ("web_token", "recordings")
+_LIVE = ("record", "web", *_WEB, "full_scan", "status")
 _POLICY = ("lead", "dwell_ms", "max_lost", "grace_ms", "no_quarantine", "error_rate", "spacing_ms", "lag_ms")
 
 
@@ -172,6 +198,8 @@ def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
     """Raise UsageError about an option that would change nothing here."""
     if click.get_current_context().params["preshape"] is None:
         _refuse("without --preshape", "change_while_held")
+    if click.get_current_context().params["web"] is None:
+        _refuse("without --web", *_WEB)
     if glove is not None:
         _refuse("on a glove", "period_us")
     elif replay is not None and replay.suffix == ".mcap":
@@ -207,8 +235,23 @@ def _policy(asked: dict[str, Any]) -> "Policy | None":
     return replace(usual, **{"hold_us": max(usual.hold_us, given.get("dwell_us", 0)), **given})
 
 
+def _page(folder: Path, address: str, token: str | None, recordings: Path, glove: "Glove") -> "LivePage":
+    from thenar.runtime.web.live import LivePage
+
+    page = LivePage(glove, folder, address, token=token, recordings=recordings)
+    say_page(page.server.url)
+    return page
+
+
 def _run_live(
-    build: "Build", harness: Path | None, viewed: bool, frames: int | None, *, status: bool, **asked: Any
+    build: "Build",
+    harness: Path | None,
+    viewed: bool,
+    make_page: "Callable[[Glove], LivePage] | None",
+    frames: int | None,
+    *,
+    status: bool,
+    **asked: Any,
 ) -> None:
     """Run until a signal comes, or so many frames are published."""
     from thenar.runtime import Glove
@@ -221,28 +264,33 @@ def _run_live(
         glove = Glove(build, str(harness), stop=stop, status=status, **asked)
         for lacking in filter(None, (glove.system.unread, glove.lacking)):
             err().print(f"thenar: {lacking}")
+        page = None if make_page is None else stack.enter_context(make_page(glove))
         stack.enter_context(glove)
         view = stack.enter_context(LiveView(out(), status)) if viewed else None
-        _look_on(glove, view, frames)
-    recorder, reports = glove.recorder, glove.reports()
+        recorder = glove.recorder
+        _look_on(glove, view, page, frames)
+    reports = glove.reports()
     _say(f"{glove.frames} frame{'s' * (glove.frames != 1)}")
     _say_what_was_lost(reports)
-    if recorder is not None:
-        failed = f"; {recorder.failure}" if recorder.failure else ""
-        _say(f"{recorder.path}: {recorder.messages} messages{failed}")
-    if (recorder and recorder.failure) or _spoilt(reports):
+    recorders = [*([] if recorder is None else [recorder]), *([] if page is None else page.recorded)]
+    for each in recorders:
+        failed = f"; {each.failure}" if each.failure else ""
+        _say(f"{each.path}: {each.messages} messages{failed}")
+    if any(each.failure for each in recorders) or _spoilt(reports):
         click.get_current_context().exit(1)
 
 
-def _look_on(glove: "Glove", view: "LiveView | None", frames: int | None) -> None:
+def _look_on(glove: "Glove", view: "LiveView | None", page: "LivePage | None", frames: int | None) -> None:
     """Let the glove run, and once a second look how it fares."""
     said, health = dict[str, str](), None
     for moment in islice(glove, frames):
+        if page is not None:
+            page.show(moment)
         if glove.health is not health and glove.health is not None:
             health = glove.health
             if view is None:
                 _say_news(glove, health, said)
-                if glove.recorder is None and _nobody_listens(glove.reports()):
+                if glove.recorder is None and page is None and _nobody_listens(glove.reports()):
                     return
         if view is not None:
             view.show(moment.grasp, glove.devices, health, None if glove.follower is None else glove.follower.progress)
@@ -314,15 +362,15 @@ def _replay_recording(
     They go to the sinks as the live run sent them, without any as JSON lines to stdout; on stderr, how many came out as
     they did then.
     """
-    from thenar.runtime.live.replay import replayed
+    from thenar.runtime.live.replay import moments
     from thenar.runtime.sinks.jsonl import encode
 
     same = count = 0
-    with _published(sinks, selector, lambda grasp, shape: encode(grasp, shape, None), follower) as publish:
-        for then, now in islice(replayed(build, replay, policy, warning), frames):
-            same += then == now
+    with _published(build, sinks, selector, lambda grasp, shape: encode(grasp, shape, None), follower) as publish:
+        for then, now in islice(moments(build, replay, policy, warning), frames):
+            same += then == now.grasp
             count += 1
-            publish(now)
+            publish(now.grasp, now)
     echo(f"{same} of {count} frames recognised as they were recorded", err=True)
     if follower is not None:
         echo(follower.progress.text, err=True)
@@ -357,10 +405,10 @@ def _replay_set(
         }
         return msgspec.json.encode(shown if selector is None else shown | {"preshape": shape}) + b"\n"
 
-    with _published(sinks, selector, line) as publish:
+    with _published(build, sinks, selector, line) as publish:
         for grasp in _rows(build, grasp_set, period_us):
             found.append(grasp.grasp)
-            publish(grasp)
+            publish(grasp, None)
     rows = len(grasp_set)
     correct = sum(map(eq, found, grasp_set.grasps.tolist()))
     echo(f"{correct} of {rows} frames recognised as recorded ({correct / max(rows, 1):.1%})", err=True)
@@ -404,11 +452,12 @@ def _rows(build: "Build", grasp_set: "GraspSet", period_us: int) -> "Iterator[Li
 
 @contextmanager
 def _published(
+    build: "Build",
     sinks: Sequence[str],
     selector: "PreshapeSelector | None",
     line: "Callable[[LiveGrasp, Preshape | None], bytes]",
     follower: "TaskFollower | None" = None,
-) -> "Iterator[Callable[[LiveGrasp], None]]":
+) -> "Iterator[Callable[[LiveGrasp, Moment | None], None]]":
     """Yield what publishes a replayed grasp with its preshape, and news of a task: to sinks, which wait for their
     readers, or without any as a `line` on stdout. At the end say what was lost, with exit code 1.
     """
@@ -421,11 +470,14 @@ def _published(
             opened.append(open_sink(name, wait=True))
             stack.callback(opened[-1].close)
         fanout = Fanout(opened)
+        fanout.begin(build)
 
-        def publish(grasp: "LiveGrasp") -> None:
+        def publish(grasp: "LiveGrasp", moment: "Moment | None") -> None:
             shape = None if selector is None else selector.update(grasp)
             if opened:
                 fanout.publish(grasp, shape, None)
+                if moment is not None:
+                    fanout.moment(moment)
             else:
                 sys.stdout.buffer.write(line(grasp, shape))
             progress = None if follower is None else follower.update(grasp)

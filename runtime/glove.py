@@ -63,6 +63,8 @@ class Glove:
         Where each moment goes besides: "unix:/run/grasps", as `thenar run --sink` spells them.
     record : str or path, optional
         A new .mcap file for the raw frames and what came of them.
+    recordable : bool
+        Whether recordings may begin later (`new_recording`): all sensors are read, as for `record`.
     full_scan : bool
         Whether every scan reads all ports, even when the rest cannot matter.
     task : str or path, optional
@@ -122,6 +124,7 @@ class Glove:
         change_while_held: bool = False,
         sinks: Sequence[str | Sink] = (),
         record: str | PathLike[str] | None = None,
+        recordable: bool = False,
         full_scan: bool = False,
         status: bool = False,
         task: str | PathLike[str] | None = None,
@@ -136,7 +139,8 @@ class Glove:
         self.health: HealthReport | None = None
         self.recorder: Recorder | None = None
         # A recording is to be learnt from: it holds all sensors.
-        devices = system.sources(full_scan=full_scan, all_sensors=record is not None)
+        whole = recordable or record is not None
+        devices = system.sources(full_scan=full_scan, all_sensors=whole)
         self._recognizer, self.sources = system.recognizer(), devices
         self.feed: Feed = self.sources if feed is None else feed
         self._selector = None
@@ -146,11 +150,12 @@ class Glove:
                 preshapes, loaded, segments=by_segments, change_while_held=change_while_held
             )
         calibration = system.calibration
-        read = system.sensor_names if record is not None else system.read_sensors
+        read = system.sensor_names if whole else system.read_sensors
         self._angles = None if calibration is None else AngleReader(system.sensor_names, calibration, read)
         self._measured: GloveFrame | None = None
         self._newest_angles: JointAngles | None = None
         self._sinks, self._record, self._status = tuple(sinks), record, status
+        self._recordable = recordable
         self.follower = None if task is None else TaskFollower.of(Path(task), loaded.grasps)
         self._health, self._due_us = Health(loaded), 0
         self._quarantined: tuple[Quarantined, ...] = ()
@@ -164,8 +169,9 @@ class Glove:
                 sinks.append(open_sink(sink) if isinstance(sink, str) else sink)
                 opening.callback(sinks[-1].close)
             self._fanout = Fanout(sinks)
+            self._fanout.begin(self.system.build)
             if self._record is not None:
-                self.recorder = opening.enter_context(Recorder(Path(self._record), self._session()))
+                self.recorder = opening.enter_context(self.new_recording(Path(self._record)))
             if self.feed is self.sources:
                 opening.enter_context(self.sources)
             self._open = opening.pop_all()
@@ -196,6 +202,7 @@ class Glove:
         progress = None if self.follower is None else self.follower.update(grasp)
         moment.angles = self._angles_of(taken.measured)
         self._fanout.publish(grasp, moment.preshape, moment.angles)
+        self._fanout.moment(moment)
         if progress is not None:
             self._fanout.task(progress)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None, moment.codes)
@@ -204,6 +211,19 @@ class Glove:
             self._look(now)
         self.frames += 1
         return moment
+
+    def new_recording(self, path: Path) -> Recorder:
+        """Return a recording of this glove that has begun. Only the thread that iterates may set it as `recorder`, or
+        take it away; whoever made it closes it.
+
+        Raises SettingError where the file exists, OSError as the operating system gives it.
+        """
+        return Recorder(path, self._session(), marks=self._recordable)
+
+    @property
+    def has_preshapes(self) -> bool:
+        """Whether a robot's hand is told what to do."""
+        return self._selector is not None
 
     def devices(self) -> tuple[DeviceHealth, ...]:
         """Return how every device fares now."""

@@ -231,6 +231,7 @@ class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 
     closed_least, closed_most  for each grasp type, in 255ths, the share of a subject's trials in which it is closed, of
                                the subject with the least and the most; "" in builds of older versions
+    closed_share  the share of all rows in which it is closed; None in builds of older versions
     """
 
     column: Count
@@ -239,6 +240,7 @@ class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     threshold: Threshold | None = None
     closed_least: Bytes = ""
     closed_most: Bytes = ""
+    closed_share: Share | None = None
 
     @property
     def source(self) -> str:
@@ -391,6 +393,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     zero_gain_nodes  decisions of the placement's tree at which no switch gained anything alone; left out if there are
                      none
     scan_sha256      of scan.json; left out where the build was compiled for no harness
+    hand_sha256      of hand.json; None in builds of older versions
     fitting          how the fit was chosen; left out where the options leave no choice
     faults           what faults of inputs leave of the rows trained on; None in builds of older versions
     detection        how surely the build says whether something is held, of the rows trained on and of folds
@@ -418,6 +421,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     detection: tuple[Detected, ...] = ()
     rejection: Rejection | None = None
     segments: SegmentModel | None = None
+    hand_sha256: Digest | None = None
 
     @property
     def answers(self) -> tuple[str, ...]:

@@ -7,8 +7,10 @@ import shutil
 import signal
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FrameType
 from typing import Any, NoReturn
 
 import pytest
@@ -56,6 +58,42 @@ def weka() -> Callable[..., str]:
         return subprocess.run([*command, *arguments], check=True, capture_output=True, text=True).stdout
 
     return run
+
+
+@pytest.fixture(scope="session")
+def calls() -> Callable[[Callable[[], object]], int]:
+    """Return what counts the calls of Python and C functions that some work makes: no other load changes them."""
+
+    def counted(work: Callable[[], object]) -> int:
+        number = 0
+
+        def count(_frame: FrameType, event: str, _what: object) -> None:
+            nonlocal number
+            number += event in {"call", "c_call"}
+
+        sys.setprofile(count)
+        try:
+            work()
+        finally:
+            sys.setprofile(None)
+        return number
+
+    return counted
+
+
+@pytest.fixture(scope="session")
+def peak_bytes() -> Callable[[Callable[[], object]], int]:
+    """Return what tells the most memory that some work holds at a time, arrays included."""
+
+    def measured(work: Callable[[], object]) -> int:
+        tracemalloc.start()
+        try:
+            work()
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+    return measured
 
 
 @pytest.fixture(scope="session")

@@ -296,6 +296,7 @@ def provenance(manifest: Manifest) -> Pairs:
         ("tables.bin, SHA-256", manifest.tables_sha256),
         ("ensemble.bin, SHA-256", manifest.ensemble_sha256),
         ("scan.json, SHA-256", manifest.scan_sha256 or ""),
+        ("hand.json, SHA-256", manifest.hand_sha256 or ""),
     )
     return tuple((name, value) for name, value in pairs if value)
 

@@ -25,8 +25,9 @@ LARGEST_RECORD = 16 << 20
 # What the name of the program in the file's header begins with.
 WRITER = "thenar "
 
-SWITCHES, GLOVE, GRASP, RECOGNITION, TRIALS, TAXELS = range(1, 7)
-# Channel number: (topic, type of its messages). That of taxels is there only where the glove has some.
+SWITCHES, GLOVE, GRASP, RECOGNITION, TRIALS, TAXELS, MARKS = range(1, 8)
+# Channel number: (topic, type of its messages). That of taxels is there only where the glove has some, that of marks
+# where somebody can set one.
 CHANNELS = {
     SWITCHES: ("/thenar/switches", BYTES),
     GLOVE: ("/thenar/glove", BYTES),
@@ -34,6 +35,7 @@ CHANNELS = {
     RECOGNITION: ("/thenar/recognition", STRING),
     TRIALS: ("/thenar/trials", STRING),
     TAXELS: ("/thenar/taxels", BYTES),
+    MARKS: ("/thenar/marks", STRING),
 }
 _SCHEMAS = {name: number for number, name in enumerate(DEFINITIONS, start=1)}
 

@@ -19,17 +19,18 @@ from ..errors import McapError
 from ..frames import GloveFrame, SwitchFrame
 from ..names import SHOWN, list_names, shortened
 from ..published import LiveGrasp
-from .layout import CHANNELS, GLOVE, LARGEST_RECORD, RECOGNITION, SWITCHES, TAXELS, TRIALS, WRITER, Tail
+from .layout import CHANNELS, GLOVE, LARGEST_RECORD, MARKS, RECOGNITION, SWITCHES, TAXELS, TRIALS, WRITER, Tail
 from .messages import decode_bytes, decode_text, glove_frame, switch_frame, taxel_codes
 from .records import End, RawRecord, RecordStream, inside, kind_of
-from .session import METADATA, Label, Session, from_metadata
+from .session import METADATA, Label, Mark, Session, from_metadata
 
-Entry = Session | SwitchFrame | GloveFrame | LiveGrasp | Label
+Entry = Session | SwitchFrame | GloveFrame | LiveGrasp | Label | Mark
 
 _MESSAGE = Struct("<HIQQ")
-_DECODERS: dict[int, Callable[[bytes], LiveGrasp | Label]] = {
+_DECODERS: dict[int, Callable[[bytes], LiveGrasp | Label | Mark]] = {
     RECOGNITION: msgspec.json.Decoder(LiveGrasp).decode,
     TRIALS: msgspec.json.Decoder(Label).decode,
+    MARKS: msgspec.json.Decoder(Mark).decode,
 }
 # What the library's records answer bad bytes with.
 _UNREADABLE = (LibraryError, error, UnicodeDecodeError, OverflowError)
@@ -202,7 +203,7 @@ def parsed(kind: type[Any], content: bytes) -> tuple[Any, int]:
         raise McapError(f"is no {kind.__name__.lower()}: {reason}") from None
 
 
-def _from_json(channel: int, text: bytes) -> LiveGrasp | Label | None:
+def _from_json(channel: int, text: bytes) -> LiveGrasp | Label | Mark | None:
     decoder = _DECODERS.get(channel)
     if decoder is None:
         return None

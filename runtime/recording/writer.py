@@ -17,9 +17,9 @@ from thenar.drivers.errors import SettingError
 from ..files import write_atomically
 from ..frames import GloveFrame, SwitchFrame
 from ..published import LiveGrasp
-from .layout import GLOVE, GRASP, RECOGNITION, SWITCHES, TAXELS, TRIALS, Tail, beginning, ending, session_record
+from .layout import GLOVE, GRASP, MARKS, RECOGNITION, SWITCHES, TAXELS, TRIALS, Tail, beginning, ending, session_record
 from .messages import encode_bytes, encode_text, glove_bytes, switch_bytes, taxel_bytes
-from .session import Label, Session
+from .session import Label, Mark, Session
 
 SYNC_S = 1.0
 
@@ -116,15 +116,17 @@ class Recorder:
     A full disk ends the recording and nothing else: no method raises, and `failure` holds the sentence for the user.
     """
 
-    def __init__(self, path: Path, session: Session, *, tail: Tail | None = None, sync_s: float = SYNC_S) -> None:
-        """Begin a file that must not exist, or go on behind the `tail` of one that does.
+    def __init__(
+        self, path: Path, session: Session, *, tail: Tail | None = None, marks: bool = False, sync_s: float = SYNC_S
+    ) -> None:
+        """Begin a file that must not exist, which takes `marks` or not, or go on behind the `tail` of one that does.
 
         Raises SettingError where the file exists, OSError as the operating system gives it.
         """
         after_ns = 0 if tail is None else tail.last_ns
         self.session = replace(session, clock_ns=max(time.time_ns(), after_ns) - time.monotonic_ns())
         self.path = path
-        self._tail = _begun(path, self.session) if tail is None else tail
+        self._tail = _begun(path, self.session, marks) if tail is None else tail
         self._file = AppendedFile(path, self._tail.size, sync_s)
         if tail is not None and self._append(record := session_record(self.session)):
             self._tail.add_session(len(record))
@@ -175,6 +177,10 @@ class Recorder:
         """Record what became of a trial."""
         self._message(TRIALS, label.time_us, encode_text(_json(label)))
 
+    def mark(self, mark: Mark) -> None:
+        """Record a mark."""
+        self._message(MARKS, mark.time_us, encode_text(_json(mark)))
+
     def close(self) -> None:
         """Write the summary and close; may wait for the disk, and may be called again."""
         if self._file.size == self._tail.size:
@@ -204,13 +210,15 @@ class Recorder:
         return whole
 
 
-def _begun(path: Path, session: Session) -> Tail:
+def _begun(path: Path, session: Session, marks: bool) -> Tail:
     """Make the file, its first session in it, and return its tail."""
     if path.exists():
         raise SettingError(f"{path} exists, and a recording is never written over: name another file")
     tail = Tail()
     if session.taxels:
         tail.counts[TAXELS] = 0
+    if marks:
+        tail.counts[MARKS] = 0
     first, record = beginning(session.thenar, tail), session_record(session)
     # Whole or not at all, so that there is no file without a session.
     write_atomically(path, first + record, mode=_PRIVATE)

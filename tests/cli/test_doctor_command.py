@@ -44,10 +44,9 @@ def test_what_is_there_is_said_with_both_times_and_a_record_against_the_formula(
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert [one["part"] for one in found[1:]] == ["a record", "a record of 9 sensors"]
-    assert all(one["present"] and one["measured_us"] > 0 for one in found)
+    assert all(one["present"] and one["measured_us"] > 0.9 * one["predicted_us"] for one in found)
     assert [round(one["predicted_us"]) for one in found] == [6323, 6323, round(9 * 250 + 12 * 10e6 / 115_200)]
     assert "of the vendor's formula, 6323 us" in found[1]["remarks"][0]
-    assert found[1]["measured_us"] > found[2]["measured_us"] > 0.9 * found[2]["predicted_us"]
     measured = round(found[1]["measured_us"])
     assert harness.read_text() == before.replace("[cyberglove]\n", f"[cyberglove]\nrecord_us = {measured}\n")
     assert thenar("doctor", harness, "--write").returncode == 0

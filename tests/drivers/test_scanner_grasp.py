@@ -12,7 +12,7 @@ from thenar.drivers.scanner_protocol import DEGRADED, EARLY, NO_GRASP
 KEYS = 12
 EVERY = (1 << KEYS) - 1
 BAUD = 1_000_000
-LONG_S = 5.0
+LONG_S = 60.0
 
 
 @pytest.fixture

@@ -29,13 +29,15 @@ from thenar.compiler.report.frontier import frontier_view
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME, Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.hand import HAND_NAME, load_hand
 from thenar.runtime.live.system import System
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import scan_us
 
 _SEAL = 10  # bytes that say what a file is, and its format
-_DIGESTS = {TABLES_NAME: "tables_sha256", ENSEMBLE_NAME: "ensemble_sha256", SCAN_NAME: "scan_sha256"}
+_DIGESTS = {TABLES_NAME: "tables_sha256", ENSEMBLE_NAME: "ensemble_sha256"}
+_DIGESTS |= {SCAN_NAME: "scan_sha256", HAND_NAME: "hand_sha256"}
 
 
 def _canonical(data: bytes, kind: type[msgspec.Struct]) -> bytes:
@@ -74,6 +76,7 @@ def _use_build(folder: Path) -> None:
     switches, joints = build.tables.n_switches, build.tables.n_joints
     closed, codes = np.ones(switches, np.bool_), np.full(joints, 65535, np.uint16)
     build.classify(closed, codes)
+    load_hand(folder, build.manifest)
     build.recognise(closed, codes, closed, np.zeros(joints, np.bool_))
     for step in (_live, _verified, _spec, _firmware):
         _allowed(step, build, folder)

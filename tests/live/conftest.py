@@ -30,8 +30,6 @@ from thenar.simulator.playing.performance import Performance, of_scene
 SETTLE_US = 150_000
 # By so much more a frame of a scanner board may seem to be older than it is: the round trip of a PING.
 TRIP_US = 25_000
-# What such a computer adds to a time that is promised.
-SLACK_US = 300_000
 LONG_S = 20.0
 # So many grasps of what is left show that the rest goes on.
 AGAIN = 10
@@ -310,13 +308,12 @@ def outage() -> Callable[..., float]:
         *,
         lost: set[str],
         period_us: int,
-        within_us: int = 1_000_000,
         rows: tuple[int, int] | None = None,
     ) -> float:
         """Show a row; let `fault` happen and show another row; heal.
 
-        Within two of the device's periods exactly `lost` must be missing, and be missing until it is healed: nothing
-        else stops. Within within_us of healing all must be well and right.
+        Exactly `lost` must come to be missing, and be missing until it is healed: nothing else stops. Then all must be
+        well and right again. How soon is printed: in test_recogniser.py the clock is the test's own.
         """
         before, during = rows or (0, 5)
         scene.show(before)
@@ -325,21 +322,18 @@ def outage() -> Callable[..., float]:
         gone_us = now_us()
         scene.show(during)
         first = scene.grasps.wait(lambda g: g.health != "ok" and set(g.lost) == lost, gone_us)
-        limit_us = 2 * period_us + SLACK_US
-        assert first.time_us - gone_us <= limit_us, f"told only {first.time_us - gone_us} us after"
         # The rest goes on: such grasps come again and again. (A busy computer may be late with the rest for a while.)
-        again_us = gone_us + limit_us
+        again_us = sure_us = first.time_us + 2 * period_us + SETTLE_US
         for _ in range(AGAIN):
             again_us = scene.grasps.wait(lambda g: set(g.lost) == lost, again_us + 1).time_us
         healed_us = now_us()
         heal()
         back_us = now_us()
-        told = [g for g in scene.grasps.since(gone_us + limit_us) if g.time_us < healed_us]
+        told = [g for g in scene.grasps.since(sure_us) if g.time_us < healed_us]
         assert all(g.health != "ok" and lost <= set(g.lost) for g in told)
         well = scene.well(back_us)
         took_us = well.time_us - back_us
         print(f"missed {(first.time_us - gone_us) / 1000:.1f} ms after, well {took_us / 1000:.1f} ms after")
-        assert took_us <= within_us + SLACK_US, f"well again only {took_us} us after"
         scene.settled(during, back_us)
         assert scene.check() > 0
         return took_us / 1e6

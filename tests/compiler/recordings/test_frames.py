@@ -1,5 +1,5 @@
 import runpy
-import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +15,8 @@ from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.recordings.taxonomy import own
 from thenar.simulator.running.simulation import simulate
 from thenar.simulator.scenes.decode import load_scene
+
+Measure = Callable[[Callable[[], object]], int]
 
 COLUMNS = Path(__file__).resolve().parents[3] / "examples" / "columns"
 
@@ -112,13 +114,16 @@ def test_what_never_varies_and_what_is_hardly_there_says_nothing() -> None:
         assert looks_like_frames(grasp_set.rows(np.arange(rows))) is None
 
 
-def test_a_set_of_20000_rows_takes_less_than_a_second() -> None:
-    large = make(trials=200, frames=10, types=10, subjects=1, n_switches=160, n_joints=22)
-    wrong = misnamed(large, "row")
-    began = time.process_time()
-    assert looks_like_frames(large) is None
-    assert looks_like_frames(wrong)
-    assert time.process_time() - began < 2.0
+@pytest.mark.parametrize("wrong", [False, True])
+def test_ten_times_the_rows_are_the_same_calls_on_ten_times_the_memory(
+    calls: Measure, peak_bytes: Measure, wrong: bool
+) -> None:
+    few, many = (make(trials=trials, frames=10, types=10, subjects=1, n_switches=160) for trials in (20, 200))
+    if wrong:
+        few, many = misnamed(few, "row"), misnamed(many, "row")
+    assert bool(looks_like_frames(many)) == wrong
+    assert calls(lambda: looks_like_frames(many)) == calls(lambda: looks_like_frames(few))
+    assert peak_bytes(lambda: looks_like_frames(many)) < 12 * peak_bytes(lambda: looks_like_frames(few))
 
 
 def test_the_refusal_names_both_remedies_and_the_claim_silences_it() -> None:

@@ -1,8 +1,8 @@
 import codecs
 import gzip
+from collections.abc import Callable
 from pathlib import Path
 from random import Random
-from time import process_time
 
 import pytest
 
@@ -93,14 +93,14 @@ def test_a_table_that_is_not_utf8_is_windows_1252_where_python_decodes_it_so(byt
 
 
 @pytest.mark.parametrize("signs", ["\",;\t| '\\ab1", "\"'~`,;|", '",a\\', "1.,- ", '"', ",", "*/ int x; /*,"])
-def test_a_hostile_sample_is_looked_at_quickly(signs: str, tmp_path: Path) -> None:
+def test_a_hostile_sample_is_looked_at_quickly(
+    signs: str, tmp_path: Path, calls: Callable[[Callable[[], object]], int]
+) -> None:
     """Long lines of whatever may be a delimiter, a quote or an escape, in two orders."""
     random = Random(1)
     lines = ["".join(random.choices(signs, k=20_000)) for _ in range(30)] + [signs * (20_000 // len(signs))] * 30
     (tmp_path / "t.csv").write_text("\n".join(lines))
-    start = process_time()
-    sniff(tmp_path / "t.csv")
-    assert process_time() - start < 2
+    assert calls(lambda: sniff(tmp_path / "t.csv")) < 3_000_000
 
 
 @pytest.mark.parametrize(

@@ -97,7 +97,7 @@ def test_after_a_restart_it_answers_when_it_is_ready(line: PtyLine, client: Seri
         began = monotonic()
         client.write(b"\x12")
         assert client.read(SOON_S)[:1] == b"\x12"
-        assert 1.75 <= monotonic() - began < SOON_S
+        assert monotonic() - began >= 1.75
         client.drain(0.05)
         assert Dialogue(client).ask(query("G")) == b"\x03"
 

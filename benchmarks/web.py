@@ -1,0 +1,163 @@
+"""What a page costs the run that it shows, with nobody looking, one browser, ten, and one of ten that hangs.
+
+    python benchmarks/web.py [--frames N]
+
+Each frame comes from memory, 400 a second, to a run without a page and to one with it, so that what else the machine
+does hits both. A line a case: CPU of the run's thread a frame, and how much more that is than without a page (at most
+20 us); wall time from a frame to its grasp; how busy the server's thread keeps a core; how many frames a second the
+readers got. Readers are WebSockets in a process of their own, on the same cores.
+"""
+
+import argparse
+import os
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from urllib.parse import urlsplit
+
+import numpy as np
+from liveplay import Memory, Played, board, glove, played, restless, with_glove
+from rich.console import Console
+from rich.table import Table
+
+from thenar.runtime import Glove
+from thenar.runtime.frames import now_us
+from thenar.runtime.web.live import LivePage
+
+MOST_US, HZ, WARM = 20, 400, 200
+# Says when all are connected; at the end of its input, how many frames each reader got.
+READERS = """
+import asyncio, sys
+from websockets.asyncio.client import connect
+url, origin, readers, hanging = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
+counts = [0] * readers
+async def read(number, live):
+    async for text in live:
+        counts[number] += text.startswith('{"topic":"frame"')
+async def main():
+    how = dict(origin=origin, compression=None, proxy=None, ping_interval=None)
+    live = [await connect(url, **how, max_queue=None if n < readers else 1) for n in range(readers + hanging)]
+    tasks = [asyncio.create_task(read(number, each)) for number, each in enumerate(live[:readers])]
+    print("connected", flush=True)
+    line = await asyncio.get_running_loop().run_in_executor(None, sys.stdin.readline)
+    print(*counts, flush=True)
+    for each in live: each.transport.abort()
+asyncio.run(main())
+"""
+
+
+@dataclass
+class Case:
+    """A run, and what its frames took."""
+
+    what: str
+    step: Callable[[], object]
+    feed: Memory
+    thread_us: list[float] = field(default_factory=list)
+    wall_us: list[float] = field(default_factory=list)
+
+
+def measured(cases: Sequence[Case], frames: list[tuple[int, bytes]]) -> None:
+    """Let frames come at their rate, each to every case, and note what it takes."""
+    due = time.perf_counter()
+    for number, (closed, sensors) in enumerate(frames):
+        due += 1 / HZ
+        time.sleep(max(due - time.perf_counter(), 0))
+        for case in cases if number % 2 else reversed(cases):
+            case.feed.put(now_us(), closed, sensors)
+            wall, own = time.perf_counter_ns(), time.thread_time_ns()
+            case.step()
+            case.thread_us.append((time.thread_time_ns() - own) / 1e3)
+            case.wall_us.append((time.perf_counter_ns() - wall) / 1e3)
+
+
+def run_of(scene: Played, folder: Path, what: str, stack: ExitStack, *, page: bool) -> tuple[Case, LivePage | None]:
+    """Return a run with a sink, and its page."""
+    harness, feed = with_glove(board(scene), glove(scene)), Memory(len(scene.kept))
+    run = Glove(scene.build, harness, sinks=["jsonl:/dev/null"], status=True, feed=feed, recordable=page)
+    if not page:
+        stack.enter_context(run)
+        return Case(what, lambda: next(run), feed), None
+    shown = stack.enter_context(LivePage(run, scene.folder, "127.0.0.1:0", token=None, recordings=folder))
+    stack.enter_context(run)
+    return Case(what, lambda: shown.show(next(run)), feed), shown
+
+
+@contextmanager
+def readers(page: LivePage, number: int, hanging: int, found: list[str]) -> Iterator[None]:
+    """Let so many read along; `found` is how many frames a second the slowest and the quickest of them got."""
+    place = urlsplit(page.server.url).netloc
+    arguments = [f"ws://{place}/live", f"http://{place}", str(number), str(hanging)]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        [sys.executable, "-c", READERS, *arguments], stdin=pipe, stdout=pipe, text=True, bufsize=1
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdout.readline()
+        start = time.perf_counter()
+        yield
+        seconds = time.perf_counter() - start
+        process.stdin.write("\n")
+        counts = sorted(int(word) / seconds for word in process.stdout.readline().split())
+        found.append(f"{counts[0]:.0f} to {counts[-1]:.0f}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--frames", type=int, default=4000, help="of each case (default 4000)")
+    options = parser.parse_args()
+    console = Console(width=180)
+    busy = f"{os.getloadavg()[0]:.1f} processes were busy on {os.cpu_count()} cores when it began"
+    console.print(f"{platform.machine()}, Python {platform.python_version()}; {busy}\n")
+    table = Table(title=f"A frame of a run that shows itself (at most {MOST_US} us more of the run's thread)")
+    for name in ("", "run's thread: median, 99 %", "more", "frame to grasp: median, 99 %", "server", "frames/s shown"):
+        table.add_column(name, justify="right" if table.columns else "left")
+    with TemporaryDirectory() as name:
+        scene = played("quick", Path(name))
+        for what, number, hanging in (
+            ("nobody looks", 0, 0),
+            ("one browser", 1, 0),
+            ("ten browsers", 10, 0),
+            ("ten, and one that hangs", 10, 1),
+        ):
+            for case in compared(scene, Path(name), what, number, hanging, options.frames):
+                table.add_row(*case)
+    console.print(table)
+
+
+def compared(
+    scene: Played, folder: Path, what: str, number: int, hanging: int, frames: int
+) -> Iterator[tuple[str, ...]]:
+    """Yield the line of a run without a page, and that of one with."""
+    with ExitStack() as stack:
+        plain, _ = run_of(scene, folder, "  no page", stack, page=False)
+        shown, page = run_of(scene, folder, what, stack, page=True)
+        assert page is not None
+        found: list[str] = []
+        clock = time.pthread_getcpuclockid(page.server.thread.ident or 0)
+        with readers(page, number, hanging, found) if number else ExitStack():
+            start, busy = time.perf_counter(), time.clock_gettime(clock)
+            measured((plain, shown), restless(len(scene.kept), frames, seed=1))
+            share = (time.clock_gettime(clock) - busy) / (time.perf_counter() - start)
+        before = np.median(plain.thread_us[WARM:])
+        for case in (plain, shown):
+            own, wall = (np.percentile(each[WARM:], (50, 99)) for each in (case.thread_us, case.wall_us))
+            yield (
+                case.what,
+                f"{own[0]:.0f} us, {own[1]:.0f} us",
+                "" if case is plain else f"{own[0] - before:+.1f} us",
+                f"{wall[0]:.0f} us, {wall[1]:.0f} us",
+                "" if case is plain else f"{share:.1%}",
+                found[0] if found and case is shown else "",
+            )
+
+
+if __name__ == "__main__":
+    main()

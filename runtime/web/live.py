@@ -1,0 +1,180 @@
+"""The live page of a run: what it shows of each moment, and what it may ask for.
+
+In the loop of the run a moment costs a reference or two; its text is made on the server's thread, when a page is open.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import msgspec
+
+from ..detail import Details
+from ..glove import Glove
+from ..hand import load_hand
+from ..live.recogniser import Moment
+from ..published import HealthReport, LiveGrasp
+from ..recording.writer import Recorder
+from ..taxels import calibration_of
+from .recordings import Recordings
+from .server import Server, message
+
+# How much of the past a page that is opened now gets to see, and how finely.
+PAST_US, _STEP_US = 30_000_000, 10_000
+_encode = msgspec.json.Encoder().encode
+_FRAME = b'{"topic":"frame",'
+
+
+class LivePage:
+    """Serves the live page of a glove until it is left; a context manager.
+
+    Parameters
+    ----------
+    glove : Glove
+        What runs; it is `recordable`.
+    folder : Path
+        The build's, whose hand is drawn.
+    address, token
+        As for `Server`.
+    recordings : Path
+        The one folder into which a page can record.
+
+    Attributes
+    ----------
+    server : Server
+        What serves it; `server.url` is its address.
+
+    Raises
+    ------
+    BuildError
+        If the build's drawing of a hand is damaged.
+    SettingError, SinkError
+        As `Server` does.
+    """
+
+    def __init__(self, glove: Glove, folder: Path, address: str, *, token: str | None, recordings: Path) -> None:
+        self._glove, self._frames = glove, FrameText(glove)
+        self._health: HealthReport | None = None
+        self._progress: object = None
+        self._past = Past()
+        self._recordings = Recordings(glove, recordings, self._tell_recording)
+        build, hand = glove.system.build, load_hand(folder, glove.system.build.manifest)
+        self._first = (
+            message(
+                "build",
+                name=glove.system.harness.name,
+                grasps=build.manifest.answers,
+                switches=[switch.name for switch in build.manifest.switches],
+                joints=[joint.name for joint in build.manifest.joints],
+                taxels=glove.system.harness.taxel_names,
+                preshapes=glove.has_preshapes,
+                records=True,
+            ),
+            message("hand", hand),
+        )
+        self.server = Server("live", address, token=token, on_message=self._recordings.take, hello=self._hello)
+        self._tell_recording()
+
+    def show(self, moment: Moment) -> None:
+        """Show what the glove has just published, and do what pages asked for. For the thread of the run."""
+        grasp, glove = moment.grasp, self._glove
+        self.server.publish("frame", partial(self._frames, moment))
+        self._past.add(grasp)
+        if glove.health is not self._health and glove.health is not None:
+            self._health = glove.health
+            self.server.publish("health", partial(message, "health", self._health))
+            self._tell_recording()
+        if glove.follower is not None and glove.follower.progress is not self._progress:
+            self._progress = glove.follower.progress
+            self.server.publish("task", partial(message, "task", text=glove.follower.progress.text))
+        self._recordings.step()
+
+    @property
+    def recorded(self) -> Sequence[Recorder]:
+        """The recordings that pages began."""
+        return self._recordings.made
+
+    def close(self) -> None:
+        """End the page, and a recording that it began."""
+        self.server.close()
+        self._recordings.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _tell_recording(self) -> None:
+        self.server.publish("recording", message("recording", self._recordings.state))
+
+    def _hello(self) -> Sequence[bytes]:
+        return (*self._first, self._past.text())
+
+
+class Past:
+    """What was recognised lately, for pages that are opened later. `add` and `text` may be called on two threads."""
+
+    def __init__(self) -> None:
+        self._grasps: deque[LiveGrasp] = deque(maxlen=PAST_US // _STEP_US)
+        self._newest_us, self._due_us = 0, 0
+
+    def add(self, grasp: LiveGrasp) -> None:
+        """Take what was recognised."""
+        if grasp.time_us >= self._due_us or grasp.time_us < self._newest_us:
+            self._due_us = grasp.time_us + _STEP_US
+            self._grasps.append(grasp)
+        self._newest_us = grasp.time_us
+
+    def text(self) -> bytes:
+        """Return the message of it: an entry for every change."""
+        changes: list[tuple[object, ...]] = []
+        until_us = 0
+        for grasp in self._grasps.copy():
+            until_us = grasp.time_us
+            entry = (
+                *(grasp.candidate, grasp.grasp, grasp.health, grasp.state, grasp.segment),
+                *(grasp.segment_type, grasp.segment_us),
+            )
+            if not changes or entry != changes[-1][1:]:
+                changes.append((until_us, *entry))
+        return message("past", changes=changes, until_us=until_us)
+
+
+class FrameText:
+    """Makes the text of a moment: the fields of its grasp, preshape and angles as sinks have them, those of `Detail`,
+    and `taxels`: how far each taxel that was read and is calibrated is pressed, by name: 0 at rest, 1 at its press.
+    """
+
+    def __init__(self, glove: Glove) -> None:
+        harness = glove.system.harness
+        self._details = Details(glove.system.build)
+        calibration = calibration_of(harness.taxel_settings)
+        self._taxels = [None if calibration is None else calibration.line(name) for name in harness.taxel_names]
+
+    def __call__(self, moment: Moment) -> bytes:
+        """Return the text."""
+        frame = moment.switches
+        more = {
+            "preshape": moment.preshape,
+            "angles": moment.angles,
+            "taxels": {} if frame is None or frame.taxels is None else self._pressed(frame.taxels),
+        }
+        parts = map(_inside, (moment.grasp, self._details(moment), more))
+        return _FRAME + b",".join(parts) + b"}"
+
+    def _pressed(self, codes: Sequence[int | None]) -> dict[str, float]:
+        return {
+            line.name: round(min(max((code - line.rest) / (line.press - line.rest), 0.0), 1.0), 3)
+            for code, line in zip(codes, self._taxels, strict=True)
+            if code is not None and line is not None
+        }
+
+
+def _inside(fields: object) -> bytes:
+    return _encode(fields)[1:-1]

@@ -1,0 +1,58 @@
+// The live page of a run: what comes is shown, what is pressed is asked for.
+import { View } from "./view.js";
+import { connect, say } from "./wire.js";
+
+const $ = (id) => document.getElementById(id);
+const view = new View();
+let recording = null;
+
+const send = connect({
+  open: () => view.link(true),
+  closed: () => view.link(false),
+  source: (source) => view.source(source),
+  build: (build) => {
+    view.build(build);
+    $("record-panel").hidden = !build.records;
+  },
+  hand: (hand) => view.setHand(hand),
+  past: (past) => view.past(past),
+  frame: (frame) => view.take(frame),
+  health: (report) => view.health(report),
+  task: (task) => view.task(task),
+  recording: (state) => {
+    recording = state;
+    say($("refused"), "");
+    show(state);
+  },
+  refused: ({ why }) => say($("refused"), why),
+});
+
+function show({ on, fixed, name, folder, since_s, messages, marks, failure }) {
+  $("recording").dataset.on = on ? "yes" : "no";
+  const begun = new Date(1000 * since_s).toLocaleTimeString();
+  const held = `${messages} messages, ${marks} ${marks === 1 ? "mark" : "marks"}`;
+  const words = on ? `${name}, since ${begun}: ${held}` : name ? `${name} is whole: ${held}` : `none; goes to ${folder}`;
+  say($("recording"), failure || words);
+  const had = document.activeElement;
+  $("record").disabled = on;
+  $("record-name").disabled = on;
+  $("mark").disabled = !on;
+  $("stop").disabled = !on || fixed;
+  // A keyboard stays where it can go on.
+  if (had?.disabled) $(on ? "mark" : "record").focus();
+}
+
+$("record").addEventListener("click", () => {
+  const name = $("record-name");
+  if (name.reportValidity()) ask({ do: "record", name: name.value });
+});
+$("record-name").addEventListener("keydown", (event) => {
+  if (event.key === "Enter") $("record").click();
+});
+$("mark").addEventListener("click", () => ask({ do: "mark" }));
+$("stop").addEventListener("click", () => ask({ do: "stop" }));
+
+function ask(asked) {
+  if (!send(asked)) say($("refused"), "not connected");
+  else if (recording) say($("refused"), "");
+}

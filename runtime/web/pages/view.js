@@ -1,0 +1,296 @@
+// What the live page shows of a run, wherever its moments come from.
+import { drawHand } from "./hand.js";
+import { Timeline } from "./timeline.js";
+import { say } from "./wire.js";
+
+const $ = (id) => document.getElementById(id);
+const WORDS_MS = 200; // numbers and words change five times a second, or nobody could read them
+const SETTLED_MS = 1000; // what is read out has stood for so long
+const QUIET_MS = 3000; // and no sooner after the last
+const SHOWN = 8;
+
+const MEANS = {
+  ok: "everything is read",
+  changing: "everything is read, and the hand changes",
+  degraded: "means stand in for what is lost, or a record is late",
+  unknown: "too little can be read",
+};
+
+export class View {
+  constructor() {
+    this.timeline = new Timeline($("past"));
+    this.frame = null;
+    this.shown = null;
+    this.drawing = null;
+    this.hand = null;
+    this.bits = new Map();
+    this.closed = [];
+    this.joints = [];
+    this.rows = new Map();
+    this.quarantined = [];
+    this.words = 0;
+    this.said = { text: "", at: 0, since: 0, candidate: "" };
+    this.latencies = [];
+    this.count = { frames: 0, from: performance.now(), number: null };
+    requestAnimationFrame(() => this.#draw());
+  }
+
+  /** Take which grasp types, switches and joints there are. */
+  build(build) {
+    say($("name"), build.name);
+    this.timeline.setNames(build.grasps);
+    this.bits = new Map(build.switches.map((name, bit) => [name, bit]));
+    this.joints = build.joints;
+    this.closed = build.switches.map(() => false);
+    this.rows.clear();
+    $("types").replaceChildren();
+    for (const grasp of build.grasps) this.#row(grasp);
+    $("preshape").hidden = !build.preshapes;
+    $("hand-panel").hidden = Boolean(build.partial);
+    this.answers = build.grasps;
+  }
+
+  /** Take where the inputs of the build are on the hand. */
+  setHand(hand) {
+    this.hand = hand;
+    this.drawing = drawHand($("hand"), hand, {});
+  }
+
+  /** Take what was recognised before. */
+  past({ changes, until_us }) {
+    this.timeline.clear();
+    for (const [time_us, candidate, grasp, health, state, segment, segment_type, segment_us] of changes) {
+      this.timeline.untilUs = time_us; // an entry stands until the next
+      this.timeline.add({ time_us, candidate, grasp, health, state, segment, segment_type, segment_us });
+    }
+    this.timeline.untilUs = until_us;
+  }
+
+  /** Take a moment. */
+  take(frame) {
+    if (frame === null) return;
+    this.frame = frame;
+    this.count.frames += 1;
+    this.latencies.push(frame.latency_us);
+    this.timeline.add(frame);
+  }
+
+  /** Take how devices and inputs fare. */
+  health(report) {
+    const rows = report.devices.map((device) => {
+      const row = document.createElement("tr"), head = cell("th", device.name);
+      head.scope = "row";
+      const state = device.error || (device.connected ? "connected" : "not connected");
+      const counted = device.counts.filter((count) => count.value).map((count) => `${count.name} ${count.value}`);
+      row.append(head, cell("td", state), cell("td", counted.join(", ") || "nothing"));
+      return row;
+    });
+    $("devices").replaceChildren(...rows);
+    this.quarantined = report.quarantined.map(({ name, reason, used }) =>
+      `${name}: ${reason}, ${used ? "used all the same" : "treated as lost"}`,
+    );
+    this.suspects = [
+      ...report.stuck_open.map((name) => `${name}: was never seen closed`),
+      ...report.stuck_closed.map((name) => `${name}: was never seen open`),
+      ...report.chattering.map((name) => `${name}: chatters`),
+      ...report.drifting.map(({ joint, codes }) => `${joint}: has drifted by ${codes} codes`),
+    ];
+    this.rates = `${report.switch_hz.toFixed(0)}/s switches, ${report.glove_hz.toFixed(0)}/s glove`;
+    this.#wrong();
+  }
+
+  task({ text }) {
+    $("task").hidden = false;
+    say($("task"), `Task: ${text}`);
+  }
+
+  /** Show whether the server is there, and what it says of where its moments come from. */
+  link(connected) {
+    this.connected = connected;
+    this.#link();
+  }
+
+  source(source) {
+    this.from = source;
+    this.#link();
+  }
+
+  #link() {
+    const there = this.connected && (this.from?.connected ?? true);
+    $("link").dataset.is = there ? "ok" : "unknown";
+    say($("link"), there ? "connected" : "not connected");
+    say($("source"), (this.connected && this.from?.error) || "");
+    if (!there) this.#announce("not connected", performance.now(), true);
+  }
+
+  #row(grasp) {
+    const row = document.createElement("li"), bar = document.createElement("div"), full = document.createElement("span");
+    const parts = ["sign", "name", "share"].map((name) => {
+      const part = document.createElement("span");
+      part.className = name;
+      return part;
+    });
+    parts[1].textContent = grasp;
+    bar.className = "bar";
+    bar.append(full);
+    row.append(...parts, bar);
+    $("types").append(row);
+    this.rows.set(grasp, { row, full, share: parts[2] });
+    return this.rows.get(grasp);
+  }
+
+  #draw() {
+    requestAnimationFrame(() => this.#draw());
+    const { frame } = this, now = performance.now();
+    if (frame === null || frame === this.shown) return;
+    const news = this.shown?.grasp !== frame.grasp;
+    this.shown = frame;
+    this.#now(frame);
+    // Some streams say nothing of single switches, or of how likely the other types are.
+    $("types-say").hidden = frame.closed !== undefined;
+    this.#hand(frame);
+    this.#bars(frame);
+    this.timeline.draw();
+    if (news || now - this.words >= WORDS_MS) {
+      this.words = now;
+      this.#numbers(frame, now);
+    }
+    this.#announce(frame.grasp, now);
+  }
+
+  #now(frame) {
+    const grasp = $("grasp");
+    if (grasp.textContent !== frame.grasp) {
+      grasp.textContent = frame.grasp;
+      grasp.style.setProperty("--letters", String([...frame.grasp].length));
+      document.title = `${frame.grasp} · thenar`;
+    }
+    grasp.classList.toggle("unsure", frame.grasp === "unknown");
+    const health = $("health");
+    if (health.dataset.is !== frame.health || !health.textContent) {
+      health.dataset.is = frame.health;
+      say(health, frame.health);
+      say($("why"), MEANS[frame.health] ?? "");
+    }
+  }
+
+  #hand(frame) {
+    if (!this.drawing || frame.closed === undefined) return;
+    const lost = new Set(frame.lost), gone = [];
+    for (const [name, bit] of this.bits) {
+      gone[bit] = lost.has(name);
+      // What was left unread stays as it was read last.
+      if (frame.unread[bit] !== "1") this.closed[bit] = frame.closed[bit] === "1";
+    }
+    this.drawing.setClosed(this.closed, gone);
+    this.drawing.setPose((frame.joints ?? this.joints.map(() => null)).map((value, at) => (lost.has(this.joints[at]) ? null : value)));
+    this.drawing.setTaxels(this.hand.taxels.map(({ name }) => frame.taxels[name] ?? null));
+  }
+
+  #bars(frame) {
+    const { probabilities } = frame;
+    for (const [grasp, { row, full }] of this.rows) {
+      const share = probabilities?.[this.answers.indexOf(grasp)] ?? (grasp === frame.grasp ? frame.probability : 0);
+      full.style.transform = `scaleX(${share})`;
+      if (grasp === frame.grasp) row.setAttribute("aria-current", "true");
+      else row.removeAttribute("aria-current");
+    }
+    if (!this.rows.has(frame.grasp) && frame.grasp !== "unknown") this.#row(frame.grasp);
+  }
+
+  #numbers(frame, now) {
+    for (const [grasp, { share }] of this.rows) {
+      const at = this.answers.indexOf(grasp);
+      const value = frame.probabilities?.[at] ?? (grasp === frame.grasp ? frame.probability : null);
+      say(share, value === null ? "–" : `${(100 * value).toFixed(value > 0.9995 || value < 0.0005 ? 0 : 1)} %`);
+    }
+    const sure = frame.grasp === "unknown" ? "" : `${(100 * frame.probability).toFixed(0)}\u00a0% in this frame`;
+    const held = frame.segment_us === null ? "" : `segment ${frame.segment}, ${frame.state} for ${((frame.time_us - frame.segment_us) / 1e6).toFixed(1)}\u00a0s`;
+    say($("segment"), [sure, held].filter(Boolean).join(" · "));
+    if (!$("preshape").hidden) say($("preshape"), `Preshape: ${frame.preshape?.name ?? "none yet"}`);
+    const closed = this.closed.filter(Boolean).length;
+    if (this.bits.size && frame.closed !== undefined) {
+      const names = [...this.bits].filter(([, bit]) => this.closed[bit]).map(([name]) => name);
+      say($("hand-says"), `${closed} of ${this.bits.size} closed${listed(names)}`);
+    }
+    this.#times(frame, now);
+    this.#wrong();
+    const segments = this.timeline.segments().slice(0, SHOWN);
+    list($("segments"), segments.map(({ number, type, seconds, lasts }) => `${number}: ${type}, ${seconds.toFixed(1)} s${lasts ? ", now" : ""}`));
+    const told = segments.length ? segments.map(({ type }) => type).reverse().join(", ") : "none";
+    const label = `What was recognised in the last 30 seconds: this frame ${frame.candidate}, announced ${frame.grasp}, segments: ${told}`;
+    if ($("past").getAttribute("aria-label") !== label) $("past").setAttribute("aria-label", label);
+  }
+
+  #times(frame, now) {
+    const { count } = this, seconds = (now - count.from) / 1000;
+    if (seconds >= 1) {
+      if (count.number !== null) {
+        const made = (frame.number - count.number) / seconds;
+        this.rate = `${(count.frames / seconds).toFixed(0)}/s of ${made.toFixed(0)}/s`;
+      }
+      this.count = { frames: 0, from: now, number: frame.number };
+      const sorted = this.latencies.sort((one, other) => one - other);
+      this.latency = sorted.length ? sorted[Math.floor(sorted.length / 2)] : null;
+      this.latencies = [];
+    }
+    pairs($("times"), {
+      "latency": ms(this.latency ?? frame.latency_us),
+      "switches, age": ms(frame.switch_age_us),
+      "glove, age": ms(frame.glove_age_us),
+      "frames shown": this.rate ?? "–",
+      ...(this.rates ? { "read": this.rates } : {}),
+    });
+  }
+
+  #wrong() {
+    const named = new Set(this.quarantined.map((text) => text.split(": ")[0]));
+    const lost = (this.frame?.lost ?? []).filter((name) => !named.has(name)).map((name) => `${name}: lost`);
+    const all = [...this.quarantined, ...lost, ...(this.suspects ?? [])];
+    list($("wrong"), all.length ? all : ["nothing"], all.length ? "" : "none");
+  }
+
+  // What a screen reader says: what has stood for a second, and not more often than every third.
+  #announce(grasp, now, atOnce = false) {
+    const { said } = this;
+    if (said.candidate !== grasp) Object.assign(said, { candidate: grasp, since: now });
+    const settled = now - said.since >= SETTLED_MS && now - said.at >= QUIET_MS;
+    if (grasp !== said.text && (atOnce || settled)) {
+      Object.assign(said, { text: grasp, at: now });
+      say($("told"), grasp);
+    }
+  }
+}
+
+function cell(kind, text) {
+  const made = document.createElement(kind);
+  made.textContent = text;
+  return made;
+}
+
+const ms = (us) => (us === null || us === undefined ? "none yet" : `${(us / 1000).toFixed(1)} ms`);
+
+function listed(names) {
+  if (!names.length) return "";
+  const more = names.length > SHOWN ? ` and ${names.length - SHOWN} more` : "";
+  return `: ${names.slice(0, SHOWN).join(", ")}${more}`;
+}
+
+// Fill a list, touching only what is another.
+function list(element, texts, className = "") {
+  while (element.children.length > texts.length) element.lastChild.remove();
+  texts.forEach((text, at) => {
+    const item = element.children[at] ?? element.appendChild(document.createElement("li"));
+    if (item.className !== className) item.className = className;
+    say(item, text);
+  });
+}
+
+function pairs(element, values) {
+  Object.entries(values).forEach(([name, value], at) => {
+    const pair = element.children[at] ?? element.appendChild(document.createElement("div"));
+    if (!pair.children.length) pair.append(cell("dt", name), cell("dd", value));
+    say(pair.children[0], name);
+    say(pair.children[1], value);
+  });
+}

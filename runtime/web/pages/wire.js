@@ -1,0 +1,44 @@
+// The WebSocket of a page: every message to the handler of its topic; it comes back by itself when it was cut.
+
+const FIRST_MS = 250;
+const LONGEST_MS = 5000;
+
+/**
+ * Connect to the server of this page.
+ * @param {Object<string, function(object): void>} handlers by topic; "open" and "closed" are of the connection itself
+ * @returns {function(object): boolean} send({do: ..., ...}), which is false while there is no connection
+ */
+export function connect(handlers) {
+  let socket = null;
+  let wait = FIRST_MS;
+
+  function open() {
+    const scheme = location.protocol === "https:" ? "wss:" : "ws:";
+    socket = new WebSocket(`${scheme}//${location.host}/live`);
+    socket.addEventListener("open", () => {
+      wait = FIRST_MS;
+      handlers.open?.({});
+    });
+    socket.addEventListener("message", (event) => {
+      const message = JSON.parse(event.data);
+      handlers[message.topic]?.(message);
+    });
+    socket.addEventListener("close", () => {
+      handlers.closed?.({});
+      setTimeout(open, wait);
+      wait = Math.min(2 * wait, LONGEST_MS);
+    });
+  }
+
+  open();
+  return (asked) => {
+    if (socket.readyState !== WebSocket.OPEN) return false;
+    socket.send(JSON.stringify(asked));
+    return true;
+  };
+}
+
+/** Set the text of an element, if it is another: what did not change is not read out again. */
+export function say(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}

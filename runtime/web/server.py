@@ -1,0 +1,357 @@
+"""`Server`: one page, its files, and what happens now, to every browser that has it open.
+
+It runs on a thread of its own. Whoever publishes leaves a reference and goes on; a message is made when it is sent, and
+none is while nobody looks. Every browser gets the newest message of each topic, at most 100 times a second. What waits
+for a browser is what the system buffers: a slow one sees fewer moments, one that reads nothing for five seconds is
+dropped.
+"""
+
+import asyncio
+import logging
+import socket
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from threading import Event, Thread
+from typing import Self
+
+import msgspec
+from aiohttp import WSCloseCode, WSMsgType, web
+
+from thenar.drivers.errors import ThenarError
+
+from ..sinks.sockets import listen
+from .guard import HEADERS, Guard
+
+Message = bytes | Callable[[], bytes]
+
+_log = logging.getLogger("thenar")
+# Neither of them writes what a stranger sent into our log.
+_quiet = logging.getLogger("thenar.web")
+_quiet.setLevel(logging.CRITICAL)
+
+PAGES = Path(__file__).parent / "pages"
+_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+
+PERIOD_S = 0.01
+# Pages that are open at a time, and connections, some of which fetch files.
+MOST_PAGES, MOST_CONNECTIONS = 32, 96
+# A connection that is no page has so long for all that it wants.
+_FETCH_S = 20.0
+# A page that takes not a byte for so long hangs.
+HANGING_S = 5.0
+_SEND_BUFFER = 65_536
+# One that vanished is noticed by the system.
+_GONE_MS = 20_000
+# A page sends a few words, when somebody presses a button or holds a key.
+MOST_BYTES, MOST_PER_S, MOST_AT_ONCE = 16_384, 20.0, 40.0
+_CLOSING_S = 0.5
+_ANY = {"0.0.0.0", "::"}
+
+
+def message(topic: str, content: object = None, **more: object) -> bytes:
+    """Return the text of a message: the topic, the fields of `content` (a struct, dataclass or mapping), and more."""
+    fields = {} if content is None else msgspec.to_builtins(content)
+    return msgspec.json.encode({"topic": topic, **fields, **more})
+
+
+class Server:
+    """Serves a page until it is closed; a context manager.
+
+    Parameters
+    ----------
+    page : str
+        Which page stands at the address: "live" is `pages/live.html`.
+    address : str
+        "127.0.0.1:8080", "localhost:8080", "[::1]:8080" or "8080". Port 0 is any free one.
+    token : str or None
+        What the first address must hold besides; None is for loopback addresses alone.
+    on_message : callable, optional
+        Takes what a page sends: an object with "do", a string. It is called on the server's thread. A ThenarError that
+        it raises is told to that page alone, as the message "refused".
+    hello : callable, optional
+        Returns messages that a page gets first. It is called on the server's thread.
+
+    Attributes
+    ----------
+    url : str
+        What to open, the token included.
+    thread : Thread
+        On which all of it happens.
+
+    Raises
+    ------
+    SettingError
+        About an address or a token that cannot be.
+    SinkError
+        If the address is taken.
+    """
+
+    def __init__(
+        self,
+        page: str,
+        address: str = "127.0.0.1:8080",
+        *,
+        token: str | None,
+        on_message: Callable[[Mapping[str, object]], None] | None = None,
+        hello: Callable[[], Sequence[bytes]] | None = None,
+    ) -> None:
+        self._files = _files(page)
+        self._listener = listen(address, f"--web {address}", "127.0.0.1:8080")
+        try:
+            there, port = self._listener.getsockname()[:2]
+            name = address.rpartition(":")[0].strip("[]") or there
+            self._guard = Guard(name, there, port, token)
+        except ThenarError:
+            self._listener.close()
+            raise
+        shown = socket.gethostname() if name in _ANY else name
+        self.url = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}/" + (f"?token={token}" if token else "")
+        self._on_message, self._hello = on_message, hello
+        self._latest: dict[str, Message] = {}
+        self._pages: list[_Page] = []
+        self._started = Event()
+        self.thread = Thread(target=self._run, name="thenar web", daemon=True)
+        self.thread.start()
+        self._started.wait()
+
+    def publish(self, topic: str, message: Message) -> None:
+        """Let every page have this as the newest message of its topic: its text, or what makes it, on the server's
+        thread, when somebody looks. Never blocks. What is not sent before the next message of its topic never is.
+        """
+        self._latest[topic] = message
+
+    @property
+    def pages(self) -> int:
+        """How many pages are open."""
+        return len(self._pages)
+
+    def close(self) -> None:
+        """End; may be called again."""
+        if self.thread.is_alive():
+            self._loop.call_soon_threadsafe(self._closing.set)
+            self.thread.join()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _run(self) -> None:
+        try:
+            asyncio.run(self._serve())
+        except Exception:  # a fault of ours, which must not end the run
+            _log.exception("the page's server: a fault of the program")
+        finally:
+            self._started.set()
+
+    async def _serve(self) -> None:
+        self._loop, self._closing, self._somebody = asyncio.get_running_loop(), asyncio.Event(), asyncio.Event()
+        self._server = web.Server(
+            self._answer, access_log=None, logger=_quiet, keepalive_timeout=_FETCH_S, lingering_time=0
+        )
+        with self._listener:
+            working = [asyncio.create_task(self._let_in()), asyncio.create_task(self._tick())]
+            self._started.set()
+            try:
+                closing = asyncio.create_task(self._closing.wait())
+                await asyncio.wait((closing, *working), return_when=asyncio.FIRST_COMPLETED)
+                for done in working:
+                    if done.done():
+                        done.result()
+            finally:
+                for task in (closing, *working):
+                    task.cancel()
+                await asyncio.gather(*working, return_exceptions=True)
+                # How it ended is the last that a page shows.
+                last = {topic: _text(made) for topic, made in self._latest.copy().items()}
+                await asyncio.gather(*(page.send(last, self._loop.time()) for page in self._pages))
+                await asyncio.gather(*(page.close(WSCloseCode.GOING_AWAY) for page in self._pages))
+                await self._server.shutdown(_CLOSING_S)
+
+    async def _let_in(self) -> None:
+        self._listener.setblocking(False)
+        while True:
+            try:
+                reader, _ = await self._loop.sock_accept(self._listener)
+            except OSError:  # gone between knocking and entering, or no descriptors left
+                await asyncio.sleep(PERIOD_S)
+                continue
+            if len(self._server.connections) >= MOST_CONNECTIONS:
+                reader.close()
+                continue
+            with suppress(OSError):
+                reader.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
+                reader.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                if hasattr(socket, "TCP_USER_TIMEOUT"):
+                    reader.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _GONE_MS)
+                transport, _ = await self._loop.connect_accepted_socket(self._server, reader)
+                self._loop.call_later(_FETCH_S, self._end_unless_page, transport)
+
+    def _end_unless_page(self, transport: asyncio.Transport) -> None:
+        if all(page.transport is not transport for page in self._pages):
+            transport.abort()
+
+    async def _tick(self) -> None:
+        """Send what is new to every page, as long as there is one."""
+        sent: dict[str, Message] = {}
+        due_s = self._loop.time()
+        while True:
+            if not self._pages:
+                self._somebody.clear()
+                await self._somebody.wait()
+            now_s = self._loop.time()
+            due_s = max(due_s + PERIOD_S, now_s)
+            await asyncio.sleep(due_s - now_s)
+            latest = self._latest.copy()
+            new = {topic: _text(made) for topic, made in latest.items() if made is not sent.get(topic)}
+            sent = latest
+            for page in tuple(self._pages):
+                await page.send(new, self._loop.time())
+
+    async def _answer(self, request: web.BaseRequest) -> web.StreamResponse:
+        guard = self._guard
+        if not guard.knows_host(request.headers.get("Host", "")):
+            return _said(403, "This page is open under its address in digits, localhost, or this machine's name.")
+        if request.method not in ("GET", "HEAD") or request.body_exists:
+            return _said(405, "Nothing can be sent here.")
+        if guard.takes_token(request.query.get("token")):
+            return _welcome(guard)
+        if not guard.lets_in(request.cookies.get(guard.cookie)):
+            return _said(403, "Open the address that thenar has printed, with the token in it.")
+        if request.path == "/live":
+            return await self._live(request)
+        file = self._files.get(request.path)
+        if file is None:
+            return _said(404, "There is no such page.")
+        return web.Response(body=file[0], content_type=file[1], charset="utf-8", headers=HEADERS)
+
+    async def _live(self, request: web.BaseRequest) -> web.StreamResponse:
+        if not self._guard.same_origin(request.headers.get("Origin"), request.headers.get("Host", "")):
+            return _said(403, "Only thenar's own page is served here.")
+        transport = request.transport
+        if transport is None or len(self._pages) >= MOST_PAGES:
+            return _said(503, f"{MOST_PAGES} pages are open already: close one.")
+        live = web.WebSocketResponse(
+            autoping=False, compress=False, max_msg_size=MOST_BYTES, timeout=_CLOSING_S, decode_text=False
+        )
+        live.headers.update(HEADERS)
+        await live.prepare(request)
+        page = _Page(live, transport, self._loop.time())
+        latest = self._latest.copy()
+        first = [] if self._hello is None else list(self._hello())
+        for text in (*first, *map(_text, latest.values())):
+            await page.say(text)
+        self._pages.append(page)
+        self._somebody.set()
+        try:
+            await self._listen(page)
+        finally:
+            self._pages.remove(page)
+        return live
+
+    async def _listen(self, page: "_Page") -> None:
+        async for came in page.socket:
+            if not page.may_speak(self._loop.time()):
+                await page.close(WSCloseCode.POLICY_VIOLATION)
+                return
+            if came.type is WSMsgType.PING and page.transport.get_write_buffer_size() == 0:
+                await page.socket.pong(came.data)
+            elif came.type is WSMsgType.TEXT:
+                await self._take(page, came.data)
+            elif came.type is WSMsgType.BINARY:
+                await page.close(WSCloseCode.UNSUPPORTED_DATA)
+                return
+
+    async def _take(self, page: "_Page", text: bytes) -> None:
+        """Hand on what a page asks for; what cannot be is told to it."""
+        asked: dict[str, object] = {}
+        try:
+            asked = msgspec.json.decode(text, type=dict[str, object])
+            if not isinstance(asked.get("do"), str):
+                raise msgspec.ValidationError("it has no `do`")
+            if self._on_message is None:
+                raise ThenarError("this page only shows")
+            self._on_message(asked)
+        except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as wrong:
+            await page.say(message("refused", why=f"what the page sent means nothing: {wrong}"))
+        except ThenarError as reason:
+            await page.say(message("refused", do=asked.get("do"), why=str(reason)))
+        except Exception as fault:  # of ours
+            _log.exception("the page's server: a fault of the program")
+            await page.say(message("refused", do=asked.get("do"), why=f"a fault of thenar: {type(fault).__name__}"))
+
+
+class _Page:
+    """A page that is open in a browser: its WebSocket, and what waits for it."""
+
+    def __init__(self, live: web.WebSocketResponse, transport: asyncio.Transport, now_s: float) -> None:
+        self.socket, self.transport = live, transport
+        # Nothing is sent before all that was is with the system: writing never has to wait.
+        transport.set_write_buffer_limits(high=2**30)
+        self._waiting: dict[str, bytes] = {}
+        self._stalled_s: float | None = None
+        self._stalled_at = 0
+        self._may, self._spoke_s = MOST_AT_ONCE, now_s
+
+    async def send(self, new: Mapping[str, bytes], now_s: float) -> None:
+        """Send the newest of each topic, unless the page is behind; drop it if it hangs."""
+        self._waiting.update(new)
+        held = self.transport.get_write_buffer_size()
+        if held:
+            if self._stalled_s is None or held < self._stalled_at:
+                self._stalled_s, self._stalled_at = now_s, held
+            elif now_s - self._stalled_s >= HANGING_S:
+                self.transport.abort()
+            return
+        self._stalled_s = None
+        waiting, self._waiting = self._waiting, {}
+        for text in waiting.values():
+            await self.say(text)
+
+    async def say(self, text: bytes) -> None:
+        """Send one message; to a page that is gone, nothing."""
+        with suppress(OSError, RuntimeError):
+            if text:
+                await self.socket.send_frame(text, WSMsgType.TEXT)
+
+    def may_speak(self, now_s: float) -> bool:
+        """Return whether the page has sent no more than it may."""
+        self._may = min(MOST_AT_ONCE, self._may + (now_s - self._spoke_s) * MOST_PER_S) - 1
+        self._spoke_s = now_s
+        return self._may >= 0
+
+    async def close(self, code: int) -> None:
+        """End it."""
+        with suppress(OSError, RuntimeError):
+            await self.socket.close(code=code)
+
+
+def _files(page: str) -> dict[str, tuple[bytes, str]]:
+    """Return content and type of each file, by the path under which a browser asks for it: nothing else can be read."""
+    found = {f"/{path.name}": (path.read_bytes(), _TYPES[path.suffix]) for path in PAGES.iterdir() if path.is_file()}
+    return {"/": found[f"/{page}.html"]} | {path: file for path, file in found.items() if file[1] != "text/html"}
+
+
+def _text(made: Message) -> bytes:
+    """Return the text of a message; b"" of one that cannot be made, which the log says."""
+    if isinstance(made, bytes):
+        return made
+    try:
+        return made()
+    except Exception:  # of ours, or of a program that publishes here
+        _log.exception("the page's server: a message could not be made")
+        return b""
+
+
+def _said(status: int, sentence: str) -> web.Response:
+    answer = web.Response(status=status, text=sentence + "\n", headers=HEADERS)
+    answer.force_close()
+    return answer
+
+
+def _welcome(guard: Guard) -> web.Response:
+    answer = web.Response(status=303, headers=HEADERS | {"Location": "/"})
+    answer.set_cookie(guard.cookie, guard.secret, httponly=True, samesite="Lax", path="/")
+    return answer

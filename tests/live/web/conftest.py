@@ -1,0 +1,145 @@
+"""A run in this process on emulated serial devices, its page, and a browser that has it open."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from importlib.resources import files
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import msgspec
+import pytest
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.wait import WebDriverWait
+
+from thenar.runtime import Glove
+from thenar.runtime.frames import now_us
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.policy import Policy
+from thenar.runtime.web.live import LivePage
+from thenar.simulator.playing.bench import Bench
+
+FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1400,1000")
+PATIENCE_S = 30
+# The answer is the candidate of each frame.
+FRANK = Policy(lead=0.0, dwell_us=0)
+
+
+class Browser:
+    """A browser, with one page open."""
+
+    def __init__(self, driver: webdriver.Chrome) -> None:
+        self.driver = driver
+
+    def open(self, url: str, *, width: int = 1400, scheme: str = "light") -> None:
+        """Open a page, in a window so wide, of a reader whose system is light or dark."""
+        self.complaints()
+        features = [{"name": "prefers-color-scheme", "value": scheme}]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+        metrics = {"width": width, "height": 1000, "deviceScaleFactor": 1, "mobile": width < 600}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        self.driver.get(url)
+
+    def script(self, text: str, *arguments: object) -> Any:
+        return self.driver.execute_script(text, *arguments)
+
+    def wait(self, until: Callable[[], object]) -> None:
+        WebDriverWait(self.driver, PATIENCE_S, poll_frequency=0.02).until(lambda _: until())
+
+    def text(self, name: str) -> str:
+        """Return the text of the element with this id, at one moment."""
+        return str(self.script("return document.getElementById(arguments[0]).textContent", name))
+
+    def texts(self, selector: str) -> list[str]:
+        """Return the texts of all elements that a selector finds, at one moment."""
+        found = self.script("return [...document.querySelectorAll(arguments[0])].map((e) => e.textContent)", selector)
+        return list(found)
+
+    def click(self, name: str) -> None:
+        self.driver.find_element(By.ID, name).click()
+
+    def complaints(self) -> list[dict[str, Any]]:
+        entries: list[dict[str, Any]] = self.driver.get_log("browser")  # type: ignore[no-untyped-call]
+        return entries
+
+    def axe(self) -> list[str]:
+        """Return what axe-core finds of serious and critical faults: the rule, and where."""
+        self.script((files("axe_core_python") / "axe.min.js").read_text())
+        found = self.driver.execute_async_script(
+            "axe.run({resultTypes: ['violations']}).then(arguments[0], (wrong) => arguments[0](String(wrong)))"
+        )
+        assert isinstance(found, dict), found
+        assert found["passes"]
+        grave = [one for one in found["violations"] if one["impact"] in ("serious", "critical")]
+        return [f"{one['id']}: {node['html']}: {node['failureSummary']}" for one in grave for node in one["nodes"]]
+
+
+@pytest.fixture(scope="module")
+def chromium(tool: Callable[[str], str]) -> Iterator[Browser]:
+    options = webdriver.ChromeOptions()
+    options.binary_location = tool("chromium")
+    for flag in FLAGS:
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(executable_path=tool("chromedriver")))
+    yield Browser(driver)
+    driver.quit()
+
+
+@pytest.fixture
+def browser(chromium: Browser) -> Iterator[Browser]:
+    """Return the browser; the page may not have complained of anything when the test ends."""
+    yield chromium
+    complaints = chromium.complaints()
+    chromium.driver.get("about:blank")
+    assert complaints == []
+
+
+class Run:
+    """What runs, the scene that it looks at, and its page."""
+
+    def __init__(self, stack: ExitStack, scene: Any, harness: Harness, folder: Path, build: Path) -> None:
+        performance = scene.truth.performance
+        self.scene, self.recordings = scene, folder / "recordings"
+        self.bench = stack.enter_context(Bench(harness, performance.switch_names, folder))
+        scene._show = self.bench.show
+        (folder / "calibration.toml").write_text(performance.calibration.to_toml())
+        wired = self.bench.harness
+        if wired.cyberglove is not None:
+            glove = msgspec.structs.replace(wired.cyberglove, calibration=str(folder / "calibration.toml"))
+            wired = msgspec.structs.replace(wired, cyberglove=glove)
+        self.stream, self.build = f"unix:{folder}/stream", build
+        sinks = [f"{self.stream}?detail"]
+        self.glove = Glove(scene.truth.build, wired, policy=FRANK, recordable=True, sinks=sinks, status=True)
+        self.page = LivePage(self.glove, build, "127.0.0.1:0", token=None, recordings=self.recordings)
+        stack.enter_context(self.page)
+        stack.enter_context(self.glove)
+        self._thread = Thread(target=self._run, name="loop")
+        self._thread.start()
+        stack.callback(self.end)
+
+    def _run(self) -> None:
+        for moment in self.glove:
+            self.page.show(moment)
+            self.scene.grasps.add(moment.grasp)
+
+    def end(self) -> None:
+        self.glove.stop.set()
+        self._thread.join()
+
+
+@pytest.fixture
+def run(stage: Any, harness_of: Callable[..., Harness], make_scene: Any, tmp_path: Path) -> Iterator[Callable[[], Run]]:
+    """Return what starts a run of a glove and a scanner board, showing row 0: all is well when it returns."""
+    with ExitStack() as stack:
+
+        def start() -> Run:
+            scene = make_scene(stage.truth("both"), None)
+            made = Run(stack, scene, harness_of("both", "glove", "scanner"), tmp_path, stage.builds["both"])
+            scene.show(0)
+            scene.well(now_us())
+            return made
+
+        yield start

@@ -1,0 +1,316 @@
+"""The live page in a real browser: what it shows is what was published, and what is pressed happens."""
+
+from collections.abc import Callable
+from threading import Event, Thread
+from typing import Any
+
+import pytest
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
+
+from thenar.runtime.live.replay import replayed
+from thenar.runtime.published import LiveGrasp
+from thenar.runtime.recording.reader import Reader
+from thenar.runtime.recording.session import Mark
+from thenar.runtime.web.monitor import StreamMonitor
+from thenar.runtime.web.server import Server, message
+
+pytestmark = pytest.mark.slow
+
+_BARS = """return Object.fromEntries([...document.querySelectorAll('#types li')].map((row) =>
+    [row.querySelector('.name').textContent, row.querySelector('.share').textContent]))"""
+_CLOSED = "return document.querySelectorAll('#hand .spot.closed').length"
+_LOST = "return document.querySelectorAll('#hand .spot.lost').length"
+
+
+def shown(browser: Any, scene: Any, row: int) -> None:
+    """Show a row on the devices, and wait until the page shows what was settled on, and the switches of that row."""
+    scene.show(row)
+    answer = scene.settled(row).grasp
+    closed = int(scene.truth.bits[row].sum())
+    browser.wait(lambda: browser.text("grasp") == answer and browser.script(_CLOSED) == closed)
+    browser.wait(lambda: browser.texts("#types li[aria-current] .name") == [answer])
+
+
+def test_the_page_shows_what_is_published(run: Callable[[], Any], browser: Any) -> None:
+    running = run()
+    scene, truth = running.scene, running.scene.truth
+    browser.open(running.page.server.url)
+    answers = set()
+    for row in range(0, len(truth.performance), 3):
+        shown(browser, scene, row)
+        answers.add(browser.text("grasp"))
+        names = [name for name, bit in zip(truth.switch_names, truth.bits[row], strict=True) if bit]
+        said = f"{len(names)} of {len(truth.switch_names)} closed"
+        browser.wait(lambda said=said: browser.text("hand-says").startswith(said))
+        assert browser.text("hand-says").removeprefix(said).strip(": ").startswith(", ".join(names[:8]))
+        browser.wait(lambda: bars_are(browser, scene))
+        assert browser.driver.title == f"{browser.text('grasp')} · thenar"
+    assert len(answers) > 5
+    assert browser.texts("#types .name") == list(truth.build.manifest.answers)
+    assert browser.text("health") == "ok"
+    browser.wait(lambda: len(browser.texts("#devices tr")) == 2)
+    assert browser.texts("#devices td:nth-child(2)") == ["connected", "connected"]
+    assert browser.texts("#wrong li") == ["nothing"]
+
+
+def bars_are(browser: Any, scene: Any) -> bool:
+    """Return whether the bars show the probabilities of the row that is on the devices now, by the build itself."""
+    truth, row = scene.truth, scene.shown[-1].row
+    found = truth.build.recognise(truth.bits[row], truth.codes[row])
+    share = browser.script(_BARS)[found.grasp]
+    near: bool = abs(float(share.removesuffix(" %")) - 100 * found.probability) < 0.11
+    return near
+
+
+def test_the_page_of_a_run_elsewhere_shows_the_same(run: Callable[[], Any], browser: Any) -> None:
+    running, stop = run(), Event()
+    scene, truth = running.scene, running.scene.truth
+    with StreamMonitor(running.stream, "127.0.0.1:0", token=None, build=running.build) as monitor:
+        thread = Thread(target=monitor.run, args=(stop,))
+        thread.start()
+        try:
+            browser.open(monitor.server.url)
+            for row in range(0, len(truth.performance), 7):
+                shown(browser, scene, row)
+                browser.wait(lambda: bars_are(browser, scene))
+            browser.wait(lambda: len(browser.texts("#devices tr")) == 2)
+            assert not browser.driver.find_element("id", "record-panel").is_displayed()
+            assert not browser.driver.find_element("id", "types-say").is_displayed()
+            assert browser.texts("#types .name") == list(truth.build.manifest.answers)
+            browser.driver.get("about:blank")
+        finally:
+            stop.set()
+            thread.join()
+
+
+def test_the_posed_hand_follows_the_joints(run: Callable[[], Any], browser: Any) -> None:
+    running = run()
+    browser.open(running.page.server.url)
+    bones = "return [...document.querySelectorAll('#hand .bone')].map((bone) => bone.getAttribute('d'))"
+    shown(browser, running.scene, 0)
+    before = browser.script(bones)
+    assert len(before) == 5
+    shown(browser, running.scene, 5)
+    browser.wait(lambda: sum(one != other for one, other in zip(before, browser.script(bones), strict=True)) >= 3)
+
+
+def test_what_is_lost_is_named_and_crossed_out(run: Callable[[], Any], browser: Any) -> None:
+    running = run()
+    names = running.scene.truth.switch_names
+    browser.open(running.page.server.url)
+    shown(browser, running.scene, 0)
+    assert browser.script(_LOST) == 0
+    scanner = running.bench.lines[1]
+    scanner.unplug()
+    browser.wait(lambda: browser.text("health") == "degraded")
+    browser.wait(lambda: browser.texts("#wrong li") == [f"{name}: lost" for name in names])
+    browser.wait(lambda: browser.script(_LOST) == len(names))
+    browser.wait(lambda: any("there is no such port" in text for text in browser.texts("#devices td:nth-child(2)")))
+    scanner.replug()
+    browser.wait(lambda: browser.text("health") == "ok" and browser.script(_LOST) == 0)
+    assert browser.texts("#wrong li") == ["nothing"]
+
+
+def test_record_mark_and_stop_write_what_the_command_writes(run: Callable[[], Any], browser: Any) -> None:
+    running = run()
+    browser.open(running.page.server.url)
+    shown(browser, running.scene, 0)
+    browser.driver.find_element("id", "record-name").send_keys("first_try")
+    browser.click("record")
+    browser.wait(lambda: browser.text("recording").startswith("first_try-"))
+    for row in (5, 11):
+        shown(browser, running.scene, row)
+        browser.click("mark")
+    browser.wait(lambda: "2 marks" in browser.text("recording"))
+    browser.click("stop")
+    browser.wait(lambda: "is whole" in browser.text("recording"))
+    written = browser.text("recording")
+    browser.driver.get("about:blank")
+    running.end()
+    running.page.close()
+    (path,) = running.recordings.iterdir()
+    assert path.name in written
+    entries, reader = list(Reader(path)), Reader(path)
+    assert not list(reader.faults())
+    marks = [entry for entry in entries if isinstance(entry, Mark)]
+    recorded = [entry for entry in entries if isinstance(entry, LiveGrasp)]
+    assert len(marks) == 2
+    assert recorded[0].time_us < marks[0].time_us < marks[1].time_us < recorded[-1].time_us
+    first, last = recorded[0].time_us, recorded[-1].time_us
+    assert recorded == [one for one in running.scene.grasps.all if first <= one.time_us <= last]
+    pairs = list(replayed(running.glove.system.build, path, running.glove.system.policy))
+    assert {one.grasp for one in recorded} >= {running.scene.truth.answer(row) for row in (0, 5, 11)}
+    # The first frames rest on what came in before the recording began.
+    assert [then.candidate for then, _ in pairs[20:]] == [now.candidate for _, now in pairs[20:]]
+
+
+def test_a_keyboard_is_enough(run: Callable[[], Any], browser: Any) -> None:
+    running = run()
+    browser.open(running.page.server.url)
+    shown(browser, running.scene, 0)
+
+    def press(*keys: str) -> None:
+        ActionChains(browser.driver).send_keys(*keys).perform()
+
+    def focused() -> str:
+        return str(browser.script("return document.activeElement.id"))
+
+    press(Keys.TAB)
+    assert focused() == "record-name"
+    outline = "return getComputedStyle(document.activeElement).outlineStyle"
+    assert browser.script(outline) == "solid"
+    press("keys", Keys.ENTER)
+    browser.wait(lambda: browser.text("recording").startswith("keys-"))
+    browser.wait(lambda: focused() == "mark")
+    press(Keys.SPACE)
+    browser.wait(lambda: "1 mark" in browser.text("recording"))
+    press(Keys.TAB)
+    assert focused() == "stop"
+    press(Keys.ENTER)
+    browser.wait(lambda: "is whole" in browser.text("recording"))
+    browser.wait(lambda: focused() == "record")
+
+
+def test_what_cannot_be_is_said_beside_the_buttons(run: Callable[[], Any], browser: Any) -> None:
+    running = run()
+    running.recordings.write_text("a file where the folder should be")
+    browser.open(running.page.server.url)
+    browser.wait(lambda: browser.text("recording") == f"none; goes to {running.recordings}")
+    browser.click("record")
+    browser.wait(lambda: browser.text("refused") == f"nothing can be recorded in {running.recordings}: File exists")
+    running.recordings.unlink()
+    browser.click("record")
+    browser.wait(lambda: browser.text("recording").startswith("run-"))
+    assert browser.text("refused") == ""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1400, 400])
+def test_in_every_light_and_width_it_fits_and_axe_finds_no_serious_fault(
+    run: Callable[[], Any], browser: Any, scheme: str, width: int
+) -> None:
+    running = run()
+    browser.open(running.page.server.url, width=width, scheme=scheme)
+    shown(browser, running.scene, 0)
+    browser.wait(lambda: browser.texts("#devices tr"))
+    assert browser.script("return document.documentElement.scrollWidth") <= width
+    background = browser.script("return getComputedStyle(document.body).backgroundColor")
+    assert (background == "rgb(255, 255, 255)") == (scheme == "light")
+    # Some 15 mm at 96 pixels an inch: what can be read from three metres.
+    letters = browser.script("return parseFloat(getComputedStyle(document.getElementById('grasp')).fontSize)")
+    assert letters >= 80
+    assert browser.axe() == []
+
+
+def test_a_screen_reader_is_told_what_stands_and_not_flooded(run: Callable[[], Any], browser: Any) -> None:
+    running = run()
+    browser.open(running.page.server.url)
+    shown(browser, running.scene, 0)
+    answer = browser.text("grasp")
+    browser.wait(lambda: browser.text("told") == answer)
+    browser.script(
+        "window.said = 0; new MutationObserver(() => window.said++)"
+        ".observe(document.getElementById('told'), {childList: true, characterData: true, subtree: true})"
+    )
+    rows = [row for row in range(1, 25) if running.scene.truth.answer(row) != running.scene.truth.answer(row - 1)]
+    for row in rows:
+        shown(browser, running.scene, row)
+    said = browser.script("return window.said")
+    assert said < len(rows) / 2
+    answer = browser.text("grasp")
+    browser.wait(lambda: browser.text("told") == answer)
+    live = browser.script(
+        "return [...document.querySelectorAll('[aria-live], [role=status], [role=log]')].map((e) => e.id)"
+    )
+    assert live == ["told"]
+
+
+def test_a_page_that_comes_late_sees_what_was(run: Callable[[], Any], browser: Any) -> None:
+    running = run()
+    for row in (0, 5, 11):
+        running.scene.show(row)
+        running.scene.settled(row)
+    browser.open(running.page.server.url)
+    types = [running.scene.truth.answer(row) for row in (0, 5, 11)]
+    browser.wait(lambda: all(name in browser.script(_PAST_LABEL) for name in types[-1:]))
+    browser.wait(lambda: len(browser.texts("#segments li")) >= 1)
+    drawn = browser.script(_INKED)
+    assert drawn > 1000
+
+
+_PAST_LABEL = "return document.getElementById('past').getAttribute('aria-label')"
+_INKED = """const canvas = document.getElementById('past');
+    const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+    const colours = new Set(); let inked = 0;
+    for (let at = 0; at < data.length; at += 4) if (data[at + 3]) inked++;
+    return inked"""
+
+
+def test_closing_all_pages_changes_nothing(run: Callable[[], Any], browser: Any) -> None:
+    running = run()
+    browser.open(running.page.server.url)
+    shown(browser, running.scene, 0)
+    browser.driver.get("about:blank")
+    browser.wait(lambda: running.page.server.pages == 0)
+    for row in (5, 11, 17):
+        running.scene.show(row)
+        running.scene.settled(row)
+    assert running.scene.check() > 0
+
+
+SCRIPT = "<script>alert(1)</script>"
+
+
+def test_names_are_text_wherever_they_are_shown(browser: Any) -> None:
+    """A grasp type, a switch, a device, a folder and a preshape that are called like scripts."""
+    image = "<img src=x onerror=alert(1)>"
+    hand = {
+        **{"view": "", "placed": False, "radius_mm": 3.0, "outline": [], "strips": [], "creases": [], "labels": []},
+        "switches": [{"name": image, "x_mm": 0.0, "y_mm": 0.0, "bit": 0}],
+        **{"taxels": [], "joints": []},
+    }
+    build = {
+        "name": image,
+        "grasps": [SCRIPT, image],
+        "switches": [image],
+        "joints": [],
+        "preshapes": True,
+        "records": True,
+    }
+    frame = {
+        **{"time_us": 1_000_000, "number": 1, "grasp": SCRIPT, "candidate": SCRIPT, "probability": 1.0, "margin": 1},
+        **{"health": "degraded", "switch_age_us": 1, "glove_age_us": None, "latency_us": 1, "lost": [image]},
+        **{"state": "held", "segment": 1, "segment_type": SCRIPT, "segment_us": 0, "preshape": {"name": image}},
+        **{"closed": "1", "unread": "0", "joints": [], "taxels": {}, "probabilities": [1.0, 0.0]},
+    }
+    report = {
+        **{
+            "stuck_open": [image],
+            "stuck_closed": [],
+            "chattering": [],
+            "drifting": [],
+            "switch_hz": 1.0,
+            "glove_hz": 0.0,
+        },
+        "devices": [{"name": image, "connected": False, "error": SCRIPT, "counts": [{"name": image, "value": 1}]}],
+        "quarantined": [{"name": SCRIPT, "reason": image, "used": False}],
+    }
+    state = {"folder": image, "on": True, "name": SCRIPT, "fixed": False, "since_s": 0.0, "messages": 1, "marks": 0}
+    with Server(
+        "live", "127.0.0.1:0", token=None, hello=lambda: [message("build", build), message("hand", hand)]
+    ) as server:
+        server.publish("frame", message("frame", frame))
+        server.publish("health", message("health", report))
+        server.publish("recording", message("recording", state | {"failure": ""}))
+        server.publish("task", message("task", text=SCRIPT))
+        browser.open(server.url)
+        browser.wait(lambda: browser.text("grasp") == SCRIPT and browser.texts("#wrong li"))
+        assert browser.texts("#types .name") == [SCRIPT, image]
+        browser.wait(lambda: browser.text("segment") and browser.texts("#segments li"))
+        assert browser.text("preshape") == f"Preshape: {image}"
+        assert browser.texts("#devices th, #devices td") == [image, SCRIPT, f"{image} 1"]
+        assert browser.text("name") == image
+        assert browser.script("return [document.scripts.length, document.images.length]") == [1, 0]
+        assert browser.driver.title == f"{SCRIPT} · thenar"
+        browser.driver.get("about:blank")
