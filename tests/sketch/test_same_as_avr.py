@@ -67,7 +67,7 @@ class Board:
 
 
 def timeless(message: FromBoard) -> FromBoard:
-    return message if isinstance(message, Lost) else replace(message, time_us=0)  # type: ignore[call-arg]
+    return message if isinstance(message, Lost) else replace(message, time_us=0)  # type: ignore[arg-type]
 
 
 def conversation(board: Board) -> list[FromBoard]:
@@ -133,7 +133,7 @@ def avr(tool: Callable[[str], str], build: Any, stack: ExitStack, tmp_path: Path
         "chip mcp23017 0x20",
         "chip pca9555 0x21",
     ]
-    lines += [f"key {key} {at} {pin} low" for key, (at, pin) in enumerate(PLACES)]  # type: ignore[assignment]
+    lines += [f"key {key} {at} {pin} low" for key, (at, pin) in enumerate(PLACES)]
     running = stack.enter_context(
         simulated.SimulatedBoard(harness("simavr_board"), lines, next(tmp_path.glob("*.elf")))
     )
