@@ -164,6 +164,8 @@ def command(
             _print(fit, measured, frontier=frontier, updates=mode == "glove")
         if firmware.segments:
             out().print(f"{firmware.segments}.", soft_wrap=True)
+        if output is not None and mode == "classify" and (said := TARGETS[target].said(firmware.library())):
+            out().print(f"{said}.", soft_wrap=True)
         if output is not None:
             next_step = TARGETS[target].next_step.format(folder=shlex.quote(str(output)))
             out().print(f"{output}: firmware for {target}; {next_step}", soft_wrap=True)

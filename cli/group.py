@@ -21,7 +21,7 @@ from .lines import echo
 COMMANDS = (
     *("simulate", "plan", "import", "export", "merge", "split", "info", "place", "draw"),
     *("evaluate", "frontier", "compile", "verify", "segment", "teach"),
-    *("firmware", "spec", "run", "calibrate", "record", "emulate", "doctor", "stability"),
+    *("firmware", "spec", "run", "monitor", "calibrate", "record", "emulate", "doctor", "stability"),
 )
 
 # What the extras of pyproject.toml bring, by the names that are imported.
@@ -37,6 +37,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "ws": ("websockets",),
     "lsl": ("pylsl",),
     "web": ("aiohttp",),
+    "foxglove": ("foxglove",),
 }
 
 

@@ -33,6 +33,7 @@ from .web_options import say_page, token_for, web_options
 if TYPE_CHECKING:
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime import Build, Glove
+    from thenar.runtime.live.recogniser import Moment
     from thenar.runtime.policy import Policy
     from thenar.runtime.preshape import Preshape, PreshapeSelector
     from thenar.runtime.published import HealthReport, LiveGrasp
@@ -361,15 +362,15 @@ def _replay_recording(
     They go to the sinks as the live run sent them, without any as JSON lines to stdout; on stderr, how many came out as
     they did then.
     """
-    from thenar.runtime.live.replay import replayed
+    from thenar.runtime.live.replay import moments
     from thenar.runtime.sinks.jsonl import encode
 
     same = count = 0
-    with _published(sinks, selector, lambda grasp, shape: encode(grasp, shape, None), follower) as publish:
-        for then, now in islice(replayed(build, replay, policy, warning), frames):
-            same += then == now
+    with _published(build, sinks, selector, lambda grasp, shape: encode(grasp, shape, None), follower) as publish:
+        for then, now in islice(moments(build, replay, policy, warning), frames):
+            same += then == now.grasp
             count += 1
-            publish(now)
+            publish(now.grasp, now)
     echo(f"{same} of {count} frames recognised as they were recorded", err=True)
     if follower is not None:
         echo(follower.progress.text, err=True)
@@ -404,10 +405,10 @@ def _replay_set(
         }
         return msgspec.json.encode(shown if selector is None else shown | {"preshape": shape}) + b"\n"
 
-    with _published(sinks, selector, line) as publish:
+    with _published(build, sinks, selector, line) as publish:
         for grasp in _rows(build, grasp_set, period_us):
             found.append(grasp.grasp)
-            publish(grasp)
+            publish(grasp, None)
     rows = len(grasp_set)
     correct = sum(map(eq, found, grasp_set.grasps.tolist()))
     echo(f"{correct} of {rows} frames recognised as recorded ({correct / max(rows, 1):.1%})", err=True)
@@ -451,11 +452,12 @@ def _rows(build: "Build", grasp_set: "GraspSet", period_us: int) -> "Iterator[Li
 
 @contextmanager
 def _published(
+    build: "Build",
     sinks: Sequence[str],
     selector: "PreshapeSelector | None",
     line: "Callable[[LiveGrasp, Preshape | None], bytes]",
     follower: "TaskFollower | None" = None,
-) -> "Iterator[Callable[[LiveGrasp], None]]":
+) -> "Iterator[Callable[[LiveGrasp, Moment | None], None]]":
     """Yield what publishes a replayed grasp with its preshape, and news of a task: to sinks, which wait for their
     readers, or without any as a `line` on stdout. At the end say what was lost, with exit code 1.
     """
@@ -468,11 +470,14 @@ def _published(
             opened.append(open_sink(name, wait=True))
             stack.callback(opened[-1].close)
         fanout = Fanout(opened)
+        fanout.begin(build)
 
-        def publish(grasp: "LiveGrasp") -> None:
+        def publish(grasp: "LiveGrasp", moment: "Moment | None") -> None:
             shape = None if selector is None else selector.update(grasp)
             if opened:
                 fanout.publish(grasp, shape, None)
+                if moment is not None:
+                    fanout.moment(moment)
             else:
                 sys.stdout.buffer.write(line(grasp, shape))
             progress = None if follower is None else follower.update(grasp)

@@ -6,25 +6,23 @@ from .common import Command, err
 
 HERE = "127.0.0.1:8080"
 
+web_token_option = click.option(
+    "--web-token",
+    is_flag=True,
+    help="Show the page only to who has its whole address; needed where other machines reach it.",
+)
+
 
 def web_options(command: Command) -> Command:
     """Add --web and --web-token, whose values the command takes as `web` (None: no page) and `web_token`."""
-    for option in (
-        click.option(
-            "--web-token",
-            is_flag=True,
-            help="Show the page only to those who know its whole address: needed for an ADDRESS other machines reach.",
-        ),
-        click.option(
-            "--web",
-            is_flag=False,
-            flag_value=HERE,
-            metavar="[ADDRESS]",
-            help=f"Show a page in the browser, at an address of this machine.  [{HERE}]",
-        ),
-    ):
-        command = option(command)
-    return command
+    option = click.option(
+        "--web",
+        is_flag=False,
+        flag_value=HERE,
+        metavar="[ADDRESS]",
+        help=f"Show a page in the browser.  [{HERE}]",
+    )
+    return option(web_token_option(command))
 
 
 def token_for(web_token: bool) -> str | None:

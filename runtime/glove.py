@@ -169,6 +169,7 @@ class Glove:
                 sinks.append(open_sink(sink) if isinstance(sink, str) else sink)
                 opening.callback(sinks[-1].close)
             self._fanout = Fanout(sinks)
+            self._fanout.begin(self.system.build)
             if self._record is not None:
                 self.recorder = opening.enter_context(self.new_recording(Path(self._record)))
             if self.feed is self.sources:
@@ -201,6 +202,7 @@ class Glove:
         progress = None if self.follower is None else self.follower.update(grasp)
         moment.angles = self._angles_of(taken.measured)
         self._fanout.publish(grasp, moment.preshape, moment.angles)
+        self._fanout.moment(moment)
         if progress is not None:
             self._fanout.task(progress)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None, moment.codes)

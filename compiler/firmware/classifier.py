@@ -333,8 +333,12 @@ class Library:
         """The classifier's files, what makes codes of readings, and the decoder of segments where the build has costs
         of them.
         """
-        codes = codes_files(self.name, self.sensors, code_bits=self.layout.code_bits, avr=self.avr)
-        return self.files | codes | self.segments
+        return self.files | self.codes | self.segments
+
+    @cached_property
+    def codes(self) -> dict[str, str]:
+        """The files of what makes codes of readings."""
+        return codes_files(self.name, self.sensors, code_bits=self.layout.code_bits, avr=self.avr)
 
     @cached_property
     def segments(self) -> dict[str, str]:

@@ -21,7 +21,6 @@ from thenar.runtime.taxels import TaxelCalibration, calibration_of, count_limit
 from . import FirmwareError
 from .words import Names, comment, identifiers
 
-_ONE = 1 << FRACTION
 _RAW = "raw"
 
 
@@ -34,10 +33,15 @@ class Grid:
     first: int
     last: int
 
+    @property
+    def steps(self) -> int:
+        """How many steps lie between the two."""
+        return self.last - self.first
+
     def code(self, reading: int) -> int:
         """Return the code of a number, as `runtime.sources.rows` has it."""
-        steps = self.last - self.first
-        return self.first + CodeLine(Point(self.low, 0), Point(self.high, steps * _ONE), 0, steps).code(reading)
+        ends = Point(self.low, 0), Point(self.high, self.steps << FRACTION)
+        return self.first + CodeLine(*ends, least=0, most=self.steps).code(reading)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +82,11 @@ class Sensors:
     def every(self) -> tuple[Sensor, ...]:
         """All of them, in the order of their numbers."""
         return (*self.joints, *self.taxels)
+
+    @property
+    def sorts(self) -> str:
+        """What they are, in words: "joints, then taxels"."""
+        return ", then ".join(["joints"] * bool(self.joints) + ["taxels"] * bool(self.taxels))
 
     @property
     def known(self) -> bool:
@@ -186,7 +195,7 @@ def _grid(name: str, limits: Range, first: int, last: int) -> Grid:
 
 
 def codes_files(name: str, sensors: Sensors, *, code_bits: int, avr: bool) -> dict[str, str]:
-    """Return the texts of thenar_`name`_codes.h and .c, which go with the classifier; none without sensors."""
+    """Return the texts of thenar_`name`_codes.h and .c, which go with the classifier; none of a build of switches."""
     if not sensors.every:
         return {}
     values = {
@@ -197,7 +206,7 @@ def codes_files(name: str, sensors: Sensors, *, code_bits: int, avr: bool) -> di
         "n_joints": len(sensors.joints),
         "n_taxels": len(sensors.taxels),
         "levels": sensors.levels,
-        "sorts": ", then ".join(["joints"] * bool(sensors.joints) + ["taxels"] * bool(sensors.taxels)).capitalize(),
+        "sorts": sensors.sorts.capitalize(),
         "put": " or ".join(
             ["the code of a joint"] * bool(sensors.joints)
             + ["which levels of a taxel are closed"] * bool(sensors.taxels)

@@ -4,6 +4,7 @@ import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -14,6 +15,10 @@ from ..names import shortened
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
+
+if TYPE_CHECKING:
+    from ..build import Build
+    from ..live.recogniser import Moment
 
 _log = logging.getLogger("thenar")
 
@@ -51,12 +56,18 @@ class Sink(ABC):
 
     __slots__ = ()
 
+    def begin(self, build: "Build") -> None:  # noqa: B027
+        """Learn what recognises, before the first frame."""
+
     @abstractmethod
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Send on what was recognised.
 
         preshape is what the hand shall have now, None where it shall be told nothing; angles are the glove's.
         """
+
+    def moment(self, moment: "Moment") -> None:  # noqa: B027
+        """Send on what the grasp that was published last came of: frames, codes, scores."""
 
     def health(self, report: HealthReport) -> None:  # noqa: B027
         """Send on how the glove fares, once a second or so."""
@@ -162,9 +173,17 @@ class Fanout:
         self._sinks = tuple(sinks)
         self._errors, self._lost = [""] * len(self._sinks), [0] * len(self._sinks)
 
+    def begin(self, build: "Build") -> None:
+        """Tell all sinks what recognises."""
+        self._all(lambda sink: sink.begin(build))
+
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Publish to all sinks that work."""
         self._all(lambda sink: sink.publish(grasp, preshape, angles))
+
+    def moment(self, moment: "Moment") -> None:
+        """Send on to all sinks that work what the newest grasp came of."""
+        self._all(lambda sink: sink.moment(moment))
 
     def health(self, report: HealthReport) -> None:
         """Send on to all sinks that work how the glove fares."""

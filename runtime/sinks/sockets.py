@@ -301,7 +301,7 @@ def open_tcp(place: str, *, public: bool = False, clock: Callable[[], float] = m
     free one. Raises SinkError, or SettingError where `place` is not such an address.
     """
     where = f"tcp-public:{place}" if public else f"tcp:{place}"
-    family, address = _resolve(place, where, "tcp:127.0.0.1:7777")
+    family, address = resolve(place, where, "tcp:127.0.0.1:7777")
     if not public and not ipaddress.ip_address(address[0].partition("%")[0]).is_loopback:
         raise SettingError(
             f"{where}: other machines could read along there: take 127.0.0.1, or write tcp-public:{place} to let them"
@@ -314,7 +314,7 @@ def listen(place: str, where: str, example: str) -> socket.socket:
 
     Raises SinkError, or SettingError where `place` is no address.
     """
-    return _listener(*_resolve(place, where, example), where)
+    return _listener(*resolve(place, where, example), where)
 
 
 def _listener(family: socket.AddressFamily, address: tuple[str, int], where: str) -> socket.socket:
@@ -331,7 +331,11 @@ def _listener(family: socket.AddressFamily, address: tuple[str, int], where: str
     return listener
 
 
-def _resolve(place: str, where: str, example: str) -> tuple[socket.AddressFamily, tuple[str, int]]:
+def resolve(place: str, where: str, example: str) -> tuple[socket.AddressFamily, tuple[str, int]]:
+    """Return the family and the address, host and port first, of HOST:PORT, [HOST]:PORT or a PORT of 127.0.0.1.
+
+    Raises SettingError, with `where` and `example` as in `listen`.
+    """
     found = re.fullmatch(r"(?:(?:\[([^][]+)\]|([^][:]+)):)?([0-9]{1,5})", place)
     if not found or int(found[3]) > 65535:
         raise SettingError(f"{where} is no address: write it as {example}, with a port from 0 to 65535")

@@ -60,8 +60,7 @@ class LivePage:
         self._glove, self._frames = glove, FrameText(glove)
         self._health: HealthReport | None = None
         self._progress: object = None
-        self._past: deque[LiveGrasp] = deque(maxlen=PAST_US // _STEP_US)
-        self._due_us = 0
+        self._past = Past()
         self._recordings = Recordings(glove, recordings, self._tell_recording)
         build, hand = glove.system.build, load_hand(folder, glove.system.build.manifest)
         self._first = (
@@ -84,9 +83,7 @@ class LivePage:
         """Show what the glove has just published, and do what pages asked for. For the thread of the run."""
         grasp, glove = moment.grasp, self._glove
         self.server.publish("frame", partial(self._frames, moment))
-        if grasp.time_us >= self._due_us:
-            self._due_us = grasp.time_us + _STEP_US
-            self._past.append(grasp)
+        self._past.add(grasp)
         if glove.health is not self._health and glove.health is not None:
             self._health = glove.health
             self.server.publish("health", partial(message, "health", self._health))
@@ -118,20 +115,36 @@ class LivePage:
         self.server.publish("recording", message("recording", self._recordings.state))
 
     def _hello(self) -> Sequence[bytes]:
-        return (*self._first, past(tuple(self._past)))
+        return (*self._first, self._past.text())
 
 
-def past(grasps: Sequence[LiveGrasp]) -> bytes:
-    """Return the message of what was recognised before: an entry for every change."""
-    changes: list[tuple[object, ...]] = []
-    for grasp in grasps:
-        entry = (
-            *(grasp.candidate, grasp.grasp, grasp.health, grasp.state, grasp.segment),
-            *(grasp.segment_type, grasp.segment_us),
-        )
-        if not changes or entry != changes[-1][1:]:
-            changes.append((grasp.time_us, *entry))
-    return message("past", changes=changes, until_us=grasps[-1].time_us if grasps else 0)
+class Past:
+    """What was recognised lately, for pages that are opened later. `add` and `text` may be called on two threads."""
+
+    def __init__(self) -> None:
+        self._grasps: deque[LiveGrasp] = deque(maxlen=PAST_US // _STEP_US)
+        self._newest_us, self._due_us = 0, 0
+
+    def add(self, grasp: LiveGrasp) -> None:
+        """Take what was recognised."""
+        if grasp.time_us >= self._due_us or grasp.time_us < self._newest_us:
+            self._due_us = grasp.time_us + _STEP_US
+            self._grasps.append(grasp)
+        self._newest_us = grasp.time_us
+
+    def text(self) -> bytes:
+        """Return the message of it: an entry for every change."""
+        changes: list[tuple[object, ...]] = []
+        until_us = 0
+        for grasp in self._grasps.copy():
+            until_us = grasp.time_us
+            entry = (
+                *(grasp.candidate, grasp.grasp, grasp.health, grasp.state, grasp.segment),
+                *(grasp.segment_type, grasp.segment_us),
+            )
+            if not changes or entry != changes[-1][1:]:
+                changes.append((until_us, *entry))
+        return message("past", changes=changes, until_us=until_us)
 
 
 class FrameText:

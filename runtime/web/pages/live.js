@@ -7,8 +7,9 @@ const view = new View();
 let recording = null;
 
 const send = connect({
-  open: () => view.link("ok", "connected"),
-  closed: () => view.link("unknown", "not connected"),
+  open: () => view.link(true),
+  closed: () => view.link(false),
+  source: (source) => view.source(source),
   build: (build) => {
     view.build(build);
     $("record-panel").hidden = !build.records;

@@ -46,6 +46,9 @@ export class View {
     $("types").replaceChildren();
     for (const grasp of build.grasps) this.#row(grasp);
     $("preshape").hidden = !build.preshapes;
+    // A stream says nothing of single switches, or of how likely the other types are.
+    $("hand-panel").hidden = Boolean(build.partial);
+    $("types-say").hidden = !build.partial;
     this.answers = build.grasps;
   }
 
@@ -103,10 +106,23 @@ export class View {
     say($("task"), `Task: ${text}`);
   }
 
-  link(is, words) {
-    $("link").dataset.is = is;
-    say($("link"), words);
-    if (is === "unknown") this.#announce("not connected", performance.now(), true);
+  /** Show whether the server is there, and what it says of where its moments come from. */
+  link(connected) {
+    this.connected = connected;
+    this.#link();
+  }
+
+  source(source) {
+    this.from = source;
+    this.#link();
+  }
+
+  #link() {
+    const there = this.connected && (this.from?.connected ?? true);
+    $("link").dataset.is = there ? "ok" : "unknown";
+    say($("link"), there ? "connected" : "not connected");
+    say($("source"), (this.connected && this.from?.error) || "");
+    if (!there) this.#announce("not connected", performance.now(), true);
   }
 
   #row(grasp) {

@@ -61,5 +61,10 @@ def serve() -> Iterator[Callable[..., Client]]:
 
 
 @pytest.fixture
+def hear_one() -> Callable[[ClientConnection], dict[str, Any]]:
+    return told
+
+
+@pytest.fixture
 def hear() -> Callable[[ClientConnection], dict[str, Any]]:
     return told

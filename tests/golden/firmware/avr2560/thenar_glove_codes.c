@@ -73,8 +73,10 @@ static uint16_t nearest(const point_readings *at, const point_codes *codes, int3
 /* Return a reading as it is compared with those at the points. */
 static int32_t coded(uint16_t sensor, int32_t reading)
 {
+    int32_t found = reading;
+
     (void)sensor;
-    return reading;
+    return found;
 }
 
 void thenar_glove_codes_init(thenar_glove_codes *codes)

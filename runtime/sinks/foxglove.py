@@ -1,0 +1,312 @@
+"""Live topics for Foxglove, over its own WebSocket protocol (extra `foxglove`); messages are JSON, with their schemas.
+
+    /thenar/grasp     the grasp type, probability, state, segment and health, on change and `rate` times a second
+    /thenar/scores    score and probability of every grasp type, with `grasp`
+    /thenar/switches  names of the switches that are closed, lost or left unread, with `grasp`
+    /thenar/joints    angles in rad where they are calibrated, and the codes that are scored, with `grasp`
+    /thenar/preshape  the preshape, on change and once a second
+    /thenar/task      if a task is followed: its step, on change and once a second
+    /thenar/health    once a second, if asked for: how the glove fares
+
+A message's time is that of its frame. A topic that nobody has subscribed to costs nothing. What waits for a reader is
+bounded, the oldest goes first: one that stops reading holds nobody up. The server is the SDK's, on threads of its own;
+readers can ask for nothing but topics. A web page that is open in a browser of this machine may read as Foxglove does.
+
+Foxglove knows no null, no alternatives and no references in a schema: what is None is left out of its message.
+"""
+
+import ipaddress
+import re
+from collections import Counter
+from math import exp
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from thenar.drivers.errors import SettingError
+
+from ..names import shortened
+from ..preshape.selector import Preshape
+from ..published import HealthReport, JointAngles, LiveGrasp
+from ..task import Progress
+from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
+from .sockets import resolve
+
+if TYPE_CHECKING:
+    from ..build import Build
+    from ..live.recogniser import Moment
+
+RATE_HZ = 50
+_FASTEST_HZ = 1000
+_REPEAT_US = 1_000_000
+# Messages that wait for one reader, of all topics: some two seconds.
+BACKLOG = 512
+
+
+class Score(msgspec.Struct, frozen=True):
+    """How a frame scores a grasp type, in integer steps, and its softmax among all."""
+
+    grasp: str
+    score: int
+    probability: float
+
+
+class Scores(msgspec.Struct, frozen=True):
+    """Those of every grasp type, in the build's order, and whether the build refuses the frame; none while too little
+    can be read.
+    """
+
+    types: tuple[Score, ...]
+    refused: bool
+
+
+class Switches(msgspec.Struct, frozen=True):
+    """Names of the build's switches. Of those that are in none of the lists it is known that they are open."""
+
+    closed: tuple[str, ...]
+    lost: tuple[str, ...]
+    unread: tuple[str, ...]
+
+
+class Angle(msgspec.Struct, frozen=True):
+    """Where a joint of the glove is."""
+
+    name: str
+    position_rad: float
+
+
+class Code(msgspec.Struct, frozen=True):
+    """What is scored of a joint of the build."""
+
+    name: str
+    code: int
+
+
+class JointValues(msgspec.Struct, frozen=True):
+    """All joints; lists are empty where there is no calibration, or the joints are lost."""
+
+    angles: tuple[Angle, ...]
+    codes: tuple[Code, ...]
+
+
+TOPICS: dict[str, type[msgspec.Struct]] = {
+    "/thenar/grasp": LiveGrasp,
+    "/thenar/scores": Scores,
+    "/thenar/switches": Switches,
+    "/thenar/joints": JointValues,
+    "/thenar/preshape": Preshape,
+    "/thenar/task": Progress,
+    "/thenar/health": HealthReport,
+}
+
+
+def schema(kind: type[msgspec.Struct]) -> dict[str, Any]:
+    """Return the JSON schema of a struct in the part of the language that Foxglove knows."""
+    (found,), shared = msgspec.json.schema_components((kind,), ref_template="{name}")
+    return {"title": f"thenar.{kind.__name__}", **_plain(found, shared)}
+
+
+def _plain(found: dict[str, Any], shared: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    if "$ref" in found:
+        return _plain(shared[found["$ref"]], shared)
+    if "anyOf" in found:
+        return _plain(next(each for each in found["anyOf"] if each != {"type": "null"}), shared)
+    if "enum" in found:
+        return {"type": "string"}
+    if found["type"] == "array":
+        return {"type": "array", "items": _plain(found["items"], shared)}
+    if found["type"] == "object":
+        fields = {name: _plain(field, shared) for name, field in found["properties"].items()}
+        return {"type": "object", "properties": fields}
+    return {"type": found["type"]}
+
+
+def encode(content: msgspec.Struct) -> bytes:
+    """Return a message: the fields of a struct that are not None."""
+    fields = ((name, getattr(content, name)) for name in content.__struct_fields__)
+    return msgspec.json.encode({name: value for name, value in fields if value is not None})
+
+
+class FoxgloveServer(Sink):
+    """Serves Foxglove at an address. Raises SettingError about one that cannot be, SinkError where it cannot be served.
+
+    `host` is an address, `port` 0 any free one: the attribute `port` says which.
+    """
+
+    def __init__(self, host: str = "127.0.0.1", port: int = 8765, *, rate: int = RATE_HZ, where: str = "") -> None:
+        # The SDK is an extra.
+        import foxglove
+        from foxglove.websocket import ServerListener
+
+        self._where = where or f"foxglove:{host}:{port}"
+        if not 1 <= rate <= _FASTEST_HZ:
+            raise SettingError(f"{self._where}: a rate of {rate}: it is 1 to {_FASTEST_HZ} a second")
+        # Channels are gone with it.
+        self._context = context = foxglove.Context()
+        self._channels = {
+            topic: foxglove.Channel(topic, schema=schema(kind), message_encoding="json", context=context)
+            for topic, kind in TOPICS.items()
+        }
+        self._subscribed = Counter[int]()
+        try:
+            self._server = foxglove.start_server(
+                name="thenar",
+                host=host,
+                port=port,
+                context=context,
+                server_listener=_listener(ServerListener, self._subscribed),
+                message_backlog_size=BACKLOG,
+            )
+        except (RuntimeError, OSError) as reason:
+            said = re.sub(r" \(os error [0-9]+\)", "", str(reason).removeprefix("FoxgloveError: "))
+            hint = ": another process serves that port; take another" if "in use" in said else ""
+            raise SinkError(f"{self._where} cannot be opened: {said}{hint}") from None
+        self.port: int = self._server.port
+        self._period_us, self._due, self._closed = 1_000_000 // rate, False, False
+        self._written_us = self._repeated_us = self._unix_us = self._time_us = 0
+        self._shown: tuple[object, ...] = ()
+        # Preshape and task, by their topics: whoever comes later has them within a second.
+        self._kept: dict[str, msgspec.Struct] = {}
+        self._build: Build | None = None
+        self._sent = self._lost = 0
+        self._error = ""
+
+    def begin(self, build: "Build") -> None:
+        """Take the names of switches, joints and grasp types."""
+        self._build = build
+
+    def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
+        """Publish the grasp if that is news, or due, and what is kept."""
+        self._time_us, self._unix_us = grasp.time_us, grasp.unix_us
+        shown = (grasp.grasp, grasp.health, grasp.state, grasp.segment, grasp.segment_type)
+        # The recording of several sessions may go back in time.
+        due = not self._shown or not 0 <= grasp.time_us - self._written_us < self._period_us
+        self._due = due or shown != self._shown
+        if self._due:
+            self._shown = shown
+            self._written_us = grasp.time_us if due else self._written_us
+            self._log("/thenar/grasp", grasp)
+        if preshape is not None and preshape is not self._kept.get("/thenar/preshape"):
+            self._keep("/thenar/preshape", preshape)
+        if not 0 <= grasp.time_us - self._repeated_us < _REPEAT_US:
+            self._repeated_us = grasp.time_us
+            for topic, content in self._kept.items():
+                self._log(topic, content)
+
+    def moment(self, moment: "Moment") -> None:
+        """Publish with the grasp what it came of."""
+        if self._due and self._build is not None and self._subscribed:
+            self._log("/thenar/scores", _scores(moment, self._build))
+            if moment.switches is not None:
+                self._log("/thenar/switches", _switches(moment, self._build))
+            self._log("/thenar/joints", _joints(moment, self._build))
+
+    def health(self, report: HealthReport) -> None:
+        """Publish how the glove fares."""
+        self._log("/thenar/health", report, report.time_us - self._time_us)
+
+    def task(self, progress: Progress) -> None:
+        """Publish how far the hand has come."""
+        self._keep("/thenar/task", progress)
+
+    def _keep(self, topic: str, content: msgspec.Struct) -> None:
+        self._kept[topic] = content
+        self._log(topic, content)
+
+    def _log(self, topic: str, content: msgspec.Struct, later_us: int = 0) -> None:
+        """Hand a message to the server if somebody reads its topic, stamped so much later than the newest frame."""
+        channel = self._channels[topic]
+        if self._closed or not channel.has_sinks():
+            return
+        try:
+            channel.log(encode(content), log_time=1000 * max(0, self._unix_us + later_us))
+            self._sent += 1
+        except Exception as reason:  # of the SDK's own kinds
+            self._lost += 1
+            self._error = str(reason)
+
+    def report(self) -> SinkReport:
+        """Return how this sink is doing; what the server drops of a reader that is slow, it tells nobody."""
+        readers = 0 if self._closed else len(self._subscribed)
+        return SinkReport(self._where, readers, self._sent, self._lost, self._error)
+
+    def close(self) -> None:
+        """End the server and its connections."""
+        if not self._closed:
+            self._closed = True
+            self._server.stop()
+            for channel in self._channels.values():
+                channel.close()
+
+
+def _listener(base: type[Any], subscribed: Counter[int]) -> Any:
+    """Return what counts the topics of each reader."""
+
+    class Listener(base):  # type: ignore[misc]
+        def on_subscribe(self, client: Any, channel: Any) -> None:
+            subscribed[client.id] += 1
+
+        def on_unsubscribe(self, client: Any, channel: Any) -> None:
+            subscribed[client.id] -= 1
+            if not subscribed[client.id]:
+                del subscribed[client.id]
+
+    return Listener()
+
+
+def _scores(moment: "Moment", build: "Build") -> Scores:
+    if moment.scores is None:
+        return Scores((), moment.refused)
+    best = max(moment.scores)
+    odds = [exp((score - best) / build.tables.scale) for score in moment.scores]
+    shares = [each / sum(odds) for each in odds]
+    return Scores(tuple(map(Score, build.grasps, moment.scores, shares)), moment.refused)
+
+
+def _switches(moment: "Moment", build: "Build") -> Switches:
+    frame = moment.switches
+    assert frame is not None
+    names = [switch.name for switch in build.manifest.switches]
+
+    def named(mask: int) -> tuple[str, ...]:
+        return tuple(name for bit, name in enumerate(names) if mask >> bit & 1)
+
+    return Switches(
+        closed=named(frame.closed & ~(frame.lost | frame.unread)),
+        lost=named(frame.lost),
+        unread=named(frame.unread & ~frame.lost),
+    )
+
+
+def _joints(moment: "Moment", build: "Build") -> JointValues:
+    angles = moment.angles or JointAngles((), ())
+    return JointValues(
+        tuple(map(Angle, angles.names, angles.positions_rad)),
+        tuple(map(Code, (joint.name for joint in build.manifest.joints), map(int, moment.codes or ()))),
+    )
+
+
+def _open(where: SinkPlace) -> Sink:
+    rate = where.options.get("rate", str(RATE_HZ))
+    if not re.fullmatch("[0-9]{1,9}", rate):
+        raise SettingError(f"{where.text}: a rate of {shortened(repr(rate))}: it is 1 to {_FASTEST_HZ} a second")
+    _, address = resolve(where.place, where.text, "foxglove:127.0.0.1:8765")
+    if "public" not in where.options and not ipaddress.ip_address(address[0].partition("%")[0]).is_loopback:
+        raise SettingError(
+            f"{where.text}: other machines could read along there: take 127.0.0.1, or write "
+            f"foxglove:{where.place}?public to let them"
+        )
+    try:
+        return FoxgloveServer(*address[:2], rate=int(rate), where=where.text)
+    except ImportError as reason:
+        raise SinkError(f"{where.text} needs Foxglove's SDK: pip install 'thenar[foxglove]' ({reason})") from None
+
+
+MEMBER = SinkKind(
+    "foxglove",
+    "127.0.0.1:PORT",
+    f"live topics for Foxglove, {RATE_HZ} or HZ times a second and on change; with public others may read",
+    _open,
+    ("public", "rate=HZ"),
+    rank=6,
+)

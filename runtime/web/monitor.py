@@ -1,0 +1,169 @@
+"""The page of a run elsewhere: what a run publishes on a socket (`--sink tcp:...` or `unix:...`), read and shown.
+
+The stream holds what was recognised and how the glove fares. It does not hold single switches, joints or the
+probabilities of other types, so the page leaves them out.
+"""
+
+import re
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from threading import Event
+from typing import Self
+
+import msgspec
+
+from thenar.drivers.errors import DeviceError, SettingError
+
+from ..build import load_manifest
+from ..names import shortened
+from ..sinks.jsonl import HealthLine, Line
+from ..task import ProgressLine
+from .live import Past
+from .server import Server, message
+
+RETRY_S, _WAIT_S = 1.0, 0.2
+# More than any line of a run; of a sender that is none, no more is kept.
+LONGEST_LINE = 1 << 20
+_TCP = re.compile(r"tcp:(?:\[([^][]+)\]|([^][:]+)):([0-9]{1,5})")
+_decode = msgspec.json.Decoder(Line | HealthLine | ProgressLine).decode
+
+
+class Source(msgspec.Struct, frozen=True):
+    """Where the page's moments come from, whether they do, and what is wrong."""
+
+    where: str
+    connected: bool
+    error: str = ""
+
+
+class StreamMonitor:
+    """Shows the stream at `where` on a page; a context manager.
+
+    Parameters
+    ----------
+    where : str
+        "tcp:HOST:PORT" or "unix:PATH", as the run's sink has it.
+    address, token
+        As for `Server`.
+    build : Path, optional
+        The folder of the build that runs there: all of its types are listed from the beginning.
+
+    Attributes
+    ----------
+    server : Server
+        What serves the page.
+
+    Raises
+    ------
+    SettingError
+        About a `where` that names no stream, and as `Server` does.
+    BuildError
+        If the build cannot be read.
+    """
+
+    def __init__(self, where: str, address: str, *, token: str | None, build: Path | None = None) -> None:
+        self._place, self._where = _place(where), where
+        grasps = () if build is None else load_manifest(build).answers
+        self._first = message(
+            "build", name=where, grasps=grasps, switches=(), joints=(), preshapes=True, records=False, partial=True
+        )
+        self._past = Past()
+        self._source = Source(where, connected=False, error="not connected yet")
+        self.server = Server("live", address, token=token, hello=self._hello)
+
+    def run(self, stop: Event, say: Callable[[Source], None] = lambda _: None) -> None:
+        """Read and show until `stop` is set; what is cut is opened again. `say` takes how the stream fares, whenever
+        that changes.
+        """
+        self._say = say
+        while not stop.is_set():
+            try:
+                with _connected(self._place, self._where) as stream:
+                    self._tell(Source(self._where, connected=True))
+                    for line in _lines(stream, stop):
+                        self._show(line)
+                if not stop.is_set():
+                    self._tell(Source(self._where, connected=False, error="the run has ended, or has dropped us"))
+            except (DeviceError, OSError) as reason:
+                self._tell(Source(self._where, connected=False, error=str(reason)))
+            stop.wait(RETRY_S)
+
+    def close(self) -> None:
+        """End the page."""
+        self.server.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _show(self, text: bytes) -> None:
+        try:
+            line = _decode(text)
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
+            raise DeviceError(f"what comes is no stream of thenar: {shortened(str(wrong), 120)}") from None
+        if isinstance(line, Line):
+            self._past.add(line)
+            self.server.publish("frame", partial(message, "frame", line))
+        elif isinstance(line, HealthLine):
+            self.server.publish("health", partial(message, "health", line))
+        else:
+            self.server.publish("task", partial(message, "task", text=line.text))
+
+    def _tell(self, source: Source) -> None:
+        self.server.publish("source", message("source", source))
+        if source != self._source:
+            self._source = source
+            self._say(source)
+
+    def _hello(self) -> Sequence[bytes]:
+        return self._first, self._past.text()
+
+
+def _place(where: str) -> str | tuple[str, int]:
+    """Return the path of a socket, or host and port."""
+    if where.startswith("unix:") and len(where) > len("unix:"):
+        return where.removeprefix("unix:")
+    found = _TCP.fullmatch(where)
+    if found is None or int(found[3]) > 65535:
+        raise SettingError(
+            f"{shortened(repr(where))} is no stream of a run: write tcp:HOST:PORT or unix:PATH, as its --sink has it"
+        )
+    return found[1] or found[2], int(found[3])
+
+
+def _connected(place: str | tuple[str, int], where: str) -> socket.socket:
+    """Return a connection to the stream. Raises DeviceError."""
+    try:
+        if isinstance(place, tuple):
+            return socket.create_connection(place, timeout=RETRY_S)
+        stream = socket.socket(socket.AF_UNIX)
+        try:
+            stream.connect(place)
+        except OSError:
+            stream.close()
+            raise
+    except (OSError, UnicodeError) as reason:
+        why = getattr(reason, "strerror", None) or str(reason)
+        raise DeviceError(f"{where} cannot be opened: {why}; does the run go on, with --sink {where}?") from None
+    return stream
+
+
+def _lines(stream: socket.socket, stop: Event) -> Iterator[bytes]:
+    """Yield whole lines until the stream ends or `stop` is set."""
+    stream.settimeout(_WAIT_S)
+    rest = b""
+    while not stop.is_set():
+        try:
+            data = stream.recv(65_536)
+        except TimeoutError:
+            continue
+        if not data:
+            return
+        *lines, rest = (rest + data).split(b"\n")
+        if len(rest) > LONGEST_LINE:
+            raise DeviceError("what comes is no stream of thenar: a line without an end")
+        yield from filter(None, lines)

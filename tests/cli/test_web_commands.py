@@ -1,0 +1,218 @@
+"""`thenar run --web` and `thenar monitor` from the command line: what they say, what a page can do, how they end."""
+
+import json
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
+
+from thenar.runtime.recording.reader import Reader
+from thenar.runtime.recording.session import Mark
+
+Thenar = Callable[..., "subprocess.CompletedProcess[str]"]
+PATIENCE_S = 30
+
+
+class Command:
+    """A command that serves a page."""
+
+    def __init__(self, process: "subprocess.Popen[str]") -> None:
+        self.process, self.said = process, list[str]()
+        self.url = self.until(r"thenar: the page is at (http://\S+)")
+
+    def until(self, pattern: str) -> str:
+        """Return what the first line on stderr says that matches."""
+        assert self.process.stderr is not None
+        for line in self.process.stderr:
+            self.said.append(line)
+            if found := re.search(pattern, line):
+                return found[1] if found.groups() else found[0]
+        raise AssertionError("".join(self.said))
+
+    @contextmanager
+    def page(self) -> Iterator[ClientConnection]:
+        place = self.url.removeprefix("http://").partition("/")[0]
+        how = {"origin": Origin(f"http://{place}"), "proxy": None, "compression": None}
+        with connect(f"ws://{place}/live", **how) as live:  # type: ignore[arg-type]
+            yield live
+
+    def end(self) -> int:
+        self.process.send_signal(signal.SIGINT)
+        assert self.process.stderr is not None
+        self.said += self.process.stderr
+        return self.process.wait(PATIENCE_S)
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., Command]]:
+    with ExitStack() as stack:
+
+        def begin(*arguments: object) -> Command:
+            command = [sys.executable, "-m", "thenar.cli", *map(str, arguments)]
+            out = stack.enter_context((tmp_path / "stdout").open("wb"))
+            process = subprocess.Popen(command, cwd=tmp_path, stdout=out, stderr=subprocess.PIPE, text=True)
+            stack.enter_context(process)
+            stack.callback(process.kill)
+            return Command(process)
+
+        yield begin
+
+
+@pytest.fixture
+def glove(tmp_path: Path) -> Path:
+    """Return a harness whose board never comes: a run of it goes on all the same."""
+    path = tmp_path / "glove.toml"
+    names = [f"s{number}" for number in range(6)]
+    path.write_text(f'name = "glove <b>"\n[[scanner]]\nport = "{tmp_path}/none"\nswitches = {json.dumps(names)}\n')
+    return path
+
+
+def told(live: ClientConnection, topic: str, wanted: Callable[[Any], bool] = lambda _: True) -> Any:
+    while True:
+        message = json.loads(live.recv(timeout=PATIENCE_S))
+        if message["topic"] == topic and wanted(message):
+            return message
+
+
+def ask(live: ClientConnection, **asked: object) -> None:
+    live.send(json.dumps(asked))
+
+
+def test_a_page_of_a_run_records_marks_and_stops(
+    start: Callable[..., Command], build_folder: Path, glove: Path, tmp_path: Path
+) -> None:
+    run = start("run", build_folder, "--glove", glove, "--web", "127.0.0.1:0")
+    with run.page() as live:
+        build = told(live, "build")
+        assert (build["name"], build["grasps"], build["records"]) == ("glove <b>", ["cup", "pen", "rod", "none"], True)
+        assert told(live, "hand")["switches"]
+        assert told(live, "recording")["folder"] == "recordings"
+        frame = told(live, "frame")
+        assert (frame["grasp"], frame["probabilities"]) == ("unknown", None)
+        assert told(live, "health")["devices"][0]["error"]
+        ask(live, do="record", name="one")
+        state = told(live, "recording", lambda state: state["on"])
+        ask(live, do="mark", text="here <b>")
+        told(live, "recording", lambda state: state["marks"] == 1)
+        ask(live, do="record", name="two")
+        assert told(live, "refused")["why"] == "a recording goes on: stop that first"
+        ask(live, do="stop")
+        told(live, "recording", lambda state: not state["on"])
+        ask(live, do="record")
+        last = told(live, "recording", lambda state: state["on"])
+    # What nobody stops, the end of the run does.
+    assert run.end() == 0
+    names = [state["name"], last["name"]]
+    assert sorted(path.name for path in (tmp_path / "recordings").iterdir()) == sorted(names)
+    assert re.fullmatch(r"one-[0-9]{8}-[0-9]{6}\.mcap", names[0])
+    said = "".join(run.said)
+    assert all(f"recordings/{name}: " in said for name in names)
+    readers = [Reader(tmp_path / "recordings" / name) for name in names]
+    entries = [list(reader) for reader in readers]
+    assert not [fault for reader in readers for fault in reader.faults()]
+    assert [entry.text for entry in entries[0] if isinstance(entry, Mark)] == ["here <b>"]
+
+
+NO_NAMES = (
+    *("../up", "/etc/cron.d/x", "a/b", "a\\b", ".hidden", "-option", "x.mcap", "a b", "x" * 41, "\0", "ä", "x\n"),
+    *(5, None, ["x"], {"x": 1}),
+)
+
+
+def test_a_name_that_is_no_part_of_a_files_name_is_refused(
+    start: Callable[..., Command], build_folder: Path, glove: Path, tmp_path: Path
+) -> None:
+    run = start("run", build_folder, "--glove", glove, "--web", "127.0.0.1:0", "--recordings", tmp_path / "own")
+    before = set(tmp_path.rglob("*"))
+    with run.page() as live:
+        for name in NO_NAMES:
+            ask(live, do="record", name=name)
+            assert "at most 40 letters of a to z, digits, - and _" in told(live, "refused")["why"], name
+        ask(live, do="mark", text="x" * 201)
+        assert "nothing is being recorded" in told(live, "refused")["why"]
+        ask(live, do="format")
+        assert "a page can ask to record, mark or stop, not 'format'" in told(live, "refused")["why"]
+    assert run.end() == 0
+    assert set(tmp_path.rglob("*")) == before
+
+
+def test_a_recording_of_the_command_is_marked_by_pages_and_ended_by_none(
+    start: Callable[..., Command], build_folder: Path, glove: Path, tmp_path: Path
+) -> None:
+    options = ("--web", "127.0.0.1:0", "--record", tmp_path / "own.mcap")
+    run = start("run", build_folder, "--glove", glove, *options)
+    with run.page() as live:
+        told(live, "recording", lambda state: state["on"] and state["fixed"])
+        ask(live, do="stop")
+        assert "was begun by the command (--record), and ends with it" in told(live, "refused")["why"]
+        ask(live, do="mark")
+        told(live, "recording", lambda state: state["marks"] == 1)
+    assert run.end() == 0
+    assert [entry.text for entry in Reader(tmp_path / "own.mcap") if isinstance(entry, Mark)] == [""]
+
+
+def test_the_token_is_said_once_and_asked_for(start: Callable[..., Command], build_folder: Path, glove: Path) -> None:
+    run = start("run", build_folder, "--glove", glove, "--web", "127.0.0.1:0", "--web-token")
+    token = run.url.partition("/?token=")[2]
+    assert len(token) == 32
+    with pytest.raises(Exception, match="403"), run.page():
+        pass
+    assert run.end() == 0
+    assert "".join(run.said).count(token) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--web", "0.0.0.0:0"), "other machines can reach: add --web-token"),
+        (("--web", "nowhere"), "--web nowhere is no address: write it as 127.0.0.1:8080, with a port from 0 to 65535"),
+        (("--web", ""), "is no address"),
+        (("--web", "no.such.host.invalid:80"), "there is no host no.such.host.invalid"),
+        (("--web-token",), "--web-token changes nothing without --web: leave it out"),
+        (("--recordings", "folder"), "--recordings changes nothing without --web: leave it out"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(
+    thenar: Thenar, build_folder: Path, glove: Path, options: tuple[str, ...], said: str
+) -> None:
+    done = thenar("run", build_folder, "--glove", glove, *options)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1 or "nothing in" in done.stderr
+
+
+def test_a_port_that_is_taken_is_said_so(thenar: Thenar, build_folder: Path, glove: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        place = f"127.0.0.1:{taken.getsockname()[1]}"
+        for command in (("run", build_folder, "--glove", glove), ("monitor", "unix:/nowhere")):
+            done = thenar(*command, "--web", place)
+            assert done.returncode == 2
+            assert f"--web {place} cannot be opened: Address already in use: another process serves" in done.stderr
+
+
+def test_monitor_shows_a_run_elsewhere(
+    start: Callable[..., Command], build_folder: Path, glove: Path, tmp_path: Path
+) -> None:
+    where = f"unix:{tmp_path}/grasps"
+    monitor = start("monitor", where, "--build", build_folder, "--web", "127.0.0.1:0")
+    monitor.until("cannot be opened")
+    run = start("run", build_folder, "--glove", glove, "--web", "127.0.0.1:0", "--sink", where, "--status")
+    monitor.until(f"{where}: connected")
+    with monitor.page() as live:
+        assert told(live, "build")["grasps"] == ["cup", "pen", "rod", "none"]
+        assert told(live, "frame")["grasp"] == "unknown"
+        assert told(live, "health")["devices"][0]["name"].startswith("scanner")
+        ask(live, do="record")
+        assert told(live, "refused")["why"] == "this page only shows"
+        assert run.end() == 0
+        told(live, "source", lambda source: not source["connected"])
+    assert monitor.end() == 0
