@@ -8,6 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -110,6 +111,15 @@ class Trier:
     def log(self, kind: str) -> list[dict[str, Any]]:
         entries: list[dict[str, Any]] = self.driver.get_log(kind)  # type: ignore[no-untyped-call]
         return entries
+
+    def faults(self) -> list[str]:
+        """Return what axe-core finds wrong: the rule, and where."""
+        self.script((files("axe_core_python") / "axe.min.js").read_text())
+        found = self.driver.execute_async_script(
+            "axe.run({resultTypes: ['violations']}).then(arguments[0], (wrong) => arguments[0](String(wrong)))"
+        )
+        assert found["passes"]
+        return [f"{one['id']}: {node['html']}" for one in found["violations"] for node in one["nodes"]]
 
     def requests(self) -> list[str]:
         """Return the addresses that were asked for since the page was opened."""
@@ -466,6 +476,10 @@ def test_it_fits_the_screen_in_light_and_dark_with_letters_that_can_be_read(open
         light = opened.script(look)
         opened.scheme("dark")
         opened.wait(lambda: all(one != other for one, other in zip(light, opened.script(look), strict=True)))
+        assert opened.faults() == []
+        opened.scheme("light")
+        opened.wait(lambda: opened.script(look) == light)
+        assert opened.faults() == []
     finally:
         opened.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
