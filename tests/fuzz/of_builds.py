@@ -314,6 +314,7 @@ FORMATS = (
     _member(TABLES_NAME, sealed(altered), bytes),
     _member(ENSEMBLE_NAME, sealed(npz_file), bytes),
     _member(SCAN_NAME, json_file, lambda data: _canonical(data, ScanMap)),
+    _member(HAND_NAME, json_file, bytes),
     Format("build", lambda: [_packed_build()], _mixed, _folder),
     Format("frontier.json", _frontier, json_file, _compile_from),
     Format("store.jsonl", lambda: [_store()], _changed_store, _resume),

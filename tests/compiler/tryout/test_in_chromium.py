@@ -8,6 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,8 @@ from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_protocol import SENSORS_22
 from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts, GloveState
 from thenar.drivers.emulated.scanner import ScannerBoard
-from thenar.drivers.lines import Header, parsed
+from thenar.drivers.line_reader import RowReader
+from thenar.drivers.lines import Header, Row, parsed
 from thenar.drivers.scanner_protocol import (
     WITHOUT_DIODES,
     Event,
@@ -46,8 +48,12 @@ from thenar.drivers.scanner_protocol import (
 )
 from thenar.drivers.scanner_state import ambiguous
 from thenar.runtime import Build
-from thenar.runtime.calibration import CodeTables, codes_of_bytes
+from thenar.runtime.calibration import CodeTables, codes_of_bytes, numbers_of
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.harness.wiring import Debounce, Harness, ScannerWiring, StreamWiring
+from thenar.runtime.live.system import System
 from thenar.runtime.manifest import Calibration
+from thenar.runtime.sources.rows import RowSource
 from thenar.runtime.tables import PAIRED, PLAIN, SLOPED
 from thenar.simulator.handmaps.handmap import hand_map
 
@@ -105,6 +111,15 @@ class Trier:
     def log(self, kind: str) -> list[dict[str, Any]]:
         entries: list[dict[str, Any]] = self.driver.get_log(kind)  # type: ignore[no-untyped-call]
         return entries
+
+    def faults(self) -> list[str]:
+        """Return what axe-core finds wrong: the rule, and where."""
+        self.script((files("axe_core_python") / "axe.min.js").read_text())
+        found = self.driver.execute_async_script(
+            "axe.run({resultTypes: ['violations']}).then(arguments[0], (wrong) => arguments[0](String(wrong)))"
+        )
+        assert found["passes"]
+        return [f"{one['id']}: {node['html']}" for one in found["violations"] for node in one["nodes"]]
 
     def requests(self) -> list[str]:
         """Return the addresses that were asked for since the page was opened."""
@@ -461,6 +476,10 @@ def test_it_fits_the_screen_in_light_and_dark_with_letters_that_can_be_read(open
         light = opened.script(look)
         opened.scheme("dark")
         opened.wait(lambda: all(one != other for one, other in zip(light, opened.script(look), strict=True)))
+        assert opened.faults() == []
+        opened.scheme("light")
+        opened.wait(lambda: opened.script(look) == light)
+        assert opened.faults() == []
     finally:
         opened.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
@@ -645,6 +664,109 @@ def test_lines_of_numbers_are_rows_of_the_build(gloved_trier: Trier, folder: Pat
         assert bits_now(trier, build) == bits[row].astype(int).tolist()
     trier.wait(lambda: trier.text("serial-said") == 'Connected: 4 rows; lines that hold none: 1, such as "12,what".')
     assert trier.log("browser") == []
+
+
+@pytest.fixture(scope="module")
+def counted_pads(make_set: Make) -> GraspSet:
+    """Return a set with two switches and two taxels whose codes are a converter's counts."""
+    made = make_set()
+    held = np.where(made.switches[:, 2:4], 700, 80) + np.random.default_rng(3).integers(0, 300, (len(made), 2))
+    return replace(
+        made,
+        switches=made.switches[:, :2],
+        switch_names=("a", "b"),
+        taxels=held.astype(np.uint16),
+        taxel_columns=tuple(Joint(name, "count", 0, 0.0, 1023, 1023.0) for name in ("pad", "other pad")),
+    )
+
+
+def test_a_board_is_read_as_the_wiring_has_it_with_its_taxels(
+    gloved_trier: Trier, counted_pads: GraspSet, tmp_path: Path
+) -> None:
+    board = ScannerWiring(port="/dev/ttyACM0", switches=("", "b", "a"), taxels=("", "other pad", "pad"), baud=500_000)
+    harness = Harness(name="glove", scanners=(board,))
+    compile_build(counted_pads, tmp_path / "build", folds=0, rounds=8, levels=3, inputs="switches", harness=harness)
+    build, trier, now = Build.load(tmp_path / "build"), gloved_trier, 0
+    wire = connected(trier, tmp_path / "build" / "try.html", "scanner")
+    emulated = ScannerBoard(1, 3, channels=3, bits=10)
+    wire.feed(b"".join(emulated.boot(0)))
+    kept = {switch.source for switch in build.manifest.switches}
+    assert {"pad", "other pad"} <= kept
+    for row in (0, 1, 2):
+        values = dict(zip(("pad", "other pad"), counted_pads.taxels[row].tolist(), strict=True))
+        values |= dict(zip(("a", "b"), counted_pads.switches[row].tolist(), strict=True))
+        emulated.codes = (5, values["other pad"], values["pad"])
+        closed = values["b"] << 1 | values["a"] << 2
+        emulated.touch(now)
+
+        def turn(heard: bytes, closed: int = closed) -> bytes:
+            nonlocal now
+            now += 30_000
+            return b"".join([*emulated.receive(heard, now), *emulated.scan(closed, now)])
+
+        bits, _ = rows_of(build, counted_pads)
+        wanted = said_of(build, bits[row].astype(int).tolist(), [])
+        wire.until(lambda wanted=wanted: (trier.text("grasp"), trier.text("margin")) == wanted, turn)  # type: ignore[misc]
+    assert trier.script("return fake.options.baudRate") == 500_000
+    assert trier.log("browser") == []
+
+
+def test_lines_are_read_as_the_wiring_of_a_stream_has_them(
+    gloved_trier: Trier, counted_pads: GraspSet, tmp_path: Path
+) -> None:
+    stream = StreamWiring(
+        port="/dev/ttyACM0",
+        columns=("ms", "j0", "b", "a", "pad", "other pad", "j1", "j2"),
+        switches=("a", "b"),
+        threshold=2.5,
+        thresholds={"b": 100.0},
+        closed="low",
+        joints={"j0": (0.0, 127.5), "j1": (200.0, -3.0), "j2": (0.0, 1.0)},
+        taxels={"pad": (0.0, 1023.0), "other pad": (0.0, 1023.0)},
+    )
+    harness = Harness(name="glove", streams=(stream,), debounce=Debounce(enabled=False))
+    compile_build(counted_pads, tmp_path / "build", folds=0, rounds=8, levels=3, harness=harness)
+    build, trier = Build.load(tmp_path / "build"), gloved_trier
+    wire = connected(trier, tmp_path / "build" / "try.html", "lines")
+    system, reader = System.of(build, harness), Handed()
+    source = RowSource(reader, harness, 0, system.switch_names, system.scan)
+    source.open()
+    joints = CodeTables(build.manifest.joints, harness.sensor_names, numbers_of(stream.joints))
+    for line in (b"7,99.4,100.5,2.4,300,900,12.25,0.5", b"8,130,99,3,0,1023,201,-1", b"9,nan,1,2.5,512,80,100,0.3333"):
+        wire.feed(line + b"\n")
+        reader.lines.append(line)
+        switches, glove = source.read(0), source.read(0)
+        assert isinstance(switches, SwitchFrame)
+        assert isinstance(glove, GloveFrame)
+        codes = np.array(joints.codes(glove.sensors), np.uint16)
+        flags = [
+            [bool(mask >> bit & 1) for bit in range(build.tables.n_switches)]
+            for mask in (switches.closed, switches.lost)
+        ]
+        dull = [bool(joints.lost >> joint & 1) for joint in range(build.tables.n_joints)]
+        found = build.recognise(flags[0], codes, flags[1], dull)
+        said = f"{100 * found.probability:.1f} %, ahead by {found.margin} steps"
+        trier.wait(lambda said=said: trier.text("margin").startswith(said))  # type: ignore[misc]
+        assert trier.text("grasp") == found.grasp
+    assert trier.log("browser") == []
+
+
+class Handed(RowReader):
+    """Hands over the rows of lines, one at a time."""
+
+    def __init__(self) -> None:
+        self.lines: list[bytes] = []
+
+    def open(self) -> None:
+        """Do nothing."""
+
+    def read(self, _timeout_s: float) -> list[Row]:
+        row = parsed(self.lines.pop(0))
+        assert isinstance(row, Row)
+        return [row]
+
+    def close(self) -> None:
+        """Do nothing."""
 
 
 # ---- The parts that are Python's, in JavaScript ----
