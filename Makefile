@@ -103,6 +103,7 @@ bench: $(VENV)/bench  ## the benchmarks, as ratios against a peer or a bound in 
 	$(BIN)/python benchmarks/runtime.py
 	$(BIN)/python benchmarks/simulator.py
 	$(BIN)/python benchmarks/live.py
+	$(BIN)/python benchmarks/web.py
 	$(BIN)/python benchmarks/firmware.py
 
 soak: $(VENV)/installed  ## an hour of live recognition on emulated devices: does anything grow?

@@ -35,7 +35,7 @@ _HEARD = 32
 _WINDOW = 256
 _EARLIER = 8  # boots
 
-_NET = re.compile(r"udp://(\[[0-9A-Fa-f:.%]+\]|[A-Za-z0-9._-]+):(\d{1,5})/?")
+_NET = re.compile(r"udp://(\[[0-9A-Fa-f:.]+(?:%[A-Za-z0-9._-]+)?\]|[A-Za-z0-9._-]+):(\d{1,5})/?")
 _AGAIN_S = 0.1  # after so long a setting that was not acknowledged is sent again
 _SILENT_S = 4.0  # a board that answers nothing for so long may have another address by now
 _AT_ONCE = 64

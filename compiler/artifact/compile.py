@@ -56,11 +56,11 @@ from .training import (
     Tested,
     Trained,
     answered,
+    built_tables,
     cross_validated,
     cuts_of,
     detection_of,
     groups_for,
-    integers_of,
     rates_of,
     rejected_by,
     samples_of,
@@ -264,7 +264,7 @@ class Making:
         self.grasp_set, self.samples = grasp_set, samples
         self.options, self.trained, self.hand = options, trained, hand
         kept = trained.read(samples)
-        self.integers = integers_of(trained, samples, options)
+        self.integers = built_tables(trained, samples, options)
         names = names_of(grasp_set, trained.kept)
         self.harness = harness(names) if callable(harness) else harness
         self.scan = None
@@ -346,6 +346,7 @@ class Making:
         rates = rates_of("training", self.samples, deployed, options.seed)
         detection = detection_of("training", self.samples, deployed, options.seed)
         switches = zip(self.trained.kept, names_of(grasp_set, self.trained.kept), self.trained.gains, strict=True)
+        shares = kept.switches.mean(axis=0).tolist()
         return Manifest(
             schema=SCHEMA,
             checksum="",
@@ -363,8 +364,13 @@ class Making:
             options=options,
             grasps=self.samples.grasps,
             switches=tuple(
-                replace(self._switch(*each), closed_least=least.tobytes().hex(), closed_most=most.tobytes().hex())
-                for each, least, most in zip(switches, *closed_shares(self.trained.read(self.samples)), strict=True)
+                replace(
+                    self._switch(*each),
+                    closed_least=least.tobytes().hex(),
+                    closed_most=most.tobytes().hex(),
+                    closed_share=share,
+                )
+                for each, least, most, share in zip(switches, *closed_shares(kept), shares, strict=True)
             ),
             joints=tuple(_calibration(column, grasp_set.joints[column]) for column in self.trained.joints),
             proof=_proof(self.integers, self.comparison, options.width),

@@ -72,8 +72,9 @@ class Firmware:
             if self.board is not None:
                 raise FirmwareError("the mode classify reads no board: leave the board out, or ask for scan or glove")
         elif self.mode not in target.modes:
-            others = " and ".join(name for name, each in TARGETS.items() if self.mode in each.modes)
-            raise FirmwareError(f"the mode {self.mode} is written for {others}, not for {self.target}")
+            *others, last = (name for name, each in TARGETS.items() if self.mode in each.modes)
+            able = f"{', '.join(others)} and {last}"
+            raise FirmwareError(f"the mode {self.mode} is written for {able}, not for {self.target}")
         elif self.board is None:
             raise FirmwareError(f"the mode {self.mode} needs a board.toml: how the microcontroller is wired")
         elif self.mode == "glove" and len(keys_of(self.board, self.names.switches)) < len(self.names.switches):

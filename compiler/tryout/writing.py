@@ -21,7 +21,7 @@ from thenar.runtime.rejection import none_leads
 from thenar.runtime.sources.rows import steps_of
 from thenar.runtime.taxels import TaxelSettings, calibration_of, count_limit
 
-from ..text import counted
+from ..text import counted, listed
 
 MOST_BYTES = 500_000
 _MOST_ROWS = 400
@@ -169,7 +169,13 @@ def _stream(stream: StreamWiring) -> Json:
 
 def _rendered(manifest: Manifest, data: Json) -> bytes:
     style, script = _style(), _script()
-    inputs = counted(len(manifest.switches), "switch", "switches"), counted(len(manifest.joints), "joint")
+    levels = sum(switch.threshold is not None for switch in manifest.switches)
+    inputs = (
+        (len(manifest.switches) - levels, "switch", "switches"),
+        (levels, "level of taxels", "levels of taxels"),
+        (len(manifest.joints), "joint"),
+    )
+    read = [counted(*each) for each in inputs if each[0]]
     page = (
         _environment()
         .get_template("try.html.j2")
@@ -178,7 +184,8 @@ def _rendered(manifest: Manifest, data: Json) -> bytes:
             style_sha256=_sha256(style),
             script=Markup(script),
             script_sha256=_sha256(script),
-            sentence=f"It distinguishes {len(manifest.answers)} answers by {inputs[0]} and {inputs[1]}.",
+            sentence=f"It distinguishes {len(manifest.answers)} answers by {listed(read)}.",
+            levels=levels,
             checksum=manifest.checksum[:16],
             version=manifest.thenar,
             data=embedded(data),

@@ -26,6 +26,7 @@ from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Orig
 from thenar.runtime.tables import IntegerTables
 
 SHIM = Path(__file__).with_name("arduino")
+CHIPS = Path(__file__).parents[1] / "simavr"  # whose models of port expanders need no libsimavr
 STRICT_C = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror")
 STRICT_CPP = ("-std=gnu++17", "-Wall", "-Wextra", "-Wconversion", "-Werror")
 SANITIZED = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
@@ -237,7 +238,7 @@ class Network:
             pass
 
 
-def written(folder: Path, text: str, mode: Mode = "scan", build: Build | None = None) -> Path:
+def write(folder: Path, text: str, mode: Mode = "scan", build: Build | None = None) -> Path:
     """Write the firmware of such a board.toml to `folder`, and return the folder of its sketch."""
     board, used = parse_board(text), small_build() if build is None else build
     files = Firmware(used.tables, used.manifest, board.part, mode, board=board).files()
@@ -265,8 +266,10 @@ def compiled(sketch: Path, tool: Callable[[str], str]) -> Path:
                 [*commands[source.suffix], "-o", objects[-1]], capture_output=True, text=True, check=False
             )
             assert (done.returncode, done.stderr) == (0, ""), source.name
-    bench = [tool("g++"), *STRICT_CPP, *SANITIZED, f"-I{SHIM}", str(SHIM / "bench.cpp"), *objects]
-    subprocess.run([*bench, "-o", str(sketch / "program")], check=True, timeout=300)
+    chips = [tool("gcc"), *SANITIZED, "-c", str(CHIPS / "board_chips.c"), "-o", str(sketch / "chips.o")]
+    subprocess.run(chips, check=True, timeout=300)
+    bench = [tool("g++"), *STRICT_CPP, *SANITIZED, f"-I{SHIM}", f"-I{CHIPS}", str(SHIM / "bench.cpp"), *objects]
+    subprocess.run([*bench, str(sketch / "chips.o"), "-o", str(sketch / "program")], check=True, timeout=300)
     return sketch / "program"
 
 
@@ -277,10 +280,28 @@ def program(tool: Callable[[str], str], tmp_path_factory: pytest.TempPathFactory
 
     def program(text: str, mode: Mode = "scan") -> Path:
         if (text, mode) not in made:
-            made[text, mode] = compiled(written(tmp_path_factory.mktemp("sketch"), text, mode), tool)
+            made[text, mode] = compiled(write(tmp_path_factory.mktemp("sketch"), text, mode), tool)
         return made[text, mode]
 
     return program
+
+
+@pytest.fixture
+def written() -> Callable[..., Path]:
+    """Return what writes the firmware of a board.toml to a folder, and gives that of its sketch."""
+    return write
+
+
+@pytest.fixture
+def shim() -> Path:
+    """Return the folder of the headers that stand for Arduino's core."""
+    return SHIM
+
+
+@pytest.fixture(scope="session")
+def build() -> Build:
+    """Return the build that all boards carry."""
+    return small_build()
 
 
 @pytest.fixture

@@ -169,20 +169,20 @@ export class ScannerBoard {
     const { kind, sequence, payload } = frame;
     if (kind === KIND.HELLO) return this.#greeted(sequence, payload);
     if (!this.hello) return false;
-    const gap = sequence !== ((this.last + 1) & 0xff);
+    const gap = sequence !== ((this.last + 1) & 0xff), follows = !gap && !this.unread, afterLost = this.wasLost;
     this.last = sequence;
-    const afterLost = this.wasLost && !gap;
-    this.wasLost = false;
+    this.wasLost = this.unread = false;
     if (gap) this.hasBitmap = this.hasLost = false;
-    if (!this.#read(kind, payload, gap, afterLost)) {
+    if (!this.#read(kind, payload, follows, afterLost)) {
       this.misfits++;
+      this.unread = true; // it may have been anything
       this.hasBitmap = this.hasLost = false;
     }
     return true;
   }
 
   // Return whether the board can have said that.
-  #read(kind, payload, gap, afterLost) {
+  #read(kind, payload, follows, afterLost) {
     const { keys } = this.hello, size = (keys + 7) >> 3, view = new DataView(payload.buffer, payload.byteOffset);
     const bitmap = (from) => {
       if (payload.length !== from + size || flagsOf(payload.subarray(from), 8 * size).slice(keys).some(Boolean)) return null;
@@ -194,7 +194,7 @@ export class ScannerBoard {
         const found = bitmap(kind === KIND.STATE ? 0 : 4);
         if (!found) return false;
         [this.closed, this.hasBitmap] = [found, true];
-        if (kind === KIND.HEARTBEAT && !gap && !afterLost) [this.lost, this.hasLost] = [found.map(() => false), true];
+        if (kind === KIND.HEARTBEAT && follows && !afterLost) [this.lost, this.hasLost] = [found.map(() => false), true];
         return true;
       }
       case KIND.LOST: {
@@ -243,7 +243,7 @@ export class ScannerBoard {
       if (this.channels.length && payload[1] & ANALOG_FLAG) this.#askChannels();
     }
     this.last = sequence;
-    this.wasLost = false;
+    this.wasLost = this.unread = false;
     return first || booted;
   }
 }

@@ -144,6 +144,21 @@ export function valueOf(joint, code) {
   return joint.value_a + (code - joint.code_a) * ((joint.value_b - joint.value_a) / (joint.code_b - joint.code_a));
 }
 
+// The line of integers through two readings and their values, as runtime/code_line.py has it.
+function codeLine(joint, ...ends) {
+  const step = (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a);
+  const points = ends.map(([reading, value]) => [reading, rounded((joint.code_a + (value - joint.value_a) / step) * 2 ** 24)]);
+  const [[first, low], [last, high]] = points.sort(([a], [b]) => a - b).map(([reading, code]) => [reading, BigInt(code)]);
+  const span = BigInt(last - first), whole = span << 24n;
+  return (reading) => {
+    const far = low * span + (high - low) * BigInt(reading - first) + (span << 23n);
+    let nearest = far / whole, rest = far % whole;
+    if (rest < 0n) [nearest, rest] = [nearest - 1n, rest + whole];
+    if (rest === 0n) nearest -= nearest & 1n;
+    return Math.min(Math.max(Number(nearest), 0), 65535);
+  };
+}
+
 /**
  * Return the code of each byte, 0 to 255, of a CyberGlove's sensor, or of a stream's joint.
  *
@@ -152,8 +167,8 @@ export function valueOf(joint, code) {
 export function codesOfBytes(joint, line) {
   const bytes = Array.from({ length: 256 }, (_, raw) => raw);
   if (line) {
-    const step = (line.value_b - line.value_a) / (line.raw_b - line.raw_a);
-    return bytes.map((raw) => codeOf(joint, line.value_a + (raw - line.raw_a) * step));
+    const code = codeLine(joint, [line.raw_a, line.value_a], [line.raw_b, line.value_b]);
+    return bytes.map(code);
   }
   const raw = (code) => code >= 1 && code <= 255;
   if (raw(joint.code_a) && raw(joint.code_b)) return bytes;

@@ -3,6 +3,7 @@
 const SVG = "http://www.w3.org/2000/svg";
 const MARGIN = 5;
 const NARROW = 560; // of a drawing so wide, in pixels, the parts stand one below the other
+const LEAST_UNIT = 0.3; // millimetres that a pixel shows at least: few inputs are not drawn as giants
 const LETTER = 9.5; // pixels that a letter has at least
 const FINGER = 6; // pixels that the half of a button has at least, where there is room
 
@@ -476,9 +477,9 @@ export function drawHand(svg, hand, { onSwitch = null, onJoint = null } = {}) {
       else x += box.width;
       high = Math.max(high, box.height);
     }
-    const size = narrow ? [across, y] : [x, high];
-    svg.setAttribute("viewBox", `0 0 ${size[0].toFixed(1)} ${size[1].toFixed(1)}`);
-    const unit = size[0] / width;
+    const [broad, tall] = narrow ? [across, y] : [x, high], whole = Math.max(broad, LEAST_UNIT * width);
+    svg.setAttribute("viewBox", `${((broad - whole) / 2).toFixed(1)} 0 ${whole.toFixed(1)} ${tall.toFixed(1)}`);
+    const unit = whole / width;
     svg.style.setProperty("--letter", `${(LETTER * unit).toFixed(2)}px`);
     for (const part of parts) part.fit(unit);
   };

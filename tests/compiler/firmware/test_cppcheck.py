@@ -36,6 +36,7 @@ DEFINED = {
 }
 
 PINS = "[pins]\n" + "".join(f's{n} = "PD{n + 2}"\n' for n in range(6)) + 's6 = "PB0"\ns7 = "PB1"\ns8 = "PB2"\n'
+ON_GPIO = "[pins]\n" + "".join(f's{n} = "GPIO{pin}"\n' for n, pin in enumerate((4, 5, 13, 14, 18, 19, 21, 22, 23)))
 MATRIX = '[matrix]\nrows = ["PC0", "PC1", "PC2"]\ncolumns = ["PB0", "PB1", "PB2"]\nswitches = ' + str(
     [[f"s{3 * row + column}" for column in range(3)] for row in range(3)]
 )
@@ -79,9 +80,11 @@ CASES: dict[str, tuple[str, Mode, str, Mapping[str, int]]] = {
     "scan chips": ("avr328p", "scan", CHIPS, {}),
     "glove, analog": ("avr328p", "glove", PINS + ANALOG, {}),
     "glove, CyberGlove": ("avr2560", "glove", CHIPS + CYBERGLOVE, {}),
+    "sketch, scan, Wi-Fi": ("esp32", "scan", "[wifi]\n" + ON_GPIO, {}),
+    "sketch, glove, chips": ("rp2040", "glove", "early_exit = true\nscan_us = 3000\n" + CHIPS + CYBERGLOVE, {}),
     "glove, early exit": ("avr2560", "glove", "early_exit = true\n" + CHIPS + CYBERGLOVE, {}),
 }
-PART = {"avr328p": "atmega328p", "avr2560": "atmega2560"}
+PART = {"avr328p": "atmega328p", "avr2560": "atmega2560", "esp32": "esp32", "rp2040": "rp2040"}
 
 
 def files_of(case: str, make_tables: MakeTables, describe: Describe) -> dict[str, str]:

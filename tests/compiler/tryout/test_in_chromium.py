@@ -5,6 +5,7 @@ import csv
 import io
 import json
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.export import to_csv
+from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.tryout import writing
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
@@ -30,9 +32,21 @@ from thenar.drivers.cyberglove_protocol import SENSORS_22
 from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts, GloveState
 from thenar.drivers.emulated.scanner import ScannerBoard
 from thenar.drivers.lines import Header, parsed
-from thenar.drivers.scanner_protocol import Frame, FrameDecoder, encode
+from thenar.drivers.scanner_protocol import (
+    WITHOUT_DIODES,
+    Event,
+    Frame,
+    FrameDecoder,
+    FromBoard,
+    Heartbeat,
+    Hello,
+    Lost,
+    encode,
+    frame,
+)
+from thenar.drivers.scanner_state import ambiguous
 from thenar.runtime import Build
-from thenar.runtime.calibration import CodeTables, code_of_value, codes_of_bytes
+from thenar.runtime.calibration import CodeTables, codes_of_bytes
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.tables import PAIRED, PLAIN, SLOPED
 from thenar.simulator.handmaps.handmap import hand_map
@@ -129,7 +143,13 @@ ASK = "return arguments[0].map(([bits, codes, lost, dull]) => thenar.recognise(b
 
 def rows_of(build: Build, grasp_set: GraspSet) -> tuple[np.ndarray, np.ndarray]:
     """Return the bits and the codes of all rows of a set, as the build reads them."""
-    bits = grasp_set.switches[:, [switch.column for switch in build.manifest.switches]]
+    columns = [
+        grasp_set.switches[:, switch.column]
+        if switch.threshold is None
+        else grasp_set.taxels[:, switch.threshold.taxel.column] > switch.threshold.code
+        for switch in build.manifest.switches
+    ]
+    bits = np.stack(columns, axis=1)
     return bits, grasp_set.codes[:, [joint.column for joint in build.manifest.joints]]
 
 
@@ -198,6 +218,12 @@ def test_a_build_with_a_class_of_none_and_one_that_refuses_say_none_as_python_do
         # Nothing closed, everything closed: unlike all grasps.
         s, j = build.tables.n_switches, build.tables.n_joints
         frames += [[[bit] * s, [code] * j, [0] * s, [0] * j] for bit in (0, 1) for code in (0, 65535)]
+        # Of grasps, more and more switches lost, down to none that is known to be closed.
+        frames += [
+            [bits, codes, [1] * lost + [0] * (s - lost), dull]
+            for lost in range(s + 1)
+            for bits, codes, _, dull in frames[:9]
+        ]
         answers = trier.script(ASK, frames)
         assert differing(build, frames, answers) == []
         assert "none" in {answer["grasp"] for answer in answers}
@@ -379,6 +405,46 @@ def test_a_lost_switch_counts_by_its_mean(opened: Trier, folder: Path) -> None:
     )
 
 
+def test_a_taxel_goes_from_level_to_level_and_recorded_values_are_levels(
+    trier: Trier, make_set: Make, tmp_path: Path
+) -> None:
+    made = make_set()
+    held = np.where(made.switches[:, 2:4], 2500, 300) + np.random.default_rng(3).integers(0, 1200, (len(made), 2))
+    padded = replace(
+        made,
+        switches=made.switches[:, :2],
+        switch_names=("a", "b"),
+        taxels=held.astype(np.uint16),
+        taxel_columns=(Joint("pad", "N", 0, 0.0, 4095, 20.0), Joint("pull-up", "V", 0, 5.0, 4095, 0.0)),
+    )
+    build = compiled(padded, tmp_path / "build", rounds=8, levels=4)
+    taxels = Counter(switch.source for switch in build.manifest.switches if switch.threshold is not None)
+    name, levels = max(taxels.items(), key=lambda each: each[1])
+    assert levels > 1
+    trier.open(tmp_path / "build" / "try.html")
+    button = trier.one(f"#hand [role=button][aria-label^='{name}']")
+    rising = sorted(
+        (switch.threshold.code, bit)
+        for bit, switch in enumerate(build.manifest.switches)
+        if switch.threshold is not None and switch.source == name
+    )
+    for press in range(1, levels + 2):
+        button.find_element(By.CSS_SELECTOR, ".area").click()
+        closed = press % (levels + 1)
+        assert button.get_attribute("aria-label") == f"{name}, {closed} of {levels} levels closed"
+        bits = np.zeros(build.tables.n_switches, np.intp)
+        bits[[bit for _, bit in rising[:closed]]] = 1
+        assert (trier.text("grasp"), trier.text("margin")) == said_of(build, bits.tolist(), codes_now(trier))
+    (tmp_path / "rows.csv").write_text(to_csv(padded))
+    trier.one("#file").send_keys(str(tmp_path / "rows.csv"))
+    right = sum(
+        build.classify(*row) == truth for *row, truth in zip(*rows_of(build, padded), padded.grasps, strict=True)
+    )
+    said = f"rows.csv: 96 rows, of 96 with a known grasp {right} are recognised."
+    trier.wait(lambda: trier.text("rows-said") == said)
+    assert trier.log("browser") == []
+
+
 @pytest.mark.parametrize("width", [1400, 400])
 def test_it_fits_the_screen_in_light_and_dark_with_letters_that_can_be_read(opened: Trier, width: int) -> None:
     metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
@@ -533,6 +599,8 @@ def test_a_cyberglove_is_asked_what_it_is_and_its_bytes_become_codes(
         trier.wait(lambda said=said: trier.text("margin").startswith(said))  # type: ignore[misc]
     state.plugged = False
     wire.until(lambda: "unplugged" in trier.text("serial-said"), turn)
+    inputs = build.tables.n_switches + build.tables.n_joints
+    trier.wait(lambda: f"degraded: {inputs} inputs are lost" in trier.text("margin"))
     assert trier.log("browser") == []
 
 
@@ -583,7 +651,7 @@ def test_lines_of_numbers_are_rows_of_the_build(gloved_trier: Trier, folder: Pat
 
 PARTS = (
     *("parseCalibration", "codeOf", "codesOfBytes", "rounded"),
-    *("parsedLine", "parseCsv", "encodeFrame", "FrameDecoder"),
+    *("parsedLine", "parseCsv", "encodeFrame", "FrameDecoder", "ScannerBoard"),
 )
 
 
@@ -634,6 +702,48 @@ def test_frames_of_a_board_are_encoded_and_decoded_as_by_the_driver(parts: Trier
                 assert parts.script(again, list(wrong)) == [None]
 
 
+HEAR = """const [board, sent] = [globalThis.board, globalThis.sent];
+    const found = board.received(Uint8Array.from(arguments[0]));
+    return [found && found.closed.map(Number), found && found.known.map(Number), sent.splice(0).map((one) => one[1])]"""
+
+
+def test_keys_are_known_while_nothing_is_missing_of_what_the_board_told(parts: Trier) -> None:
+    parts.script("globalThis.sent = []; globalThis.board = new parts.ScannerBoard((bytes) => sent.push([...bytes]))")
+    hello = Hello(1, 0, 0, 7, 1, 0, 0, 1, 3, 1000, 0, 50_000, 0, 0, 0)
+
+    def hear(*messages: tuple[FromBoard, int]) -> tuple[list[int] | None, list[int] | None]:
+        wire = b"".join(encode(frame(message, number)) for message, number in messages)
+        closed, known, _ = parts.script(HEAR, list(wire))
+        return closed, known
+
+    assert hear((Heartbeat(0, 1, 3), 9)) == (None, None)
+    assert hear((hello, 10)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(5, 0b101, 3), 11)) == ([1, 0, 1], [1, 1, 1])
+    assert hear((Event(6, 1, 1), 12)) == ([1, 1, 1], [1, 1, 1])
+    # A frame is missing, which may have been an EVENT or a LOST: a HEARTBEAT alone does not say that all can be read.
+    assert hear((Event(7, 1, 0), 14)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(8, 0b100, 3), 16)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(9, 0b100, 3), 17)) == ([0, 0, 1], [1, 1, 1])
+    assert hear((Lost(0b100, 3), 18), (Heartbeat(9, 0b101, 3), 19)) == ([1, 0, 0], [1, 1, 0])
+    # A sound frame that such a board cannot send: nothing holds any more.
+    assert hear((Heartbeat(9, 0b1101, 4), 20), (Event(9, 7, 1), 21)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(9, 0b1, 3), 22)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(9, 0b1, 3), 23)) == ([1, 0, 0], [1, 1, 1])
+    assert parts.script(HEAR, list(b"\x05damaged\x00"))[1] == [0, 0, 0]
+
+
+def test_ghosts_of_a_matrix_without_diodes_are_unknown(parts: Trier) -> None:
+    parts.script("globalThis.sent = []; globalThis.board = new parts.ScannerBoard((bytes) => sent.push([...bytes]))")
+    hello = Hello(1, WITHOUT_DIODES, 0, 7, 1, 0, 0, 3, 4, 1000, 0, 50_000, 0, 0, 0)
+    random = np.random.default_rng(8)
+    parts.script(HEAR, list(encode(frame(hello, 0))))
+    for number in range(1, 40):
+        closed = int(random.integers(0, 1 << 12) & random.integers(0, 1 << 12))
+        _, known, _ = parts.script(HEAR, list(encode(frame(Heartbeat(0, closed, 12), number))))
+        wanted = ~ambiguous(closed, 3, 4)
+        assert known == [wanted >> key & 1 for key in range(12)]
+
+
 def test_values_and_bytes_become_the_codes_that_python_makes_of_them(parts: Trier) -> None:
     random = np.random.default_rng(6)
     for joint in (
@@ -644,7 +754,8 @@ def test_values_and_bytes_become_the_codes_that_python_makes_of_them(parts: Trie
         coded = {name: getattr(joint, name) for name in ("name", "unit", "code_a", "value_a", "code_b", "value_b")}
         values = [*random.uniform(-400, 400, 200).tolist(), *np.arange(-30, 30, 0.25).tolist()]
         told = parts.script("return arguments[1].map((value) => parts.codeOf(arguments[0], value))", coded, values)
-        assert told == [code_of_value(joint, value) for value in values]
+        recorded = Joint(joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
+        assert told == np.clip(recorded.code(np.array(values)), 0, 65535).astype(int).tolist()
         line = SensorCalibration("a", 31, -12.5, 222, 95.25)
         meaning = GloveCalibration(sensors=(line,))
         ends = {name: getattr(line, name) for name in ("raw_a", "value_a", "raw_b", "value_b")}

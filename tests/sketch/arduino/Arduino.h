@@ -1,13 +1,13 @@
 /* What the sketches use of Arduino's API, on this machine: time, pins, converter, serial ports.
 
-   Pins are wired as `bench.cpp` is told on its standard input. A pin reads low if closed switches lead from it to ground
+   The headers need no library of C++, so that compilers for other machines take them. Pins are wired as `bench.cpp` is
+   told on its standard input. A pin reads low if closed switches lead from it to ground
    or to a pin that is driven low. */
 #ifndef ARDUINO_H
 #define ARDUINO_H
 
-#include <cstddef>
-#include <cstdint>
-#include <deque>
+#include <stddef.h>
+#include <stdint.h>
 
 #define LOW 0
 #define HIGH 1

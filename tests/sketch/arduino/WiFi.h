@@ -2,7 +2,7 @@
 #ifndef WIFI_H
 #define WIFI_H
 
-#include <cstdint>
+#include <stdint.h>
 
 #define WIFI_STA 1
 #define WL_CONNECTED 3

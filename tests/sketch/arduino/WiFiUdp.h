@@ -4,10 +4,8 @@
 #ifndef WIFI_UDP_H
 #define WIFI_UDP_H
 
-#include <cstddef>
-#include <cstdint>
-#include <deque>
-#include <vector>
+#include <stddef.h>
+#include <stdint.h>
 
 #include "WiFi.h"
 
@@ -19,15 +17,15 @@ public:
     size_t write(const uint8_t *bytes, size_t size);
     int endPacket();
     int parsePacket();
-    int available() { return static_cast<int>(received_.size()); }
+    int available() { return static_cast<int>(size_ - at_); }
     int read(uint8_t *bytes, size_t size);
     IPAddress remoteIP() { return from_; }
     uint16_t remotePort() { return from_port_; }
 
 private:
     int descriptor_ = -1;
-    std::deque<uint8_t> received_;
-    std::vector<uint8_t> sent_;
+    uint8_t received_[2048], sent_[2048];
+    size_t size_ = 0, at_ = 0, to_send_ = 0;
     IPAddress from_, to_;
     uint16_t from_port_ = 0, to_port_ = 0;
 };

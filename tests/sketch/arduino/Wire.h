@@ -1,13 +1,9 @@
-/* What the sketches use of Wire: chips are files of registers, whose number a write begins with and that count up. */
+/* What the sketches use of Wire: the chips at it are those of tests/simavr/board_chips.c. */
 #ifndef WIRE_H
 #define WIRE_H
 
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <deque>
-#include <map>
-#include <vector>
+#include <stddef.h>
+#include <stdint.h>
 
 class TwoWire {
 public:
@@ -25,14 +21,6 @@ public:
     uint8_t requestFrom(uint8_t address, uint8_t size);
     int available();
     int read();
-
-    std::map<uint8_t, std::array<uint8_t, 256>> chips;  // what is there; others do not acknowledge
-
-private:
-    uint8_t address_ = 0;
-    std::map<uint8_t, uint8_t> pointers_;
-    std::vector<uint8_t> written_;
-    std::deque<uint8_t> read_;
 };
 
 extern TwoWire Wire;

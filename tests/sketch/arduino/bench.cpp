@@ -2,22 +2,34 @@
 
    wire A B 0|1     open or close a switch between two pins; pin 255 is ground
    analog PIN CODE  what the converter gives
-   chip ADDRESS REGISTER VALUE  a register of a chip at the bus, and that it is there
-   gone ADDRESS     a chip is there no more
+   mux PIN A B C D  a multiplexer of 16 channels at that input, with these pins at S0 to S3
+   tap PIN N CODE   what the converter gives of its channel N
+   chip KIND ADDRESS             a port expander at the bus
+   key KEY ADDRESS PIN           a switch at pin 0 to 23 of one
+   close KEY 0|1                 that switch
+   plug ADDRESS 0|1              whether the chip is on the bus; it comes back as after power-on
    wifi 0|1         whether there is a network
 
-   It says `udp PORT` and `NAME PATH` of a serial port when the sketch opens them, and `ok` after each line. It ends
-   with its standard input. */
+   It says `udp PORT` and `NAME PATH` of a serial port when the sketch opens them, and `ok` after each line. A serial port
+   whose name is in the environment is the one that is there. It ends with its standard input. */
 #include "Arduino.h"
 #include "WiFi.h"
 #include "WiFiUdp.h"
 #include "Wire.h"
 
+extern "C" {
+#include "board_chips.h"
+}
+
+#include <algorithm>
 #include <arpa/inet.h>
+#include <cstdarg>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <deque>
 #include <fcntl.h>
+#include <map>
 #include <poll.h>
 #include <random>
 #include <set>
@@ -27,6 +39,7 @@
 #include <time.h>
 #include <unistd.h>
 #include <utility>
+#include <vector>
 
 namespace {
 
@@ -42,7 +55,18 @@ int codes[256];
 int resolution = 10;
 std::set<std::pair<uint8_t, uint8_t>> switches;
 
-[[noreturn]] void fail(const char *what)
+struct Mux {
+    uint8_t select[4];
+    int codes[16];
+};
+std::map<uint8_t, Mux> muxes;
+
+/* What is under way on the bus. */
+std::vector<uint8_t> written;
+std::deque<uint8_t> answer;
+uint8_t addressed;
+
+[[noreturn]] void stop(const char *what)
 {
     std::perror(what);
     std::exit(1);
@@ -61,7 +85,8 @@ bool drives_low(uint8_t pin)
 
 void obey(const std::string &line)
 {
-    unsigned first, second, third;
+    unsigned first, second, third, fourth, fifth;
+    char name[16];
 
     if (std::sscanf(line.c_str(), "wire %u %u %u", &first, &second, &third) == 3) {
         const std::pair<uint8_t, uint8_t> one(first, second);
@@ -70,12 +95,23 @@ void obey(const std::string &line)
         } else {
             switches.erase(one);
         }
+    } else if (std::sscanf(line.c_str(), "mux %u %u %u %u %u", &first, &second, &third, &fourth, &fifth) == 5) {
+        muxes[static_cast<uint8_t>(first)] = {
+            {static_cast<uint8_t>(second), static_cast<uint8_t>(third), static_cast<uint8_t>(fourth),
+             static_cast<uint8_t>(fifth)},
+            {}};
+    } else if (std::sscanf(line.c_str(), "tap %u %u %u", &first, &second, &third) == 3) {
+        muxes.at(static_cast<uint8_t>(first)).codes[second & 15] = static_cast<int>(third);
     } else if (std::sscanf(line.c_str(), "analog %u %u", &first, &second) == 2) {
         codes[first & 255] = static_cast<int>(second);
-    } else if (std::sscanf(line.c_str(), "chip %u %u %u", &first, &second, &third) == 3) {
-        Wire.chips[static_cast<uint8_t>(first)][second & 255] = static_cast<uint8_t>(third);
-    } else if (std::sscanf(line.c_str(), "gone %u", &first) == 1) {
-        Wire.chips.erase(static_cast<uint8_t>(first));
+    } else if (std::sscanf(line.c_str(), "chip %15s %u", name, &first) == 2) {
+        chips_add(name, static_cast<uint8_t>(first));
+    } else if (std::sscanf(line.c_str(), "key %u %u %u", &first, &second, &third) == 3) {
+        chips_add_key(static_cast<uint16_t>(first), static_cast<uint8_t>(second), static_cast<uint8_t>(third), false);
+    } else if (std::sscanf(line.c_str(), "close %u %u", &first, &second) == 2) {
+        (void)chips_close(static_cast<uint16_t>(first), second != 0);
+    } else if (std::sscanf(line.c_str(), "plug %u %u", &first, &second) == 2) {
+        (void)chips_plug(static_cast<uint8_t>(first), second != 0);
     } else if (std::sscanf(line.c_str(), "wifi %u", &first) == 1) {
         WiFi.there = first != 0;
     } else {
@@ -106,6 +142,17 @@ void listen()
 }
 
 }  // namespace
+
+/* What the chips say. */
+extern "C" [[noreturn]] void fail(const char *format, ...)
+{
+    va_list values;
+
+    va_start(values, format);
+    std::vfprintf(stderr, format, values);
+    va_end(values);
+    std::exit(2);
+}
 
 unsigned long micros()
 {
@@ -166,7 +213,17 @@ void analogReadResolution(int bits)
 
 int analogRead(uint8_t pin)
 {
-    return codes[pin] & ((1 << resolution) - 1);
+    const auto mux = muxes.find(pin);
+    int code = codes[pin];
+    if (mux != muxes.end()) {
+        unsigned channel = 0;
+        for (unsigned bit = 0; bit < 4; bit++) {
+            const Pin &select = pins[mux->second.select[bit]];
+            channel |= (select.mode == OUTPUT && select.value == HIGH) ? 1u << bit : 0u;
+        }
+        code = mux->second.codes[channel];
+    }
+    return code & ((1 << resolution) - 1);
 }
 
 uint32_t esp_random()
@@ -188,13 +245,20 @@ void SerialPort::begin(unsigned long, uint32_t, int, int)
 {
     termios raw;
 
+    if (const char *there = std::getenv(name_)) {
+        descriptor_ = open(there, O_RDWR | O_NOCTTY | O_NONBLOCK);
+        if (descriptor_ < 0) {
+            stop(there);
+        }
+        return;
+    }
     descriptor_ = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);
     if (descriptor_ < 0 || grantpt(descriptor_) != 0 || unlockpt(descriptor_) != 0) {
-        fail("pty");
+        stop("pty");
     }
     const int other = open(ptsname(descriptor_), O_RDWR | O_NOCTTY);  // kept open: nobody hangs up
     if (other < 0 || tcgetattr(other, &raw) != 0) {
-        fail("pty");
+        stop("pty");
     }
     cfmakeraw(&raw);
     tcsetattr(other, TCSANOW, &raw);
@@ -227,27 +291,24 @@ void TwoWire::begin() {}
 
 void TwoWire::beginTransmission(uint8_t address)
 {
-    address_ = address;
-    written_.clear();
+    addressed = address;
+    written.clear();
 }
 
 size_t TwoWire::write(const uint8_t *bytes, size_t size)
 {
-    written_.insert(written_.end(), bytes, bytes + size);
+    written.insert(written.end(), bytes, bytes + size);
     return size;
 }
 
 uint8_t TwoWire::endTransmission(bool)
 {
-    const auto chip = chips.find(address_);
-    if (chip == chips.end()) {
+    if (!chips_start(addressed)) {
         return 2;
     }
-    if (!written_.empty()) {
-        uint8_t &pointer = pointers_[address_];
-        pointer = written_.front();
-        for (size_t at = 1; at < written_.size(); at++) {
-            chip->second[pointer++] = written_[at];
+    for (const uint8_t byte : written) {
+        if (!chips_write(byte)) {
+            return 3;
         }
     }
     return 0;
@@ -255,26 +316,27 @@ uint8_t TwoWire::endTransmission(bool)
 
 uint8_t TwoWire::requestFrom(uint8_t address, uint8_t size)
 {
-    const auto chip = chips.find(address);
-    read_.clear();
-    for (uint8_t at = 0; chip != chips.end() && at < size; at++) {
-        read_.push_back(chip->second[pointers_[address]++]);
+    answer.clear();
+    if (chips_start(address)) {
+        for (uint8_t at = 0; at < size; at++) {
+            answer.push_back(chips_read());
+        }
     }
-    return static_cast<uint8_t>(read_.size());
+    return static_cast<uint8_t>(answer.size());
 }
 
 int TwoWire::available()
 {
-    return static_cast<int>(read_.size());
+    return static_cast<int>(answer.size());
 }
 
 int TwoWire::read()
 {
-    if (read_.empty()) {
+    if (answer.empty()) {
         return -1;
     }
-    const int byte = read_.front();
-    read_.pop_front();
+    const int byte = answer.front();
+    answer.pop_front();
     return byte;
 }
 
@@ -298,21 +360,23 @@ void WiFiUDP::stop()
 {
     close(descriptor_);
     descriptor_ = -1;
-    received_.clear();
+    size_ = at_ = 0;
 }
 
 int WiFiUDP::beginPacket(IPAddress address, uint16_t port)
 {
     to_ = address;
     to_port_ = port;
-    sent_.clear();
+    to_send_ = 0;
     return 1;
 }
 
 size_t WiFiUDP::write(const uint8_t *bytes, size_t size)
 {
-    sent_.insert(sent_.end(), bytes, bytes + size);
-    return size;
+    const size_t taken = std::min(size, sizeof sent_ - to_send_);
+    std::memcpy(&sent_[to_send_], bytes, taken);
+    to_send_ += taken;
+    return taken;
 }
 
 int WiFiUDP::endPacket()
@@ -322,35 +386,31 @@ int WiFiUDP::endPacket()
     there.sin_family = AF_INET;
     there.sin_addr.s_addr = to_;
     there.sin_port = htons(to_port_);
-    return sendto(descriptor_, sent_.data(), sent_.size(), 0, reinterpret_cast<sockaddr *>(&there), sizeof there) >= 0;
+    return sendto(descriptor_, sent_, to_send_, 0, reinterpret_cast<sockaddr *>(&there), sizeof there) >= 0;
 }
 
 int WiFiUDP::parsePacket()
 {
-    uint8_t bytes[2048];
     sockaddr_in from = {};
     socklen_t size = sizeof from;
 
-    if (!received_.empty()) {
+    if (available() > 0) {
         return 0;
     }
-    const ssize_t got = recvfrom(descriptor_, bytes, sizeof bytes, 0, reinterpret_cast<sockaddr *>(&from), &size);
-    if (got <= 0) {
-        return 0;
-    }
-    received_.assign(bytes, bytes + got);
+    const ssize_t got =
+        recvfrom(descriptor_, received_, sizeof received_, 0, reinterpret_cast<sockaddr *>(&from), &size);
+    size_ = got > 0 ? static_cast<size_t>(got) : 0;
+    at_ = 0;
     from_ = from.sin_addr.s_addr;
     from_port_ = ntohs(from.sin_port);
-    return static_cast<int>(got);
+    return static_cast<int>(size_);
 }
 
 int WiFiUDP::read(uint8_t *bytes, size_t size)
 {
-    size_t taken = 0;
-    for (; taken < size && !received_.empty(); taken++) {
-        bytes[taken] = received_.front();
-        received_.pop_front();
-    }
+    const size_t taken = std::min(size, size_ - at_);
+    std::memcpy(bytes, &received_[at_], taken);
+    at_ += taken;
     return static_cast<int>(taken);
 }
 
