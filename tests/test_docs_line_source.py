@@ -8,7 +8,7 @@ from thenar.drivers.lines import LONGEST, Header, LineCounts, Row, parsed
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.sinks.base import SINKS
 from thenar.runtime.sources.base import SOURCES
-from thenar.runtime.sources.rows import JOINT_CODES, _TAXEL_STEPS, RowCounts, RowKind
+from thenar.runtime.sources.rows import _TAXEL_STEPS, JOINT_CODES, RowCounts, RowKind
 
 PAGE = (Path(__file__).parents[1] / "docs" / "line-source.md").read_text(encoding="utf-8")
 
