@@ -8,7 +8,7 @@ from thenar.drivers.lines import LONGEST, Header, LineCounts, Row, parsed
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.sinks.base import SINKS
 from thenar.runtime.sources.base import SOURCES
-from thenar.runtime.sources.rows import _JOINT_CODES, _TAXEL_STEPS, RowCounts, RowKind
+from thenar.runtime.sources.rows import _TAXEL_STEPS, JOINT_CODES, RowCounts, RowKind
 
 PAGE = (Path(__file__).parents[1] / "docs" / "line-source.md").read_text(encoding="utf-8")
 
@@ -42,6 +42,6 @@ def test_every_count_and_every_way_is_there() -> None:
 
 
 def test_its_numbers_are_the_codes() -> None:
-    first, last = _JOINT_CODES
+    first, last = JOINT_CODES
     for words in (f"{LONGEST:,}", f"{_TAXEL_STEPS} steps", f"{first} + round({last - first} * (number - a) / (b - a))"):
         assert words in PAGE

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from thenar.compiler import GraspSet, compile_build
+from thenar.runtime.build import Build
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 Tool = Callable[[str], str]
@@ -171,6 +172,29 @@ def test_firmware_is_replaced_when_asked_and_the_users_files_stay(thenar: Thenar
     assert thenar(*made, "--name", "left_hand", "--overwrite").returncode == 0
     assert {"mine.c", "thenar_left_hand.c"} <= content(tmp_path / "made").keys()
     assert "thenar_glove.c" not in content(tmp_path / "made")
+
+
+def test_a_glove_s_ranges_are_what_its_pins_read_and_boards_that_fit_are_told(
+    thenar: Thenar, build: Path, tmp_path: Path
+) -> None:
+    joints = [joint.name for joint in Build.load(build).manifest.joints]
+    ranges = ", ".join(f"{name} = [0, 1023]" for name in joints)
+    glove = tmp_path / "glove.toml"
+    glove.write_text(f'name = "glove"\n[[stream]]\nport = "/dev/ttyUSB0"\njoints = {{ {ranges} }}\n')
+    for given, known in (((), 0), (("--glove", glove), 1)):
+        made = tmp_path / f"made{known}"
+        done = thenar("firmware", build, "--target", "arduino", *given, "-o", made)
+        assert done.returncode == 0, done.stderr
+        assert "\nthe example Recognise fits Arduino Uno and Nano and Mega as it is.\n" in done.stdout
+        header = (made / "src" / "thenar_glove_codes.h").read_text()
+        assert f"#define THENAR_GLOVE_CALIBRATED {known} " in header
+        sketch = (made / "examples/Recognise/Recognise.ino").read_text()
+        assert ("unknown readings" in sketch) != bool(known)
+    glove.write_text(glove.read_text().replace("[0, 1023]", "[0, 3.3]"))
+    done = thenar("firmware", build, "--target", "arduino", "--glove", glove, "-o", tmp_path / "none")
+    assert done.returncode == 2
+    assert "0 to 3.3, is not of whole numbers" in done.stderr
+    assert not (tmp_path / "none").exists()
 
 
 @pytest.mark.parametrize(
