@@ -13,9 +13,11 @@ from typing import Self
 
 import msgspec
 
+from ..build import Build
 from ..frames import Mask
 from ..glove import Glove
 from ..hand import load_hand
+from ..harness.wiring import Harness
 from ..live.recogniser import Moment
 from ..published import HealthReport, LiveGrasp
 from ..recording.writer import Recorder
@@ -57,7 +59,7 @@ class LivePage:
     """
 
     def __init__(self, glove: Glove, folder: Path, address: str, *, token: str | None, recordings: Path) -> None:
-        self._glove, self._frames = glove, FrameText(glove)
+        self._glove, self._frames = glove, FrameText(glove.system.build, glove.system.harness)
         self._health: HealthReport | None = None
         self._progress: object = None
         self._past = Past()
@@ -156,8 +158,7 @@ class FrameText:
     probabilities  of every answer of the build, in its order; null while too little can be read
     """
 
-    def __init__(self, glove: Glove) -> None:
-        build, harness = glove.system.build, glove.system.harness
+    def __init__(self, build: Build, harness: Harness) -> None:
         self._switches, self._scale = build.tables.n_switches, build.tables.scale
         self._none_leads = None if build.rejector is None else build.none_leads
         self._joints = [
