@@ -332,7 +332,9 @@ class _Walk:
         while True:
             if self._next is None:
                 self._next = next(self._entries, None)
-            if self._next is None or self._next[0] > unix_us:
+            # Where nothing was recognised yet, the first that is, is shown.
+            none_yet = self._moment is None and self._grasp is None
+            if self._next is None or self._next[0] > unix_us + LEAD_US * none_yet:
                 break
             self._take(*self._next)
             self._next = None
