@@ -95,7 +95,7 @@ mutants: $(VENV)/mutants  ## small deliberate faults in the numerical modules: h
 	rm -rf .mutants
 	$(BIN)/python tests/mutants/stage.py .mutants
 	cd .mutants && env -u THENAR_REQUIRE_ALL PYTHONHASHSEED=0 PYTHONPATH=$(CURDIR)/tests/mutants ../$(BIN)/mutmut run
-	cd .mutants && ../$(BIN)/python ../tests/mutants/report.py ../docs/mutants.md
+	cd .mutants && ../$(BIN)/python ../tests/mutants/report.py ../tests/mutants/README.md
 
 bench: $(VENV)/bench  ## the benchmarks, as ratios against a peer or a bound in the same run
 	$(BIN)/python benchmarks/id3.py
@@ -103,6 +103,7 @@ bench: $(VENV)/bench  ## the benchmarks, as ratios against a peer or a bound in 
 	$(BIN)/python benchmarks/runtime.py
 	$(BIN)/python benchmarks/simulator.py
 	$(BIN)/python benchmarks/live.py
+	$(BIN)/python benchmarks/web.py
 	$(BIN)/python benchmarks/firmware.py
 
 soak: $(VENV)/installed  ## an hour of live recognition on emulated devices: does anything grow?

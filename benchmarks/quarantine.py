@@ -59,7 +59,8 @@ def held(
     live, now_us = LiveRecognizer(build, switch_period_us=_HELD_US, policy=policy), 0
     for number, closed in enumerate(grasps):
         late = number >= at
-        for pause_us, shown in ((open_us, 0), (1, 0), (_HELD_US - SETTLED_US, closed), (SETTLED_US, closed)):
+        # What a grasp is weighed for counts in the next frame, and so in this grasp.
+        for pause_us, shown in ((open_us, 0), (1, 0), *[(SETTLED_US, closed)] * (_HELD_US // SETTLED_US)):
             frame = SwitchFrame(now_us, (shown | stuck * late) & ~(dead * late), lost * late)
             grasp = live.step(now_us, 0, frame, None).grasp
             now_us += pause_us

@@ -3,6 +3,7 @@
 import os
 import select
 import sys
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -13,18 +14,17 @@ from rich.table import Table
 
 from .common import Number, OutputFile, err, existing_file, keep_apart, overwrite_flag, serial_port
 from .lines import echo
+from .web_options import token_for, web_options
 
 if TYPE_CHECKING:
-    from thenar.drivers.calibration import GloveCalibration, Held, Pose
     from thenar.drivers.cyberglove import CyberGlove, GloveInfo
     from thenar.runtime.harness.wiring import Harness
     from thenar.runtime.live.sources import Sources
+    from thenar.runtime.posing import PoseGuide
     from thenar.runtime.taxels import TaxelCalibration
 
 _WAIT_S = 0.05
 _REFRESH_S = 0.1
-# Pressing the key shakes the hand, and records from before it are still on their way.
-_SETTLE_S = 0.15
 
 _WAIT_US = 50_000
 _PATIENCE_S = 5.0
@@ -60,6 +60,7 @@ def _device(context: click.Context, argument: click.Parameter, text: str) -> str
 @click.option("--taxels", is_flag=True, is_eager=True, help="Calibrate the taxels of a glove.toml, not a CyberGlove.")
 @click.option("--newtons", type=Number(0.001, 1000), help="Force of the presses, where it is known; with --taxels.")
 @click.option("--hold", type=Number(0.05, 60), default=1.0, show_default=True, help="Seconds to hold a pose.")
+@web_options
 def command(
     port: str,
     output: Path,
@@ -69,6 +70,8 @@ def command(
     taxels: bool,
     newtons: float | None,
     hold: float,
+    web: str | None,
+    web_token: bool,
 ) -> None:
     """Calibrate the CyberGlove at PORT (/dev/ttyUSB0, socket://HOST:PORT, ...) for the hand that wears it; with
     --taxels, the taxels of a glove.toml; of a glove.toml without it, the joints of its [[stream]].
@@ -82,6 +85,7 @@ def command(
         thenar calibrate /dev/ttyUSB0 -o anna.toml
         thenar calibrate glove.toml --taxels -o pads.toml
         thenar calibrate glove.toml -o anna.toml
+        thenar calibrate /dev/ttyUSB0 -o anna.toml --web
     """
     from thenar.drivers.cyberglove import CyberGlove
     from thenar.runtime.files import write_atomically
@@ -90,6 +94,8 @@ def command(
     wearer = subject or output.stem
     if reason := fault(wearer):
         raise click.UsageError(f"subject {shortened(repr(wearer))} {reason}: give another with --subject")
+    if taxels and web is not None:
+        raise click.UsageError("--web shows poses of joints: leave it out with --taxels")
     if taxels:
         _calibrate_taxels(Path(port), output, wearer, newtons, hold)
         return
@@ -100,15 +106,29 @@ def command(
         glove = StreamedJoints(Path(port), output)
     else:
         glove = CyberGlove(port, baud=baud, sensors=int(sensors) if sensors else None)
+
+    def written(guide: "PoseGuide") -> str:
+        """Write what the poses make; return what there is to say of it."""
+        calibrated = guide.calibration(wearer)
+        found = {sensor.name for sensor in calibrated.sensors}
+        if not found:
+            raise click.ClickException(f"no sensor moved, so there is nothing to calibrate by: {output} is not written")
+        if left_out := [name for name in guide.names if name not in found]:
+            err().print(f"Not calibrated, because they did not move: {', '.join(left_out)}", soft_wrap=True)
+        write_atomically(output, calibrated.to_toml().encode("utf-8"))
+        return f"{output}: {len(found)} sensors of {calibrated.subject}"
+
     try:
-        guide = Guide(glove, glove.open(), hold)
-        calibrated = _calibrated(guide, wearer)
+        info = glove.open()
+        if web is None:
+            said = written(Guide(glove, info, hold).lead())
+        else:
+            from .posed_web import calibrate_on_page
+
+            said = calibrate_on_page(partial(raw_of, glove), info, hold, wearer, web, token_for(web_token), written)
     finally:
         glove.close()
-    if not calibrated.sensors:
-        raise click.ClickException(f"no sensor moved, so there is nothing to calibrate by: {output} is not written")
-    write_atomically(output, calibrated.to_toml().encode("utf-8"))
-    echo(f"{output}: {len(calibrated.sensors)} sensors of {calibrated.subject}")
+    echo(said)
 
 
 def _calibrate_taxels(glove: Path, output: Path, wearer: str, newtons: float | None, hold: float) -> None:
@@ -132,109 +152,95 @@ def _calibrate_taxels(glove: Path, output: Path, wearer: str, newtons: float | N
     echo(f"{output}: {len(calibrated.taxels)} taxels of {calibrated.subject}; name it under [taxels] of {glove.name}")
 
 
-def _calibrated(guide: "Guide", subject: str) -> "GloveCalibration":
-    from thenar.drivers.calibration import calibration, poses_of
-
-    poses = poses_of(guide.info.names)
-    taken: list[Held] = []
-    while len(taken) < len(poses):
-        flat = taken[0] if taken else None
-        found = guide.take(poses[len(taken)], f"{len(taken) + 1} of {len(poses)}", flat)
-        taken = taken[:-1] if found is None else [*taken, found]
-    done = calibration(guide.info.names, taken[0], list(zip(poses[1:], taken[1:], strict=True)), subject)
-    guide.report_left_out(done)
-    return done
-
-
 class Guide:
     """Leads through the poses on stderr, with the sensors' bytes live where that is a terminal; answers are typed."""
 
     def __init__(self, glove: "CyberGlove | StreamedJoints", info: "GloveInfo | StreamedJoints", hold_s: float) -> None:
-        self.info = info
-        self._glove, self._hold_s = glove, hold_s
+        from thenar.runtime.posing import PoseGuide
+
+        self._posing = PoseGuide(info.names, round(hold_s * 1e6))
+        self._glove = glove
         self._console = err()
         self._typed = TypedLines(sys.stdin.fileno())
         for note in info.notes:
             self._say(note)
 
-    def take(self, pose: "Pose", number: str, flat: "Held | None") -> "Held | None":
-        """Return what the pose gave, asking until it is taken; None to take the pose before it again.
+    def lead(self) -> "PoseGuide":
+        """Return the guide once all poses are taken, each asked for until it is.
 
         Raises click.Abort if the user quits, DeviceError if the glove is gone or unplugged.
         """
-        from thenar.drivers.calibration import held, problems
+        from thenar.runtime.frames import now_us
+        from thenar.runtime.posing import PoseKey, PoseStage
 
-        while True:
-            self._say(f"\nPose {number}, {pose.name}: {pose.instruction}")
-            answer = self._asked("Enter when you hold it (b: back to the pose before, q: quit)", pose, "b")
-            if answer == "b":
-                return None
-            found = held(self._samples())
-            against = problems(self.info.names, flat, pose, found)
-            if not against or self._is_kept(against, pose):
-                return found
+        posing = self._posing
+        while posing.stage is not PoseStage.DONE:
+            if posing.stage is PoseStage.HELD:
+                self._take()
+                continue
+            if posing.stage is PoseStage.DOUBTED:
+                for problem in posing.problems:
+                    self._say(f"  {problem}")
+                question, other, meant = "Enter to hold it again (k: keep it all the same, q: quit)", "k", PoseKey.KEEP
+            else:
+                pose, number = posing.pose, f"{len(posing.taken) + 1} of {len(posing.poses)}"
+                self._say(f"\nPose {number}, {pose.name}: {pose.instruction}")
+                question, other, meant = (
+                    "Enter when you hold it (b: back to the pose before, q: quit)",
+                    "b",
+                    PoseKey.BACK,
+                )
+            answer = self._asked(question, other)
+            posing.press(now_us(), PoseKey.ACCEPT if answer == "" else meant)
+        return posing
 
-    def report_left_out(self, done: "GloveCalibration") -> None:
-        """Say which sensors got no line."""
-        calibrated = {sensor.name for sensor in done.sensors}
-        left_out = [name for name in self.info.names if name not in calibrated]
-        if left_out:
-            self._say(f"Not calibrated, because they did not move: {', '.join(left_out)}")
-
-    def _is_kept(self, against: list[str], pose: "Pose") -> bool:
-        for problem in against:
-            self._say(f"  {problem}")
-        return self._asked("Enter to hold it again (k: keep it all the same, q: quit)", pose, "k") == "k"
-
-    def _asked(self, question: str, pose: "Pose", other: str) -> str:
+    def _asked(self, question: str, other: str) -> str:
         """Return "" or the `other` answer, asking again whoever types anything else."""
-        while (answer := self._answered(question, pose)) not in ("", other):
+        while (answer := self._answered(question)) not in ("", other):
             if answer == "q":
                 raise click.Abort
             self._say(f"'{answer}' is no answer here")
         return answer
 
-    def _answered(self, question: str, pose: "Pose") -> str:
+    def _answered(self, question: str) -> str:
         self._say(question)
         with Live(console=self._console, transient=True, auto_refresh=False) as live:
             drawn = 0.0
             while (answer := self._typed.take()) is None:
-                raw = self._raw()
+                self._take()
+                raw = self._posing.raw
                 if raw is not None and self._console.is_terminal and monotonic() - drawn > _REFRESH_S:
-                    live.update(self._table(raw, pose), refresh=True)
+                    live.update(self._table(raw), refresh=True)
                     drawn = monotonic()
         return answer
 
-    def _samples(self) -> list[bytes]:
-        """Return what the sensors say for as long as a pose is held, once it has settled."""
-        samples: list[bytes] = []
-        settled = monotonic() + _SETTLE_S
-        while monotonic() < settled:
-            self._raw()
-        end = settled + self._hold_s
-        while monotonic() < end or not samples:
-            raw = self._raw()
-            samples += [] if raw is None else [raw]
-        return samples
+    def _take(self) -> None:
+        from thenar.runtime.frames import now_us
 
-    def _raw(self) -> bytes | None:
-        timed = self._glove.read(_WAIT_S)
-        if timed is None or isinstance(timed, bytes):
-            return timed
-        if timed[1].fault == "unplugged":
-            from thenar.drivers.errors import DeviceError
+        raw = raw_of(self._glove)
+        if raw is not None:
+            self._posing.take(now_us(), raw)
 
-            raise DeviceError(f"{self._glove.url}: the glove is not plugged into its box")
-        return timed[1].sensors
-
-    def _table(self, raw: bytes, pose: "Pose") -> Table:
-        table = Table("sensor", "byte", "this pose's")
-        for name, byte in zip(self.info.names, raw, strict=True):
-            table.add_row(name, str(byte), "yes" if name in pose.degrees else "")
+    def _table(self, raw: bytes) -> Table:
+        table, posing = Table("sensor", "byte", "this pose's", ""), self._posing
+        for name, byte, state in zip(posing.names, raw, posing.states(), strict=True):
+            table.add_row(name, str(byte), "yes" if name in posing.pose.degrees else "", state)
         return table
 
     def _say(self, text: str) -> None:
         self._console.print(text, soft_wrap=True)
+
+
+def raw_of(glove: "CyberGlove | StreamedJoints") -> bytes | None:
+    """Return the next bytes of the sensors, None where none came in time. Raises DeviceError."""
+    timed = glove.read(_WAIT_S)
+    if timed is None or isinstance(timed, bytes):
+        return timed
+    if timed[1].fault == "unplugged":
+        from thenar.drivers.errors import DeviceError
+
+        raise DeviceError(f"{glove.url}: the glove is not plugged into its box")
+    return timed[1].sensors
 
 
 class StreamedJoints:

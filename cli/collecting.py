@@ -2,10 +2,11 @@
 
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
 from threading import Event
-from typing import Protocol
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import click
 
@@ -14,9 +15,10 @@ from thenar.compiler.recordings.taxonomy import Taxonomy
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.errors import HarnessError
-from thenar.runtime.frames import now_us
+from thenar.runtime.frames import SwitchFrame, now_us
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.sources import NOT_YET, DeviceState, Sources, Taken
+from thenar.runtime.names import list_names
 from thenar.runtime.recording.guide import Guide, Journal, Stage, Trial
 from thenar.runtime.recording.session import Collection, Session
 from thenar.runtime.recording.writer import Recorder
@@ -28,6 +30,9 @@ from .common import err, of_device
 from .ending import ended_by_signals
 from .guide_keys import GuideKeys
 from .guide_view import GuideView
+
+if TYPE_CHECKING:
+    from .guided_web import PageAt
 
 _WAIT_US = 50_000
 # What is just being plugged in gets this long.
@@ -51,18 +56,21 @@ def collect(
     harness: Harness,
     file: Path,
     collection: Collection,
-    left: Sequence[Trial],
+    trials: Sequence[Trial],
     recording: Path,
     journal: Journal | None,
     countdown_s: float,
+    page: "PageAt | None" = None,
 ) -> int:
-    """Lead through the trials that are `left`; return how many were accepted.
+    """Lead through those of the `trials` that the journal lacks; return how many are accepted, all in all.
 
-    Raises SettingError or DeviceError if a device cannot serve, click.ClickException if the recording cannot go on.
+    Keys come from stdin, unless there is a `page` and stdin is no terminal. Raises SettingError or DeviceError if a
+    device cannot serve, SinkError if the page cannot be served, click.ClickException if the recording cannot go on.
     """
-    if sys.stdin is None:
+    typed = page is None or (sys.stdin is not None and sys.stdin.isatty())
+    if sys.stdin is None and typed:
         raise click.UsageError("stdin is closed: the keys that lead through a collection come from there")
-    if any(stream.port == "-" for stream in harness.streams):
+    if typed and any(stream.port == "-" for stream in harness.streams):
         raise click.UsageError("the keys that lead through a collection come from stdin: let rows come by udp:")
     switches, sensors = harness.switches, harness.sensor_names
     check_names("column", (*switches, *harness.taxel_names, *sensors))
@@ -80,43 +88,95 @@ def collect(
         )
         if journal is not None:
             _check_same_glove(journal, session)
-        _meet(sources, stop)
+        _meet(sources, len(switches), stop)
+        accepted = () if journal is None else journal.accepted
         if stop.is_set():
-            return 0
-        with Recorder(recording, session, tail=None if journal is None else journal.tail) as recorder:
-            guide = Guide(left, recorder, round(countdown_s * 1e6))
-            done = 0 if journal is None else len(journal.accepted)
-            view = GuideView(err(), _taxonomy(collection), len(left) + done, done)
-            lead(guide, sources, recorder, view, stop)
+            return len(accepted)
+        with ExitStack() as entered:
+            taxonomy, faces = Taxonomy(collection.taxonomy, collection.types), list[Face]()
+            if page is not None:
+                # Before the recording is begun: an address that cannot be served leaves no file.
+                faces.append(entered.enter_context(page.serve(session, taxonomy, recording)))
+            tail = None if journal is None else journal.tail
+            recorder = entered.enter_context(Recorder(recording, session, tail=tail))
+            if typed:
+                faces.append(entered.enter_context(Terminal(taxonomy)))
+            guide = Guide(trials, recorder, round(countdown_s * 1e6), accepted)
+            lead(guide, sources, recorder, faces, stop)
     if recorder.failure is not None:
         raise click.ClickException(f"{recorder.failure}; make room, and the same command goes on")
-    return guide.accepted
+    return guide.done
 
 
-def _meet(sources: Sources, stop: Event) -> None:
-    """Wait until every device is there, or `stop` is set. Raises DeviceError or SettingError about one that is not."""
+def _meet(sources: Sources, switches: int, stop: Event) -> None:
+    """Wait until every device is there and something is read, or `stop` is set.
+
+    Raises DeviceError or SettingError about a device that is not there, DeviceError where all are silent: a port may
+    well be opened without anybody at its other end.
+    """
     end = now_us() + _PATIENCE_US
-    while not stop.is_set() and (missing := [device for device in sources.devices() if not device.connected]):
+    read = False
+    while not stop.is_set():
+        missing = [device for device in sources.devices() if not device.connected]
+        if read and not missing:
+            return
         sources.raise_settings()
-        if now_us() > end and all(device.error != NOT_YET for device in missing):
+        if now_us() > end and missing and all(device.error != NOT_YET for device in missing):
             raise DeviceError(f"{of_device(missing[0].name, missing[0].error)}; nothing is recorded")
-        sources.take(_WAIT_US)
+        if now_us() > end and not missing:
+            names = list_names([device.name for device in sources.devices()])
+            raise DeviceError(f"{names}: nothing came in {_PATIENCE_US // 1_000_000} s; nothing is recorded")
+        taken = sources.take(_WAIT_US)
+        read = read or taken.glove is not None or (taken.switches is not None and _is_read(taken.switches, switches))
 
 
-def lead(guide: Guide, devices: Devices, recorder: Recorder, view: GuideView, stop: Event) -> None:
+def _is_read(frame: SwitchFrame, switches: int) -> bool:
+    """Return whether the frame holds a switch, of so many, or a taxel that could be read."""
+    return bool((1 << switches) - 1 & ~frame.lost) or any(code is not None for code in frame.taxels or ())
+
+
+class Face(Protocol):
+    """Where a collection is looked at and keys are pressed: the terminal, or a page."""
+
+    def press(self, now_us: int, guide: Guide) -> None:
+        """Press what somebody has pressed there since the last call."""
+
+    def show(self, now_us: int, guide: Guide, devices: Sequence[DeviceState]) -> None:
+        """Show where `guide` stands."""
+
+
+class Terminal:
+    """Keys from stdin, and the view on stderr; a context manager."""
+
+    def __init__(self, taxonomy: Taxonomy) -> None:
+        self._view = GuideView(err(), taxonomy)
+        self._keys = GuideKeys(sys.stdin.fileno())
+        self.show = self._view.show
+        self._entered = ExitStack()
+
+    def press(self, now_us: int, guide: Guide) -> None:
+        """Press what was typed."""
+        for key in self._keys.pressed():
+            guide.press(now_us, key)
+
+    def __enter__(self) -> Self:
+        self._entered.enter_context(self._keys)
+        self._entered.enter_context(self._view)
+        return self
+
+    def __exit__(self, *of_error: Any) -> None:
+        self._entered.__exit__(*of_error)
+
+
+def lead(guide: Guide, devices: Devices, recorder: Recorder, faces: Sequence[Face], stop: Event) -> None:
     """Lead through the guide's trials until they are done, the user leaves, `stop` is set, or the recording fails."""
-    with GuideKeys(sys.stdin.fileno()) as keys, view:
-        while guide.stage is not Stage.OVER and recorder.failure is None and not stop.is_set():
-            arrived = devices.take(_WAIT_US).arrived
-            devices.raise_settings()
-            guide.take(now_us(), arrived)
-            for key in keys.pressed():
-                guide.press(now_us(), key)
-            view.show(now_us(), guide, devices.devices())
-
-
-def _taxonomy(collection: Collection) -> Taxonomy:
-    return Taxonomy(collection.taxonomy, collection.types)
+    while guide.stage is not Stage.OVER and recorder.failure is None and not stop.is_set():
+        arrived = devices.take(_WAIT_US).arrived
+        devices.raise_settings()
+        guide.take(now_us(), arrived)
+        for face in faces:
+            face.press(now_us(), guide)
+            face.show(now_us(), guide, devices.devices())
 
 
 def _check_same_glove(journal: Journal, session: Session) -> None:

@@ -204,7 +204,8 @@ def command(
 
     The folder holds build.json, tables.bin and ensemble.bin, the classifier in C in firmware/, with --glove scan.json,
     and in hand.json where its switches lie. report.html shows all of it in a browser; spec/ describes the reduced glove
-    to cut, solder and run. The same recordings, options, wiring and layout give the same bytes.
+    to cut, solder and run; try.html recognises in a browser what is closed and bent there. The same recordings,
+    options, wiring and layout give the same bytes.
 
     \b
     Example:

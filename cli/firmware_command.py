@@ -71,7 +71,13 @@ class _Command(click.Command):
     "--calibration",
     metavar="HAND.toml",
     type=existing_file,
-    help="The hand that a glove firmware is for: its CyberGlove's bytes, from `thenar calibrate`.",
+    help="The hand that it is for: its CyberGlove's bytes, from `thenar calibrate`.",
+)
+@click.option(
+    "--glove",
+    metavar="glove.toml",
+    type=existing_file,
+    help="The glove whose readings a library converts: the ranges of its streams, its calibrations.",
 )
 @click.option(
     "--name",
@@ -101,6 +107,7 @@ def command(
     mode: "Mode",
     board: Path | None,
     calibration: Path | None,
+    glove: Path | None,
     name: str,
     flash_limit: int | None,
     frontier: bool,
@@ -124,18 +131,23 @@ def command(
     from thenar.compiler.firmware.generate import Firmware, write_folder
     from thenar.compiler.firmware.measuring import measure as measured_of
     from thenar.compiler.firmware.one_hand import for_one_hand
+    from thenar.compiler.firmware.sensors import sensors_of
     from thenar.compiler.firmware.targets import TARGETS
     from thenar.runtime.build import Build
     from thenar.runtime.calibration import load_calibration
+    from thenar.runtime.harness.loading import load_harness
 
-    _check(
-        TARGETS[target], mode, writes=output is not None, counts=measure or frontier, calibrated=calibration is not None
-    )
+    _check(TARGETS[target], mode, writes=output is not None, counts=measure or frontier)
+    _check_calibrated(mode, calibration, glove)
     loaded = Build.load(build)
-    if calibration is not None:
-        loaded = for_one_hand(loaded, load_calibration(calibration))
+    hand = None if calibration is None else load_calibration(calibration)
+    sensors = None
+    if mode == "classify" and (hand or glove):
+        sensors = sensors_of(loaded.manifest, None if glove is None else load_harness(glove), hand)
+    elif hand is not None:
+        loaded = for_one_hand(loaded, hand)
     wiring = None if board is None else load_board(board)
-    firmware = Firmware(loaded.tables, loaded.manifest, target, mode, name, wiring, flash_limit, loaded.scan)
+    firmware = Firmware(loaded.tables, loaded.manifest, target, mode, name, wiring, flash_limit, loaded.scan, sensors)
     with progress("choosing a layout"):
         fit = firmware.fit
     measured = None
@@ -152,13 +164,27 @@ def command(
             _print(fit, measured, frontier=frontier, updates=mode == "glove")
         if firmware.segments:
             out().print(f"{firmware.segments}.", soft_wrap=True)
+        if output is not None and mode == "classify" and (said := TARGETS[target].said(firmware.library())):
+            out().print(f"{said}.", soft_wrap=True)
         if output is not None:
             next_step = TARGETS[target].next_step.format(folder=shlex.quote(str(output)))
             out().print(f"{output}: firmware for {target}; {next_step}", soft_wrap=True)
     return 0 if measured is None or measured.holds else 1
 
 
-def _check(target: "Target", mode: "Mode", *, writes: bool, counts: bool, calibrated: bool) -> None:
+def _check_calibrated(mode: "Mode", calibration: Path | None, glove: Path | None) -> None:
+    """Raise UsageError where a mode takes no calibration, or it is given twice."""
+    if calibration is not None and mode == "scan":
+        raise click.UsageError(
+            "--calibration is for the modes classify and glove: a board that scans reads no CyberGlove."
+        )
+    if glove is not None and mode != "classify":
+        raise click.UsageError("--glove is for --mode classify: how a board of the other modes is wired says --board.")
+    if glove is not None and calibration is not None:
+        raise click.UsageError("glove.toml names its calibration: leave --calibration out, or --glove.")
+
+
+def _check(target: "Target", mode: "Mode", *, writes: bool, counts: bool) -> None:
     """Raise UsageError where options do not go together; `counts` is --measure or --frontier."""
     if mode == "scan" and counts:
         raise click.UsageError("A board that only scans holds no classifier to --measure or to see the --frontier of.")
@@ -166,8 +192,6 @@ def _check(target: "Target", mode: "Mode", *, writes: bool, counts: bool, calibr
         raise click.UsageError("On this machine nothing is counted: --measure and --frontier are for microcontrollers.")
     if not writes and not counts:
         raise click.UsageError("Name a folder to write with -o, or look first, with --frontier or --measure.")
-    if calibrated and mode != "glove":
-        raise click.UsageError("--calibration is for --mode glove: no other reads a CyberGlove.")
 
 
 def _print(fit: "Fit", measured: "Measured | None", *, frontier: bool, updates: bool) -> None:

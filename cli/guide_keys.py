@@ -10,13 +10,14 @@ from typing import Self
 
 from thenar.runtime.recording.guide import Key
 
-_MEANT = {"": Key.ACCEPT, " ": Key.ACCEPT, "a": Key.ACCEPT, "r": Key.REDO, "q": Key.QUIT}
+LETTERS = {Key.ACCEPT: "Enter", Key.REDO: "r", Key.UNDO: "u", Key.SKIP: "s", Key.PAUSE: "p", Key.QUIT: "q"}
+_MEANT = {letter: key for key, letter in LETTERS.items()} | dict.fromkeys(("", " ", "a"), Key.ACCEPT)
 # What a terminal sends for arrows, function keys and the like.
 _ESCAPES = re.compile(r"\x1b(?:\[[0-9;?]*[ -/]*[@-~]|O.)?")
 
 
 class GuideKeys:
-    """Reads `descriptor` without waiting for it: Enter, blank and a accept, r does it again, q or the end leaves."""
+    """Reads `descriptor` without waiting for it: Enter, blank and a accept, other keys are LETTERS, the end leaves."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor

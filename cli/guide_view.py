@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
@@ -15,29 +15,20 @@ from thenar.runtime.live.sources import DeviceState
 from thenar.runtime.published import NONE
 from thenar.runtime.recording.guide import Guide, Stage
 
-if TYPE_CHECKING:
-    from thenar.runtime.recording.guide import Trial
+from .guide_keys import LETTERS
 
 _REDRAW_US = 100_000
-_KEYS = {
-    Stage.READY: "Enter: start the countdown   q: leave, and go on another time",
-    Stage.COUNTDOWN: "r: begin the countdown again   q: leave",
-    Stage.MOVING: "r: begin the countdown again   q: leave",
-    Stage.REVIEW: "Enter: keep it, next grasp   r: do it again   q: leave",
-    Stage.OVER: "",
-}
 
 
 class GuideView:
     """Draws on a terminal ten times a second and at every change, in place; elsewhere says in a line what is new."""
 
-    def __init__(self, console: Console, taxonomy: Taxonomy, total: int, done: int) -> None:
+    def __init__(self, console: Console, taxonomy: Taxonomy) -> None:
         self._console = console
         self._full = dict(zip(taxonomy.types, taxonomy.full_names, strict=True))
-        self._total, self._done = total, done
         self._live = Live(console=console, auto_refresh=False, transient=True) if console.is_terminal else None
         self._due_us = 0
-        self._shown: tuple[Stage, Trial | None] | None = None
+        self._shown = -1
         self._said = ""
 
     def __enter__(self) -> Self:
@@ -55,34 +46,35 @@ class GuideView:
         """Show where `guide` stands, if it is time to or news."""
         if self._live is None:
             self._say(guide, devices)
-        elif now_us >= self._due_us or self._shown != (guide.stage, guide.trial):
+        elif now_us >= self._due_us or self._shown != guide.step:
             self._due_us = now_us + _REDRAW_US
-            self._shown = guide.stage, guide.trial
+            self._shown = guide.step
             self._live.update(self._drawn(now_us, guide, devices), refresh=True)
 
     def _say(self, guide: Guide, devices: Sequence[DeviceState]) -> None:
         errors = "; ".join(device.error for device in devices if not device.connected)
         why = f" ({errors})" if errors else ""
         problem = f"not captured: {guide.problem}{why}; " if guide.problem else ""
-        line = f"{self._task(guide)}: {problem}{_KEYS[guide.stage]}"
+        line = f"{self._task(guide)}: {problem}{_keys(guide)}"
         if line != self._said and guide.stage is not Stage.OVER:
             self._said = line
             self._console.print(line, soft_wrap=True)
 
     def _drawn(self, now_us: int, guide: Guide, devices: Sequence[DeviceState]) -> RenderableType:
         table = Table.grid(padding=(0, 2))
-        done = self._done + guide.accepted
-        table.add_row("done", Text(f"{done} of {self._total}"), ProgressBar(self._total, done, width=40))
+        skipped = f", {guide.skipped} skipped" if guide.skipped else ""
+        bar = ProgressBar(guide.total, guide.done, width=40)
+        table.add_row("done", Text(f"{guide.done} of {guide.total}{skipped}"), bar)
         for device in devices:
             table.add_row(device.name, Text("connected") if device.connected else Text(device.error, style="red"))
         stage = Text(self._standing(now_us, guide), style="bold")
-        return Group(table, Text(), Text(self._task(guide), style="bold cyan"), stage, Text(_KEYS[guide.stage]))
+        return Group(table, Text(), Text(self._task(guide), style="bold cyan"), stage, Text(_keys(guide)))
 
     def _task(self, guide: Guide) -> str:
         trial = guide.trial
         if trial is None:
-            return ""
-        place = f"{self._done + guide.accepted + 1} of {self._total}"
+            return f"{guide.done} of {guide.total}: no trial is left"
+        place = f"{guide.done + guide.skipped + 1} of {guide.total}"
         if trial.grasp == NONE and NONE not in self._full:
             return f"{place}: nothing held, {trial.object}: {MOVEMENTS.get(trial.object, 'touch nothing')}"
         full = self._full[trial.grasp]
@@ -90,6 +82,8 @@ class GuideView:
         return f"{place}: {name}, object {trial.object}"
 
     def _standing(self, now_us: int, guide: Guide) -> str:
+        if guide.stage is Stage.PAUSED:
+            return "paused; nothing is recorded meanwhile"
         if guide.problem:
             return f"not captured: {guide.problem}"
         if guide.stage is Stage.COUNTDOWN:
@@ -103,3 +97,8 @@ class GuideView:
         closed = "" if switches is None else f"{switches.closed.bit_count()} switches closed"
         sensors = "" if glove is None else "glove " + " ".join(map(str, glove.sensors))
         return "captured: " + ", ".join(filter(None, (closed, sensors)))
+
+
+def _keys(guide: Guide) -> str:
+    """Return the keys that do something now: "Enter: start the countdown   q: leave"."""
+    return "   ".join(f"{LETTERS[key]}: {what}" for key, what in guide.offered().items())

@@ -23,9 +23,8 @@ from .web_options import HERE, say_page, token_for, web_token_option
 def command(source: str, build: Path | None, web: str, web_token: bool) -> None:
     """Show a run elsewhere, or a recording, on a page in the browser.
 
-    ADDRESS is where that run publishes: tcp:HOST:PORT or unix:PATH, as its --sink has it. The page shows what is
-    recognised, segments and health; single switches and other types' probabilities are not in the stream. What is cut
-    is opened again.
+    ADDRESS is where that run publishes: tcp:HOST:PORT or unix:PATH, as its --sink has it. With ?detail there and
+    --build here the page shows switches, joints and all types' probabilities as well. What is cut is opened again.
 
     RECORDING is an .mcap file: the page goes to any moment of it, plays it, and shows what was labelled beside what was
     recognised; with --build also the hand as it was, and the other types' probabilities.
@@ -34,7 +33,7 @@ def command(source: str, build: Path | None, web: str, web_token: bool) -> None:
 
     \b
     Example:
-        thenar run build/ --glove glove.toml --sink unix:/tmp/grasps --status
+        thenar run build/ --glove glove.toml --sink "unix:/tmp/grasps?detail" --status
         thenar monitor unix:/tmp/grasps --build build/
         thenar monitor run.mcap --build build/
     """

@@ -8,6 +8,7 @@ import click
 
 from .common import Number, OutputFile, check_devices, existing_file, keep_apart, progress, seed_range, warning
 from .lines import echo
+from .web_options import token_for, web_options
 
 if TYPE_CHECKING:
     from thenar.runtime.recording.guide import Journal
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     help="Record the empty hand too: open, approaching, releasing, moving idly.  [default: none]",
 )
 @click.option("--seed", type=seed_range, help="Seed of the trial order.  [default: random]")
+@web_options
 @click.option(
     "-o", "--output", type=OutputFile(".grasps", goes_on=True), required=True, help="The .grasps file to write."
 )
@@ -45,6 +47,8 @@ def command(
     countdown: float,
     none: bool | None,
     seed: int | None,
+    web: str | None,
+    web_token: bool,
     output: Path,
 ) -> None:
     """Record labelled grasps: which one to take is shown, in random order, and counted down to.
@@ -58,6 +62,7 @@ def command(
     \b
     Example:
         thenar record --glove glove.toml --subject A --objects objects.toml -o anna.grasps
+        thenar record --glove glove.toml --subject A -o anna.grasps --web
     """
     from thenar.compiler.recordings.errors import check_names
     from thenar.compiler.recordings.taxonomy import collected
@@ -91,11 +96,16 @@ def command(
     wanted = Collection(subject, types.name, types.types, tasks, repetitions, drawn)
     if journal is not None:
         wanted = _resumed(journal, wanted, seed)
-    accepted = frozenset() if journal is None else journal.accepted
     trials = planned(wanted)
-    left = [trial for trial in trials if trial.number not in accepted]
-    more = collect(harness, glove, wanted, left, recording, journal, countdown) if left else 0
-    _write(recording, output, len(accepted) + more, len(trials))
+    accepted = 0 if journal is None else len(journal.accepted)
+    if accepted < len(trials):
+        page = None
+        if web is not None:
+            from .guided_web import PageAt
+
+            page = PageAt(web, token_for(web_token))
+        accepted = collect(harness, glove, wanted, trials, recording, journal, countdown, page)
+    _write(recording, output, accepted, len(trials))
 
 
 def _resumed(journal: "Journal", wanted: "Collection", seed: int | None) -> "Collection":

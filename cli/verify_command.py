@@ -45,10 +45,10 @@ def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bo
 
     The worst that integers can do is not looked for among the rows: it is worked out, over every frame there is.
 
-    With --firmware, every score and grasp type of the compiled classifiers is held against Python's: on every row, on
-    10,000 random frames and on all extreme ones. host runs with sanitizers; avr on the smaller of ATmega328P and
-    ATmega2560 that holds the build, in simavr; cortex-m on an M0+ and an M4, riscv on an RV32IMAC, xtensa on an LX106,
-    in qemu.
+    With --firmware, every score, grasp type, margin and probability of the compiled classifiers is held against
+    Python's: on every row, on 10,000 random frames and on all extreme ones. host runs with sanitizers; avr on the
+    smaller of ATmega328P and ATmega2560 that holds the build, in simavr; cortex-m on an M0+ and an M4, riscv on an
+    RV32IMAC, xtensa on an LX106, in qemu.
 
     With --faults, every fault is put to every row: each input lost, whose mean row stands in, and stuck at each of its
     values; each port, chip and board of the build's scan map dead; and any two inputs lost.
@@ -191,15 +191,17 @@ def _outcome(check: "TargetCheck") -> str:
         return f"{check.differing} of {check.frames} frames DIFFER; the first:"
     counted = "" if check.worst is None else f", at most {check.worst} {check.unit}"
     stack = "" if check.stack is None else f" and {check.stack} bytes of stack"
-    return f"every score and grasp type of {check.frames} frames is Python's{counted}{stack}"
+    what = "score, grasp type, margin and probability" if check.shares else "score and grasp type"
+    return f"every {what} of {check.frames} frames is Python's{counted}{stack}"
 
 
 def _print_difference(first: "Difference") -> None:
     console = out()
     codes = " ".join(map(str, first.codes)) or "none"
     console.print(f"    {first.frame}: closed {', '.join(first.closed) or 'none'}; codes {codes}")
-    for who, grasp, scores in (
-        ("Python", first.grasp, first.scores),
-        ("compiled", first.compiled_grasp, first.compiled_scores),
+    for who, grasp, scores, said in (
+        ("Python", first.grasp, first.scores, first.said),
+        ("compiled", first.compiled_grasp, first.compiled_scores, first.compiled_said),
     ):
-        console.print(f"    {who}: {grasp}, scores {' '.join(map(str, scores))}")
+        more = f", margin {said[0]}, probability {said[1]} of 65535" if said else ""
+        console.print(f"    {who}: {grasp}, scores {' '.join(map(str, scores))}{more}")

@@ -1,4 +1,6 @@
-"""Independent pieces of work on all cores, each answer handed over as soon as it is there."""
+"""Work in other processes: independent pieces on all cores, each answer handed over as soon as it is there; and one
+piece aside, for whoever must not wait for it.
+"""
 
 import os
 import select
@@ -9,8 +11,8 @@ import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import BrokenExecutor
-from contextlib import ExitStack, contextmanager
-from typing import TypeVar
+from contextlib import ExitStack, contextmanager, suppress
+from typing import Any, Generic, TypeVar
 
 from .cluster import on_cluster
 
@@ -163,3 +165,66 @@ def _end_after(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(_LOOK_S)
     os._exit(1)
+
+
+class Aside(Generic[Answer]):
+    """One piece of work at a time in a process of its own, which yields to everything else on the machine.
+
+    It ends when this process does, however that ends.
+    """
+
+    def __init__(self) -> None:
+        self._process: Any = None
+        self._answers: Any = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether a piece of work is under way, or its answer has not been fetched."""
+        return self._process is not None
+
+    def start(self, work: Callable[[Task], Answer], task: Task) -> None:
+        """Begin; must not be busy. `work` and `task` are pickled, and what `work` raises is told by its name."""
+        from multiprocessing import get_context
+
+        assert not self.busy
+        context = get_context("spawn")
+        self._answers, there = context.Pipe(duplex=False)
+        # Its signals are held from before it is: a Ctrl-C is for this process.
+        with _safe_paths(), _interrupts_held():
+            self._process = context.Process(target=_aside, args=(os.getpid(), there, work, task), daemon=True)
+            self._process.start()
+        there.close()
+
+    def fetch(self) -> Answer | None:
+        """Return the answer, if it is there. Raises BrokenExecutor if the work has failed, with a sentence."""
+        if self._process is None or not self._answers.poll():
+            return None
+        try:
+            failure, answer = self._answers.recv()
+        except EOFError:
+            failure, answer = "its process ended, perhaps for want of memory", None
+        self.close()
+        if failure:
+            raise BrokenExecutor(failure)
+        found: Answer = answer
+        return found
+
+    def close(self) -> None:
+        """End what is under way."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+            self._process.close()
+            self._answers.close()
+            self._process = None
+
+
+def _aside(parent: int, there: Any, work: Callable[[Task], Answer], task: Task) -> None:
+    _end_with_parent(parent)
+    with suppress(OSError):
+        os.nice(10)
+    try:
+        answer = "", work(task)
+    except Exception as fault:
+        answer = f"{type(fault).__name__}: {fault}", None  # type: ignore[assignment]
+    there.send(answer)

@@ -1,4 +1,4 @@
-"""The switch-scanner board on a serial line: what it says, as sets of closed keys, and codes, with their times."""
+"""The switch-scanner board, on a serial line or in a Wi-Fi: its closed keys, and codes, with their times."""
 
 import logging
 from collections import deque
@@ -8,6 +8,8 @@ from typing import NamedTuple, Self
 
 from .closing import Closing
 from .errors import DeviceError, SettingError
+from .scanner_datagrams import DatagramCounts, DatagramLink, is_datagram_port
+from .scanner_link import Break, Received, ScannerLink, SerialLink
 from .scanner_protocol import (
     DEGRADED,
     EARLY,
@@ -19,7 +21,6 @@ from .scanner_protocol import (
     Faults,
     Frame,
     FrameCounts,
-    FrameDecoder,
     FromBoard,
     GetState,
     Grasp,
@@ -37,7 +38,6 @@ from .scanner_protocol import (
     from_board,
 )
 from .scanner_state import BoardKeys, BoardTimes
-from .serial_line import SerialLine
 
 _LOG = logging.getLogger(__name__)
 _Setting = SetRate | SetDebounce | SetChannels | SetSegments
@@ -94,17 +94,19 @@ class ScannerCounts(FrameCounts):
     """What came in since the board was opened.
 
     Besides frames: gaps in the numbers of the sound ones; misfits, which were sound but said what this board cannot
-    say. And how often the state was asked for, something being amiss, and the time.
+    say; in a Wi-Fi, datagrams that were missing, late, repeated or foreign, as DatagramCounts has them. And how often
+    the state was asked for, something being amiss, and the time.
     """
 
     gaps: int = 0
     misfits: int = 0
+    missing: int = 0
+    late: int = 0
+    repeated: int = 0
+    foreign: int = 0
     asked: int = 0
     pings: int = 0
 
-
-# When it came in, in the host's monotonic microseconds, and a sound frame, or None for something that was none.
-Received = tuple[int, Frame | None]
 
 # Opening the port of an Arduino resets it, and its boot loader answers nobody for up to two seconds.
 _BOOT_S = 3.0
@@ -113,7 +115,9 @@ _ASK_AGAIN_S = 0.1
 
 
 class Scanner(Closing):
-    """A scanner board at `url`: a device, socket://HOST:PORT or rfc2217://HOST:PORT; boards with USB ignore `baud`.
+    """A scanner board at `url`: a device, socket://HOST:PORT, rfc2217://HOST:PORT; in a Wi-Fi udp://HOST:PORT.
+
+    Boards with USB or Wi-Fi ignore `baud`.
 
     `open`, then `read` again and again; both raise DeviceError when the board is gone or is not what it was, after
     which opening it again is the way back. For one thread.
@@ -129,7 +133,7 @@ class Scanner(Closing):
 
     def __init__(self, url: str, baud: int = 115200) -> None:
         self.url, self.baud = url, baud
-        self._line: SerialLine | None = None
+        self._link: ScannerLink | None = None
         self._forget()
 
     def _forget(self) -> None:
@@ -138,11 +142,11 @@ class Scanner(Closing):
         self.grasp: BoardGrasp | None = None
         self.segment: BoardSegment | None = None
         self.analog: Channels | None = None
-        self._decoder = FrameDecoder()
-        self._sequence = self._received_bytes = 0
+        self._frames, self._datagrams = FrameCounts(), DatagramCounts()
+        self._sequence = 0
         self._keys = BoardKeys()
         self.times = BoardTimes()
-        self._waiting: deque[Received] = deque()
+        self._waiting: deque[tuple[int, Received]] = deque()  # when it came in, in the host's monotonic microseconds
         self._misfits = self._asked = 0
         self._ask_at = self._channels_at = self._segments_at = 0.0
         self._told: dict[int, _Setting] = {}
@@ -156,9 +160,11 @@ class Scanner(Closing):
         """Find the board. Raises DeviceError if none answers within three seconds, or one that speaks otherwise."""
         self.close()
         self._forget()
-        self._line = SerialLine(self.url, self.baud)
+        if is_datagram_port(self.url):
+            self._link = DatagramLink(self.url, self._frames, self._datagrams)
+        else:
+            self._link = SerialLink(self.url, self.baud, self._frames)
         try:
-            self._line.write(b"\0")  # ends whatever stands half-sent in the board's receiver
             self.hello = self._greet()
             if self.hello.has_segments:
                 self._tell(SetSegments(1))
@@ -171,7 +177,7 @@ class Scanner(Closing):
     def counts(self) -> ScannerCounts:
         """What came in since the board was last opened."""
         keys, times = self._keys, self.times
-        seen = asdict(self._decoder.counts)
+        seen = asdict(self._frames) | asdict(self._datagrams)
         return ScannerCounts(**seen, gaps=keys.gaps, misfits=self._misfits, asked=self._asked, pings=times.pings)
 
     def read(self, timeout_s: float) -> ScannerReading | None:
@@ -216,26 +222,25 @@ class Scanner(Closing):
 
     def close(self) -> None:
         """Close the line. Does no harm twice."""
-        line, self._line = self._line, None
-        if line is not None:
-            line.close()
+        link, self._link = self._link, None
+        if link is not None:
+            link.close()
 
-    def _opened(self) -> SerialLine:
-        if self._line is None:
+    def _opened(self) -> ScannerLink:
+        if self._link is None:
             raise DeviceError(f"{self.url}: the scanner board is not open")
-        return self._line
+        return self._link
 
     def _send(self, message: ToBoard) -> None:
-        self._opened().write(encode(frame(message, self._sequence)))
+        setting = message.KIND if isinstance(message, _Setting) else None
+        self._opened().send(encode(frame(message, self._sequence)), setting)
         self._sequence += 1
 
     def _receive(self, timeout_s: float) -> None:
         """Add what came in to what waits, after waiting for something until the timeout."""
-        data = self._opened().read(timeout_s)
+        received = self._opened().receive(timeout_s)
         came_us = monotonic_ns() // 1000
-        self._received_bytes += len(data)
-        for received in self._decoder.received(data):
-            self._waiting.append((came_us, received))
+        self._waiting.extend((came_us, each) for each in received)
 
     def _tell(self, setting: _Setting) -> None:
         self._send(setting)
@@ -250,13 +255,16 @@ class Scanner(Closing):
             self._receive(max(0.0, ping_at - now))
             while self._waiting:
                 came_us, received = self._waiting.popleft()
-                if received is not None and received.kind == Hello.KIND:
+                if isinstance(received, Frame) and received.kind == Hello.KIND:
                     hello = self._meet(received, came_us)
                     if self.times.answered:
                         return hello
+        wireless = is_datagram_port(self.url)
+        at, check = ("", "address, Wi-Fi") if wireless else (f" at {self.baud} baud", "port, baud rate")
         raise DeviceError(
-            f"{self.url}: no scanner board answered at {self.baud} baud in {_BOOT_S:g} s ({self._received_bytes} bytes"
-            f" came, {self._decoder.counts.frames} sound frames): check port, baud rate, power and the board's firmware"
+            f"{self.url}: no scanner board answered{at} in {_BOOT_S:g} s ({self._opened().received_bytes} bytes"
+            f" came, {self._frames.frames} sound frames): check {check}, power and the board's firmware"
+            + (", and whether another program has it open: it hears one at a time" if wireless else "")
         )
 
     def _meet(self, received: Frame, came_us: int) -> Hello:
@@ -275,7 +283,7 @@ class Scanner(Closing):
                 return reading
         return None
 
-    def _take(self, came_us: int, received: Frame | None) -> ScannerReading | None:
+    def _take(self, came_us: int, received: Received) -> ScannerReading | None:
         """Return what came in as a reading, if it says something new: keys as they are, or that they are unknown."""
         keys = self._keys
         was_trusted = keys.trusted
@@ -283,7 +291,7 @@ class Scanner(Closing):
         time_us = self.times.stamp(message, came_us)
         if isinstance(message, Hello):
             self._same(message)
-            if received is not None and received.sequence == 0 and not message.token:  # it has booted
+            if isinstance(received, Frame) and received.sequence == 0 and not message.token:  # it has booted
                 self._restarted()
         elif isinstance(message, Faults):
             self.faults = message
@@ -320,9 +328,9 @@ class Scanner(Closing):
         if message.token == self._token:
             self.analog = message
 
-    def _message(self, received: Frame | None) -> FromBoard | None:
+    def _message(self, received: Received) -> FromBoard | None:
         """Return what a frame says, None if it says nothing; then an event may have been lost."""
-        if received is not None:
+        if isinstance(received, Frame):
             self._keys.numbered(received.sequence)
             try:
                 return from_board(received, self._keys.keys)
@@ -330,9 +338,15 @@ class Scanner(Closing):
                 _LOG.warning("%s: a sound frame was refused: %s", self.url, reason)
                 self._misfits += 1
                 self._keys.misread()
-        else:
+        elif received is Break.DAMAGED:
             _LOG.info("%s: bytes that are no frame were skipped", self.url)
             self._keys.damaged()
+        else:
+            what = "the board has booted" if received is Break.RESTARTED else "datagrams are missing"
+            _LOG.info("%s: %s", self.url, what)
+            self._keys.misread()
+            if received is Break.RESTARTED:
+                self._restarted()
         return None
 
     def _same(self, hello: Hello) -> None:

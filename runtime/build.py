@@ -20,6 +20,7 @@ from .rejection import Rejector, none_leads
 from .scanning import scanmap as scan_file
 from .scanning.scanmap import ScanMap, check_switches, scanmap_from_bytes
 from .scores import LANE_OFFSET, Scorer, softmax
+from .softmax import Softmax
 from .tables import IntegerTables, tables_from_bytes
 
 MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME = "build.json", "tables.bin", "ensemble.bin", "scan.json"
@@ -29,8 +30,10 @@ MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME = "build.json", "tables.bin
 class Recognition:
     """What was recognised in a frame, and how surely.
 
-    probability is the softmax of the scores, margin the lead over the second best in integer steps; degraded says that
-    a switch or a joint was missing and its mean contribution was added for it.
+    probability is the softmax of the scores of all answers, of nothing held too where the build may refuse a frame, as
+    it is published; a board's, in integers and of the grasp types alone, is that of `Build.softmax`. margin is the lead
+    over the second best in integer steps; degraded says that a switch or a joint was missing and its mean contribution
+    was added for it.
     """
 
     grasp: str
@@ -44,12 +47,13 @@ class Build:
 
     A frame is `bits` (s,), the kept switches in the order of `manifest.switches`, and `codes` (j,), the joints in the
     order of `manifest.joints`. Of equal scores the first grasp type wins. `scan` is how to read the kept switches, None
-    where the build was compiled for no harness. `scorer` is what all that score frames of this build share. `none` is
+    where the build was compiled for no harness. `scorer` is what all that score frames of this build share,
+    and `softmax` makes of scores the probabilities that a board gives, in 65535ths. `none` is
     the class of frames in which nothing is held, None where no row trained on showed that; then `rejector` says which
     frames are refused, None where none is, and `none_leads` by how much none leads one that is not, and one that is.
     """
 
-    __slots__ = ("grasps", "manifest", "none", "none_leads", "rejector", "scan", "scorer", "tables")
+    __slots__ = ("grasps", "manifest", "none", "none_leads", "rejector", "scan", "scorer", "softmax", "tables")
 
     def __init__(self, manifest: Manifest, tables: IntegerTables, scan: ScanMap | None = None) -> None:
         """Put together what belongs together. Raises BuildError if they describe different builds."""
@@ -67,6 +71,7 @@ class Build:
         self.scan = scan
         self.grasps = manifest.grasps
         self.scorer = Scorer(tables)
+        self.softmax = Softmax(tables.scale)
         self.none = len(self.grasps) - 1 if self.grasps[-1] == NONE else None
         refusal = manifest.rejection
         self.rejector = None if refusal is None else Rejector(refusal)

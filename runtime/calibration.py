@@ -1,15 +1,16 @@
 """A CyberGlove's calibration, and what it makes of a record's bytes: the joint codes of a build, and angles in rad.
 
-A raw byte r of a sensor that is calibrated means value(r); the build codes that value as
+The two points of a calibration are bytes and values. A build codes a value v as
 
-    code = rint(code_a + (value(r) - value_a) / step),   step = (value_b - value_a) / (code_b - code_a)
+    code = code_a + (v - value_a) / step,   step = (value_b - value_a) / (code_b - code_a)
 
-held to 0..65535, by the two points that its recordings were coded by. Importing recordings works out the same, so a
-live byte gets the code that a recorded one got.
+by the two points that its recordings were coded by. So the two bytes have codes, and a straight line gives all other
+bytes theirs (`code_line`). Importing recordings and the C of firmware work out the same: a live byte gets the code that
+a recorded one got.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import getitem, itemgetter
 from pathlib import Path
@@ -17,6 +18,7 @@ from pathlib import Path
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.errors import SettingError
 
+from .code_line import code_line
 from .errors import FrameError
 from .frames import PERIODS, GloveFrame, Mask, Newest
 from .manifest import Calibration
@@ -28,7 +30,6 @@ from .toml_struct import convert
 _BYTES = 256
 # The unit of recorded bytes that are not calibrated.
 _RAW = "raw"
-_HIGHEST_CODE = 65535
 # A CyberGlove never sends 0: it ends a record.
 _RAW_CODES = range(1, _BYTES)
 
@@ -51,6 +52,11 @@ class Numbers:
 Meaning = GloveCalibration | Numbers | None
 
 
+def numbers_of(ranges: Mapping[str, tuple[float, float]]) -> Numbers:
+    """Return what bytes mean of a stream whose joints have these ranges."""
+    return Numbers(tuple(SensorCalibration(name, 1, low, 255, high) for name, (low, high) in ranges.items()))
+
+
 class CodeTables:
     """The joints of a build as look-ups into a record's bytes. The last record's codes are kept: switches come several
     times as often as records do. `lost` are the joints whose bytes in it are 0: nothing was measured.
@@ -64,7 +70,7 @@ class CodeTables:
         Raises SettingError if the glove lacks a joint, or if its bytes cannot be turned into the build's codes.
         """
         self._sensors = len(sensor_names)
-        places = [_place(joint.name, sensor_names) for joint in joints]
+        places = [place_of(joint.name, sensor_names) for joint in joints]
         self._pick = _picker(places)
         self._tables = [codes_of_bytes(joint, calibration) for joint in joints]
         self._last: bytes | None = None
@@ -80,7 +86,10 @@ class CodeTables:
         if len(sensors) != self._sensors:
             raise FrameError(f"a CyberGlove record of {len(sensors)} sensors, {self._sensors} are named")
         self._last, self._last_codes = sensors, list(map(getitem, self._tables, picked := self._pick(sensors)))
-        self.lost = sum(1 << joint for joint, byte in enumerate(picked[: len(self._tables)]) if not byte)
+        whole = all(picked)
+        self.lost = (
+            0 if whole else sum(1 << joint for joint, byte in enumerate(picked[: len(self._tables)]) if not byte)
+        )
         return self._last_codes
 
 
@@ -170,7 +179,8 @@ def _picker(places: Sequence[int]) -> Callable[[bytes], tuple[int, ...]]:
     return itemgetter(*places, *places[:1]) if places else lambda _sensors: ()
 
 
-def _place(joint: str, sensor_names: Sequence[str]) -> int:
+def place_of(joint: str, sensor_names: Sequence[str]) -> int:
+    """Return which of the sensors a joint of a build is. Raises SettingError if the glove has none of that name."""
     if joint in sensor_names:
         return list(sensor_names).index(joint)
     raise SettingError(
@@ -191,7 +201,9 @@ def codes_of_bytes(joint: Calibration, calibration: Meaning) -> tuple[int, ...]:
     lines = {line.name: line for line in calibration.sensors}
     if joint.name not in lines:
         raise SettingError(f"the calibration has no sensor {joint.name!r}: calibrate the glove again")
-    return tuple(code_of_value(joint, lines[joint.name].value(raw)) for raw in range(_BYTES))
+    sensor = lines[joint.name]
+    line = code_line(joint, (sensor.raw_a, sensor.value_a), (sensor.raw_b, sensor.value_b))
+    return tuple(map(line.code, range(_BYTES)))
 
 
 def _raw(joint: Calibration) -> tuple[int, ...]:
@@ -201,16 +213,3 @@ def _raw(joint: Calibration) -> tuple[int, ...]:
         f"joint {joint.name!r} of the build is coded in {joint.unit!r}, not in the glove's bytes: calibrate it "
         "(`thenar calibrate`) and name the file in glove.toml: `calibration` of [cyberglove], or of the [[stream]]"
     )
-
-
-def code_of_value(joint: Calibration, value: float) -> int:
-    """Return the code of a value of a joint or a taxel, held to 0..65535. Raises SettingError where that is none."""
-    try:
-        code = joint.code_a + (value - joint.value_a) / (
-            (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a)
-        )
-    except ZeroDivisionError:
-        raise SettingError(f"the two points of {joint.name!r} in the build are no line: compile it again") from None
-    if math.isnan(code):
-        raise SettingError(f"the calibration of {joint.name!r} is no number: calibrate the glove again")
-    return round(min(max(code, 0), _HIGHEST_CODE))

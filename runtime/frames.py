@@ -83,7 +83,9 @@ class Newest(Generic[F]):
         """Take what came in by now: the same frame again, or another, which counts for `longest_us` from the time at
         which it was read; one older than the newest is dropped.
         """
-        if frame is self.frame or frame == self.frame:
+        last = self.frame
+        # Times first: to compare all of two frames takes longer, and they seldom are the same.
+        if last is not None and frame.time_us == last.time_us and frame == last:
             return
         time_us = min(frame.time_us, now_us)
         if time_us >= self.time_us:

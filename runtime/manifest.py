@@ -231,6 +231,7 @@ class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 
     closed_least, closed_most  for each grasp type, in 255ths, the share of a subject's trials in which it is closed, of
                                the subject with the least and the most; "" in builds of older versions
+    closed_share  the share of all rows in which it is closed; None in builds of older versions
     """
 
     column: Count
@@ -239,6 +240,7 @@ class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     threshold: Threshold | None = None
     closed_least: Bytes = ""
     closed_most: Bytes = ""
+    closed_share: Share | None = None
 
     @property
     def source(self) -> str:

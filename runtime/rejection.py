@@ -3,7 +3,8 @@
 A frame is refused for its candidate, the grasp type of the largest score, if that score is below the least of the type,
 if fewer or more switches are closed than the type's least and most, or if more joints than `outside` lie beyond the
 type's ranges. All of that are integers: Python and C refuse the same frames. What is lost is left out: a lost or unread
-switch may be closed or open, a lost joint lies within, and with unread switches the score is not judged.
+switch may be closed or open, a lost joint lies within, and the score is judged only of frames of which nothing is lost
+or unread.
 """
 
 import math
@@ -63,10 +64,11 @@ class Rejector:
         """
         best = max(lanes)
         candidate = lanes.index(best)
-        if best < self._least[candidate] and not unread:
+        doubtful = lost | unread
+        whole = not (doubtful or lost_joints or codes is None)
+        if best < self._least[candidate] and whole:
             return True
         fewest, most = self._closed[candidate]
-        doubtful = lost | unread
         seen = (closed & ~doubtful).bit_count()
         if seen > most or seen + doubtful.bit_count() < fewest:
             return True

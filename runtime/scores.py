@@ -9,8 +9,8 @@ import math
 from bisect import bisect_left
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from itertools import compress, repeat
-from operator import getitem, not_, sub, truediv
+from itertools import compress
+from operator import getitem, not_
 from struct import Struct
 
 import numpy as np
@@ -25,6 +25,8 @@ LANE_OFFSET = 1 << 15
 _EIGHT = 8
 # Of how many classes answers of `reach` are kept, over all answers: some 2 MB.
 _KEPT = 1 << 16
+# A sensor's byte has no more codes than these; a finer stream uses them again and again.
+_MOST_CODES = 1 << 12
 
 
 class Scorer:
@@ -51,6 +53,7 @@ class Scorer:
         binned = [tables.binned(joint) for joint in range(tables.n_joints)]
         self.joint_rows = [_packed(rows, offsets) for _, rows in binned]
         self.thresholds: list[list[int]] = [thresholds.tolist() for thresholds, _ in binned]
+        self._by_code = [*map(_RowsByCode, self.thresholds, self.joint_rows)]
         # Of a set of unread switches: the joints are unread as well, and scored as if they were lost.
         self.joints_bit: Mask = 1 << tables.n_switches
         self._pairs = [
@@ -85,10 +88,11 @@ class Scorer:
         """Return the sum of what all joints' codes add, of those that are lost the mean."""
         if lost:
             there = [not lost >> joint & 1 for joint in range(len(codes))]
-            rows = map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes))
+            rows = map(getitem, self._by_code, codes)
             known = sum(compress(rows, there), sum(compress(self.joint_means, map(not_, there))))
             return known + self._pair_sum([code * own for code, own in zip(codes, there, strict=True)])
-        return sum(map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes))) + self._pair_sum(codes)
+        known = sum(map(getitem, self._by_code, codes))
+        return known + self._pair_sum(codes) if self._pairs else known
 
     def _pair_sum(self, codes: Sequence[int]) -> int:
         total = 0
@@ -128,6 +132,21 @@ class Scorer:
             found = found + joint_reaches(self.tables, leader)
         steps: list[int] = found.tolist()
         return tuple(steps)
+
+
+class _RowsByCode(dict[int, int]):
+    """The rows of a joint by its codes: a code is looked for among the thresholds the first time that it comes."""
+
+    __slots__ = ("_rows", "_thresholds")
+
+    def __init__(self, thresholds: Sequence[int], rows: Sequence[int]) -> None:
+        self._thresholds, self._rows = thresholds, rows
+
+    def __missing__(self, code: int) -> int:
+        if len(self) >= _MOST_CODES:
+            self.clear()
+        row = self[code] = self._rows[bisect_left(self._thresholds, code)]
+        return row
 
 
 def reaches(tables: IntegerTables, leader: int, switches: Sequence[int]) -> NDArray[np.int64]:
@@ -207,14 +226,21 @@ class LiveScores:
         return scorer.unpack((self._closed + self._silent + self._joints).to_bytes(scorer.size, "little"))
 
 
-def softmax(scores: Sequence[int], number: int, scale: float) -> float:
-    """Return the softmax of `scores` (K,), in steps of 1 / `scale`, for class `number`; it cannot overflow.
+def softmax(scores: Sequence[int], number: int, scale: float, total: float | None = None) -> float:
+    """Return the softmax of `scores` (K,), in steps of 1 / `scale`, for class `number`; it cannot overflow. `total`:
+    their `odds`, where they are known.
 
     It is worked out only to be published: no decision rests on it.
     """
-    best = max(scores)
-    odds = map(math.exp, map(truediv, map(sub, scores, repeat(best)), repeat(scale)))
-    return math.exp((scores[number] - best) / scale) / sum(odds)
+    return math.exp((scores[number] - max(scores)) / scale) / (odds(scores, scale) if total is None else total)
+
+
+def odds(scores: Sequence[int], scale: float) -> float:
+    """Return the sum of all classes' odds to the best one."""
+    best, total = max(scores), 0.0
+    for score in scores:
+        total += math.exp((score - best) / scale)
+    return total
 
 
 def _packed(rows: NDArray[np.int16], offsets: int) -> list[int]:

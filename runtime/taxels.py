@@ -23,7 +23,7 @@ from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
 
-from .calibration import code_of_value
+from .code_line import CodeLine, code_line
 from .frames import Mask
 from .manifest import Calibration, Switch, Threshold
 from .names import fault, list_names, shortened
@@ -72,6 +72,10 @@ class TaxelLine(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=T
     def at(self, raw: int) -> float:
         """Return the value at a count."""
         return (raw - self.rest) * (self.value / (self.press - self.rest))
+
+    def codes(self, coded: Calibration) -> CodeLine:
+        """Return the line from counts to the codes of a build. Raises SettingError if there is none."""
+        return code_line(coded, (self.rest, 0.0), (self.press, self.value))
 
 
 class TaxelCalibration(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, rename={"taxels": "taxel"}):
@@ -182,9 +186,8 @@ def count_limit(threshold: Threshold, calibration: TaxelCalibration | None) -> i
             "compile recordings in that unit"
         )
     rising = (coded.code_b > coded.code_a) == ((coded.value_b > coded.value_a) == (line.press > line.rest))
-    first = bisect_left(
-        range(COUNTS), True, key=lambda raw: (code_of_value(coded, line.at(raw)) > threshold.code) == rising
-    )
+    codes = line.codes(coded)
+    first = bisect_left(range(COUNTS), True, key=lambda raw: (codes.code(raw) > threshold.code) == rising)
     if not rising:
         return ~first
     return first - 1 if first else ~COUNTS  # closed at every count

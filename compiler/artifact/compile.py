@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
-from thenar.runtime.hand import HAND_NAME, HandDrawing, hand_to_bytes
+from thenar.runtime.hand import HAND_NAME, HandDrawing, hand_from_bytes, hand_to_bytes
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import (
     AUTO,
@@ -49,18 +49,18 @@ from ..tables.compare import Comparison, compare
 from ..tables.faults import count_faults, groups_of, worst_faults
 from ..trainers.base import SHARED, TRAINERS, Training, changed
 from . import CompileError
-from .documents import REPORT_NAME, SPEC_FOLDER, BuildReport, Documents, Progress
+from .documents import REPORT_NAME, SPEC_FOLDER, TRY_NAME, BuildReport, Documents, Progress
 from .drawn_hand import drawn_hand
 from .ensemble import ensemble_to_bytes
 from .training import (
     Tested,
     Trained,
     answered,
+    built_tables,
     cross_validated,
     cuts_of,
     detection_of,
     groups_for,
-    integers_of,
     rates_of,
     rejected_by,
     samples_of,
@@ -72,7 +72,7 @@ from .verify_firmware import made_firmware
 
 # A build that was compiled for no harness has no scan map, one that is too large for any microcontroller no firmware,
 # one without a report no spec.
-MEMBERS = frozenset({MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME, HAND_NAME, REPORT_NAME})
+MEMBERS = frozenset({MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME, HAND_NAME, REPORT_NAME, TRY_NAME})
 _FOLDERS = {FIRMWARE_NAME: frozenset(LIBRARY_FILES), SPEC_FOLDER: NAMES}
 
 
@@ -264,7 +264,7 @@ class Making:
         self.grasp_set, self.samples = grasp_set, samples
         self.options, self.trained, self.hand = options, trained, hand
         kept = trained.read(samples)
-        self.integers = integers_of(trained, samples, options)
+        self.integers = built_tables(trained, samples, options)
         names = names_of(grasp_set, trained.kept)
         self.harness = harness(names) if callable(harness) else harness
         self.scan = None
@@ -296,6 +296,8 @@ class Making:
         described = manifest_to_bytes(replace(undrawn, hand_sha256=_sha256(files[HAND_NAME])))
         manifest = manifest_from_bytes(described)
         firmware, note = made_firmware(manifest, self.integers, self.scan)
+        if (page := self._page(manifest, files[TABLES_NAME], files[HAND_NAME])) is not None:
+            files[TRY_NAME] = page
         report = BuildReport(
             folder=target,
             manifest=manifest,
@@ -309,6 +311,7 @@ class Making:
             trained=self.trained,
             comparison=self.comparison,
             faults=self.faults,
+            has_page=page is not None,
             confusion=None if tested is None else tested.confusion,
         )
         files |= {path: text.encode() for path, text in firmware.items()}
@@ -323,6 +326,13 @@ class Making:
         codes = self.trained.read(self.samples).codes
         return drawn_hand(manifest, self.hand, names[:taxels], names[taxels:], codes)
 
+    def _page(self, manifest: Manifest, tables: bytes, hand: bytes) -> bytes | None:
+        from ..tryout.writing import try_html
+
+        kept = self.trained.read(self.samples)
+        rows = kept.switches, kept.codes, kept.labels
+        return try_html(manifest, tables, hand_from_bytes(hand, manifest), self.harness, rows)
+
     def _only_answer(self) -> str | None:
         answers = np.unique(self.comparison.deployed)
         return self.samples.grasps[answers[0]] if len(answers) == 1 else None
@@ -336,6 +346,7 @@ class Making:
         rates = rates_of("training", self.samples, deployed, options.seed)
         detection = detection_of("training", self.samples, deployed, options.seed)
         switches = zip(self.trained.kept, names_of(grasp_set, self.trained.kept), self.trained.gains, strict=True)
+        shares = kept.switches.mean(axis=0).tolist()
         return Manifest(
             schema=SCHEMA,
             checksum="",
@@ -353,8 +364,13 @@ class Making:
             options=options,
             grasps=self.samples.grasps,
             switches=tuple(
-                replace(self._switch(*each), closed_least=least.tobytes().hex(), closed_most=most.tobytes().hex())
-                for each, least, most in zip(switches, *closed_shares(self.trained.read(self.samples)), strict=True)
+                replace(
+                    self._switch(*each),
+                    closed_least=least.tobytes().hex(),
+                    closed_most=most.tobytes().hex(),
+                    closed_share=share,
+                )
+                for each, least, most, share in zip(switches, *closed_shares(kept), shares, strict=True)
             ),
             joints=tuple(_calibration(column, grasp_set.joints[column]) for column in self.trained.joints),
             proof=_proof(self.integers, self.comparison, options.width),

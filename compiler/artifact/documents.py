@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ..frontier.points import Frontier
     from ..segmenting.transitions import Transitions
 
-REPORT_NAME, SPEC_FOLDER = "report.html", "spec"
+REPORT_NAME, TRY_NAME, SPEC_FOLDER = "report.html", "try.html", "spec"
 _TRAININGS = 40  # about so many for the paper's tables
 
 Progress = Callable[[int, int], None]
@@ -55,6 +55,8 @@ class BuildReport:
         What was trained on, what came of it, and its rows through the model, its tables and the integers.
     faults : FaultCounts
         What each fault of an input leaves of the rows trained on.
+    has_page : bool
+        Whether it has `try.html`: it has none where tables and hand are too large for a page.
     confusion : ndarray of int, shape (K, K), or None
         How often rows of each grasp type were answered by each in the folds; None without folds.
     """
@@ -71,6 +73,7 @@ class BuildReport:
     trained: Trained
     comparison: Comparison
     faults: FaultCounts
+    has_page: bool
     confusion: NDArray[np.intp] | None
 
 
@@ -130,6 +133,7 @@ class Documents:
                 transitions=_transitions(made.grasp_set),
                 comparison=made.comparison,
                 faults=made.faults,
+                has_page=made.has_page,
                 worst=worst_case(made.trained.model, made.tables, made.comparison, made.manifest.grasps, names),
             )
         )

@@ -30,6 +30,7 @@ from ..segmenting.learning import learnt
 from ..segmenting.streams import TICK_US, SegmentingError, streams_of
 from ..tables.collapse import Model, collapse
 from ..tables.quantise import integer_scores, quantise
+from ..tables.standing_in import fit_lost
 from ..trainers.base import Report, Training
 from ..workers import in_workers, little
 from . import CompileError
@@ -165,6 +166,12 @@ def integers_of(trained: Trained, samples: Samples, options: Options) -> Integer
     kept = trained.read(samples.rows(samples.balanced()))
     tables = collapse(trained.model, kept.n_switches)
     return quantise(tables, kept.switches, kept.codes, options.width, options.table_bits)
+
+
+def built_tables(trained: Trained, samples: Samples, options: Options) -> IntegerTables:
+    """Return the integer tables of what was trained on these samples, with what stands in for lost inputs fitted."""
+    kept = trained.read(samples.rows(samples.balanced()))
+    return fit_lost(integers_of(trained, samples, options), kept.switches, kept.codes, kept.labels)
 
 
 USUAL_ROUNDS = 100  # where a fit is chosen, its work is taken to be that of so many

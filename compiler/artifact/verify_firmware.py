@@ -124,7 +124,9 @@ def _content(path: Path) -> bytes | None:
 
 
 class Difference(Struct, frozen=True):
-    """A frame that is answered otherwise: which it is, what is closed, coded and missing in it, and both answers."""
+    """A frame that is answered otherwise: which it is, what is closed, coded and missing in it, and both answers;
+    `said` are the margin and the probability of one grasp type, in 65535ths, where these were asked.
+    """
 
     frame: str
     closed: tuple[str, ...]
@@ -133,6 +135,8 @@ class Difference(Struct, frozen=True):
     scores: tuple[int, ...]
     compiled_grasp: str
     compiled_scores: tuple[int, ...]
+    said: tuple[int, ...] = ()
+    compiled_said: tuple[int, ...] = ()
     lost: tuple[str, ...] = ()
 
 
@@ -142,7 +146,9 @@ class TargetCheck(Struct, frozen=True, kw_only=True):
     layout     which layout was compiled, and why
     answer     "classify": every frame from nothing; "update": from what changed since the frame before
     missing    whether inputs are missing in all frames, in every second one alone
-    frames     how many were answered, `differing` of them with another score or grasp type than in Python
+    frames     how many were answered, `differing` of them with another score, grasp type, margin or probability than
+               in Python
+    shares     whether margins and probabilities were asked for: on an AVR only where inputs are missing
     first      the first of those
     misnamed   how many grasp types thenar_NAME_grasp calls otherwise than the manifest; None: not asked, on an AVR
     worst      what the slowest answer took, in `unit`, and `stack` the bytes that answers need; None: not counted
@@ -152,6 +158,7 @@ class TargetCheck(Struct, frozen=True, kw_only=True):
     layout: str
     answer: Answer
     missing: bool
+    shares: bool
     frames: int
     differing: int
     first: Difference | None
@@ -188,11 +195,14 @@ class FirmwareTrial:
         bare = fit.target.avr and not missing
         classes = scores.argmax(axis=1) if bare else self._classes(scores, missing=missing)
         wrong = (answers.scores != scores).any(axis=1) | (answers.classes != classes)
+        if (said := _said(answers)) is not None:
+            wrong |= (said != self._said(missing=missing)).any(axis=1)
         return TargetCheck(
             part=fit.target.part,
             layout=fit.choice.why,
             answer=answer,
             missing=missing,
+            shares=said is not None,
             frames=len(wrong),
             differing=int(np.count_nonzero(wrong)),
             first=self._difference(int(wrong.argmax()), answers, missing=missing) if wrong.any() else None,
@@ -216,6 +226,14 @@ class FirmwareTrial:
         ]
         return np.asarray(np.where(refused, k, found))
 
+    def _said(self, *, missing: bool) -> NDArray[np.int64]:
+        """Return the margin of each frame, and the probability of one grasp type, each in turn: (n, 2)."""
+        scores = self._scores_without if missing else self._scores
+        best, second = np.sort(scores, axis=1)[:, :-3:-1].T
+        softmax = self._build.softmax
+        shares = [softmax.probabilities(own)[n % len(own)] for n, own in enumerate(scores.tolist())]
+        return np.stack([best - second, shares], axis=1)
+
     def _misnamed(self, answers: Answers) -> int | None:
         if answers.names is None:
             return None
@@ -232,6 +250,7 @@ class FirmwareTrial:
         described = self._build.manifest
         inputs = [*(switch.name for switch in described.switches), *(joint.name for joint in described.joints)]
         build, bits, codes = self._build, self._frames.bits[frame], self._frames.codes[frame]
+        said = _said(answers)
         return Difference(
             frame=self._name(frame),
             closed=tuple(switch.name for switch, bit in zip(build.manifest.switches, bits, strict=True) if bit),
@@ -240,6 +259,8 @@ class FirmwareTrial:
             scores=tuple(scores[frame].tolist()),
             compiled_grasp=self._grasp(int(answers.classes[frame])),
             compiled_scores=tuple(answers.scores[frame].tolist()),
+            said=() if said is None else tuple(self._said(missing=missing)[frame].tolist()),
+            compiled_said=() if said is None else tuple(said[frame].tolist()),
             lost=tuple(compress(inputs, self._lost[frame])) if missing else (),
         )
 
@@ -252,6 +273,13 @@ class FirmwareTrial:
 
     def _grasp(self, number: int) -> str:
         return self._build.grasps[number] if number < len(self._build.grasps) else f"type {number}, which there is not"
+
+
+def _said(answers: Answers) -> NDArray[np.int64] | None:
+    """Return what a program said of margin and probability, (n, 2); None where it was not asked."""
+    if answers.margins is None or answers.shares is None:
+        return None
+    return np.stack([answers.margins, answers.shares], axis=1).astype(np.int64)
 
 
 def _masks(flags: NDArray[np.bool_]) -> list[int]:
@@ -272,7 +300,9 @@ class FirmwareVerification(Struct, frozen=True, kw_only=True):
 
     @property
     def holds(self) -> bool:
-        """Whether every score, grasp type and name is the same everywhere, and the build carries no other firmware."""
+        """Whether every score, grasp type, margin, probability and name is the same everywhere, and the build carries
+        no other firmware.
+        """
         return not self.carried.outdated and not any(check.differing or check.misnamed for check in self.checks)
 
 

@@ -3,19 +3,23 @@
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise, product
+from typing import cast
 
 from . import FirmwareError
 from .layout import Field, JointLayout, Layout, Lookup
 from .words import Names, comment, switches_in_words
 
 # Free to use for a C function, and to be kept for its caller; of pairs the lower.
-_FREE, _KEPT = (18, 20, 22, 24, 26), (28, 16, 14, 12, 10, 8, 6, 4, 2)
+_FREE, _KEPT = (22, 24, 26, 18, 20), (16, 14, 12, 10, 8, 6, 4, 2, 28)
+# What finding a row needs besides r0, r1 and Z: Y, which points at the glove; where codes are wide, two zeros and a
+# register for comparisons; where some of the input is far, X.
+_POINTER, _WIDE, _FAR = 28, (18, 20), (26,)
 _IMMEDIATE = 16  # registers from here on can be loaded with a constant
 _LPM_REACH = 65536
 # rcall reaches 4 KiB either way; all that update() does about a look-up must stay within that.
 _NEAR_BYTES = 3600
-_LOOKUP_BYTES, _JOINT_BYTES = 104, 54  # without comparisons
-_SLOPE_BYTES = 80  # but for its products, which no near call reaches across
+_LOOKUP_BYTES, _JOINT_BYTES, _SOURCE_BYTES = 100, 54, 26  # without comparisons
+_SLOPE_BYTES = 110  # but for its products, which no near call reaches across
 FLAGS = 2  # bytes of a glove from where Y points to its input
 _REACH = 63  # of ldd
 
@@ -42,6 +46,7 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
         "byte_sums": layout.sum_bits == 8,
         "wide": layout.code_bits == 16,
         "unrolled": layout.adding == "unrolled",
+        "finds_first": finds_first(layout),
         "call": "rcall" if near else "call",
         "jump": "rjmp" if near else "jmp",
         "passes": passes,
@@ -49,6 +54,9 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
         "stride": stride,
         "frame_size": layout.frame_size,
         "kept": kept_registers(layout),
+        "borrowed": [register for low in _borrowed(layout) for register in (low, low + 1)],
+        "seen": seen_size(layout),
+        "sources": FLAGS + layout.frame_size + _n_found(layout),
         "halves": layout.entry_shift == 8,
         "clean": layout.biased and not layout.entry_shift,  # r1 is zero between look-ups
         "tables": [
@@ -58,9 +66,38 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
     }
 
 
+def finds_first(layout: Layout) -> bool:
+    """Return whether classify() finds all rows before it adds any: where classes are added up in parts, or where their
+    sums leave no registers to find rows with.
+    """
+    return len(layout.parts.firsts) > 1 or bool(_pairs(layout) & _spare(layout))
+
+
+def compared_bytes(layout: Layout, lookup: Lookup) -> list[int]:
+    """Return the places in the frame of the bytes of input that update() compares, to know whether a look-up's row may
+    be another: none of a group of switches alone, whose row is made of few bits.
+    """
+    if not lookup.joints:
+        return []
+    ports = [] if lookup.group is None else [field.port for field in layout.fields[lookup.group]]
+    return [*dict.fromkeys(ports), *(place for joint in lookup.joints for place in _code_bytes(layout, joint.number))]
+
+
+def found_size(layout: Layout) -> int:
+    """Return the bytes that hold what classify() has found, where it finds first."""
+    return max(_n_found(layout), 1) if finds_first(layout) else 0
+
+
 def seen_size(layout: Layout) -> int:
-    """Return the bytes that say what is in the sums: a row of each look-up, a distance of each slope."""
-    return max(len(layout.lookups) + len(layout.tables.slopes), 1)
+    """Return the bytes that say what is in the sums of update(): the distances of slopes, the rows of look-ups, and the
+    input that these were found from.
+    """
+    codes = sum(len(compared_bytes(layout, lookup)) for lookup in layout.lookups)
+    return max(_n_found(layout) + codes + len(layout.tables.slopes) * layout.code_bits // 8, 1)
+
+
+def _n_found(layout: Layout) -> int:
+    return len(layout.lookups) + len(layout.tables.slopes)
 
 
 def glove_size(layout: Layout) -> int:
@@ -72,13 +109,12 @@ def glove_size(layout: Layout) -> int:
 def calls_are_near(layout: Layout) -> bool:
     """Return whether all calls are `rcall`; else they are `call`, a word and a cycle more."""
     joints = sum(_JOINT_BYTES + 4 * len(joint.thresholds) * joint.compared for joint in layout.joints)
-    passes = len(layout.parts.firsts)
     wide = sum(4 * len(joint.thresholds) * joint.compared for joint in layout.joints) * (layout.code_bits == 16)
     groups = [layout.fields[lookup.group] for lookup in layout.lookups if lookup.group is not None]
     put_together = 2 * sum(len(group_lines(fields)) for fields in groups)
-    put_together += sum(4 * len(fields) for fields in groups)
     each = put_together + _LOOKUP_BYTES * len(layout.lookups) + _SLOPE_BYTES * len(layout.tables.slopes)
-    return each * passes + joints + wide < _NEAR_BYTES
+    each += _SOURCE_BYTES * (seen_size(layout) - _n_found(layout)) + joints + wide
+    return each * len(layout.parts.firsts) < _NEAR_BYTES
 
 
 _MOST_MOVES, _BYTE = 4, range(8)
@@ -126,6 +162,33 @@ def taken(place: int, register: int, *, wide: bool = False) -> list[str]:
     return moved + [f"ld    r{each}, X+" for each in registers]
 
 
+def _loaded(layout: Layout, places: Sequence[int]) -> list[list[str]]:
+    """Return for each byte of input the instructions that load it into r0 while sums are in their registers."""
+    return [_lending(layout, taken(place, 0)) for place in places]
+
+
+def _lending(layout: Layout, lines: list[str]) -> list[str]:
+    """Return the instructions, and around them what saves X where they need it and it is a sum."""
+    if _FAR[0] not in _borrowed(layout) or not any("r26" in line for line in lines):
+        return lines
+    return ["push  r26", "push  r27", *lines, "pop   r27", "pop   r26"]
+
+
+def found_is_far(layout: Layout, number: int) -> bool:
+    """Return whether the byte that says what update() has found for a slope, or then for a look-up, is beyond Y."""
+    return far(layout.frame_size + number)
+
+
+def _exchange(layout: Layout, number: int) -> Row:
+    """Return the instructions that load what was found before into r31, and those that store r30 in its place."""
+    if not found_is_far(layout, number):
+        at = FLAGS + layout.frame_size + number
+        return {"before_in_r31": [f"ldd   r31, Y+{at}"], "store_r30": [f"std   Y+{at}, r30"]}
+    *moved, _ = taken(layout.frame_size + number, 31)
+    lines = (_lending(layout, [*moved, each]) for each in ("ld    r31, X", "st    X, r30"))
+    return dict(zip(("before_in_r31", "store_r30"), lines, strict=True))
+
+
 def group_lines(fields: Sequence[Field]) -> list[str]:
     """Return the instructions that make the byte of a group of its fields' ports in r30; r31 is theirs to use, r0 and
     r1 are not.
@@ -144,47 +207,83 @@ def group_lines(fields: Sequence[Field]) -> list[str]:
     return lines
 
 
+def _spare(layout: Layout) -> set[int]:
+    """Return the registers that are needed to find rows; of pairs the lower."""
+    beyond = max(layout.frame_size - 1, layout.frame_size + _n_found(layout) - 1)
+    return {_POINTER, *(_WIDE if layout.code_bits == 16 else ()), *(_FAR if far(beyond) else ())}
+
+
 def _registers(layout: Layout) -> list[int]:
-    """Return the registers of the sums of a pass; of pairs the lower."""
-    pairs = [*_FREE, *_KEPT]
+    """Return the registers of the sums of a pass; of pairs the lower. Those that finding rows needs are the last to be
+    taken.
+    """
+    spare = _spare(layout)
+    pairs = sorted((*_FREE, *_KEPT), key=lambda low: (low == _POINTER, low in spare))
     found = pairs if layout.sum_bits == 16 else [low + half for low in pairs for half in (0, 1)]
     return sorted(found[: layout.parts.width])
 
 
+def _pairs(layout: Layout) -> set[int]:
+    """Return the pairs of registers that hold sums; the lower of each."""
+    return {register // 2 * 2 for register in _registers(layout)}
+
+
+def _borrowed(layout: Layout) -> list[int]:
+    """Return the pairs besides Y that update() must save whenever it finds a row."""
+    return sorted(_pairs(layout) & _spare(layout) - {_POINTER})
+
+
 def kept_registers(layout: Layout) -> list[int]:
-    """Return the registers that are saved: because they hold sums, and because they point at the glove before."""
+    """Return the registers that are saved: because they hold sums, and because Y points at the glove."""
     halves = (0, 1) if layout.sum_bits == 16 else (0,)
     sums = {low + half for low in _registers(layout) for half in halves if low // 2 * 2 in _KEPT}
-    return sorted(sums | {28, 29})
+    return sorted(sums | {_POINTER, _POINTER + 1})
 
 
 def _pass(names: Names, layout: Layout, number: int) -> Row:
     """Return a pass over all look-ups for some classes: their sums, each in a register or in a pair from `low` on,
-    their place among the scores in bytes, and how many of them, the first ones, are in the pass before as well.
+    their place among the scores in bytes, and how many of them, the first ones, are in the pass before as well. While
+    Y points at the glove, the sums in `spilled`, which are the last, stay in memory.
     """
     parts = layout.parts
     first = parts.firsts[number]
     starts = layout.start[first : first + parts.width].tolist()
     grasps = map(comment, names.grasps[first : first + parts.width])
     high = int(layout.sum_bits == 16)
+    steps = [_step(names, layout, lookup, number) for lookup in layout.lookups]
+    slopes = [_slope(names, layout, at, first) for at in range(len(layout.tables.slopes))]
+    before = 0
+    for each in (*steps, *slopes):
+        each["before"] = before  # where the bytes of input that it was found from begin
+        before += len(cast("list[Row]", each["compared_bytes"]))
+    sums = [
+        {"low": low, "high": low + high, "start": start, "grasp": grasp, "immediate": low >= _IMMEDIATE}
+        for low, start, grasp in zip(_registers(layout), starts, grasps, strict=True)
+    ]
+    held = [low for low in _registers(layout) if low < _POINTER]
     return {
         "number": number,
-        "sums": [
-            {"low": low, "high": low + high, "start": start, "grasp": grasp, "immediate": low >= _IMMEDIATE}
-            for low, start, grasp in zip(_registers(layout), starts, grasps, strict=True)
-        ],
+        "sums": sums,
+        "held": sums[: len(held)],
+        "spilled": sums[len(held) :],
         "scores": 2 * first,
         "again": parts.firsts[number - 1] + parts.width - first if number else 0,
-        "steps": [_step(names, layout, lookup, number) for lookup in layout.lookups],
-        "slopes": [_slope(names, layout, at, first) for at in range(len(layout.tables.slopes))],
+        "steps": steps,
+        "slopes": slopes,
         "last": number == len(parts.firsts) - 1,
     }
 
 
+def _code_bytes(layout: Layout, joint: int) -> list[int]:
+    """Return the places in the frame of the bytes of a joint's code."""
+    each = layout.code_bits // 8
+    first = len(layout.ports) + layout.padding + joint * each
+    return [*range(first, first + each)]
+
+
 def _code(layout: Layout, joint: int) -> list[str]:
     """Return the instructions that load a joint's code, into r30 or r31:r30."""
-    place = len(layout.ports) + layout.padding + joint * layout.code_bits // 8
-    return taken(place, 30, wide=layout.code_bits == 16)
+    return taken(_code_bytes(layout, joint)[0], 30, wide=layout.code_bits == 16)
 
 
 def _slope(names: Names, layout: Layout, at: int, first: int) -> Row:
@@ -196,6 +295,8 @@ def _slope(names: Names, layout: Layout, at: int, first: int) -> Row:
         "at": at,
         "what": comment(names.joints[slope.joint].name),
         "taken": _code(layout, slope.joint),
+        "compared_bytes": _loaded(layout, _code_bytes(layout, slope.joint)),
+        **_exchange(layout, at),
         "low": slope.low,
         "span": slope.high - slope.low,
         "upper": slope.high < (1 << layout.code_bits) - 1,
@@ -222,7 +323,7 @@ def products(row: Sequence[int]) -> list[tuple[int, list[tuple[int, bool]]]]:
 
 def _step(names: Names, layout: Layout, lookup: Lookup, part: int) -> Row:
     """Return a look-up in the pass for the classes of a part: what it is of, how the number of its row is made of the
-    input, which register has it then, and where its rows begin.
+    input, which register has it then, how each byte of that input is loaded into r0, and where its rows begin.
     """
     compared = [joint for joint in reversed(lookup.joints) if joint.compared]
     trimmed = [joint for joint in lookup.joints if not joint.compared]
@@ -230,10 +331,13 @@ def _step(names: Names, layout: Layout, lookup: Lookup, part: int) -> Row:
     weights = [joint.weight for joint in compared]
     factors = [before // weight for before, weight in pairwise(weights)]
     groups = [] if lookup.group is None else [switches_in_words(layout.groups[lookup.group])]
+    group = [] if lookup.group is None else group_lines(layout.fields[lookup.group])
     return {
         "index": lookup.index,
         "what": ", ".join([*groups, *(comment(names.joints[joint.number].name) for joint in lookup.joints)]),
         "rows": (part * layout.n_rows + lookup.first_row) * layout.parts.width * layout.entry_bits // 8,
+        "compared_bytes": _loaded(layout, compared_bytes(layout, lookup)),
+        **_exchange(layout, len(layout.tables.slopes) + lookup.index),
         "one_group": not lookup.joints,
         "compared": [
             {
@@ -248,7 +352,8 @@ def _step(names: Names, layout: Layout, lookup: Lookup, part: int) -> Row:
             {"taken": _code(layout, joint.number), **_bins(layout, joint), "how": how}
             for joint, how in zip(trimmed, _adding(len(trimmed), bool(compared), grouped), strict=True)
         ],
-        "group": [] if lookup.group is None else group_lines(layout.fields[lookup.group]),
+        "group": group,
+        "group_lent": _lending(layout, group),
         "register": 30 if trimmed or grouped else 0,
     }
 

@@ -17,14 +17,26 @@ from numpy.typing import NDArray
 
 from thenar.firmware_templates.rendering import render
 
-from .assembly import assembly_values, calls_are_near, far, glove_size, kept_registers, seen_size
+from .assembly import (
+    assembly_values,
+    calls_are_near,
+    compared_bytes,
+    far,
+    finds_first,
+    found_is_far,
+    found_size,
+    glove_size,
+    kept_registers,
+)
 from .costs import NAME_BYTES, Cost
 from .layout import Field, JointLayout, Layout, Lookup
 from .words import numbered
 
 # AVR Instruction Set Manual, DS40002198, table 5-1: cores AVRe (ATmega328P) and AVRe+ (ATmega2560), whose program
 # counter of three bytes makes calls and returns a cycle longer. A branch or a skip that is taken costs more.
-_ONE = "adc add and andi bst clr cp cpc cpi eor inc ldi lsl lsr mov movw neg or ori ror sbc sbci set sub subi swap tst"
+_ONE = (
+    "adc add and andi bst clr cp cpc clt cpi eor inc ldi lsl lsr mov movw neg or ori ror sbc sbci set sub subi swap tst"
+)
 _TWO = "icall ld ldd lds mul muls pop push sbiw st std sts"
 _CYCLES = dict.fromkeys(_ONE.split(), 1) | dict.fromkeys(_TWO.split(), 2) | {"lpm": 3}
 _JUMPS = {"rjmp": 2, "jmp": 3}
@@ -208,7 +220,7 @@ _LARGE = 5  # numbers from here on are multiplied by `mul`
 # Bytes of C code, rounded up; a table of whole pages of bins begins at one.
 _SET_SWITCH, _GRASP, _INIT, _PAGE = 80, 40, 70, 256
 _LOSING, _LOSING_JOINTS = 400, 300
-_POINTERS = 4  # bytes of variables: the glove, and what is done while an input is missing
+_POINTER = 2  # bytes of variables: what is done while an input is missing, and the glove, where rows are found first
 # Return addresses of update(), of what it calls about a change and of what that calls; a row's number in between.
 _CALLS_DEEP = 3
 
@@ -302,7 +314,12 @@ class AvrCosts:
 
     def _count(self, *lookups: Lookup) -> Counts:
         shapes = tuple(
-            (_of_group(self._layout, lookup), tuple([_of_joint(self._layout, joint) for joint in lookup.joints]))
+            (
+                _of_group(self._layout, lookup),
+                len(compared_bytes(self._layout, lookup)),
+                found_is_far(self._layout, len(self._layout.tables.slopes) + lookup.index),
+                tuple([_of_joint(self._layout, joint) for joint in lookup.joints]),
+            )
             for lookup in lookups
         )
         return _counted(_Part((shapes, self._of_all), self._layout, lookups), self._near, self._counter == 3)
@@ -334,7 +351,8 @@ class AvrCosts:
     def ram(self) -> int:
         """Bytes of a glove, of variables and of the deepest stack, return address included."""
         stack = _CALLS_DEEP * self._counter + len(kept_registers(self._layout)) + 1
-        return glove_size(self._layout) + 2 * seen_size(self._layout) + _POINTERS + stack
+        variables = _POINTER * (1 + finds_first(self._layout)) + found_size(self._layout)
+        return glove_size(self._layout) + variables + stack
 
     @property
     def losing(self) -> int:

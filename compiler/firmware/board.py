@@ -21,11 +21,13 @@ from thenar.runtime.toml_source import Place, TomlText, read_source, spelled
 from thenar.runtime.toml_struct import check_finite, convert
 
 from . import FirmwareError
-from .targets.avr import AVRS, Avr, best_setting, near_rates
+from .targets import Wired, wired
+from .targets.avr import Avr, best_setting, near_rates
 from .words import Names
 
 # A CD74HC4067: its channels, and the pins that select one.
 MUX_CHANNELS, SELECT_PINS = 16, 4
+_USUAL_HZ = 16_000_000
 Microseconds = Annotated[int, Meta(ge=0, le=60_000_000)]
 ShortMicroseconds = Annotated[int, Meta(ge=0, le=65_535)]
 
@@ -62,8 +64,14 @@ class BoardBus(_Table, frozen=True):
     clock_hz: Annotated[int, Meta(ge=50_000, le=400_000)] = 400_000
 
 
+class Wifi(_Table, frozen=True):
+    """The host's line is a Wi-Fi: frames are datagrams of UDP, and the board listens at `port`."""
+
+    port: Annotated[int, Meta(ge=1024, le=65_535)] = 5253
+
+
 class GloveUart(_Table, frozen=True):
-    """A CyberGlove on a UART of the part: `joints` are our names of its sensors in wire order, "" for one not used."""
+    """A CyberGlove on a UART: `joints` are our names of its sensors in wire order, "" for one not used."""
 
     uart: Annotated[int, Meta(ge=0, le=3)] = 1
     baud: Baud = 115_200
@@ -73,7 +81,7 @@ class GloveUart(_Table, frozen=True):
 
 
 class TaxelInputs(_Table, frozen=True):
-    """Taxels as voltages between 0 and AVCC on the part's converter, straight or behind CD74HC4067 multiplexers.
+    """Taxels as voltages on the part's converter, straight or behind CD74HC4067 multiplexers.
 
     inputs     channels of the converter ("ADC0"): a taxel on each, or the common pin of a multiplexer
     select     the pins that drive S0 to S3 of all multiplexers together; none: there are no multiplexers
@@ -95,11 +103,12 @@ class TaxelInputs(_Table, frozen=True):
 class Board(_Table, frozen=True):
     """A microcontroller and what hangs on its pins; one that was loaded has been found sound.
 
-    pins and analog map names of switches and joints to pins ("PD2") and channels ("ADC0").
+    pins and analog map names of switches and joints to pins ("PD2") and channels ("ADC0"). clock_hz is an AVR's: other
+    parts bring their own.
     """
 
     part: str
-    clock_hz: Annotated[int, Meta(ge=1_000_000, le=20_000_000)] = 16_000_000
+    clock_hz: Annotated[int, Meta(ge=1_000_000, le=20_000_000)] = _USUAL_HZ
     baud: Annotated[int, Meta(ge=1200, le=2_500_000)] = 1_000_000
     board: Annotated[int, Meta(ge=0, le=0xFFFF_FFFF)] = 1
     scan_us: Annotated[int, Meta(ge=100, le=60_000_000)] = 1000
@@ -107,6 +116,7 @@ class Board(_Table, frozen=True):
     heartbeat_us: Microseconds = 50_000
     early_exit: bool = False
     debounce: BoardDebounce = BoardDebounce()
+    wifi: Wifi | None = None
     pins: dict[str, str] = {}
     matrix: Matrix | None = None
     bus: BoardBus = BoardBus()
@@ -121,9 +131,15 @@ class Board(_Table, frozen=True):
         return 0 if self.taxels is None else len(self.taxels.names)
 
     @property
-    def microcontroller(self) -> Avr:
+    def microcontroller(self) -> Wired:
         """The target whose part it is."""
-        return AVRS[self.part]
+        return wired()[self.part]
+
+    @property
+    def avr(self) -> Avr | None:
+        """The same, if it is an AVR, whose registers the firmware sets itself; else Arduino's core does."""
+        part = self.microcontroller
+        return part if isinstance(part, Avr) else None
 
     @property
     def wired(self) -> tuple[str, ...]:
@@ -168,16 +184,24 @@ def check_switches(board: Board, switches: Sequence[str]) -> None:
         )
 
 
-def glove_toml(name: str, board: Board, names: Names, port: str = "/dev/ttyACM0") -> str:
-    """Return the `glove.toml` for a host that has the board at `port`. A board that debounces is not debounced again.
+def host_name(board: Board) -> str:
+    """Return what a board calls itself in a Wi-Fi."""
+    return f"thenar-{board.board}"
+
+
+def glove_toml(name: str, board: Board, names: Names, port: str | None = None) -> str:
+    """Return the `glove.toml` for a host that has the board at `port`, the usual one unless given.
+
+    A board that debounces is not debounced again.
 
     Raises FirmwareError if the board lacks a switch of the build.
     """
     switches = keys_of(board, names.switches)
     check_switches(board, switches)
     taxels = board.taxels
+    usual = "/dev/ttyACM0" if board.wifi is None else f"udp://{host_name(board)}:{board.wifi.port}"
     line = ScannerWiring(
-        port=port,
+        port=port or usual,
         baud=board.baud,
         switches=key_names(board, switches),
         taxels=() if taxels is None else taxels.names,
@@ -195,8 +219,8 @@ _TOLERANCE = 0.025
 
 def faults(board: Board) -> Iterator[Fault]:
     """Yield what is wrong with `board` and where; what comes after a fault may be wrong because of it."""
-    if board.part not in AVRS:
-        yield ("part",), f"{board.part!r} is not among its values{nearest(board.part, list(AVRS))}"
+    if board.part not in wired():
+        yield ("part",), f"{board.part!r} is not among its values{nearest(board.part, list(wired()))}"
     yield from _of_clocks(board)
     yield from _of_inputs(board)
     if board.matrix is not None:
@@ -212,18 +236,26 @@ def faults(board: Board) -> Iterator[Fault]:
 
 
 def _of_clocks(board: Board) -> Iterator[Fault]:
-    part = board.microcontroller
-    if board.clock_hz > part.highest_hz:
+    part = board.avr
+    if part is None and board.clock_hz != _USUAL_HZ:
+        yield ("clock_hz",), f"Arduino's core sets the clock of {board.microcontroller.named}: leave it out"
+    if part is not None and board.clock_hz > part.highest_hz:
         yield ("clock_hz",), f"{part.named} runs at {part.highest_hz} Hz at most"
     if board.clock_hz % _TIMER_HZ:
         yield ("clock_hz",), f"must be a multiple of {_TIMER_HZ}: the clock of microseconds would not be exact"
-    yield from _of_baud(("baud",), board.baud, board.clock_hz)
+    yield from _of_baud(("baud",), board.baud, board)
+    if board.wifi is not None and not board.microcontroller.wireless:
+        able = ", ".join(name for name, each in wired().items() if each.wireless)
+        yield ("wifi",), f"{board.microcontroller.named} has no Wi-Fi: {able} have"
     for key in ("state_us", "heartbeat_us"):
         if 0 < getattr(board, key) < board.scan_us:
             yield (key,), f"must be 0 (none) or at least scan_us, {board.scan_us}: what is sent is what was scanned"
 
 
-def _of_baud(place: Place, baud: int, clock_hz: int) -> Iterator[Fault]:
+def _of_baud(place: Place, baud: int, board: Board) -> Iterator[Fault]:
+    if board.avr is None:  # a fraction divides their clocks
+        return
+    clock_hz = board.clock_hz
     setting = best_setting(baud, clock_hz)
     if setting is None or abs(setting.error) > _TOLERANCE:
         rates = ", ".join(map(str, near_rates(baud, clock_hz)))
@@ -259,9 +291,9 @@ def _of_chips(board: Board) -> Iterator[Fault]:
             yield (*here, "kind"), f"the firmware reads no {chip.kind}: it reads {', '.join(_KINDS)}"
         if chip.mux is not None:
             yield (*here, "mux"), "the firmware selects no channels: wire the chip to the bus itself"
-    if board.chips and board.clock_hz < 16 * board.bus.clock_hz:
+    if board.avr is not None and board.chips and board.clock_hz < 16 * board.bus.clock_hz:
         yield ("bus", "clock_hz"), f"must be at most a 16th of the part's clock, {board.clock_hz // 16}"
-    if board.chips and board.clock_hz > (16 + 2 * 255) * board.bus.clock_hz:
+    if board.avr is not None and board.chips and board.clock_hz > (16 + 2 * 255) * board.bus.clock_hz:
         yield ("bus", "clock_hz"), f"the part's clock cannot be divided so far: at least {board.clock_hz // 526 + 1}"
     bus = BusWiring(device="bus", clock_hz=board.bus.clock_hz, chips=board.chips)
     for place, reason in checks.faults(Harness(name="board", buses=(bus,))):
@@ -273,20 +305,22 @@ def _of_glove(glove: GloveUart, board: Board) -> Iterator[Fault]:
     part = board.microcontroller
     if len(part.uarts) == 1:
         yield ("cyberglove",), f"{part.named} has one UART, which the host has: take an atmega2560, or [analog]"
-    if glove.uart == 0:
-        yield ("cyberglove", "uart"), "UART 0 is the host's: take 1, 2 or 3"
+    elif not 0 < glove.uart < len(part.uarts):
+        *others, last = map(str, range(1, len(part.uarts)))
+        which = "UART 0 is the host's" if glove.uart == 0 else f"{part.named} has no UART {glove.uart}"
+        yield ("cyberglove", "uart"), f"{which}: take {', '.join(others)} or {last}"
     if glove.joints and len(glove.joints) != glove.sensors:
         place: Place = ("cyberglove", "joints")
         yield place, f"{len(glove.joints)} names for {glove.sensors} sensors: name every one, in wire order"
-    yield from _of_baud(("cyberglove", "baud"), glove.baud, board.clock_hz)
+    yield from _of_baud(("cyberglove", "baud"), glove.baud, board)
 
 
 def _of_analog(board: Board) -> Iterator[Fault]:
-    channels = board.microcontroller.analog
-    seen: dict[str, str] = {}
+    part, seen = board.microcontroller, dict[str, str]()
     for joint, channel in board.analog.items():
-        if channel not in channels:
-            yield ("analog", joint), f"an {board.part} has no channel {channel!r}{nearest(channel, list(channels))}"
+        if channel not in part.analog:
+            hint = nearest(channel, list(part.analog))
+            yield ("analog", joint), f"{part.named} has no channel {channel!r}{hint}"
         if channel in seen:
             yield ("analog", joint), f"{channel} is that of {seen[channel]} already: a joint has a channel of its own"
         seen[channel] = joint
@@ -302,13 +336,13 @@ def _of_taxels(board: Board, taxels: TaxelInputs) -> Iterator[Fault]:
     for number, channel in enumerate(taxels.inputs):
         here: Place = ("taxels", "inputs", number)
         if channel not in channels:
-            yield here, f"an {board.part} has no channel {channel!r}{nearest(channel, list(channels))}"
+            yield here, f"{board.microcontroller.named} has no channel {channel!r}{nearest(channel, list(channels))}"
         if channel in seen:
             yield here, f"{channel} is {seen[channel]} already: one channel, one input"
         seen[channel] = spelled(here)
     rows = () if board.matrix is None else board.matrix.rows
     for number, pin in enumerate(taxels.select):
-        if pin[:2] in {row[:2] for row in rows}:
+        if board.avr is not None and pin[:2] in {row[:2] for row in rows}:
             yield ("taxels", "select", number), f"a row of the matrix is driven on port {pin[1:2]}: take another port"
 
 
@@ -316,14 +350,16 @@ def _of_pins(board: Board) -> Iterator[Fault]:
     part = board.microcontroller
     taken = _held(board, part)
     for place, pin in _used(board):
-        if pin not in part.pins and pin not in taken:
+        if pin in part.tied:
+            yield place, f"{pin} of {part.named} cannot be used: {part.tied[pin]}"
+        elif pin not in part.pins and pin not in taken:
             yield place, f"{part.named} has no pin {pin!r} that can be used{nearest(pin, part.pins)}"
         if pin in taken:
             yield place, f"{pin} is {taken[pin]} already: use another pin"
         taken[pin] = f"that of {spelled(place)}"
 
 
-def _held(board: Board, part: Avr) -> dict[str, str]:
+def _held(board: Board, part: Wired) -> dict[str, str]:
     """Return the pins that are not free, and what they are."""
     held = dict.fromkeys(part.uarts[0], "a pin of UART 0, the host's,")
     if board.cyberglove is not None and board.cyberglove.uart < len(part.uarts):

@@ -1,80 +1,24 @@
-"""The firmware of a board but for its classifier and its protocol: from the clock to main() and the Makefile."""
+"""The firmware of a board but for its classifier and its protocol: what it does in a turn, and its part's layer."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from math import ceil
+from typing import Protocol
 
 from thenar.drivers.scanner_protocol import OVERHEAD, Analog
 from thenar.runtime.harness.wiring import BusWiring, Harness
+from thenar.runtime.manifest import Calibration
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.scanmap import Port
 from thenar.runtime.tables import IntegerTables
 
-from . import FirmwareError
+from . import FirmwareError, avr_layer, sketch_layer
 from .board import Board, check_switches, glove_toml, key_names, keys_of, rows_and_columns
-from .board_channels import channels_files
-from .board_inputs import expanders_file, joints_file, matrix_file, pair, pins_file, text, wrapped
+from .board_inputs import check_joints, expanders_file, glove_file, portable, wrapped
 from .layout import NO_SWITCH, Layout, Ports
 from .protocol import BoardConfig
 from .segments import segmenter_bytes
-from .targets.avr import best_setting
 from .targets.base import Mode
 from .words import Names, answers_of
-
-_TIMER_US, _TIMER_DIVIDER = 20_000, 8  # the timer begins anew so often, and counts such a part of the clock
-_BITS_A_BYTE = 9
-_LONGEST_TRANSFER, _PATIENCE = 20, 4  # bytes, of which no transaction has so many; how often its time it may take
-_RECOVERY_US = 5
-
-
-def clock_files(board: Board) -> dict[str, str]:
-    """Return name -> text of the clock of microseconds."""
-    counts = board.clock_hz // _TIMER_DIVIDER * _TIMER_US // 1_000_000
-    return pair(
-        "thenar_clock",
-        clock_hz=board.clock_hz,
-        counts=counts,
-        us_a_count=(_TIMER_US << 16) // counts,
-        longest_masked_us=_TIMER_US // 2,
-    )
-
-
-def uart_files(board: Board, number: int, baud: int, *, receive_bytes: int, send_bytes: int) -> dict[str, str]:
-    """Return name -> text of UART `number` with rings of these sizes, powers of two up to 256.
-
-    Raises FirmwareError if it cannot make the rate.
-    """
-    setting = best_setting(baud, board.clock_hz)
-    if setting is None:
-        raise FirmwareError(f"a UART at {board.clock_hz} Hz cannot make {baud} baud: take a higher rate")
-    values = {
-        "uart": number,
-        "rxd": board.microcontroller.uarts[number][0],
-        "baud": baud,
-        "error": f"{setting.error:+.1%}",
-        "vector": "USART" if len(board.microcontroller.uarts) == 1 else f"USART{number}",
-        "ubrr": setting.ubrr,
-        "double": setting.double,
-        "receive_bytes": receive_bytes,
-        "send_bytes": send_bytes,
-    }
-    return {f"thenar_uart{number}.{end}": text(f"thenar_uart.{end}", **values) for end in "hc"}
-
-
-def twi_files(board: Board) -> dict[str, str]:
-    """Return name -> text of the master of the I2C bus, whose SCL is never faster than the board says."""
-    (sda, scl), wanted_hz = board.microcontroller.twi, board.bus.clock_hz
-    twbr = max(0, ceil((board.clock_hz - 16 * wanted_hz) / (2 * wanted_hz)))
-    scl_hz = board.clock_hz // (16 + 2 * twbr)
-    return pair(
-        "thenar_twi",
-        scl_hz=scl_hz,
-        timeout_us=_PATIENCE * _LONGEST_TRANSFER * _BITS_A_BYTE * 1_000_000 // scl_hz,
-        recovery_cycles=ceil(_RECOVERY_US * board.clock_hz / 1_000_000),
-        sda=sda,
-        scl=scl,
-        twbr=twbr,
-    )
-
 
 # Cycles of the firmware as libsimavr counts them, rounded up: of a scan whatever it reads, of a key that is read, of a
 # byte on the bus beside its SCL periods, of a reading, of a byte of an ANALOG; and of an answer, of a look-up for it,
@@ -82,6 +26,37 @@ def twi_files(board: Board) -> dict[str, str]:
 _SCAN, _KEY, _BUS_BYTE, _READING, _ANALOG_BYTE = 3000, 60, 110, 600, 80
 _ANSWER, _LOOKUP, _CLASS = 600, 40, 10
 _STATE = 100  # of a tick of segments, for each of their states
+# Parts with a core of Arduino's count as an AVR at 16 MHz, than which none of them is slower; their Wire takes longer.
+_WIRE_US = 200  # of a reading, beside its SCL periods
+
+
+class Layer(Protocol):
+    """What lies between the portable firmware of a board and its part; each returns name -> text."""
+
+    def base_files(self, board: Board, about: str) -> dict[str, str]:
+        """Return the program that begins and turns, the clock, and the host's line."""
+
+    def keys_files(self, board: Board, switches: Sequence[str]) -> dict[str, str]:
+        """Return what reads switches on pins or in a matrix."""
+
+    def bus_files(self, board: Board) -> dict[str, str]:
+        """Return the master of the I2C bus."""
+
+    def uart_files(self, board: Board, number: int, baud: int) -> dict[str, str]:
+        """Return a UART for a CyberGlove."""
+
+    def joints_files(self, name: str, board: Board, joints: Sequence[Calibration]) -> dict[str, str]:
+        """Return what reads joints on the converter."""
+
+    def channels_files(self, board: Board) -> dict[str, str]:
+        """Return what reads taxels on the converter; nothing for a board without."""
+
+    def folder(self, name: str, board: Board, mode: Mode, files: Mapping[str, str]) -> dict[str, str]:
+        """Return the whole folder that is to hold `files`."""
+
+
+def _layer(board: Board) -> Layer:
+    return sketch_layer if board.avr is None else avr_layer
 
 
 def readings(board: Board, switches: Sequence[str], tables: IntegerTables) -> tuple[Port, ...]:
@@ -127,7 +102,7 @@ def shortest_scan_us(
         seconds += rows * board.matrix.settle_us / 1e6
     for port in ports:
         reading = next(each for each in board.chips[port.chip].chip.readings if each.name == port.reading)
-        seconds += reading.scl_periods / board.bus.clock_hz
+        seconds += reading.scl_periods / board.bus.clock_hz + (_WIRE_US / 1e6 if board.avr is None else 0.0)
         cycles += _READING + _BUS_BYTE * reading.wire_bytes
     if board.channels and not recognises:
         cycles += _ANALOG_BYTE * (OVERHEAD + Analog.LAYOUT.size + 2 * board.channels)
@@ -160,6 +135,7 @@ def config_of(
         fastest_us=shortest_scan_us(board, switches, tables, recognises=recognises, segments=segments),
         segments=segments,
         channels=0 if recognises else board.channels,
+        code_bits=board.microcontroller.code_bits,
     )
 
 
@@ -171,67 +147,69 @@ _NUMBERS_A_LINE = 14
 
 
 def board_files(name: str, names: Names, layout: Layout, board: Board, mode: Mode) -> dict[str, str]:
-    """Return file name -> text of a board's firmware but the classifier's and the protocol's files and the Makefile.
+    """Return file name -> text of a board's firmware but the classifier's and the protocol's files.
 
     name  of the build, as its classifier's files are called; a name that words.check_name allows
     mode  "scan", or "glove", which also recognises
 
-    `config_of` and `switches_of` say what the protocol's files are to be made with. Raises FirmwareError if
-    the board lacks a switch or, for a glove, a joint; if there are more than 255 grasp types to tell of; or if a scan
-    takes longer than scan_us.
+    `config_of` and `switches_of` say what the protocol's files are to be made with; `whole_folder` takes all. Raises
+    FirmwareError if the board lacks a switch or, for a glove, a joint; if there are more than 255 grasp types to tell
+    of; or if a scan takes longer than scan_us.
     """
     switches = keys_of(board, names.switches)
     check_switches(board, switches)
     if mode == "glove" and len(answers_of(names)) > _MOST_GRASPS:
         raise FirmwareError(f"{len(answers_of(names))} grasp types: a board can tell {_MOST_GRASPS} apart")
     ports = readings(board, switches, layout.tables)
-    files = clock_files(board) | uart_files(board, 0, board.baud, receive_bytes=128, send_bytes=256)
+    about = _about_glove(board, names) if mode == "glove" else _about_scanner(board)
+    files = {f"{part}.h": portable(f"{part}.h") for part in ("thenar_clock", "thenar_due")}
+    files |= {"thenar_due.c": portable("thenar_due.c"), "thenar_turn.h": portable("thenar_turn.h", about=about)}
+    files |= _layer(board).base_files(board, about)
     files |= _inputs(board, switches, layout)
-    files |= pair("thenar_reset") | pair("thenar_due")
     joints = _joints(name, names, layout, board) if mode == "glove" else {}
     files |= joints
     if mode == "glove":
-        files["main.c"] = _glove_main(name, names, board, bool(joints), exits_early(board, ports))
+        files["thenar_turn.c"] = _glove_turn(name, names, board, bool(joints), exits_early(board, ports))
     else:
-        files |= channels_files(board)
-        values = {"about": _about_scanner(board), "chips": len(ports), "channels": board.channels}
-        files["main.c"] = text("scan_main.c", **values)
+        files |= _layer(board).channels_files(board)
+        files["thenar_turn.c"] = portable("scan_turn.c", chips=len(ports), channels=board.channels)
+    if any('#include "thenar_flash.h"' in each for each in files.values()):
+        files["thenar_flash.h"] = portable("thenar_flash.h")
     files["glove.toml"] = glove_toml(name, board, names)
     return files
 
 
 def _inputs(board: Board, switches: Sequence[str], layout: Layout) -> dict[str, str]:
     ports = readings(board, switches, layout.tables)
-    files = {"thenar_keys.h": text("thenar_keys.h", what=_inputs_in_words(board), chips=len(ports))}
-    if board.matrix is not None:
-        return files | {"thenar_matrix.c": matrix_file(board, board.matrix)}
-    if board.pins or not switches:
-        return files | {"thenar_pins.c": pins_file(board, switches)}
-    return files | twi_files(board) | {"thenar_expanders.c": expanders_file(board, ports, switches)}
+    layer, header = _layer(board), portable("thenar_keys.h", what=_inputs_in_words(board), chips=len(ports))
+    files = {"thenar_keys.h": header}
+    if board.matrix is not None or board.pins or not switches:
+        return files | layer.keys_files(board, switches)
+    return files | layer.bus_files(board) | {"thenar_expanders.c": expanders_file(board, ports, switches)}
 
 
 def _joints(identifier: str, names: Names, layout: Layout, board: Board) -> dict[str, str]:
-    files = joints_file(identifier, board, names.joints, layout.code_bits)
-    if not files:
+    check_joints(board, names.joints, layout.code_bits)
+    if not names.joints:
         return {}
     what = "a CyberGlove on a UART" if board.cyberglove is not None else "voltages on the part's converter"
-    files["thenar_joints.h"] = text(
-        "thenar_joints.h", name=identifier, what=what, attended=board.cyberglove is not None
-    )
-    if board.cyberglove is not None:
-        files |= uart_files(board, board.cyberglove.uart, board.cyberglove.baud, receive_bytes=128, send_bytes=16)
-    return files
+    glove, layer = board.cyberglove, _layer(board)
+    header = portable("thenar_joints.h", name=identifier, what=what, attended=glove is not None)
+    files = {"thenar_joints.h": header}
+    if glove is None:
+        return files | layer.joints_files(identifier, board, names.joints)
+    files["thenar_cyberglove.c"] = glove_file(identifier, glove, names.joints)
+    return files | layer.uart_files(board, glove.uart, glove.baud)
 
 
-def _glove_main(identifier: str, names: Names, board: Board, joints: bool, early_exit: bool) -> str:
+def _glove_turn(identifier: str, names: Names, board: Board, joints: bool, early_exit: bool) -> str:
     switches, model = tuple(switch.name for switch in names.switches), names.segments
     whole_us = board.heartbeat_us or _WHOLE_US
     if segments := model is not None and follows_segments(board, names):
         whole_us = min(whole_us, model.tick_us)
-    return text(
-        "glove_main.c",
+    return portable(
+        "glove_turn.c",
         name=identifier,
-        about=_about_glove(board, names),
         joints=joints,
         attended=joints and board.cyberglove is not None,
         chips=bool(board.chips),
@@ -298,18 +276,6 @@ def segments_in_words(board: Board, names: Names) -> str:
     return f"Segments are left out: they would take {takes}, and {int(ram * _MOST_RAM)} are for them"
 
 
-def board_makefile(name: str, board: Board, mode: Mode, files: Collection[str]) -> str:
-    """Return the Makefile of the firmware of the build `name` whose other files are called `files`."""
-    does = "scans the switches" if mode == "scan" else "scans the switches and recognises"
-    sources = sorted(file for file in files if file.endswith((".c", ".S")))
-    return text(
-        "Makefile",
-        title=f"Firmware that {does}, for an {board.part} at {board.clock_hz} Hz.",
-        program=f"thenar_{name}_{mode}",
-        objects=[source.rpartition(".")[0] + ".o" for source in sources],
-        headers=sorted(file for file in files if file.endswith(".h")),
-        part=board.part,
-        brown_out=board.microcontroller.brown_out,
-        avrdude_part=board.microcontroller.avrdude,
-        programmer=board.microcontroller.programmer,
-    )
+def whole_folder(name: str, board: Board, mode: Mode, files: Mapping[str, str]) -> dict[str, str]:
+    """Return path -> text of the whole folder of the firmware of the build `name`, whose files are `files`."""
+    return _layer(board).folder(name, board, mode, files)

@@ -17,6 +17,7 @@ from thenar.runtime.softmax import POWERS, Softmax
 from .assembly import assembly_values, calls_are_near, check_size
 from .layout import MOST_INLINE, Field, JointLayout, Layout, Lookup, Parts
 from .segments import segment_files
+from .sensors import Sensors, codes_files, sensors_of
 from .words import Names, answers_of, comment, identifiers, inputs_in_words, joint_in_words, string, switches_in_words
 
 _STARTS_PER_LINE = 4
@@ -221,7 +222,9 @@ LIBRARY_NAME = "glove"
 """What the library is called unless it is named: its files are thenar_glove.h and so on, its functions alike."""
 FIRMWARE_NAME = "firmware"
 LIBRARY_FILES = tuple(
-    f"thenar_{LIBRARY_NAME}{part}{ending}" for part in ("", "_tables", "_segments") for ending in (".h", ".c", "_avr.S")
+    f"thenar_{LIBRARY_NAME}{part}{ending}"
+    for part in ("", "_tables", "_codes", "_segments")
+    for ending in (".h", ".c", "_avr.S")
 )
 """The folder of a build that carries the library, and what it may hold."""
 
@@ -305,6 +308,7 @@ class Library:
     name   of its files and functions, thenar_NAME: one that words.check_name allows
     avr    whether it adds up in an AVR's assembly there
     notes  lines for the opening comments
+    glove  what is known of the sensors of a glove; None: nothing but what the build says
     """
 
     name: str
@@ -312,6 +316,12 @@ class Library:
     layout: Layout
     avr: bool
     notes: tuple[str, ...] = ()
+    glove: Sensors | None = None
+
+    @property
+    def sensors(self) -> Sensors:
+        """The sensors whose readings become codes."""
+        return sensors_of(self.names) if self.glove is None else self.glove
 
     @cached_property
     def files(self) -> dict[str, str]:
@@ -320,9 +330,21 @@ class Library:
 
     @cached_property
     def whole(self) -> dict[str, str]:
-        """The classifier's files, and those of the decoder of segments where the build has costs of them."""
+        """The classifier's files, what makes codes of readings, and the decoder of segments where the build has costs
+        of them.
+        """
+        return self.files | self.codes | self.segments
+
+    @cached_property
+    def codes(self) -> dict[str, str]:
+        """The files of what makes codes of readings."""
+        return codes_files(self.name, self.sensors, code_bits=self.layout.code_bits, avr=self.avr)
+
+    @cached_property
+    def segments(self) -> dict[str, str]:
+        """The files of the decoder of segments."""
         model = self.names.segments
-        return self.files if model is None else self.files | segment_files(self.name, model, avr=self.avr)
+        return {} if model is None else segment_files(self.name, model, avr=self.avr)
 
     @property
     def objects(self) -> str:

@@ -19,7 +19,6 @@ from . import FirmwareError
 from .board import Board, keys_of
 from .board_files import (
     board_files,
-    board_makefile,
     config_of,
     exits_early,
     follows_segments,
@@ -27,11 +26,13 @@ from .board_files import (
     readings,
     segments_in_words,
     switches_of,
+    whole_folder,
 )
 from .choose import Fit, fit_for, smallest_fit
 from .classifier import LIBRARY_NAME, Library
 from .layout import Ports, ports_of_scan
 from .protocol import decided_files, protocol_files
+from .sensors import Sensors
 from .targets import TARGETS, Target
 from .targets.base import Mode
 from .words import Names, check_name
@@ -46,6 +47,7 @@ class Firmware:
     name         what its files and functions are called: lower-case letters, digits and _, at most 32
     board        how the microcontroller is wired: needed by the modes scan and glove, and only by them
     scan         how the build's harness is read, where it has one: a library takes its switches as they come from there
+    sensors      what is known of the glove whose readings a library converts; None: nothing but what the names say
     flash        how many bytes of flash the classifier may take; None: half of the part's, three quarters where half
                  is too little
 
@@ -61,6 +63,7 @@ class Firmware:
     board: Board | None = None
     flash: int | None = None
     scan: ScanMap | None = None
+    sensors: Sensors | None = None
 
     def __post_init__(self) -> None:
         check_name(self.name)
@@ -69,8 +72,9 @@ class Firmware:
             if self.board is not None:
                 raise FirmwareError("the mode classify reads no board: leave the board out, or ask for scan or glove")
         elif self.mode not in target.modes:
-            others = " and ".join(name for name, each in TARGETS.items() if self.mode in each.modes)
-            raise FirmwareError(f"the mode {self.mode} is written for {others}, not for {self.target}")
+            *others, last = (name for name, each in TARGETS.items() if self.mode in each.modes)
+            able = f"{', '.join(others)} and {last}"
+            raise FirmwareError(f"the mode {self.mode} is written for {able}, not for {self.target}")
         elif self.board is None:
             raise FirmwareError(f"the mode {self.mode} needs a board.toml: how the microcontroller is wired")
         elif self.mode == "glove" and len(keys_of(self.board, self.names.switches)) < len(self.names.switches):
@@ -106,7 +110,7 @@ class Firmware:
 
     def library(self, notes: Sequence[str] = ()) -> Library:
         """Return the classifier alone, with lines for its opening comments."""
-        return Library(self.name, self.names, self.fit.choice.layout, self.fit.target.avr, tuple(notes))
+        return Library(self.name, self.names, self.fit.choice.layout, self.fit.target.avr, tuple(notes), self.sensors)
 
     def files(self, notes: Sequence[str] | None = None) -> dict[str, str]:
         """Return path -> text of the firmware; the same firmware and notes give the same.
@@ -124,10 +128,10 @@ class Firmware:
         config = config_of(board, switches, tables, recognises=glove, segments=segments)
         files = protocol_files(config) | board_files(name, names, library.layout, board, self.mode)
         if glove:
-            files |= library.whole if segments else library.files
+            files |= library.files | (library.segments if segments else {})
             if exits_early(board, ports := readings(board, switches, tables)):
                 files |= decided_files(name, tables, names.grasps, switches_of(ports))
-        return files | {"Makefile": board_makefile(name, board, self.mode, files)}
+        return whole_folder(name, board, self.mode, files)
 
 
 SUMS = "SHA256SUMS"

@@ -29,6 +29,8 @@ Lost = NDArray[np.bool_]
 class Answers:
     """The answers to n frames: scores (n, K) int16, classes (n,) the first best of them.
 
+    margins, shares  the lead over the second best (n,), and the probability of one class each (n,), in 65535ths: of
+                     class 0 in frame 0, 1 in frame 1 and so on, in turn; None where they were not asked
     cost   what each answer took, (n,) in `unit`; None where nothing was counted (unit "")
     stack  bytes of stack that an answer needs; None where it was not measured
     names  of the K types, as the program gave them; None where it was not asked
@@ -36,6 +38,8 @@ class Answers:
 
     scores: NDArray[np.int16]
     classes: NDArray[np.uint16]
+    margins: NDArray[np.uint16] | None = None
+    shares: NDArray[np.uint16] | None = None
     cost: NDArray[np.uint32] | None = None
     unit: Unit = ""
     stack: int | None = None
@@ -66,15 +70,16 @@ def names_in(printed: bytes, layout: Layout) -> tuple[tuple[str, ...], bytes]:
 
 
 def answers_from(printed: bytes, frames: Frames, layout: Layout) -> Answers:
-    """Return the answers that a program printed: for each frame K scores and a class, 16 bits each, little-endian.
+    """Return the answers that a program printed: for each frame K scores, a class, a margin and a probability, 16 bits
+    each, little-endian.
 
     Raises FirmwareError unless there is one for every frame.
     """
-    size = len(layout.start) + 1
+    size, classes = len(layout.start) + 3, len(layout.start)
     if len(printed) != 2 * size * len(frames):
         raise FirmwareError(f"the program printed {len(printed)} bytes for {len(frames)} frames of {2 * size} bytes")
     words = np.frombuffer(printed, "<u2").astype(np.uint16).reshape(len(frames), size)
-    return Answers(words[:, :-1].view(np.int16), words[:, -1])
+    return Answers(words[:, :classes].view(np.int16), *words[:, classes:].T)
 
 
 def record_files(
@@ -95,7 +100,7 @@ def record_files(
     if machine == "avr" and not lost:
         return files
     values["places"] = [f"{{{port}, {bit}}}" for port, bit in layout.places] if answer == "update" else []
-    return files | {"record.h": render("checking/record.h.j2", **values, answers=machine != "avr")}
+    return files | {"record.h": render("checking/record.h.j2", **values, named=machine != "avr")}
 
 
 def record_values(

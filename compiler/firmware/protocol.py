@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from textwrap import wrap
 
-from thenar.drivers.scanner_protocol import MOST_ASKED, SetChannels, SetRate
+from thenar.drivers.scanner_protocol import MOST_ASKED, MOST_BITS, SetChannels, SetRate
 from thenar.firmware_templates.rendering import render
 from thenar.runtime.scanning.decided import EarlyExit
 from thenar.runtime.scores import Scorer
@@ -37,7 +37,7 @@ class BoardConfig:
     rows, columns  of its keys, one row: wired directly      diodes  whether the keys of a matrix have any
     board          its number                                scan_us from scan to scan, at least `fastest_us`
     state_us, heartbeat_us  from frame to frame, 0: none     press_us, release_us  debouncing, 0: none
-    channels       of its converter: with any it speaks version 2 of the protocol
+    channels       of its converter: with any it speaks version 2 of the protocol; code_bits: of a code
     segments       whether it tells of segments
 
     Raises FirmwareError where a value is out of its field's range, or there are more keys than `MOST_KEYS`.
@@ -54,6 +54,7 @@ class BoardConfig:
     release_us: int = 0
     fastest_us: int = 100
     channels: int = 0
+    code_bits: int = 10
     segments: bool = False
 
     def __post_init__(self) -> None:
@@ -88,6 +89,7 @@ _RANGES = {
     "release_us": (0, _LONGEST_DEBOUNCE_US),
     "fastest_us": (1, _FOREVER_US),
     "channels": (0, MOST_ASKED),
+    "code_bits": (1, MOST_BITS),
 }
 
 

@@ -24,6 +24,7 @@ from .tools import AVR_COMPILER, HOST_COMPILER, STRICT, Tool, call, find, lackin
 
 _CLOCK_HZ = 16_000_000  # of the simulated time, in which nothing is counted
 _MAKE: Tool = (("make",), "make")
+_WORDS = 6  # bytes of an answer after the scores: type, margin, probability
 
 
 def missing() -> str | None:
@@ -95,7 +96,8 @@ def run(
     `stack` the most that any frame took, the return address included.
 
     incremental  each answer comes from update(), the change since the frame before, instead of classify()
-    lost         (n, s + j) inputs that are missing in each frame: neither cycles nor stack are those of an answer then
+    lost         (n, s + j) inputs that are missing in each frame: neither cycles nor stack are those of an answer then,
+                 and margin and probability are asked for as well
 
     Raises FirmwareError if compiler or simulator are missing, or the files do not compile without any warning or do not
     fit, or the program does not answer.
@@ -111,11 +113,15 @@ def run(
         call([*command, *sources, "-o", "classifier.elf"], folder)
         found = _symbols(folder)
         glove, scores = _symbol(found, "glove", glove_size(layout)), 2 * len(layout.start)
-        given = glove + 2 * scores + FLAGS if lost is None else _symbol(found, f"thenar_{name}_record", sent.shape[1])
-        spans = f"{given:#x}:{sent.shape[1]}", f"{glove:#x}:{scores}"
+        given, said, size = glove + 2 * scores + FLAGS, glove, scores
+        if lost is not None:
+            size = scores + _WORDS
+            given = _symbol(found, f"thenar_{name}_record", sent.shape[1])
+            said = _symbol(found, f"thenar_{name}_said", size)
+        spans = f"{given:#x}:{sent.shape[1]}", f"{said:#x}:{size}"
         places = (hex(_symbol(found, symbol)) for symbol in (f"thenar_{name}_{function}", "_end"))
         printed = call([str(program), part, str(_CLOCK_HZ), "classifier.elf", *places, *spans], folder, sent.tobytes())
-    answers = _answers(printed, len(frames), layout)
+    answers = _answers(printed, len(frames), layout, words=0 if lost is None else _WORDS)
     return answers if lost is None else replace(answers, cost=None, unit="", stack=None)
 
 
@@ -136,9 +142,12 @@ def _symbol(found: Mapping[str, tuple[int, int]], name: str, size: int | None = 
     return address
 
 
-def _answers(printed: bytes, frames: int, layout: Layout) -> Answers:
+def _answers(printed: bytes, frames: int, layout: Layout, *, words: int) -> Answers:
+    """Return the answers; `words` bytes say type, margin and probability, where these were asked."""
     classes = len(layout.start)
-    record = np.dtype([("scores", "<i2", (classes,)), ("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")])
+    said = [("said", "<u2", (words // 2,))] if words else []
+    counted = [("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")]
+    record = np.dtype([("scores", "<i2", (classes,)), *said, *counted])
     if len(printed) != frames * record.itemsize:
         raise FirmwareError(f"the simulator gave {len(printed)} bytes for {frames} frames of {record.itemsize}")
     records = np.frombuffer(printed, record)
@@ -148,7 +157,9 @@ def _answers(printed: bytes, frames: int, layout: Layout) -> Answers:
     return Answers(
         records["scores"].astype(np.int16),
         grasps.astype(np.uint16),
-        records["cycles"].astype(np.uint32),
-        "cycles",
-        stack,
+        margins=records["said"][:, 1].astype(np.uint16) if words else None,
+        shares=records["said"][:, 2].astype(np.uint16) if words else None,
+        cost=records["cycles"].astype(np.uint32),
+        unit="cycles",
+        stack=stack,
     )

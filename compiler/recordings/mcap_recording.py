@@ -3,7 +3,7 @@
 A row is what the devices had delivered last when the grasp was captured. Trials in which nothing is held have a row for
 every 0.2 s of their movement. A stream has a row for every 10 ms, with its time: a grasp is held while the hand stays
 as it was captured, and nothing is held in the rest of the trials of a collection that also records the empty hand. Of
-another collection the rest is left out, as are trials that were done again.
+another collection the rest is left out, as are trials that were done again, skipped or undone.
 
 The CyberGlove's sensors but the wrist's,
 which the paper does not use either, become joints: raw bytes where the glove was not calibrated, half degrees on one
@@ -11,7 +11,7 @@ scale for all subjects where it was. Taxels keep their counts, what their baseli
 calibrated, the counts of all are those of the first calibration.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,8 +19,10 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
+from thenar.runtime.calibration import codes_of_bytes
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.manifest import Calibration as BuildCalibration
 from thenar.runtime.names import SHOWN, shortened
 from thenar.runtime.published import NONE
 from thenar.runtime.recording.guide import FRESH_US
@@ -147,12 +149,20 @@ _MOVING_TICK_US, _TICK_US = 200_000, 10_000
 _BRIDGED, _NEAR, _NEAR_CODES = 3, 0.25, 2.0
 
 
-def _parts(reader: Reader, stream: bool) -> Iterator[_Part]:
-    """Yield every session with trials; those without are not labelled and bring nothing."""
+def _parts(reader: Reader, stream: bool) -> list[_Part]:
+    """Return every session with trials; those without are not labelled and bring nothing."""
+    parts: list[_Part] = []
     for watch in _watched(reader, stream):
+        if watch.undone:
+            parts = [_without(part, watch.undone) for part in parts]
         collection = watch.session.collection
         if collection is not None and (rows := _streamed(watch, collection) if stream else watch.rows()):
-            yield _Part(reader.path.name, watch.session, collection, rows)
+            parts.append(_Part(reader.path.name, watch.session, collection, rows))
+    return [part for part in parts if part.grasps]
+
+
+def _without(part: _Part, trials: Set[int]) -> _Part:
+    return replace(part, grasps=tuple(grasp for grasp in part.grasps if grasp.label.trial not in trials))
 
 
 def _watched(reader: Reader, stream: bool) -> Iterator["_Watch"]:
@@ -171,11 +181,12 @@ def _watched(reader: Reader, stream: bool) -> Iterator["_Watch"]:
 
 class _Watch:
     """The session that begins: its newest frames, the trials that were captured, and rows at ticks, of a stream from
-    the first label on, otherwise while the empty hand moves.
+    the first label on, otherwise while the empty hand moves; `undone` are trials of sessions before that do not count.
     """
 
     def __init__(self, reader: Reader, stream: bool) -> None:
         self.session, self.attempts, self.ticks = reader.session, list[_Attempt](), list[_Grasp]()
+        self.undone: set[int] = set()
         self._path, self._size = reader.path, reader.path.stat().st_size
         self._stream, self._tick_us = stream, _TICK_US if stream else _MOVING_TICK_US
         self._taxels = _taxels(reader)
@@ -220,10 +231,19 @@ class _Watch:
         elif before is not None and before.event == "captured":
             accepted = label.event == "accepted" and label.trial == before.trial
             self.attempts[-1].accepted, self.attempts[-1].judged_us = accepted, label.time_us
+        elif label.event == "undone":
+            self._undo(label.trial)
         if self._stream:
             self._due_us = label.time_us if self._due_us is None else self._due_us
         elif label.event != "begun":
             self._due_us = None
+
+    def _undo(self, trial: int) -> None:
+        here = [attempt for attempt in self.attempts if attempt.accepted and attempt.captured.label.trial == trial]
+        if here:
+            here[-1].accepted = False
+        else:
+            self.undone.add(trial)
 
     def _tick(self, until_us: int) -> None:
         """Note rows that are due before `until_us`, while devices are read."""
@@ -390,7 +410,13 @@ def _joint(
     calibrated = grasps[0][0].session.calibration is not None
     values = np.array([_value(name, part, grasp) for part, grasp in grasps], np.float64)
     scale = _HALF_DEGREES if calibrated else _BYTES
-    return code_joint(name, JointColumns((name,), unit, codes=not calibrated, calibration=scale), values, trials)
+    columns = JointColumns((name,), unit, codes=not calibrated, calibration=scale)
+    codes, joint, cost = code_joint(name, columns, values, trials)
+    if calibrated:  # as live bytes are coded, halves between two codes included
+        coded = _coded(joint)
+        parts = {id(part): codes_of_bytes(coded, part.session.calibration) for part, _ in grasps}
+        codes = np.array([parts[id(part)][_raw(name, part, grasp)] for part, grasp in grasps], np.uint16)
+    return codes, joint, cost
 
 
 def _taxel(place: int, grasps: Sequence[tuple[_Part, _Grasp]]) -> tuple[list[int], Joint]:
@@ -404,18 +430,27 @@ def _taxel(place: int, grasps: Sequence[tuple[_Part, _Grasp]]) -> tuple[list[int
     for part, grasp in grasps:
         count, own = grasp.counts[place], _line(part.session, place)
         assert count is not None
-        code = count if own is None or own == line else round(float(taxel.code(own.at(count))))
+        code = count if own is None or own == line else own.codes(_coded(taxel)).code(count)
         codes.append(min(max(code, 0), CODES - 1))
     return codes, taxel
+
+
+def _coded(joint: Joint) -> BuildCalibration:
+    """Return what the codes of a joint or a taxel mean, as a build has it."""
+    return BuildCalibration(0, joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
 
 
 def _line(session: Session, place: int) -> TaxelLine | None:
     return None if session.taxel_calibration is None else session.taxel_calibration.line(session.taxels[place])
 
 
-def _value(name: str, part: _Part, grasp: _Grasp) -> float:
+def _raw(name: str, part: _Part, grasp: _Grasp) -> int:
     assert grasp.glove is not None
-    raw = grasp.glove.sensors[part.session.sensors.index(name)]
+    return grasp.glove.sensors[part.session.sensors.index(name)]
+
+
+def _value(name: str, part: _Part, grasp: _Grasp) -> float:
+    raw = _raw(name, part, grasp)
     calibration = part.session.calibration
     if calibration is None:
         return raw

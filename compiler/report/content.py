@@ -42,6 +42,7 @@ class ReportContent:
     faults        what each fault of an input leaves of the rows trained on
     transitions   which type follows which, where the recordings are whole movements
     worst         the worst that integers can do, over every frame there is
+    has_page      whether try.html lies beside the report
 
     Raises ReportError where parts do not belong together.
     """
@@ -65,6 +66,7 @@ class ReportContent:
     faults: FaultCounts | None = None
     worst: WorstCase | None = None
     transitions: Transitions | None = None
+    has_page: bool = False
 
     def __post_init__(self) -> None:
         grasps, answers = len(self.manifest.grasps), len(self.manifest.answers)

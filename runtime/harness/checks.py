@@ -6,6 +6,7 @@ from thenar.drivers.errors import SettingError
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.ports import device_fault, port_fault
+from thenar.drivers.scanner_datagrams import scanner_port_fault
 from thenar.drivers.spi.chips import SPI_CHIPS
 
 from ..names import fault, nearest, shortened
@@ -49,6 +50,9 @@ def _of_glove(glove: GloveWiring) -> Iterator[Fault]:
     yield from _of_names(named, "sensor")
 
 
+_FAULT_OF = {"scanner": scanner_port_fault}
+
+
 def _of_devices(harness: Harness) -> Iterator[Fault]:
     places: list[tuple[Place, str]] = [(("scanner", n, "port"), line.port) for n, line in enumerate(harness.scanners)]
     places += [(("bus", n, "device"), bus.device) for n, bus in enumerate(harness.buses)]
@@ -58,7 +62,7 @@ def _of_devices(harness: Harness) -> Iterator[Fault]:
         places.insert(0, (("cyberglove", "port"), harness.cyberglove.port))
     seen: dict[str, Place] = {}
     for place, device in places:
-        fault_of = device_fault if place[-1] == "device" else port_fault
+        fault_of = device_fault if place[-1] == "device" else _FAULT_OF.get(str(place[0]), port_fault)
         # The source that opens a stream says what is wrong with its port.
         if place[0] != "stream" and (reason := fault_of(device)):
             yield place, f"{shortened(repr(device))} {reason}"

@@ -318,4 +318,4 @@ def _counted(device: GloveDevice | ScannerDevice) -> tuple[str, ...]:
     return (f"on its line: {', '.join(wrong)}",) if wrong else ()
 
 
-_WRONG = ("faults", "wrong start", "wrong length", "damaged", "short", "overlong", "gaps", "misfits")
+_WRONG = ("faults", "wrong start", "wrong length", "damaged", "short", "overlong", "gaps", "misfits", "missing")

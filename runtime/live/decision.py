@@ -28,7 +28,7 @@ from dataclasses import dataclass, field
 from operator import add
 
 from ..frames import Mask
-from ..scores import Scorer, softmax
+from ..scores import Scorer, odds, softmax
 
 
 class Standing:
@@ -41,13 +41,14 @@ class Standing:
     Of a build that refuses frames there are K + 1 of them (`or_none`), and none is the last class.
     """
 
-    __slots__ = ("_rivals", "_scorer", "_unread", "candidate", "lanes")
+    __slots__ = ("_odds", "_rivals", "_scorer", "_unread", "candidate", "lanes")
 
     def __init__(self, lanes: tuple[int, ...], scorer: Scorer, unread: Mask = 0) -> None:
         self.lanes = lanes
         self.candidate = lanes.index(max(lanes))
         self._scorer, self._unread = scorer, unread
         self._rivals = self._nearest(self.candidate) if unread else lanes
+        self._odds = 0.0, 0.0
 
     @property
     def whole(self) -> bool:
@@ -86,8 +87,12 @@ class Standing:
 
     def probability(self, number: int, scale: float) -> float:
         """Return the softmax of class `number`, at `scale` steps per unit."""
-        near = self._nearest(number) if self._unread and number != self.candidate else self._rivals
-        return softmax(near, number, scale)
+        if self._unread and number != self.candidate:
+            return softmax(self._nearest(number), number, scale)
+        of, total = self._odds
+        if of != scale:
+            self._odds = scale, (total := odds(self._rivals, scale))
+        return softmax(self._rivals, number, scale, total)
 
     def or_none(self, lead: int) -> "Standing":
         """Return the same with none, the last class, `lead` steps above the best: below it, where that is negative."""

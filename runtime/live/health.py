@@ -3,8 +3,8 @@
 Switches that are never, or always, on are held against how often they were in the recordings that the build was
 trained on.
 
-The tables remember that share: a switch's mean row is its row times the share of the recordings in which it was on. A
-grasp that is held is one observation, however many frames it lasts. If a switch is on in a share p of grasps, it stays
+The build remembers that share; in builds of older versions a switch's mean row is its row times the share. A grasp that
+is held is one observation, however many frames it lasts. If a switch is on in a share p of grasps, it stays
 off throughout n of them with a probability of at most (1 - p)^n, and on with at most p^n, given that grasps come as
 they did in the recordings. Because people also repeat one grasp for long, a switch is only suspected once half of the
 grasp types were seen since it was last found otherwise.
@@ -21,7 +21,6 @@ import numpy as np
 from ..build import Build
 from ..frames import Mask, SwitchFrame
 from ..published import UNKNOWN, DeviceHealth, Drift, HealthReport, LiveGrasp, Quarantined
-from ..tables import IntegerTables
 from .quarantine import Chattering, JointDrift, numbers
 
 RATE_US = 1_000_000
@@ -38,7 +37,7 @@ class Health:
         self._joint_names = tuple(joint.name for joint in build.manifest.joints)
         self._numbers = {grasp: number for number, grasp in enumerate(build.grasps)}
         self._all = (1 << len(self._switch_names)) - 1
-        self._stuck, self._drift = StuckSwitches(build.tables), JointDrift(build.tables)
+        self._stuck, self._drift = StuckSwitches(build), JointDrift(build.tables)
         self._chattering = Chattering(len(self._switch_names))
         self._switch_rate, self._glove_rate = FrameRate(), FrameRate()
         self._grasp = UNKNOWN
@@ -130,8 +129,15 @@ class FrameRate:
         return self._frames * 1e6 / (now_us - (self._began_us or 0))
 
 
-def on_shares(tables: IntegerTables) -> list[float]:
-    """Return, for every switch, the share of the recordings in which it was on; nan where its row is all zeros."""
+def on_shares(build: Build) -> list[float]:
+    """Return, for every switch, the share of the recordings in which it was on; nan where nobody knows: in builds of
+    older versions, where its row is all zeros.
+    """
+    told = [switch.closed_share for switch in build.manifest.switches]
+    known = [share for share in told if share is not None]
+    if len(known) == len(told):
+        return known
+    tables = build.tables
     rows, means = tables.switch_rows.astype(np.float64), tables.switch_means.astype(np.float64)
     weight = (rows * rows).sum(axis=1)
     shares = np.divide((rows * means).sum(axis=1), weight, out=np.full(len(rows), np.nan), where=weight > 0)
@@ -178,10 +184,10 @@ class Missed:
 class StuckSwitches:
     """Both kinds of being stuck."""
 
-    def __init__(self, tables: IntegerTables) -> None:
-        shares = on_shares(tables)
-        self._on = Missed(shares, tables.n_classes)
-        self._off = Missed([1 - share for share in shares], tables.n_classes)
+    def __init__(self, build: Build) -> None:
+        shares, classes = on_shares(build), build.tables.n_classes
+        self._on = Missed(shares, classes)
+        self._off = Missed([1 - share for share in shares], classes)
         self._read: Mask = 0
 
     def frame(self, closed: Mask, read: Mask) -> None:

@@ -334,19 +334,20 @@ class Quarantine:
             return
         if (state := (frame.closed, read, lost)) == self._state and self._weighed:
             return
-        self._state, contacts = state, frame.closed & read & ~lost
-        self._stayed &= frame.closed | ~read
+        closed = frame.closed & read
+        self._state, contacts = state, closed & ~lost
+        self._stayed &= closed | ~read
         if self._fewest is None or contacts.bit_count() < self._fewest[0].bit_count():
-            self._fewest = contacts, frame.closed & read, read, lanes, lost
+            self._fewest = contacts, closed, read, lanes, lost
         if _differ(contacts, self._contacts):
             self._contacts, self._since_us, self._weighed = contacts, time_us, False
         elif not self._weighed and time_us - self._since_us >= SETTLED_US:
             self._contacts, self._weighed = contacts, True
             quiet = ~self._chattering.switches
-            least, closed, seen, scores, without = self._fewest
+            least, kept, seen, scores, without = self._fewest
             if _differ(least, contacts) and _differ(least, self._before):
-                stuck.weigh(scores, closed, seen & quiet & ~(closed & ~self._stayed), without)
-            stuck.weigh(lanes, frame.closed & read, read & quiet, lost)
+                stuck.weigh(scores, kept, seen & quiet & ~(kept & ~self._stayed), without)
+            stuck.weigh(lanes, closed, read & quiet, lost)
             self._before, self._stayed, self._fewest = contacts, self._all, None
             self._sort()
 
@@ -370,8 +371,8 @@ class Quarantine:
 
 
 def _differ(contacts: Mask, others: Mask) -> bool:
-    changed = (contacts ^ others).bit_count()
-    return changed > 0 and 2 * changed >= (contacts | others).bit_count()
+    changed = contacts ^ others
+    return changed != 0 and 2 * changed.bit_count() >= (contacts | others).bit_count()
 
 
 def _flags(mask: Mask, bits: int) -> Flags:
@@ -381,4 +382,8 @@ def _flags(mask: Mask, bits: int) -> Flags:
 
 def numbers(mask: Mask) -> list[int]:
     """Return the numbers of the bits of `mask`."""
-    return [number for number in range(mask.bit_length()) if mask >> number & 1]
+    found = []
+    while mask:
+        found.append((mask & -mask).bit_length() - 1)
+        mask &= mask - 1
+    return found

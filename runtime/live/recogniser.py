@@ -228,24 +228,25 @@ class LiveRecognizer:
         label, of_segment = segment.label, 0.0
         if label is not None and not unknown:
             of_segment = probability if label == decided else standing.probability(label, self._scale)
+        # By name, seventeen fields take as long as a third of the rest.
         return LiveGrasp(
-            time_us=now_us,
-            unix_us=unix_us,
-            number=self._number,
-            grasp=UNKNOWN if decided is None else self._grasps[decided],
-            candidate=UNKNOWN if unknown else self._grasps[standing.candidate],
-            probability=probability,
-            margin=0 if unknown else standing.margin,
-            health=health,
-            switch_age_us=None if switches_us < 0 else now_us - switches_us,
-            glove_age_us=None if glove_us < 0 else now_us - glove_us,
-            latency_us=0 if seen_us < 0 else now_us - seen_us,
-            lost=missing.names,
-            state=segment.state,
-            segment=segment.number,
-            segment_type=segment.type,
-            segment_us=segment.began_us,
-            segment_probability=of_segment,
+            now_us,
+            unix_us,
+            self._number,
+            UNKNOWN if decided is None else self._grasps[decided],
+            UNKNOWN if unknown else self._grasps[standing.candidate],
+            probability,
+            0 if unknown else standing.margin,
+            health,
+            None if switches_us < 0 else now_us - switches_us,
+            None if glove_us < 0 else now_us - glove_us,
+            0 if seen_us < 0 else now_us - seen_us,
+            missing.names,
+            segment.state,
+            segment.number,
+            segment.type,
+            segment.began_us,
+            of_segment,
         )
 
 

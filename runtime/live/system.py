@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from thenar.drivers.calibration import GloveCalibration, SensorCalibration
+from thenar.drivers.calibration import GloveCalibration
 
 from ..build import Build
-from ..calibration import Joints, Meaning, Numbers, load_calibration
+from ..calibration import Joints, Meaning, load_calibration, numbers_of
 from ..frames import Mask
 from ..harness.wiring import Harness, StreamWiring
 from ..policy import Policy
@@ -89,8 +89,7 @@ class System:
         device = self.harness.joint_device
         if self.calibration is not None or not isinstance(device, StreamWiring):
             return self.calibration
-        ends = device.joints.items()
-        return Numbers(tuple(SensorCalibration(name, 1, low, 255, high) for name, (low, high) in ends))
+        return numbers_of(device.joints)
 
     @property
     def on_demand(self) -> bool:

@@ -31,11 +31,13 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class Journal:
-    """A collection that was begun: its first session, the trials that were accepted, and where to go on."""
+    """A collection that was begun: its first session, the accepted trials in the order in which they were accepted, and
+    where to go on.
+    """
 
     path: Path
     session: Session
-    accepted: frozenset[int]
+    accepted: tuple[int, ...]
     tail: Tail
 
 
@@ -67,12 +69,17 @@ def read_journal(path: Path) -> Journal:
     first = reader.session
     if first.collection is None:
         raise SettingError(f"{path} is a recording without trials: name another output")
-    accepted = [entry.trial for entry in reader if isinstance(entry, Label) and entry.event == "accepted"]
+    accepted: dict[int, None] = {}
+    for entry in reader:
+        if isinstance(entry, Label) and entry.event == "accepted":
+            accepted[entry.trial] = None
+        elif isinstance(entry, Label) and entry.event == "undone":
+            accepted.pop(entry.trial, None)
     if reader.foreign or reader.altered:
         raise SettingError(
             f"{path} was changed by another program, or is damaged: import it, and collect the rest into another file"
         )
-    return Journal(path, first, frozenset(accepted), reader.tail)
+    return Journal(path, first, tuple(accepted), reader.tail)
 
 
 # A frame this old was not read while the grasp was held.
@@ -83,46 +90,91 @@ MOVING_US = 2_000_000
 
 class Stage(Enum):
     """Where a collection stands: before its first countdown, counting, while the empty hand moves, with a captured
-    trial to judge, or over.
+    trial to judge, paused, with no trial left, or over.
     """
 
     READY = "ready"
     COUNTDOWN = "countdown"
     MOVING = "moving"
     REVIEW = "review"
+    PAUSED = "paused"
+    DONE = "done"
     OVER = "over"
 
 
 class Key(Enum):
-    """What the keys mean: go on (and accept), do it again, leave."""
+    """What the keys mean: go on (and accept), do it again, undo the trial before, leave this one out, pause, leave."""
 
     ACCEPT = "accept"
     REDO = "redo"
+    UNDO = "undo"
+    SKIP = "skip"
+    PAUSE = "pause"
     QUIT = "quit"
+
+
+_UNDER_WAY = {Key.PAUSE: "pause", Key.REDO: "begin the countdown again"}
+_OFFERED: dict[Stage, dict[Key, str]] = {
+    Stage.READY: {Key.ACCEPT: "start the countdown"},
+    Stage.COUNTDOWN: _UNDER_WAY,
+    Stage.MOVING: _UNDER_WAY,
+    Stage.REVIEW: {Key.ACCEPT: "keep it, next grasp", Key.REDO: "do it again"},
+    Stage.PAUSED: {Key.ACCEPT: "go on"},
+    Stage.DONE: {Key.ACCEPT: "finish"},
+    Stage.OVER: {},
+}
+# Keys that are not offered and yet mean something.
+_ALSO = {
+    (Stage.READY, Key.REDO): Key.ACCEPT,
+    (Stage.PAUSED, Key.REDO): Key.ACCEPT,
+    (Stage.PAUSED, Key.PAUSE): Key.ACCEPT,
+}
+# Here a trial waits for somebody to start it.
+_WAITING = (Stage.READY, Stage.PAUSED)
 
 
 class Guide:
     """Leads through `trials`: countdown, capture, judgement, one key a trial.
 
-    stage, trial  where it stands (trial: None when all are done)
-    accepted      how many were accepted here
+    stage, trial  where it stands (trial: None when none is left)
+    done          how many trials are accepted, those of earlier sittings included
+    skipped       how many were left out here; they come again in another sitting
     problem       why nothing could be captured, as a sentence; "" when all was well
+    step          counts every change of stage or trial
     """
 
-    def __init__(self, trials: Sequence[Trial], recorder: Recorder, countdown_us: int) -> None:
-        """The recorder's session must have a collection."""
+    def __init__(
+        self, trials: Sequence[Trial], recorder: Recorder, countdown_us: int, accepted: Sequence[int] = ()
+    ) -> None:
+        """Lead through those of `trials` that are not `accepted`, by their numbers in the order in which they were.
+
+        The recorder's session must have a collection.
+        """
         collection = recorder.session.collection
         assert collection is not None
         self.subject = collection.subject
-        self.accepted = 0
+        self.total = len(trials)
         self.problem = ""
-        self._left = list(reversed(trials))
+        self.step = 0
+        by_number, before = {trial.number: trial for trial in trials}, frozenset(accepted)
+        self._past = [(by_number[number], True) for number in accepted]
+        self._left = [trial for trial in reversed(trials) if trial.number not in before]
         self._recorder = recorder
         self._countdown_us = countdown_us
         self._zero_us = 0
         self._switches: SwitchFrame | None = None
         self._glove: GloveFrame | None = None
-        self.stage = Stage.READY if self._left else Stage.OVER
+        self.stage = Stage.READY if self._left else Stage.DONE
+
+    @property
+    def done(self) -> int:
+        """How many trials are accepted."""
+        return sum(accepted for _, accepted in self._past)
+
+    @property
+    def skipped(self) -> int:
+        """How many trials were left out in this sitting."""
+        return len(self._past) - self.done
 
     @property
     def trial(self) -> Trial | None:
@@ -134,65 +186,113 @@ class Guide:
         """The newest frames; in review, those that were captured."""
         return self._switches, self._glove
 
+    def offered(self) -> dict[Key, str]:
+        """Return the keys that do something now, and what they do."""
+        if self.stage is Stage.OVER:
+            return {}
+        found = dict(_OFFERED[self.stage])
+        if self._left:
+            found[Key.SKIP] = "skip this one"
+        if self._past:
+            found[Key.UNDO] = f"undo the last ({self._past[-1][0].grasp})"
+        if self._left:
+            found[Key.QUIT] = "leave, and go on another time" if self.stage in _WAITING else "leave"
+        return found
+
     def seconds_left(self, now_us: int) -> float:
         """Return what is left of the countdown, or of the movement."""
         return max(0, self._zero_us - now_us) / 1e6
 
     def take(self, now_us: int, arrived: Sequence[SwitchFrame | GloveFrame]) -> None:
-        """Record what came in; where the countdown has ended, capture the grasp, or begin the movement of the empty
-        hand, which is captured when its time has passed. Raises FrameError.
+        """Record what came in, but for a pause; where the countdown has ended, capture the grasp, or begin the movement
+        of the empty hand, which is captured when its time has passed. Raises FrameError.
         """
         for frame in arrived:
             self._record(frame)
         if self.stage not in (Stage.COUNTDOWN, Stage.MOVING) or now_us < self._zero_us:
             return
         if self.stage is Stage.COUNTDOWN and self._left[-1].grasp == NONE:
-            self._zero_us, self.stage = now_us + MOVING_US, Stage.MOVING
+            self._zero_us = now_us + MOVING_US
+            self._become(Stage.MOVING)
             self._label(now_us, "begun")
         else:
             self._capture(now_us)
 
     def press(self, now_us: int, key: Key) -> None:
         """Do what `key` asks for, if it means anything now."""
-        if key is Key.QUIT:
-            self.stage = Stage.OVER
+        key = _ALSO.get((self.stage, key), key)
+        if self.stage is Stage.OVER or key not in {*self.offered(), Key.QUIT}:
+            return
+        if key is Key.QUIT or (self.stage is Stage.DONE and key is Key.ACCEPT):
+            self._become(Stage.OVER)
+        elif key is Key.UNDO:
+            self._undo(now_us)
+        elif key is Key.SKIP:
+            self._judge(now_us, "skipped")
+        elif key is Key.PAUSE:
+            self._become(Stage.PAUSED)
         elif self.stage is Stage.REVIEW and key is Key.ACCEPT:
-            self._label(now_us, "accepted")
-            self._left.pop()
-            self.accepted += 1
-            self._next(now_us)
-        elif self.stage is Stage.REVIEW:
-            self._label(now_us, "redone")
-            self._next(now_us)
-        elif self.stage is Stage.READY or key is Key.REDO:
-            self._next(now_us)
+            self._judge(now_us, "accepted")
+        else:
+            if self.stage is Stage.REVIEW:
+                self._label(now_us, "redone")
+            self._begin(now_us)
 
-    def _next(self, now_us: int) -> None:
+    def _judge(self, now_us: int, event: Event) -> None:
+        """Be done with this trial, and go on to the next."""
+        self._label(now_us, event)
+        self._past.append((self._left.pop(), event == "accepted"))
+        self._turn(now_us)
+
+    def _undo(self, now_us: int) -> None:
+        """Return to the trial before; one that was captured and not judged yet is dropped."""
+        if self.stage is Stage.REVIEW:
+            self._label(now_us, "redone")
+        self._left.append(self._past.pop()[0])
+        self._label(now_us, "undone")
+        if self.stage is Stage.DONE:
+            self.stage = Stage.READY
+        self._turn(now_us)
+
+    def _turn(self, now_us: int) -> None:
+        """Begin the trial that is next now, or wait for somebody to start it if this one waited, too."""
+        if self._left and self.stage in _WAITING:
+            self.problem = ""
+            self._become(self.stage)
+        else:
+            self._begin(now_us)
+
+    def _begin(self, now_us: int) -> None:
         self.problem = ""
         self._zero_us = now_us + self._countdown_us
-        self.stage = Stage.COUNTDOWN if self._left else Stage.OVER
+        self._become(Stage.COUNTDOWN if self._left else Stage.DONE)
         if self._left and self._left[-1].grasp != NONE:
             self._label(now_us, "begun")
 
+    def _become(self, stage: Stage) -> None:
+        self.stage = stage
+        self.step += 1
+
     def _record(self, frame: SwitchFrame | GloveFrame) -> None:
+        recorded = self.stage is not Stage.PAUSED
         if isinstance(frame, SwitchFrame):
-            self._recorder.switches(frame)
+            if recorded:
+                self._recorder.switches(frame)
+            if self.stage is not Stage.REVIEW:
+                self._switches = frame
         else:
-            self._recorder.glove(frame)
-        if self.stage is Stage.REVIEW:
-            return
-        if isinstance(frame, SwitchFrame):
-            self._switches = frame
-        else:
-            self._glove = frame
+            if recorded:
+                self._recorder.glove(frame)
+            if self.stage is not Stage.REVIEW:
+                self._glove = frame
 
     def _capture(self, now_us: int) -> None:
         self.problem = self._lack(now_us)
         if self.problem:
-            self.stage = Stage.READY
+            self._become(Stage.READY)
             return
         self._label(now_us, "captured")
-        self.stage = Stage.REVIEW
+        self._become(Stage.REVIEW)
 
     def _lack(self, now_us: int) -> str:
         session = self._recorder.session

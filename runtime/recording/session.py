@@ -19,8 +19,9 @@ from ..policy import Policy
 from ..taxels import TaxelCalibration
 
 METADATA = "thenar"
-# Collections are of version 2, which says when a trial began; all else is written as version 1.
-VERSION = 2
+# Collections are of version 3: since 2 a trial says when it began, since 3 one may be undone or skipped. All else is
+# written as version 1.
+VERSION = 3
 # No glove, no taxonomy and no patience goes beyond them. A file that does is damaged, or made to fill the memory.
 _MOST_SWITCHES, _MOST_SENSORS, _MOST_TYPES, _MOST_OBJECTS = 65_536, 255, 10_000, 1000
 MOST_TRIALS = 1_000_000
@@ -49,15 +50,16 @@ class Collection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     seed: Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
 
 
-Event = Literal["begun", "captured", "accepted", "redone"]
+Event = Literal["begun", "captured", "accepted", "redone", "skipped", "undone"]
 
 
 class Label(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What happened to a trial, numbered from 1 in the order of the collection.
 
     "begun": the hand moves from now on, to the grasp, or, of none, without one until "captured"; "captured": the frames
-    before this one are the grasp; "accepted": those captured last are kept; "redone": they are not. time_us is the
-    host's monotonic clock.
+    before this one are the grasp; "accepted": those captured last are kept; "redone": they are not; "skipped": neither
+    are they, and the trial is left for another session; "undone": what was kept or skipped of this trial is not, also
+    if that was in an earlier session. time_us is the host's monotonic clock.
     """
 
     time_us: Number

@@ -13,6 +13,7 @@ before it decides, and so on.
 
 from collections import deque
 from collections.abc import Sequence
+from operator import add
 
 import msgspec
 import numpy as np
@@ -69,11 +70,19 @@ class _Paths:
     def __init__(self, model: SegmentModel, depth: int | None) -> None:
         K = model.n_types
         self._none, self.tick = K, -1
-        self._changes = [*zip(model.enter, model.direct, model.leave, strict=True)]
-        self._least, self._stay = model.least, model.stay
+        self._enter, self._direct, self._leave = model.enter, model.direct, model.leave
+        self._least_leave = min(model.leave)
+        # By how much none is dearer than the cheapest type where a type begins after the latter.
+        self._gaps = [direct - enter for enter, direct in zip(model.enter, model.direct, strict=True)]
+        self._least_gap, self._largest_gap = min(self._gaps), max(self._gaps)
+        # What every state pays at every tick changes no comparison.
+        usual = max(model.stay, key=model.stay.count)
+        self._stay = [cost - usual for cost in model.stay]
+        self._stays = any(self._stay[:K])
         self._sums, self._best, self._starts = [0] * (K + 1), [0] * (K + 1), [0] * (K + 1)
-        # Of each state, b and the beginning that it is of, of the last least - 1 ticks.
-        self._waiting = [deque([(0, 0)] * (least - 1)) for least in model.least]
+        # Of each of the last ticks, b of all states and the beginnings that it is of.
+        self._past = deque([(self._best, self._starts)] * max(model.least), max(model.least))
+        self._least, self._alike = model.least, len({*model.least[:K]}) == 1
         self._costs = (_NEVER, _NEVER, _NEVER)
         self._next = _Sources((0, 0), (K, 0), (0, 0), 0)
         self.sources: deque[_Sources] = deque(maxlen=depth)
@@ -82,46 +91,62 @@ class _Paths:
     def step(self, costs: Sequence[int]) -> None:
         """Take the next tick, which costs the states `costs`."""
         self.tick = tick = self.tick + 1
-        sums, best, starts, none, sources = self._sums, self._best, self._starts, self._none, self._next
-        first_cost, none_cost, ending_cost = self._costs
-        from_none = 0
-        first = ending = least = _NEVER
-        first_of = ending_of = least_of = (0, 0)
-        for k, (enter, direct, leave) in enumerate(self._changes):
-            total = sums[k]
-            begun = first_cost + direct
-            if none_cost + enter < begun:
-                begun = none_cost + enter
-                from_none |= 1 << k
-            begun -= total
-            if begun < best[k]:
-                best[k], starts[k] = begun, tick
-            else:
-                begun = best[k]
-            waiting = self._waiting[k]
-            waiting.append((begun, starts[k]))
-            mature, start = waiting.popleft()
-            sums[k] = total = total + costs[k] + self._stay[k]
-            if begun + total < least:
-                least, least_of = begun + total, (k, starts[k])
-            mature += total
-            if mature < first:
-                first, first_of = mature, (k, start)
-            if mature + leave < ending:
-                ending, ending_of = mature + leave, (k, start)
+        sums, none, leave, least_leave = self._sums, self._none, self._leave, self._least_leave
+        self._best, self._starts = best, starts = self._best[:], self._starts[:]
+        past, durations = self._past, self._least
+        past.append((best, starts))
+        row, ends = past[-durations[0]]
+        rows = [row] * none if self._alike else [past[-ticks][0] for ticks in durations[:none]]
+        types_costs = map(add, costs, self._stay) if self._stays else costs
+        base, changes, self._next.from_none = self._changes()
+        first = ending = within = least = _NEVER
+        first_in = ending_in = least_in = 0
+        # Types alone: numbers and changes are of no more.
+        for k, change, total, cost, own, row in zip(range(none), changes, sums, types_costs, best, rows, strict=False):
+            begun = base + change - total
+            total += cost
+            sums[k] = total
+            if begun < own:
+                own = best[k] = begun
+                starts[k] = tick
+            own += total
+            if own < least:
+                least, least_in = own, k
+            mature = row[k] + total
+            # Most types are too dear for either.
+            if mature < within:
+                if mature < first:
+                    first, first_in = mature, k
+                if mature + leave[k] < ending:
+                    ending, ending_in = mature + leave[k], k
+                within = first if first > ending - least_leave else ending - least_leave
         total = sums[none]
-        begun = ending_cost - total
+        begun = self._costs[2] - total
         if begun < best[none]:
             best[none], starts[none] = begun, tick
-        waiting = self._waiting[none]
-        waiting.append((best[none], starts[none]))
-        mature, start = waiting.popleft()
         sums[none] = total = total + costs[none] + self._stay[none]
-        self.newest = (none, starts[none]) if best[none] + total < least else least_of
-        sources.from_none = from_none
-        self.sources.append(sources)
-        self._costs = first, mature + total, ending
-        self._next = _Sources(first_of, (none, start), ending_of, 0)
+        self.newest = (none, starts[none]) if best[none] + total < least else (least_in, starts[least_in])
+        row, none_ends = past[-durations[none]]
+        self._costs = first, row[none] + total, ending
+        self.sources.append(self._next)
+        if self._alike:
+            first_of, ending_of = (first_in, ends[first_in]), (ending_in, ends[ending_in])
+        else:
+            first_of, ending_of = ((k, past[-durations[k]][1][k]) for k in (first_in, ending_in))
+        self._next = _Sources(first_of, (none, none_ends[none]), ending_of, 0)
+
+    def _changes(self) -> tuple[int, Sequence[int], int]:
+        """Return what types cost that begin now, each beyond the first number, and the bits of those that do so after
+        none.
+        """
+        first, none, _ = self._costs
+        gap = none - first
+        if gap < self._least_gap:
+            return none, self._enter, -1
+        if gap >= self._largest_gap:
+            return first, self._direct, 0
+        least = [min(gap + enter, direct) for enter, direct in zip(self._enter, self._direct, strict=True)]
+        return first, least, sum(1 << k for k, own in enumerate(self._gaps) if gap < own)
 
     def back(self, tick: int) -> tuple[int, int]:
         """Return the state of an earlier tick on the cheapest path to the newest, and when its segment began."""
@@ -161,12 +186,15 @@ class Decoder:
         """Take the scores of the next tick, and whether its frame is refused (of models with a refusal)."""
         paths = self._paths
         paths.step(self._model.costs(lanes, refused))
-        tick = paths.tick - self._lag
-        state, start = paths.back(tick) if tick >= 0 else (self._model.n_types, 0)
+        tick, newest, begun = paths.tick - self._lag, *paths.newest
+        if tick < 0:
+            state, start = self._model.n_types, 0
+        else:
+            state, start = (newest, begun) if begun <= tick else paths.back(tick)
         if state != self._state:
             self._segment += state != self._model.n_types
             self._state = state
-        return Decoded(state, self._segment, tick, start, *paths.newest)
+        return Decoded(state, self._segment, tick, start, newest, begun)
 
     def finish(self) -> list[int]:
         """Return the states of the ticks that the lag still holds back, on the cheapest path to the newest."""

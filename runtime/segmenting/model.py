@@ -12,6 +12,7 @@ The first segment begins for nothing.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Annotated, Self
 
 from msgspec import Meta, Struct
@@ -128,11 +129,18 @@ class SegmentModel(Struct, frozen=True, forbid_unknown_fields=True, omit_default
 
     def costs(self, lanes: Sequence[int], refused: bool = False) -> list[int]:
         """Return what a frame costs each of the K + 1 states; `lanes` are its `n_lanes` scores, from any zero."""
-        best, shift, gain, most, extra = max(lanes), self.shift, self.gain, self.most, self.refusal
-        found = [cost if (cost := (best - lane >> shift) * gain >> 8) < most else most for lane in lanes]
+        best, shift, extra = max(lanes), self.shift, self.refusal
+        table = _costs(shift, self.gain, self.most)
+        found = [table[best - lane >> shift] for lane in lanes]
         if extra is None:
             return found
         return [*(cost + extra for cost in found), 0] if refused else [*found, extra]
+
+
+@lru_cache
+def _costs(shift: int, gain: int, most: int) -> bytes:
+    """Return what a frame costs a state for each difference of scores, which are of 16 bits, after the shift."""
+    return bytes(min(behind * gain >> 8, most) for behind in range(1 << 16 - shift))
 
 
 def gain_of(scale: float, temperature: float, steps: int = STEPS) -> tuple[int, int]:

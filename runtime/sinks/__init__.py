@@ -3,11 +3,12 @@
 from ..published import JointAngles
 from ..task import ProgressLine
 from .base import SINKS, Fanout, Sink, SinkError, SinkKind, SinkPlace, SinkReport, open_sink
-from .jsonl import HealthLine, JsonLines, Line
+from .jsonl import DetailLine, HealthLine, JsonLines, Line
 from .sockets import SocketLines
 
 __all__ = [
     "SINKS",
+    "DetailLine",
     "Fanout",
     "HealthLine",
     "JointAngles",

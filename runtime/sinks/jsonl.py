@@ -18,6 +18,7 @@ from typing import BinaryIO
 
 from msgspec import json, structs
 
+from ..detail import Detail
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress, ProgressLine
@@ -29,6 +30,13 @@ class Line(LiveGrasp, frozen=True, tag_field="kind", tag="grasp"):
 
     preshape: Preshape | None = None
     angles: JointAngles | None = None
+
+
+class DetailLine(Detail, frozen=True, tag_field="kind", tag="detail"):
+    """The fields of `Detail`, the `number` of the line of a grasp that it belongs to, and the build's checksum."""
+
+    number: int = 0
+    build: str = ""
 
 
 class HealthLine(HealthReport, frozen=True, tag_field="kind", tag="health"):
@@ -46,6 +54,11 @@ def encode(grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | No
     """
     parts = (_GRASP, _encode(grasp)[1:-1], _PRESHAPE, _encode(preshape), _ANGLES, _encode(angles), b"}\n")
     return b"".join(parts)
+
+
+def encode_detail(detail: Detail, number: int, build: str) -> bytes:
+    """Return a detail's line, its newline included."""
+    return _encode(DetailLine(**structs.asdict(detail), number=number, build=build)) + b"\n"
 
 
 def encode_health(report: HealthReport) -> bytes:

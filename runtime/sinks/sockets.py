@@ -19,15 +19,20 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from thenar.drivers.errors import SettingError
 
+from ..detail import Details
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
 from ..task import Progress
 from .base import Sink, SinkError, SinkKind, SinkReport
-from .jsonl import Outlet, encode, encode_health, encode_task
+from .jsonl import Outlet, encode, encode_detail, encode_health, encode_task
+
+if TYPE_CHECKING:
+    from ..build import Build
+    from ..live.recogniser import Moment
 
 _BACKLOG = 16
 MAX_READERS = 32
@@ -41,6 +46,8 @@ SEND_BUFFER = 16384
 _LEVEL_S = 1.0
 # Let in at one frame, so that a crowd at the door does not hold it up.
 _KNOCKS = 16
+# What people look at changes no faster.
+_DETAIL_US = 10_000
 _HERE = frozenset({"127.0.0.1", "::1"})
 
 
@@ -48,7 +55,10 @@ class SocketLines(Sink):
     """Serves the readers of a listening socket, which it takes over; `tidy` is called once, at the end."""
 
     __slots__ = (
+        "_build",
         "_clock",
+        "_detail_us",
+        "_details",
         "_dropped",
         "_error",
         "_knocks",
@@ -66,8 +76,9 @@ class SocketLines(Sink):
         where: str,
         tidy: Callable[[], None] = lambda: None,
         clock: Callable[[], float] = monotonic,
+        detail: bool = False,
     ) -> None:
-        """Serve `listener`; `clock` gives seconds."""
+        """Serve `listener`; `clock` gives seconds. With `detail`, readers also get what grasps came of."""
         listener.setblocking(False)
         self._listener = listener
         self._knocks = select.poll()
@@ -78,6 +89,13 @@ class SocketLines(Sink):
         self._readers: list[_Reader] = []
         self._sent = self._lost = self._dropped = 0
         self._error = ""
+        self._details: Details | None = None
+        self._build, self._detail_us = "" if detail else None, 0
+
+    def begin(self, build: "Build") -> None:
+        """Learn which build recognises."""
+        if self._build is not None:
+            self._build, self._details = build.manifest.checksum, Details(build)
 
     @property
     def address(self) -> tuple[str, int] | str:
@@ -90,6 +108,13 @@ class SocketLines(Sink):
         self._let_in()
         if self._readers:
             self._send_all(encode(grasp, preshape, angles))
+
+    def moment(self, moment: "Moment") -> None:
+        """Give every reader the line of what the grasp came of, at most a hundred times a second."""
+        details, grasp = self._details, moment.grasp
+        if details is not None and self._readers and not 0 <= grasp.time_us - self._detail_us < _DETAIL_US:
+            self._detail_us = grasp.time_us
+            self._send_all(encode_detail(details(moment), grasp.number, self._build or ""))
 
     def health(self, report: HealthReport) -> None:
         """Give every reader the report's line."""
@@ -230,7 +255,7 @@ def _host(reader: socket.socket, peer: Any) -> str:
     return str(address if address.version == 4 else ipaddress.ip_network((address, 64), strict=False))
 
 
-def open_unix(path: str, clock: Callable[[], float] = monotonic) -> SocketLines:
+def open_unix(path: str, clock: Callable[[], float] = monotonic, *, detail: bool = False) -> SocketLines:
     """Return lines on a Unix socket at `path`.
 
     The socket that a process left behind when it was killed is replaced; anything else that is there stays. Raises
@@ -254,7 +279,7 @@ def open_unix(path: str, clock: Callable[[], float] = monotonic) -> SocketLines:
         if _same(path, made):
             Path(path).unlink()
 
-    return SocketLines(listener, where, tidy, clock)
+    return SocketLines(listener, where, tidy, clock, detail)
 
 
 def _make_way(path: str, where: str) -> None:
@@ -294,7 +319,9 @@ def _unix_error(where: str, reason: OSError) -> Exception:
     return SinkError(f"{where} cannot be opened: {reason.strerror}{hint}")
 
 
-def open_tcp(place: str, *, public: bool = False, clock: Callable[[], float] = monotonic) -> SocketLines:
+def open_tcp(
+    place: str, *, public: bool = False, clock: Callable[[], float] = monotonic, detail: bool = False
+) -> SocketLines:
     """Return lines on a TCP port: "127.0.0.1:7777", "localhost:7777", "[::1]:7777" or, on 127.0.0.1, "7777".
 
     Whoever can connect reads along; so only addresses of this machine itself are taken unless `public`. Port 0 is any
@@ -306,7 +333,7 @@ def open_tcp(place: str, *, public: bool = False, clock: Callable[[], float] = m
         raise SettingError(
             f"{where}: other machines could read along there: take 127.0.0.1, or write tcp-public:{place} to let them"
         )
-    return SocketLines(_listener(family, address, where), where, clock=clock)
+    return SocketLines(_listener(family, address, where), where, clock=clock, detail=detail)
 
 
 def listen(place: str, where: str, example: str) -> socket.socket:
@@ -347,18 +374,30 @@ def resolve(place: str, where: str, example: str) -> tuple[socket.AddressFamily,
     return family, address  # type: ignore[return-value]
 
 
+_DETAIL = ("detail",)
 MEMBER = (
     SinkKind(
-        "unix", "PATH", "JSON lines to whoever connects to a socket", lambda where: open_unix(where.place), rank=1
+        "unix",
+        "PATH",
+        "JSON lines to whoever connects to a socket",
+        lambda where: open_unix(where.place, detail="detail" in where.options),
+        _DETAIL,
+        rank=1,
     ),
     SinkKind(
-        "tcp", "127.0.0.1:PORT", "the same on a port of this machine", lambda where: open_tcp(where.place), rank=2
+        "tcp",
+        "127.0.0.1:PORT",
+        "the same on a port of this machine",
+        lambda where: open_tcp(where.place, detail="detail" in where.options),
+        _DETAIL,
+        rank=2,
     ),
     SinkKind(
         "tcp-public",
         "ADDRESS:PORT",
         "the same, which other machines may read",
-        lambda where: open_tcp(where.place, public=True),
+        lambda where: open_tcp(where.place, public=True, detail="detail" in where.options),
+        _DETAIL,
         rank=3,
     ),
 )

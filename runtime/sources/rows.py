@@ -18,7 +18,7 @@ from .base import SHORTEST_US, Source, SourceKind, counted, debouncer_of, pause_
 
 # Codes of joints are bytes, as a CyberGlove's; 0 is a joint of which nothing came. A taxel's whole numbers are its
 # codes; numbers that lie closer are coded in so many steps.
-_JOINT_CODES = (1, 255)
+JOINT_CODES = (1, 255)
 _TAXEL_STEPS, _FEWEST_STEPS, _MOST_STEPS = 4095, 255, 65_534
 _UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0}
 # A clock that goes back further, or ahead of ours by more, has begun anew.
@@ -171,7 +171,7 @@ class RowSource(Source):
             for place, switch in read.switches
         ]
         first = len(wiring.switches)
-        self._joints = [_Grid(limits, *_JOINT_CODES) for limits in wiring.joints.values()]
+        self._joints = [_Grid(limits, *JOINT_CODES) for limits in wiring.joints.values()]
         self._first_joint, self._first_taxel = first, first + len(self._joints)
         self._grids = [_Grid(limits, 0, steps_of(limits)) for limits in wiring.taxels.values()]
         self._taxel_names, self._everything = tuple(wiring.taxels), harness.taxel_names
@@ -309,16 +309,17 @@ class RowSource(Source):
 class _Grid:
     """The grid that numbers of a range are coded on: the code of its one end is `first`, of the other `last`."""
 
-    __slots__ = ("_factor", "_low", "first", "last")
+    __slots__ = ("_low", "_span", "first", "last")
 
     def __init__(self, limits: Range, first: int, last: int) -> None:
         self._low, high = limits
-        self.first, self.last = first, last
-        self._factor = (last - first) / (high - self._low)
+        self._span, self.first, self.last = high - self._low, first, last
 
     def code(self, value: float) -> int:
-        """Return the code of a number, beyond first and last where it is out of the range."""
-        far = (value - self._low) * self._factor
+        """Return the code of a number, beyond first and last where it is out of the range. Of whole numbers in a range
+        with whole ends it is exact: divided last, and rounded once.
+        """
+        far = (value - self._low) * (self.last - self.first) / self._span
         return self.first + round(min(max(far, -1e6), 1e6))
 
 
@@ -333,7 +334,7 @@ def steps_of(limits: Range) -> int:
 
 def joint_number(limits: Range, code: int) -> float:
     """Return a number that a joint's range codes as `code`, 1 to 255."""
-    first, last = _JOINT_CODES
+    first, last = JOINT_CODES
     return limits[0] + (code - first) * (limits[1] - limits[0]) / (last - first)
 
 

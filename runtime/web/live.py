@@ -3,7 +3,6 @@
 In the loop of the run a moment costs a reference or two; its text is made on the server's thread, when a page is open.
 """
 
-import math
 from collections import deque
 from collections.abc import Sequence
 from functools import partial
@@ -14,7 +13,7 @@ from typing import Self
 import msgspec
 
 from ..build import Build
-from ..frames import Mask
+from ..detail import Details
 from ..glove import Glove
 from ..hand import load_hand
 from ..harness.wiring import Harness
@@ -150,21 +149,12 @@ class Past:
 
 
 class FrameText:
-    """Makes the text of a moment: the fields of its grasp, preshape and angles as sinks have them, and
-
-    closed         a character a kept switch, "1" closed and "0" open, and so `unread`: which were left unread
-    joints         the value of each joint of the build, in its unit; null while they are lost
-    taxels         how far each taxel that was read and is calibrated is pressed, by name: 0 at rest, 1 at its press
-    probabilities  of every answer of the build, in its order; null while too little can be read
+    """Makes the text of a moment: the fields of its grasp, preshape and angles as sinks have them, those of `Detail`,
+    and `taxels`: how far each taxel that was read and is calibrated is pressed, by name: 0 at rest, 1 at its press.
     """
 
     def __init__(self, build: Build, harness: Harness) -> None:
-        self._switches, self._scale = build.tables.n_switches, build.tables.scale
-        self._none_leads = None if build.rejector is None else build.none_leads
-        self._joints = [
-            (joint.value_a, joint.code_a, (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a))
-            for joint in build.manifest.joints
-        ]
+        self._details = Details(build)
         calibration = calibration_of(harness.taxel_settings)
         self._taxels = [None if calibration is None else calibration.line(name) for name in harness.taxel_names]
 
@@ -174,21 +164,10 @@ class FrameText:
         more = {
             "preshape": moment.preshape,
             "angles": moment.angles,
-            "closed": self._bits(0 if frame is None else frame.closed),
-            "unread": self._bits(0 if frame is None else frame.unread),
-            "joints": None if moment.codes is None else self._values(moment.codes),
             "taxels": {} if frame is None or frame.taxels is None else self._pressed(frame.taxels),
-            "probabilities": None if not moment.scores else self._probabilities(moment.scores, moment.refused),
         }
-        return b"".join((_FRAME, _encode(moment.grasp)[1:-1], b",", _encode(more)[1:]))
-
-    def _bits(self, mask: Mask) -> str:
-        return f"{mask:0{self._switches}b}"[::-1] if self._switches else ""
-
-    def _values(self, codes: Sequence[int]) -> list[float]:
-        return [
-            round(value + (code - at) * step, 2) for code, (value, at, step) in zip(codes, self._joints, strict=True)
-        ]
+        parts = map(_inside, (moment.grasp, self._details(moment), more))
+        return _FRAME + b",".join(parts) + b"}"
 
     def _pressed(self, codes: Sequence[int | None]) -> dict[str, float]:
         return {
@@ -197,11 +176,6 @@ class FrameText:
             if code is not None and line is not None
         }
 
-    def _probabilities(self, scores: Sequence[int], refused: bool) -> list[float]:
-        best = max(scores)
-        if self._none_leads is not None:
-            scores = (*scores, best + self._none_leads[refused])
-            best = max(scores)
-        powers = [math.exp((score - best) / self._scale) for score in scores]
-        total = sum(powers)
-        return [round(power / total, 4) for power in powers]
+
+def _inside(fields: object) -> bytes:
+    return _encode(fields)[1:-1]

@@ -1,7 +1,8 @@
 """The page of a run elsewhere: what a run publishes on a socket (`--sink tcp:...` or `unix:...`), read and shown.
 
-The stream holds what was recognised and how the glove fares. It does not hold single switches, joints or the
-probabilities of other types, so the page leaves them out.
+The stream holds what was recognised and how the glove fares. What that came of, switches, joints and the probabilities
+of all types, is in it where the sink was asked for it (`?detail`) and its build is at hand here; otherwise the page
+leaves that out.
 """
 
 import re
@@ -17,8 +18,10 @@ import msgspec
 from thenar.drivers.errors import DeviceError, SettingError
 
 from ..build import load_manifest
+from ..detail import Detail
+from ..hand import load_hand
 from ..names import shortened
-from ..sinks.jsonl import HealthLine, Line
+from ..sinks.jsonl import DetailLine, HealthLine, Line
 from ..task import ProgressLine
 from .live import Past
 from .server import Server, message
@@ -27,7 +30,9 @@ RETRY_S, _WAIT_S = 1.0, 0.2
 # More than any line of a run; of a sender that is none, no more is kept.
 LONGEST_LINE = 1 << 20
 _TCP = re.compile(r"tcp:(?:\[([^][]+)\]|([^][:]+)):([0-9]{1,5})")
-_decode = msgspec.json.Decoder(Line | HealthLine | ProgressLine).decode
+_decode = msgspec.json.Decoder(Line | DetailLine | HealthLine | ProgressLine).decode
+# So long after the last detail a stream counts as one with details: moments without are left out.
+_DETAILED_US = 1_000_000
 
 
 class Source(msgspec.Struct, frozen=True):
@@ -48,7 +53,7 @@ class StreamMonitor:
     address, token
         As for `Server`.
     build : Path, optional
-        The folder of the build that runs there: all of its types are listed from the beginning.
+        The folder of the build that runs there: its types, switches and joints, and the hand that is drawn.
 
     Attributes
     ----------
@@ -65,11 +70,10 @@ class StreamMonitor:
 
     def __init__(self, where: str, address: str, *, token: str | None, build: Path | None = None) -> None:
         self._place, self._where = _place(where), where
-        grasps = () if build is None else load_manifest(build).answers
-        self._first = message(
-            "build", name=where, grasps=grasps, switches=(), joints=(), preshapes=True, records=False, partial=True
-        )
+        self._build, self._first = _first(where, build)
         self._past = Past()
+        self._line: Line | None = None
+        self._detailed_us: int | None = None
         self._source = Source(where, connected=False, error="not connected yet")
         self.server = Server("live", address, token=token, hello=self._hello)
 
@@ -107,11 +111,27 @@ class StreamMonitor:
             raise DeviceError(f"what comes is no stream of thenar: {shortened(str(wrong), 120)}") from None
         if isinstance(line, Line):
             self._past.add(line)
-            self.server.publish("frame", partial(message, "frame", line))
+            self._line = line
+            if self._detailed_us is None or not 0 <= line.time_us - self._detailed_us < _DETAILED_US:
+                self.server.publish("frame", partial(message, "frame", line))
+        elif isinstance(line, DetailLine):
+            self._detail(line)
         elif isinstance(line, HealthLine):
             self.server.publish("health", partial(message, "health", line))
         else:
             self.server.publish("task", partial(message, "task", text=line.text))
+
+    def _detail(self, detail: DetailLine) -> None:
+        """Show the newest moment with what it came of, if that is of the build at hand."""
+        if not self._build:
+            return
+        if detail.build != self._build:
+            raise DeviceError("another build runs there than --build names: name that one, or none")
+        line = self._line
+        if line is not None and line.number == detail.number:
+            self._detailed_us = line.time_us
+            more = {name: getattr(detail, name) for name in Detail.__struct_fields__}
+            self.server.publish("frame", partial(message, "frame", line, taxels={}, **more))
 
     def _tell(self, source: Source) -> None:
         self.server.publish("source", message("source", source))
@@ -120,7 +140,18 @@ class StreamMonitor:
             self._say(source)
 
     def _hello(self) -> Sequence[bytes]:
-        return self._first, self._past.text()
+        return (*self._first, self._past.text())
+
+
+def _first(where: str, folder: Path | None) -> tuple[str, tuple[bytes, ...]]:
+    """Return the checksum of the build in a folder, "" of none, and what a page is told of it first."""
+    known = {"name": where, "preshapes": True, "records": False}
+    if folder is None:
+        return "", (message("build", known, grasps=(), switches=(), joints=(), partial=True),)
+    manifest = load_manifest(folder)
+    names = {"switches": [each.name for each in manifest.switches], "joints": [each.name for each in manifest.joints]}
+    build = message("build", known, grasps=manifest.answers, partial=False, **names)
+    return manifest.checksum, (build, message("hand", load_hand(folder, manifest)))
 
 
 def _place(where: str) -> str | tuple[str, int]:

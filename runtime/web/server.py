@@ -164,6 +164,9 @@ class Server:
                 for task in (closing, *working):
                     task.cancel()
                 await asyncio.gather(*working, return_exceptions=True)
+                # How it ended is the last that a page shows.
+                last = {topic: _text(made) for topic, made in self._latest.copy().items()}
+                await asyncio.gather(*(page.send(last, self._loop.time()) for page in self._pages))
                 await asyncio.gather(*(page.close(WSCloseCode.GOING_AWAY) for page in self._pages))
                 await self._server.shutdown(_CLOSING_S)
 

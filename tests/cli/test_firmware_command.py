@@ -180,7 +180,18 @@ def test_firmware_is_replaced_when_asked_and_the_users_files_stay(thenar: Thenar
         (("--target", "pdp11", "-o", "made"), "there is no target 'pdp11': choose one of host"),
         (("--target", "avr328p", "--mode", "scan", "-o", "made"), "the mode scan needs a board.toml"),
         (("--target", "avr328p", "--mode", "scan", "--measure"), "A board that only scans holds no classifier"),
-        (("--target", "avr328p", "--calibration", "{board}", "-o", "made"), "--calibration is for --mode glove"),
+        (
+            ("--target", "avr328p", "--mode", "scan", "--calibration", "{board}", "-o", "made"),
+            "a board that scans reads no CyberGlove",
+        ),
+        (
+            ("--target", "avr328p", "--mode", "glove", "--glove", "{board}", "-o", "made"),
+            "--glove is for --mode classify",
+        ),
+        (
+            ("--target", "avr328p", "--calibration", "{board}", "--glove", "{board}", "-o", "made"),
+            "leave --calibration out, or --glove",
+        ),
         (("--target", "avr328p", "--board", "{board}", "-o", "made"), "the mode classify reads no board"),
         (
             ("--target", "avr2560", "--mode", "scan", "--board", "{board}", "-o", "made"),

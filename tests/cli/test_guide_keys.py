@@ -30,6 +30,7 @@ def terminal() -> Iterator[tuple[int, int]]:
         (b" a", [A, A]),
         (b"rR", [R, R]),
         (b"q", [Q]),
+        (b"usp", [Key.UNDO, Key.SKIP, Key.PAUSE]),
         (b"xyz1", []),
         (b"\x1b[A\x1b[1;5C\x1bOP", []),
         (b"\x1b[Ar", [R]),

@@ -6,6 +6,7 @@ import re
 import resource
 import select
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -136,6 +137,13 @@ def hands(scanner: EmulatedScanner, glove: EmulatedCyberGlove) -> None:
     scanner.set(0b0101)
 
 
+def finished(terminal: Terminal) -> tuple[int, str]:
+    """Finish a collection of which no trial is left."""
+    terminal.until(rb"no trial is left.*?Enter: finish")
+    terminal.press(b"\r")
+    return terminal.finish()
+
+
 def reviewed(terminal: Terminal, number: int) -> None:
     """Wait until this trial's grasp is there to judge; the countdown begins again while devices are on their way."""
     screen = rb"%d of 4: (?:(?!of 4: ).)*?(not captured: |: keep it)" % number
@@ -150,7 +158,7 @@ def test_a_whole_collection_becomes_a_set(folder: Path, start: Start, scanner: E
     for number in (1, 2, 3, 4):
         reviewed(terminal, number)
         terminal.press(b"\r")
-    code, said = terminal.finish()
+    code, said = finished(terminal)
     assert code == 0, said
     assert "set.grasps: 4 grasps; 4 of 4 trials are done" in said
     grasp_set = GraspSet.load(folder / "set.grasps")
@@ -178,7 +186,7 @@ def test_after_a_kill_the_same_command_goes_on_where_it_was(folder: Path, start:
     reviewed(first, 2)
     os.killpg(first.process.pid, signal.SIGKILL)
     first.process.wait()
-    assert read_journal(folder / "set.mcap").accepted == {1}
+    assert read_journal(folder / "set.mcap").accepted == (1,)
     assert not (folder / "set.grasps").exists()
 
     second = start()
@@ -188,7 +196,7 @@ def test_after_a_kill_the_same_command_goes_on_where_it_was(folder: Path, start:
     for number in (2, 3, 4):
         reviewed(second, number)
         second.press(b"\r")
-    code, text = second.finish()
+    code, text = finished(second)
     assert code == 0, text
     assert "set.grasps: 4 grasps; 4 of 4 trials are done" in text
     assert GraspSet.load(folder / "set.grasps").trials.tolist() == [1, 2, 3, 4]
@@ -246,6 +254,61 @@ def test_redone_and_left_is_what_was_accepted(folder: Path, start: Start, scanne
     assert code == 0, said
     assert "1 of 4 trials are done; the same command goes on" in said
     assert len(GraspSet.load(folder / "set.grasps")) == 1
+
+
+def test_a_trial_is_undone_another_skipped_and_a_pause_is_one(
+    folder: Path, start: Start, scanner: EmulatedScanner
+) -> None:
+    terminal = start("--seed", "5", "--no-none")
+    terminal.until(rb"s: skip this one")
+    terminal.press(b"s")
+    terminal.until(rb"2 of 4: .*?u: undo the last")
+    terminal.press(b"\r")
+    reviewed(terminal, 2)
+    terminal.press(b"\r")
+    reviewed(terminal, 3)
+    scanner.set(0b0001)
+    # The second was a mistake, and so is the third.
+    terminal.press(b"u")
+    reviewed(terminal, 2)
+    terminal.press(b"\r")
+    reviewed(terminal, 3)
+    os.killpg(terminal.process.pid, signal.SIGKILL)
+    terminal.process.wait()
+    assert read_journal(folder / "set.mcap").accepted == (2,)
+
+    again = start()
+    again.until(rb"2 of 4: .*?Enter: start the countdown")
+    again.press(b"\r")
+    # The skipped one is asked for again.
+    reviewed(again, 2)
+    again.press(b"\r")
+    again.until(rb"p: pause")
+    again.press(b"p")
+    again.until(rb"paused; nothing is recorded meanwhile.*?Enter: go on")
+    again.press(b"q")
+    code, said = again.finish()
+    assert code == 0, said
+    grasp_set = GraspSet.load(folder / "set.grasps")
+    assert grasp_set.trials.tolist() == [2, 1]
+    assert grasp_set.switches.tolist() == [[True, False, False]] * 2
+
+
+def test_a_port_without_anybody_at_its_other_end_is_no_device(folder: Path) -> None:
+    (folder / "glove.toml").write_text(
+        f'name = "bench"\n[[stream]]\nport = "unix:{folder}/rows"\nswitches = ["a", "b"]\n'
+    )
+    options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--objects", folder / "objects.toml"]
+    options += ["--subject", "A", "-o", folder / "set.grasps"]
+    command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
+    with socket.socket(socket.AF_UNIX) as silent:
+        silent.bind(str(folder / "rows"))
+        silent.listen()
+        done = subprocess.run(command, stdin=subprocess.PIPE, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 2
+    assert "nothing came in 3 s; nothing is recorded" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not list(folder.glob("set.*"))
 
 
 def test_a_full_disk_ends_it_with_a_sentence_and_room_lets_it_go_on(folder: Path, start: Start) -> None:

@@ -92,6 +92,8 @@ def test_a_reader_that_goes_away_leaves_no_traceback(set_file: Path, build_folde
         ("set.grasps", "--error-rate", ("0.1",)),
         ("set.grasps", "--lag-ms", ("100",)),
         ("set.grasps", "--change-while-held", ()),
+        ("run.mcap", "--web", ()),
+        ("set.grasps", "--web", ("127.0.0.1:0",)),
         ("--glove", "--change-while-held", ()),
     ],
 )

@@ -80,7 +80,7 @@ def test_firmware_is_compiled_and_held_against_python(
     tool("gcc")
     done = thenar("verify", build_folder, set_file, "--firmware", "host")
     assert done.returncode == 0, done.stderr
-    assert "host, every frame from nothing: every score and grasp type of " in done.stdout
+    assert "host, every frame from nothing: every score, grasp type, margin and probability of " in done.stdout
     assert "the build carries the firmware that thenar makes of it now" in done.stdout
     found = json.loads(thenar("verify", build_folder, set_file, "--firmware", "host", "--json").stdout)
     checks = found["firmware"]["checks"]
@@ -111,12 +111,13 @@ def test_firmware_for_what_there_is_not_is_refused_with_what_there_is(
 
 
 def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[str]) -> None:
-    first = Difference("row 3", ("s1",), (7, 8), "cup", (5, 4), "pen", (5, 6))
+    first = Difference("row 3", ("s1",), (7, 8), "cup", (5, 4), "pen", (5, 6), (1, 40000), (1, 40001))
     check = TargetCheck(
         part="cortex-m4",
         layout="",
         answer="update",
         missing=False,
+        shares=True,
         frames=10,
         differing=2,
         first=first,
@@ -132,8 +133,8 @@ def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[s
         "  cortex-m4, every frame from the one before: 2 of 10 frames DIFFER; the first:",
         "    3 of the grasp types have ANOTHER NAME",
         "    row 3: closed s1; codes 7 8",
-        "    Python: cup, scores 5 4",
-        "    compiled: pen, scores 5 6",
+        "    Python: cup, scores 5 4, margin 1, probability 40000 of 65535",
+        "    compiled: pen, scores 5 6, margin 1, probability 40001 of 65535",
         "  the build carries no firmware",
     ]
     assert verdict(found).endswith("a fault of thenar or of the compiler: report it, with the first frame shown")

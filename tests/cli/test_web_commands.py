@@ -205,12 +205,14 @@ def test_monitor_shows_a_run_elsewhere(
     where = f"unix:{tmp_path}/grasps"
     monitor = start("monitor", where, "--build", build_folder, "--web", "127.0.0.1:0")
     monitor.until("cannot be opened")
-    run = start("run", build_folder, "--glove", glove, "--web", "127.0.0.1:0", "--sink", where, "--status")
+    run = start("run", build_folder, "--glove", glove, "--web", "127.0.0.1:0", "--sink", f"{where}?detail", "--status")
     monitor.until(f"{where}: connected")
     with monitor.page() as live:
         assert told(live, "build")["grasps"] == ["cup", "pen", "rod", "none"]
         assert told(live, "frame")["grasp"] == "unknown"
         assert told(live, "health")["devices"][0]["name"].startswith("scanner")
+        detailed = told(live, "frame", lambda frame: "closed" in frame)
+        assert (detailed["closed"], detailed["joints"], detailed["probabilities"]) == (5 * "0", None, None)
         ask(live, do="record")
         assert told(live, "refused")["why"] == "this page only shows"
         assert run.end() == 0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.firmware.board import parse_board
-from thenar.compiler.firmware.board_files import board_files, board_makefile, config_of, readings, switches_of
+from thenar.compiler.firmware.board_files import board_files, config_of, readings, switches_of, whole_folder
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.protocol import decided_files, protocol_files
@@ -117,7 +117,7 @@ def files_of(part: str, text: str, mode: Mode, joints: tuple[str, ...]) -> dict[
         files |= classifier_files("hand", manifest, layout, avr=True)
     if board.early_exit:
         files |= decided_files("hand", tables, GRASPS, switches_of(readings(board, SWITCHES, tables)))
-    return files | {"Makefile": board_makefile("hand", board, mode, files)}
+    return whole_folder("hand", board, mode, files)
 
 
 def written(files: dict[str, str], folder: Path) -> Path:

@@ -1,6 +1,6 @@
 """Say what became of mutmut's mutants, module by module, in the staged copy that is the working directory.
 
-    python report.py docs/mutants.md
+    python report.py tests/mutants/README.md
 
 Survivors are listed by the line that they change, those that the page does not explain first marked as such. Ends with
 1 if less than 95 % were caught.

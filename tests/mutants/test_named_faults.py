@@ -112,8 +112,8 @@ FAULTS = (
     Fault(
         "a code at a threshold goes right, in the build",
         "runtime/scores.py",
-        "sum(map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes)))",
-        "sum(map(getitem, self.joint_rows, map(__import__('bisect').bisect_right, self.thresholds, codes)))",
+        "self._rows[bisect_left(self._thresholds, code)]",
+        "self._rows[__import__('bisect').bisect_right(self._thresholds, code)]",
         "tests/runtime/test_scorer.py",
     ),
     Fault(

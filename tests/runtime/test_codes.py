@@ -1,13 +1,12 @@
-import numpy as np
+from fractions import Fraction
+
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from thenar.compiler.recordings.errors import RecordingError
-from thenar.compiler.recordings.graspset import Joint
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.errors import SettingError
-from thenar.runtime.calibration import CodeTables
+from thenar.runtime.calibration import CodeTables, codes_of_bytes
 from thenar.runtime.errors import FrameError
 from thenar.runtime.manifest import Calibration
 
@@ -27,20 +26,23 @@ def raw_joint(name: str) -> Calibration:
 
 
 @given(a=codes, b=codes, value_a=values, value_b=values, raw_a=raws, raw_b=raws, low=values, high=values)
-def test_a_live_byte_gets_the_code_that_an_imported_one_gets(
+def test_a_byte_gets_the_code_on_the_line_through_the_codes_of_the_two_points(
     a: int, b: int, value_a: float, value_b: float, raw_a: int, raw_b: int, low: float, high: float
 ) -> None:
-    assume(raw_a != raw_b)
-    try:
-        recorded = Joint("a", "deg", a, value_a, b, value_b)
-    except RecordingError:
-        assume(False)
-    sensor = SensorCalibration("a", raw_a, low, raw_b, high)
-    tables = CodeTables(
-        [joint("a", a, value_a, b, value_b)], ["a"], GloveCalibration(subject="anna", sensors=(sensor,))
-    )
-    expected = np.clip(recorded.code([sensor.value(raw) for raw in range(256)]), 0, 65535)
-    assert [tables.codes(bytes([raw]))[0] for raw in range(256)] == expected.tolist()
+    assume(raw_a != raw_b and a != b and value_a != value_b)
+    coded = joint("a", a, value_a, b, value_b)
+    calibration = GloveCalibration(subject="anna", sensors=(SensorCalibration("a", raw_a, low, raw_b, high),))
+    # In 2^-24 of a code.
+    step = (value_b - value_a) / (b - a)
+    assume(step)
+    ends = [a + (value - value_a) / step for value in (low, high)]
+    if max(map(abs, ends)) >= 2**20:
+        with pytest.raises(SettingError, match=r"far beyond|no number"):
+            codes_of_bytes(coded, calibration)
+        return
+    first, last = (Fraction(round(end * 2**24), 2**24) for end in ends)
+    line = [first + (last - first) * Fraction(raw - raw_a, raw_b - raw_a) for raw in range(256)]
+    assert codes_of_bytes(coded, calibration) == tuple(min(max(round(code), 0), 65535) for code in line)
 
 
 def test_joints_are_picked_by_name_wherever_they_stand_on_the_wire() -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from thenar.runtime.manifest import Rejection
 from thenar.runtime.rejection import Rejector, refused
@@ -46,10 +47,12 @@ def test_what_is_lost_is_refused_only_where_every_value_of_it_would_be(
 ) -> None:
     rejector, lanes = Rejector(rejection), [score + LANE_OFFSET for score in scores]
     best = scores.index(max(scores))
+    # Of what is not whole the score is not judged.
+    judging = Rejector(replace(rejection, least_scores=(-100,) * K)) if lost or joints else rejector
     sure = [number for number in range(S) if lost >> number & 1]
     states = [closed & ~lost | sum(1 << n for n in sure[:count]) for count in range(len(sure) + 1)]
     likely = [rejection.ranges[best][joint][0] if joints >> joint & 1 else code for joint, code in enumerate(codes)]
-    possible = [rejector.refuses(lanes, state, 0, likely) for state in states]
+    possible = [judging.refuses(lanes, state, 0, likely) for state in states]
     assert rejector.refuses(lanes, closed, lost, codes, lost_joints=joints) == all(possible)
 
 
@@ -59,7 +62,10 @@ def test_joints_and_scores_that_are_not_whole_are_not_judged(
 ) -> None:
     best, lanes = scores.index(max(scores)), [score + LANE_OFFSET for score in scores]
     found = Rejector(rejection).refuses(lanes, closed, 0, None, unread=unread)
+    narrow = Rejector(replace(rejection, ranges=((),) * K))
+    whole = narrow.refuses(lanes, closed, 0, [], unread=unread)
     fewest, most = rejection.closed[best]
     seen = (closed & ~unread).bit_count()
     beyond = seen > most or seen + unread.bit_count() < fewest
-    assert found == (beyond or (not unread and scores[best] < rejection.least_scores[best]))
+    assert found == beyond
+    assert whole == (beyond or (not unread and scores[best] < rejection.least_scores[best]))

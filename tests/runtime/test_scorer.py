@@ -128,3 +128,13 @@ def test_the_highest_code_there_is_is_a_code(make_tables: MakeTables) -> None:
     assert scorer.lanes(bits, [65535, 0, 0]) == scorer.lanes(bits, np.array([65535, 0, 0], np.uint16))
     with pytest.raises(FrameError, match="this frame has 65536"):
         scorer.lanes(bits, [65535, 65536, 0])
+
+
+def test_every_code_of_a_joint_has_the_row_of_its_bin_the_first_time_and_again(make_tables: MakeTables) -> None:
+    tables = make_tables(3, switches=0, joints=2)
+    scorer, codes = Scorer(tables), np.arange(0, 65536, 7)
+    bins = np.searchsorted(tables.thresholds[0], codes)
+    expected = tables.bias.astype(np.int64) + tables.joint_rows[0][bins] + tables.joint_rows[1][0]
+    for _ in range(2):
+        found = [scorer.lanes([], np.array([code, 0], np.uint16)) for code in codes]
+        assert np.array_equal(np.array(found) - LANE_OFFSET, expected)

@@ -3,7 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "harness.h"
+#include "fail.h"
 
 enum { MOST_CHIPS = 16, MOST_KEYS = 512, MOST_PORTS = 3, REGISTERS = 11 };
 

@@ -3,8 +3,9 @@
 from thenar.drivers.members import Members
 
 from .base import Target
+from .wired import Wired
 
-__all__ = ["TARGETS", "Target", "kinds", "timed"]
+__all__ = ["TARGETS", "Target", "Wired", "kinds", "timed", "wired"]
 
 TARGETS: Members[Target] = Members("firmware target", Target, __name__, "thenar.targets")
 
@@ -12,6 +13,11 @@ TARGETS: Members[Target] = Members("firmware target", Target, __name__, "thenar.
 def kinds() -> tuple[str, ...]:
     """Return the names of the kinds whose code can be run: those of `thenar verify --firmware`."""
     return tuple(dict.fromkeys(target.kind for target in TARGETS.values() if target.kind))
+
+
+def wired() -> dict[str, Wired]:
+    """Return the parts that firmware of a board is written for, by what board.toml calls them."""
+    return {target.part: target for target in TARGETS.values() if isinstance(target, Wired)}
 
 
 def timed() -> tuple[str, ...]:

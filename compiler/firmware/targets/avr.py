@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from ..costs import Cost
 from ..tools import AVR_COMPILER
-from .base import Mode, Target
+from .wired import Wired
 
 if TYPE_CHECKING:
     from ..classifier import Library
@@ -20,25 +20,16 @@ _EXACT = 0.005
 
 
 @dataclass(frozen=True, kw_only=True)
-class Avr(Target):
-    """An AVR, for whose pins firmware of a board is written as well.
+class Avr(Wired):
+    """An AVR. Its pins are those without crystal and reset.
 
-    pins      usable as inputs and outputs, as the data sheet calls them; without crystal and reset
-    uarts     the (RXD, TXD) pins of every UART
-    twi       the SDA and SCL pins
-    analog    the channels of its converter by name, with the pin each shares; "" for a channel without a digital pin
     jtag      pins that the JTAG interface holds until it is switched off
     avrdude   what avrdude calls it, and `programmer` the boot loader of the usual boards with it
     brown_out what its fuses should say of brown-out at its highest clock
     """
 
     avr: ClassVar[bool] = True
-    modes: ClassVar[tuple[Mode, ...]] = ("classify", "scan", "glove")
 
-    pins: tuple[str, ...]
-    uarts: tuple[tuple[str, str], ...]
-    twi: tuple[str, str]
-    analog: Mapping[str, str]
     jtag: tuple[str, ...]
     highest_hz: int
     avrdude: str

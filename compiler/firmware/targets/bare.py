@@ -156,7 +156,7 @@ def _counted(written: bytes, frames: "Frames", layout: "Layout", machine: Machin
 
     from ..probes import answers_from, names_in
 
-    size = 2 * len(layout.start) + 2
+    size = 2 * len(layout.start) + 6
     names, written = names_in(written, layout)
     if len(written) != 4 + (size + 4) * len(frames):
         raise FirmwareError(f"the program on {machine.name} answered {len(written)} bytes for {len(frames)} frames")

@@ -116,6 +116,10 @@ class Target:
         """Return path -> text of the classifier alone, as `run` takes it: in C, unless the target says otherwise."""
         return library.files
 
+    def said(self, library: "Library") -> str:
+        """Return what there is to say of what is written, a sentence without its end; "" if there is nothing."""
+        return ""
+
     def missing(self) -> str | None:
         """Return what keeps code from being compiled and run here, and what to install; None if nothing does."""
         return f"thenar has no simulator of {self.named}"

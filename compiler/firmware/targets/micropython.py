@@ -36,11 +36,14 @@ class MicroPython(Target):
         from ..words import answers_of, string
 
         name, folder = library.name, f"modules/thenar_{library.name}"
+        c_files = library.files | library.codes
         values = {
             "name": name,
             "upper": name.upper(),
             "opening": _opening(library),
-            "sources": [path for path in library.files if path.endswith(".c")],
+            "sources": [path for path in c_files if path.endswith(".c")],
+            "sensor_names": [string(sensor.name) for sensor in library.sensors.every],
+            "sensors": len(library.sensors.every),
             "grasps": [string(grasp) for grasp in library.names.grasps],
             "names": [string(each) for each in answers_of(library.names)],
             "switch_names": [string(switch.name) for switch in library.names.switches],
@@ -56,7 +59,7 @@ class MicroPython(Target):
         }
         return {
             **self.sources(library),
-            **{f"{folder}/{path}": text for path, text in library.files.items()},
+            **{f"{folder}/{path}": text for path, text in c_files.items()},
             **{f"{folder}/{path}": render(f"micropython/{of}.j2", **values) for of, path in made.items()},
             "README.md": render("micropython/README.md.j2", **values),
         }
@@ -84,6 +87,7 @@ class MicroPython(Target):
             "slopes": _lines((s.joint, s.low, s.high, s.gain, s.zero, tuple(s.row.tolist())) for s in tables.slopes),
             "pairs": _lines((*pair.joints, tables.n_joints + 2 * n) for n, pair in enumerate(tables.pairs)),
             "powers": _lines(POWERS),
+            **_sensor_values(library),
             "softmax": Softmax(tables.scale),
         }
         if (rejection := names.rejection) is not None:
@@ -129,6 +133,28 @@ class MicroPython(Target):
         with workshop({**files, "main.py": main, "frames": with_lost(frames, lost).tobytes()}) as folder:
             call([*_interpreter(), "main.py"], folder)
             return answers_in((folder / "answers").read_bytes(), frames, layout)
+
+
+def _sensor_values(library: "Library") -> dict[str, object]:
+    """Return what the template of the module asks for of the sensors."""
+    from thenar.runtime.code_line import FARTHEST, FRACTION
+
+    sensors, joints = library.sensors, len(library.names.joints)
+    grids = [
+        sensor.grid and (sensor.grid.low, sensor.grid.high, sensor.grid.first, sensor.grid.steps)
+        for sensor in sensors.every
+    ]
+    return {
+        "sensors": len(sensors.every),
+        "sensor_names": _lines(sensor.name for sensor in sensors.every),
+        "sorts": sensors.sorts,
+        "points": _lines(sensor.codes for sensor in sensors.every),
+        "readings": _lines(sensor.readings for sensor in sensors.every),
+        "grids": _lines(grids),
+        "levels": _lines((number, joints + taxel, above) for number, taxel, above in sensors.levels),
+        "fraction": FRACTION,
+        "farthest": FARTHEST,
+    }
 
 
 def _interpreter() -> list[str]:

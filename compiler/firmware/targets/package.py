@@ -6,7 +6,7 @@ Layout and fields of the Arduino library are those of its specification, revisio
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..costs import Core
 from ..tools import XTENSA_COMPILER, XTENSA_EMULATOR
@@ -46,7 +46,7 @@ class Package(Target):
         """Return path -> text of the package thenar_NAME: the classifier in src/, what each ecosystem asks for beside
         it, a self test in check/, and an example for Arduino.
 
-        The example's pins are numbered as on an Uno or a Mega: switches from 2 on without 13, joints from A0 on.
+        The example's pins are numbered as on an Uno or a Mega: switches from 2 on without 13, sensors from A0 on.
         """
         from thenar.firmware_templates.rendering import render
 
@@ -58,12 +58,17 @@ class Package(Target):
         grasps = [comment(grasp) for grasp in names.grasps]
         values = {
             **{"name": name, "version": _VERSION, "thenar": markdown(names.thenar), "checks": CHECKS},
-            **{"grasps": grasps, **counts},
+            **{"grasps": grasps, **counts, "wiring": str(Wiring.of(library)), "on_pins": library.sensors.on_pins},
+            "sensors": bool(library.sensors.every),
+            "known": library.sensors.known,
+            "points": [
+                (n, *map(markdown, (sensor.name, *sensor.says))) for n, sensor in enumerate(library.sensors.every)
+            ],
             "sentence": f"Recognises {len(grasps)} grasp types from {inputs_in_words(**counts)} of a glove.",
             "sources": [path for path in library.whole if path.endswith((".c", ".S"))],
             "headers": [f"src/{path}" for path in library.whole if path.endswith(".h")],
             "assembly": any(path.endswith(".S") for path in library.whole),
-            "words": _keywords(name, names.segments is not None),
+            "words": _keywords(name, names.segments is not None, bool(library.sensors.every)),
         }
         return {
             **{f"src/{path}": text for path, text in library.whole.items()},
@@ -72,6 +77,10 @@ class Package(Target):
             f"check/thenar_{name}_check.h": check_header(name, library.layout, names.grasps),
             "examples/Recognise/Recognise.ino": render("package/Recognise.ino.j2", name=name, **_example(library)),
         }
+
+    def said(self, library: "Library") -> str:
+        """Return which of Arduino's boards the example fits."""
+        return str(Wiring.of(library))
 
     def missing(self) -> str | None:
         """Return what is missing of compiler and emulator."""
@@ -92,6 +101,8 @@ class Package(Target):
         return run(files, name, layout, frames, incremental=incremental, lost=lost)
 
 
+P = TypeVar("P", bound=Package)
+
 _BESIDE = (
     "library.properties",
     "keywords.txt",
@@ -105,35 +116,88 @@ _BESIDE = (
 )
 
 
-def _keywords(name: str, segments: bool) -> list[tuple[str, str]]:
+def _keywords(name: str, segments: bool, codes: bool) -> list[tuple[str, str]]:
     """Return each word of the library with the kind of keyword that it is to the Arduino editor."""
+    of_codes = ("codes_init", "calibrate", "calibrated", "code_of", "set_reading") * codes
     kinds = {
-        "KEYWORD1": (*_TYPES, *(("segmenter",) if segments else ())),
-        "KEYWORD2": (*_FUNCTIONS, *(("segment_start", "segment_push") if segments else ())),
+        "KEYWORD1": (*_TYPES, *("codes",) * codes, *("segmenter",) * segments),
+        "KEYWORD2": (*_FUNCTIONS, *of_codes, *("segment_start", "segment_push") * segments),
     }
     words = [(f"thenar_{name}", "KEYWORD1")]
     words += [(f"thenar_{name}_{word}", kind) for kind, ours in kinds.items() for word in ours]
     return [*words, *((f"THENAR_{name.upper()}_{word}", "LITERAL1") for word in _CONSTANTS)]
 
 
+# Digital pins that are no analog inputs as well, and analog inputs.
+_BOARDS = {"Uno": (14, 6), "Nano": (14, 8), "Mega": (54, 16)}
+_ON_MULTIPLEXER, _ON_REGISTER = 16, 8
+
+
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """The pins of the example: of each switch that is one, by its number, of the multiplexers' addresses, and how many
+    sensors there are.
+    """
+
+    switches: dict[int, int]
+    addresses: tuple[int, ...]
+    sensors: int
+
+    @classmethod
+    def of(cls, library: "Library") -> "Wiring":
+        """Return the pins, numbered as on an Uno or a Mega."""
+        plain = [number for number, switch in enumerate(library.names.switches) if switch.threshold is None]
+        free = [pin for pin in range(_FIRST_PIN, _FIRST_PIN + len(plain) + 5) if pin != _LED]
+        pins = dict(zip(plain, free, strict=False))
+        return cls(pins, tuple(free[len(plain) :][:4]), len(library.sensors.every))
+
+    def needed(self, *, multiplexed: bool = False) -> int:
+        """Return how many digital pins a board has, at the least, on which every switch has a pin of its own."""
+        used = [*self.switches.values(), *(self.addresses if multiplexed else ())]
+        return max(used, default=0) + 1
+
+    def on(self, digital: int, analog: int) -> str:
+        """Return what a board with so many pins needs besides: "2 shift registers 74HC165"."""
+        multiplexed = analog < self.sensors
+        parts = []
+        if digital < self.needed(multiplexed=multiplexed):
+            parts.append((-(-len(self.switches) // _ON_REGISTER), "74HC165"))
+        if multiplexed:
+            parts.append((-(-self.sensors // _ON_MULTIPLEXER), "CD74HC4067"))
+        return " and ".join(f"{count} {part}" for count, part in parts)
+
+    def __str__(self) -> str:
+        """Return which boards the example fits, in a sentence without its end."""
+        needs: dict[str, list[str]] = {}
+        for board, pins in _BOARDS.items():
+            needs.setdefault(self.on(*pins), []).append(board)
+        fits = [f"{' and '.join(boards)} {f'with {parts}' if parts else 'as it is'}" for parts, boards in needs.items()]
+        return f"the example Recognise fits Arduino {'; '.join(fits)}"
+
+
 def _example(library: "Library") -> dict[str, object]:
     """Return what the template of the example asks for."""
-    from ..words import comment, joint_in_words
+    from ..words import comment
 
-    switches = [comment(switch.name) for switch in library.names.switches]
-    joints = [comment(joint_in_words(joint)) for joint in library.names.joints]
-    pins = [pin for pin in range(_FIRST_PIN, _FIRST_PIN + len(switches) + 1) if pin != _LED][: len(switches)]
+    wiring, sensors = Wiring.of(library), library.sensors
     text = f"thenar_{library.name}_grasp(grasp)"
+    said = [comment(f"{sensor.name}: {' and '.join(sensor.says)}") for sensor in sensors.every]
+    digital = "NUM_DIGITAL_PINS - NUM_ANALOG_INPUTS" if said else "NUM_DIGITAL_PINS"
     return {
-        "switch_pins": list(zip(pins, switches, strict=True)),
-        "joint_pins": [(f"A{number}", what) for number, what in enumerate(joints)],
-        "digital_needed": max(pins, default=0) + 1,
-        "digital_pins": "NUM_DIGITAL_PINS - NUM_ANALOG_INPUTS" if joints else "NUM_DIGITAL_PINS",
+        "switches": [(n, pin, comment(library.names.switches[n].name)) for n, pin in wiring.switches.items()],
+        "sensors": [(f"A{number}", what) for number, what in enumerate(said)],
+        "sorts": "taxels" if not sensors.joints and sensors.taxels else "joints",
+        "on_pins": sensors.on_pins,
+        "digital_pins": digital,
+        "needed": wiring.needed(),
+        "needed_multiplexed": wiring.needed(multiplexed=True),
+        "address_pins": wiring.addresses,
+        "output_pins": [f"A{number}" for number in range(-(-len(said) // _ON_MULTIPLEXER))],
         "text": f"(const __FlashStringHelper *){text}" if library.avr else text,
     }
 
 
-_M0PLUS, _M4 = _CORTEX_M
+M0PLUS, _M4 = _CORTEX_M
 # It takes within 3 % what a Cortex-M4 takes.
 _M33 = replace(
     _M4,
@@ -144,7 +208,7 @@ _M33 = replace(
 )
 # The Xtensa core whose compiler and emulator Debian has: an ESP8266's, without an ESP32's windows of registers.
 # Numbers are fitted to what qemu counts, as in `costs`, for 3 to 30 classes and 3 to 27 look-ups: 1 to 47 % above.
-_XTENSA = Bare(
+XTENSA = Bare(
     architecture="xtensa",
     prefix="xtensa-lx106-elf-",
     emulator=XTENSA_EMULATOR,
@@ -179,12 +243,11 @@ _NEXT = "{folder}/README.md says how each ecosystem takes it"
 _MOST = 64 << 10
 
 
-def _family(name: str, like: Target, what: str, **given: Any) -> Package:
+def family(shape: type[P], name: str, like: Target, what: str, **given: Any) -> P:
     """Return a package for parts whose core is that of another target, which is simulated."""
     tools = {"compiler": like.compiler, "size": like.size, "flags": like.flags, "next_step": _NEXT}
-    return Package(
-        name=name, part=name, help=what, like=like, most_flash=_MOST, **{"core": like.core, **tools, **given}
-    )
+    values = {"name": name, "part": name, "help": what, "like": like, "most_flash": _MOST, "core": like.core}
+    return shape(**{**values, **tools, **given})
 
 
 # Flash is that of a family's largest usual part, RAM that of its smallest.
@@ -198,32 +261,17 @@ MEMBER = (
         own_layout=False,
         any_part=True,
     ),
-    _family(
-        "esp32",
-        _XTENSA,
-        "a package for ESP-IDF, Arduino, PlatformIO, Zephyr: ESP32, S2, S3 (Xtensa), C3, C6, H2 (RISC-V)",
-        rank=31,
-        flash=16 << 20,
-        ram=256 << 10,
-        kind="xtensa",
-    ),
-    _family(
-        "rp2040",
-        _M0PLUS,
-        "a package for pico-sdk, Arduino, PlatformIO, Zephyr: Raspberry Pi Pico, Cortex-M0+",
-        rank=32,
-        flash=16 << 20,
-        ram=256 << 10,
-    ),
-    _family(
+    family(
+        Package,
         "rp2350",
         _M33,
-        "the same: Raspberry Pi Pico 2, Cortex-M33 or RISC-V",
+        "a package as for rp2040: Raspberry Pi Pico 2, Cortex-M33 or RISC-V",
         rank=33,
         flash=16 << 20,
         ram=512 << 10,
     ),
-    _family(
+    family(
+        Package,
         "nrf52",
         _M4,
         "a package for Zephyr (nRF Connect), Arduino, PlatformIO: nRF52832, nRF52840, Cortex-M4F",
@@ -231,7 +279,8 @@ MEMBER = (
         flash=1 << 20,
         ram=64 << 10,
     ),
-    _family(
+    family(
+        Package,
         "stm32",
         _M4,
         "a package for STM32CubeIDE and any CMSIS project, Zephyr, Arduino, PlatformIO; counted as Cortex-M4",
@@ -239,5 +288,7 @@ MEMBER = (
         flash=2 << 20,
         ram=20 << 10,
     ),
-    _family("generic", _M4, "a package for any other part that has a C99 compiler; counted as Cortex-M4", rank=36),
+    family(
+        Package, "generic", _M4, "a package for any other part that has a C99 compiler; counted as Cortex-M4", rank=36
+    ),
 )

@@ -56,6 +56,7 @@ class Rust(Target):
             ("The grasp types", "Grasp"): names.grasps,
             ("The switches", "Switch"): tuple(switch.name for switch in names.switches),
             ("The joints", "Joint"): tuple(joint.name for joint in names.joints),
+            ("The sensors that are read", "Sensor"): tuple(sensor.name for sensor in library.sensors.every),
         }
         enums = [
             (
@@ -88,6 +89,7 @@ class Rust(Target):
             "joint_bins": [(joint.number, joint.bins.tolist()) for joint in layout.joints if not joint.compared],
             "finds": _finds(layout),
             "rejection": rejection,
+            **_sensor_values(library),
         }
         if rejection is not None:
             values["least_scores"] = _array(rejection.least_scores)
@@ -126,6 +128,27 @@ class Rust(Target):
         with workshop(given) as folder:
             call([find(RUST), "run", "--quiet", "--offline", "--example", "record"], folder)
             return answers_in((folder / "answers").read_bytes(), frames, layout)
+
+
+def _sensor_values(library: "Library") -> dict[str, object]:
+    """Return what the templates ask for of the sensors."""
+    from thenar.runtime.code_line import FARTHEST, FRACTION
+
+    sensors, joints = library.sensors, len(library.names.joints)
+    grids = [
+        (0, 0, 0, 0) if (grid := sensor.grid) is None else (grid.low, grid.high, grid.first, grid.steps)
+        for sensor in sensors.every
+    ]
+    return {
+        "sensors": len(sensors.every),
+        "points": _array(sensor.codes for sensor in sensors.every),
+        "readings": _array(sensor.readings or (0, 0) for sensor in sensors.every),
+        "grids": _array(grids) if any(low != high for low, high, *_ in grids) else "",
+        "levels": sensors.levels,
+        "level_array": _array((number, joints + taxel, above) for number, taxel, above in sensors.levels),
+        "fraction": FRACTION,
+        "farthest": FARTHEST,
+    }
 
 
 def _variants(kind: str, words: Iterable[str]) -> list[str]:

@@ -23,6 +23,7 @@ class Wasm(Target):
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text: the library, the module in JavaScript with its types, and what makes the .wasm."""
         from thenar.firmware_templates.rendering import render
+        from thenar.runtime.code_line import FARTHEST
         from thenar.runtime.published import NONE
 
         from ..words import answers_of, inputs_in_words
@@ -46,6 +47,10 @@ class Wasm(Target):
             "names": _array(answers),
             "switch_names": _array(switch.name for switch in names.switches),
             "joint_names": _array(joint.name for joint in names.joints),
+            "sensors": len(library.sensors.every),
+            "sensor_names": _array(sensor.name for sensor in library.sensors.every),
+            "sorts": library.sensors.sorts,
+            "farthest": FARTHEST,
             "sources": [*(path for path in files if path.endswith(".c")), f"thenar_{name}_wasm.c"],
             "headers": [path for path in files if path.endswith(".h")],
         }

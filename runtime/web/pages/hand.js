@@ -3,6 +3,7 @@
 const SVG = "http://www.w3.org/2000/svg";
 const MARGIN = 5;
 const NARROW = 560; // of a drawing so wide, in pixels, the parts stand one below the other
+const LEAST_UNIT = 0.3; // millimetres that a pixel shows at least: few inputs are not drawn as giants
 const LETTER = 9.5; // pixels that a letter has at least
 const FINGER = 6; // pixels that the half of a button has at least, where there is room
 
@@ -102,11 +103,11 @@ class Glove {
   // Open: a ring. Closed: a full square, larger, on a corner. Lost: a cross in a dashed ring.
   #switch(each, onSwitch) {
     const group = this.#place(each, "spot"), r = this.radius;
-    if (onSwitch) this.#button(group, each.name, () => onSwitch(each.bit, !this.closed[each.bit]));
     element("circle", { class: "open", r: 1.25 * r }, group);
     element("path", { class: "shut", d: `M0 ${-2 * r}L${2 * r} 0L0 ${2 * r}L${-2 * r} 0Z` }, group);
     element("path", { class: "cross", d: cross(r) }, group);
     named(group, each.name);
+    if (onSwitch) this.#button(group, each.name, () => onSwitch(each.bit, !this.closed[each.bit]));
     this.switches.push({ bit: each.bit, group });
   }
 
@@ -118,6 +119,11 @@ class Glove {
     }
     const group = this.#place(each, "spot"), r = this.radius, side = 1.35 * r;
     const found = { levels: each.levels, name: each.name, group, count: 0, value: null };
+    element("rect", { class: "open", x: -side, y: -side, width: 2 * side, height: 2 * side }, group);
+    found.disc = element("circle", { class: "press", r: 0 }, group);
+    element("path", { class: "shut", d: `M${-side} ${-side}H${side}V${side}H${-side}Z` }, group);
+    element("path", { class: "cross", d: cross(r) }, group);
+    named(group, each.name);
     if (onSwitch) {
       this.#button(group, each.name, () => {
         // From level to level, and from the last to none.
@@ -127,11 +133,6 @@ class Glove {
         });
       });
     }
-    element("rect", { class: "open", x: -side, y: -side, width: 2 * side, height: 2 * side }, group);
-    found.disc = element("circle", { class: "press", r: 0 }, group);
-    element("path", { class: "shut", d: `M${-side} ${-side}H${side}V${side}H${-side}Z` }, group);
-    element("path", { class: "cross", d: cross(r) }, group);
-    named(group, each.name);
     this.taxels.push(found);
   }
 
@@ -476,9 +477,9 @@ export function drawHand(svg, hand, { onSwitch = null, onJoint = null } = {}) {
       else x += box.width;
       high = Math.max(high, box.height);
     }
-    const size = narrow ? [across, y] : [x, high];
-    svg.setAttribute("viewBox", `0 0 ${size[0].toFixed(1)} ${size[1].toFixed(1)}`);
-    const unit = size[0] / width;
+    const [broad, tall] = narrow ? [across, y] : [x, high], whole = Math.max(broad, LEAST_UNIT * width);
+    svg.setAttribute("viewBox", `${((broad - whole) / 2).toFixed(1)} 0 ${whole.toFixed(1)} ${tall.toFixed(1)}`);
+    const unit = whole / width;
     svg.style.setProperty("--letter", `${(LETTER * unit).toFixed(2)}px`);
     for (const part of parts) part.fit(unit);
   };

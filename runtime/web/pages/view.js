@@ -12,7 +12,7 @@ const SHOWN = 8;
 const MEANS = {
   ok: "everything is read",
   changing: "everything is read, and the hand changes",
-  degraded: "means stand in for what is lost",
+  degraded: "means stand in for what is lost, or a record is late",
   unknown: "too little can be read",
 };
 
@@ -46,9 +46,7 @@ export class View {
     $("types").replaceChildren();
     for (const grasp of build.grasps) this.#row(grasp);
     $("preshape").hidden = !build.preshapes;
-    // A stream says nothing of single switches, or of how likely the other types are.
     $("hand-panel").hidden = Boolean(build.partial);
-    $("types-say").hidden = !build.partial;
     this.answers = build.grasps;
   }
 
@@ -148,6 +146,8 @@ export class View {
     const news = this.shown?.grasp !== frame.grasp;
     this.shown = frame;
     this.#now(frame);
+    // Some streams say nothing of single switches, or of how likely the other types are.
+    $("types-say").hidden = frame.closed !== undefined;
     this.#hand(frame);
     this.#bars(frame);
     this.timeline.draw();
@@ -204,8 +204,8 @@ export class View {
       const value = frame.probabilities?.[at] ?? (grasp === frame.grasp ? frame.probability : null);
       say(share, value === null ? "–" : `${(100 * value).toFixed(value > 0.9995 || value < 0.0005 ? 0 : 1)} %`);
     }
-    const sure = frame.grasp === "unknown" ? "" : `${(100 * frame.probability).toFixed(0)} % in this frame`;
-    const held = frame.segment_us === null ? "" : `segment ${frame.segment}, ${frame.state} for ${((frame.time_us - frame.segment_us) / 1e6).toFixed(1)} s`;
+    const sure = frame.grasp === "unknown" ? "" : `${(100 * frame.probability).toFixed(0)}\u00a0% in this frame`;
+    const held = frame.segment_us === null ? "" : `segment ${frame.segment}, ${frame.state} for ${((frame.time_us - frame.segment_us) / 1e6).toFixed(1)}\u00a0s`;
     say($("segment"), [sure, held].filter(Boolean).join(" · "));
     if (!$("preshape").hidden) say($("preshape"), `Preshape: ${frame.preshape?.name ?? "none yet"}`);
     const closed = this.closed.filter(Boolean).length;

@@ -48,7 +48,7 @@ def test_documents_come_and_go_with_the_builds_they_are_of(gloved: GraspSet, tmp
     assert (build / "spec").exists()
     compile_build(gloved, build, rounds=3, folds=0)
     made = sorted(path.name for path in build.iterdir())
-    assert made == ["build.json", "ensemble.bin", "firmware", "hand.json", "tables.bin"]
+    assert made == ["build.json", "ensemble.bin", "firmware", "hand.json", "tables.bin", "try.html"]
     _compile(gloved, build)
     assert "This build reads no switches." in _compile(gloved, build, inputs="joints")
     assert not (build / "spec").exists()

@@ -53,6 +53,7 @@ def test_every_score_and_type_of_every_frame_is_pythons(
         assert (check.frames, check.differing, check.first) == (96 + found.extreme + 10_000, 0, None)
         assert (check.worst is None) == (kind == "host" or (kind == "avr" and check.missing))
         assert check.misnamed == (None if kind == "avr" else 0)
+        assert check.shares == (kind != "avr" or check.missing)
     assert (found.carried.present, found.carried.outdated) == (True, ())
 
 
@@ -137,6 +138,42 @@ def test_a_frame_that_the_compiled_code_does_not_refuse_is_found(
     wrong = [check.missing for check in found.checks if check.differing]
     assert wrong
     assert all(wrong) or kind == "host"
+
+
+@pytest.mark.parametrize("kind", ["host", "avr"])
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("(uint16_t)best - (uint16_t)second)", "(uint16_t)best - (uint16_t)second + 1u)"),
+        ("own * 65535u", "own * 65534u"),
+    ],
+    ids=["margin", "probability"],
+)
+def test_a_margin_or_a_probability_that_is_off_is_found(
+    build: Path,
+    grasp_set: GraspSet,
+    tool: Tool,
+    monkeypatch: pytest.MonkeyPatch,
+    kind: str,
+    right: str,
+    wrong: str,
+) -> None:
+    for name in TOOLS[kind]:
+        tool(name)
+    made = classifier_files
+
+    def off(*arguments: object, **options: object) -> dict[str, str]:
+        files = made(*arguments, **options)  # type: ignore[arg-type]
+        assert files["thenar_glove.c"].count(right) == 1
+        return files | {"thenar_glove.c": files["thenar_glove.c"].replace(right, wrong)}
+
+    monkeypatch.setattr(classifier, "classifier_files", off)
+    found = verify_firmware(build, grasp_set, (kind,))
+    assert [bool(check.differing) for check in found.checks] == [check.shares for check in found.checks]
+    first = found.checks[-1].first
+    assert first is not None
+    assert (first.scores, first.grasp) == (first.compiled_scores, first.compiled_grasp)
+    assert [*first.said] != [*first.compiled_said]
 
 
 @pytest.mark.parametrize("kind", ["host", "cortex-m"])

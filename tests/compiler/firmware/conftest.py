@@ -10,6 +10,7 @@ from thenar.compiler.firmware.probes import Answers, Lost, Probes, extreme_frame
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Recognised, Switch
 from thenar.runtime.scores import LANE_OFFSET
+from thenar.runtime.softmax import Softmax
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 MakeTables = Callable[..., IntegerTables]
@@ -90,5 +91,11 @@ def same_as_python() -> Callable[..., None]:
         scores = np.array([without(bits, codes, row[:s], row[s:]) for bits, codes, row in held]) - LANE_OFFSET
         assert np.array_equal(answers.scores, scores)
         assert np.array_equal(answers.classes, scores.argmax(axis=1))
+        if answers.margins is not None and answers.shares is not None:
+            best, second = np.sort(scores, axis=1)[:, :-3:-1].T
+            assert np.array_equal(answers.margins, best - second)
+            softmax = Softmax(tables.scale)
+            shares = [softmax.probabilities(own)[n % len(own)] for n, own in enumerate(scores.tolist())]
+            assert answers.shares.tolist() == shares
 
     return compare

@@ -185,7 +185,7 @@ def test_the_hosts_file_names_the_keys_and_debounces_what_the_board_does_not(
 
 def test_every_example_of_the_page_is_a_sound_board() -> None:
     blocks = re.findall(r"^```toml\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
-    assert len(blocks) == 6
+    assert len(blocks) == 7
     assert all(parse_board(block).wired for block in blocks)
 
 

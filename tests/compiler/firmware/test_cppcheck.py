@@ -1,4 +1,4 @@
-"""cppcheck, with its MISRA add-on, says nothing of the C of any target and mode but what docs/misra.md explains."""
+"""cppcheck, with its MISRA add-on, says nothing of the C of any target and mode but what misra.md explains."""
 
 import re
 import subprocess
@@ -12,10 +12,12 @@ from msgspec.structs import replace
 from thenar.compiler.firmware.board import parse_board
 from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.firmware.one_hand import for_one_hand
+from thenar.compiler.firmware.sensors import sensors_of
 from thenar.compiler.firmware.targets.base import Mode
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import Manifest
+from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.manifest import Calibration, Manifest, Threshold
 from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables
 
@@ -26,7 +28,7 @@ Finding = tuple[str, str]  # what cppcheck calls it, and the file's name
 
 pytestmark = pytest.mark.slow
 
-EXPLAINED = Path(__file__).resolve().parents[3] / "docs" / "misra.md"
+EXPLAINED = Path(__file__).with_name("misra.md")
 OPTIONS = ("--enable=all", "--addon=misra", "--std=c99", "--quiet", "--template={id}\t{file}\t{line}\t{message}")
 DEFINED = {
     "atmega328p": ("--platform=avr8", "-D__AVR__", "-D__AVR_ATmega328P__"),
@@ -34,6 +36,7 @@ DEFINED = {
 }
 
 PINS = "[pins]\n" + "".join(f's{n} = "PD{n + 2}"\n' for n in range(6)) + 's6 = "PB0"\ns7 = "PB1"\ns8 = "PB2"\n'
+ON_GPIO = "[pins]\n" + "".join(f's{n} = "GPIO{pin}"\n' for n, pin in enumerate((4, 5, 13, 14, 18, 19, 21, 22, 23)))
 MATRIX = '[matrix]\nrows = ["PC0", "PC1", "PC2"]\ncolumns = ["PB0", "PB1", "PB2"]\nswitches = ' + str(
     [[f"s{3 * row + column}" for column in range(3)] for row in range(3)]
 )
@@ -49,6 +52,13 @@ CHIPS = (
 ANALOG = '[analog]\nj0 = "ADC3"\nj1 = "ADC4"\nj2 = "ADC5"\n'
 CYBERGLOVE = '[cyberglove]\nsensors = 18\njoints = ["j0", "j1", "j2"' + ', ""' * 15 + "]\n"
 HAND = GloveCalibration(sensors=tuple(SensorCalibration(f"j{n}", 40, 0.0, 200, 90.0) for n in range(3)))
+STREAM = """
+name = "glove"
+[[stream]]
+port = "/dev/ttyUSB0"
+joints = { j0 = [0, 1023], j1 = [1023, 0], j2 = [200, 800] }
+taxels = { pad = [0, 1023] }
+"""
 
 # platform, mode, board.toml, and how the tables are made
 CASES: dict[str, tuple[str, Mode, str, Mapping[str, int]]] = {
@@ -60,6 +70,8 @@ CASES: dict[str, tuple[str, Mode, str, Mapping[str, int]]] = {
     "arduino": ("arduino", "classify", "", {}),
     "avr": ("avr328p", "classify", "", {}),
     "avr, codes of 16 bits": ("avr2560", "classify", "", {"highest": 900}),
+    "host, a glove's readings": ("host", "classify", "", {}),
+    "avr, a glove's readings": ("avr328p", "classify", "", {"highest": 900}),
     "host, segments": ("host", "classify", "", {}),
     "avr, segments": ("avr328p", "classify", "", {}),
     "scan pins": ("avr328p", "scan", PINS, {}),
@@ -68,9 +80,11 @@ CASES: dict[str, tuple[str, Mode, str, Mapping[str, int]]] = {
     "scan chips": ("avr328p", "scan", CHIPS, {}),
     "glove, analog": ("avr328p", "glove", PINS + ANALOG, {}),
     "glove, CyberGlove": ("avr2560", "glove", CHIPS + CYBERGLOVE, {}),
+    "sketch, scan, Wi-Fi": ("esp32", "scan", "[wifi]\n" + ON_GPIO, {}),
+    "sketch, glove, chips": ("rp2040", "glove", "early_exit = true\nscan_us = 3000\n" + CHIPS + CYBERGLOVE, {}),
     "glove, early exit": ("avr2560", "glove", "early_exit = true\n" + CHIPS + CYBERGLOVE, {}),
 }
-PART = {"avr328p": "atmega328p", "avr2560": "atmega2560"}
+PART = {"avr328p": "atmega328p", "avr2560": "atmega2560", "esp32": "esp32", "rp2040": "rp2040"}
 
 
 def files_of(case: str, make_tables: MakeTables, describe: Describe) -> dict[str, str]:
@@ -80,9 +94,16 @@ def files_of(case: str, make_tables: MakeTables, describe: Describe) -> dict[str
     if case.endswith(", segments"):
         manifest = replace(manifest, segments=SegmentModel.usual(tables.n_classes, False, tables.scale))
     build = Build(manifest, tables)
+    sensors = None
+    if case.endswith(" a glove's readings"):
+        level = Threshold(90, 0.0, Calibration(0, "pad", "counts", 0, 0.0, 1, 1.0))
+        manifest = replace(manifest, switches=(replace(manifest.switches[0], threshold=level), *manifest.switches[1:]))
+        raw = tuple(replace(joint, unit="raw", code_a=1, code_b=255) for joint in manifest.joints)
+        manifest = replace(manifest, joints=raw)
+        build, sensors = Build(manifest, tables), sensors_of(manifest, parse_harness(STREAM, "glove.toml"))
     board = parse_board(f'part = "{PART[platform]}"\n{text}') if text else None
     build = for_one_hand(build, HAND) if mode == "glove" else build
-    return Firmware(build.tables, build.manifest, platform, mode, board=board).files()
+    return Firmware(build.tables, build.manifest, platform, mode, board=board, sensors=sensors).files()
 
 
 def looked_at(program: str, files: Mapping[str, str], folder: Path, options: tuple[str, ...]) -> set[Finding]:

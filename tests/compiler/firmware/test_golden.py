@@ -49,6 +49,18 @@ uart = 1
 sensors = 18
 """
 
+SKETCH_BOARD = """\
+part = "esp32"
+[wifi]
+[pins]
+"thumb tip" = "GPIO4"
+"index tip" = "GPIO5"
+"index middle" = "GPIO13"
+"middle tip" = "GPIO14"
+"palm radial" = "GPIO18"
+"palm ulnar" = "GPIO19"
+"""
+
 CASES: dict[str, tuple[str, Mode, str | None]] = {
     "host": ("host", "classify", None),
     "avr328p": ("avr328p", "classify", None),
@@ -58,6 +70,7 @@ CASES: dict[str, tuple[str, Mode, str | None]] = {
     "rv32imac": ("rv32imac", "classify", None),
     "arduino": ("arduino", "classify", None),
     "scan-avr328p": ("avr328p", "scan", SCAN_BOARD),
+    "scan-esp32": ("esp32", "scan", SKETCH_BOARD),
     "glove-avr2560": ("avr2560", "glove", GLOVE_BOARD),
 }
 

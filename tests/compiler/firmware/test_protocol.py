@@ -68,7 +68,7 @@ def test_the_configuration_is_what_the_preprocessor_sees(tool: Tool, tmp_path: P
     config = BoardConfig(3, 11, False, 0xFFFFFFFF, 4000, 5000, 6000, 7000, 8000, 250, channels=5)
     write(protocol_files(config), tmp_path)
     names = {"ROWS", "COLUMNS", "KEYS", "DIODES", "BOARD_ID", *(f"{one}_US" for one in ("SCAN", "STATE", "HEARTBEAT"))}
-    names |= {"PRESS_US", "RELEASE_US", "FASTEST_US", "CHANNELS"}
+    names |= {"PRESS_US", "RELEASE_US", "FASTEST_US", "CHANNELS", "CODE_BITS"}
     prints = "".join(f'printf("{name} %lu\\n", (unsigned long)THENAR_{name});' for name in sorted(names))
     (tmp_path / "main.c").write_text(f'#include <stdio.h>\n#include "thenar_config.h"\nint main(void) {{ {prints} }}\n')
     subprocess.run([tool("gcc"), "-std=c99", "main.c", "-o", "main"], cwd=tmp_path, check=True)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
@@ -94,6 +94,51 @@ def test_what_was_redone_or_never_judged_is_no_row(tmp_path: Path) -> None:
     assert grasp_set.switches.tolist() == [[0, 1, 0], [1, 0, 0]]
 
 
+def test_what_was_skipped_or_undone_is_no_row(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "a.mcap", SESSION) as recorder:
+        for trial in (1, 2):
+            do(recorder, 2 * trial, "captured", trial, closed=trial)
+            do(recorder, 2 * trial + 1, "accepted", trial)
+        do(recorder, 6, "captured", 3, closed=1)
+        do(recorder, 7, "redone", 3)
+        do(recorder, 8, "undone", 2)
+        do(recorder, 9, "captured", 2, closed=4)
+        do(recorder, 10, "accepted", 2)
+        do(recorder, 11, "captured", 3, closed=3)
+        do(recorder, 12, "skipped", 3)
+        do(recorder, 13, "captured", 4, closed=1)
+        do(recorder, 14, "accepted", 4)
+        do(recorder, 15, "undone", 4)
+    grasp_set, _ = import_recordings([recorder.path])
+    assert grasp_set.trials.tolist() == [1, 2]
+    assert grasp_set.switches.tolist() == [[1, 0, 0], [0, 0, 1]]
+    assert read_journal(recorder.path).accepted == (1, 2)
+
+
+def test_a_trial_of_an_earlier_session_may_be_undone_and_only_there(write: Write) -> None:
+    path = write()
+    other = write("b.mcap")
+    with Recorder(path, SESSION, tail=read_journal(path).tail) as recorder:
+        do(recorder, 1, "undone", 3)
+        do(recorder, 2, "captured", 3, closed=0b100)
+        do(recorder, 3, "accepted", 3)
+        do(recorder, 4, "undone", 3)
+        do(recorder, 5, "undone", 2)
+        do(recorder, 6, "captured", 2, closed=0b101)
+        do(recorder, 7, "accepted", 2)
+    grasp_set, _ = import_recordings([path])
+    assert grasp_set.trials.tolist() == [1, 2]
+    assert grasp_set.switches.tolist() == [[1, 0, 0], [1, 0, 1]]
+    # Of a set that another recording goes into as well, nothing else is undone.
+    both, _ = import_recordings([other, path])
+    assert both.trials.tolist() == [1, 2, 3, 1, 2]
+    with Recorder(path, SESSION, tail=read_journal(path).tail) as recorder:
+        do(recorder, 1, "undone", 2)
+        do(recorder, 2, "undone", 1)
+    with pytest.raises(TableError, match="no trial was accepted"):
+        import_recordings([path])
+
+
 def test_a_collection_that_was_resumed_is_one_set(write: Write) -> None:
     path = write()
     os.truncate(path, path.stat().st_size - 7)
@@ -116,11 +161,16 @@ def test_nothing_of_one_session_is_captured_in_the_next(write: Write) -> None:
     assert "dropped rows" in [warning.kind for warning in report.warnings]
 
 
-@given(st.lists(st.integers(1, 255), min_size=2, max_size=20))
+# Of 56 counts for 90 degrees, the half degrees of every seventh byte lie midway between two codes.
+HALVES = GloveCalibration(sensors=tuple(SensorCalibration(name, 40, 0.0, 96, 90.0) for name in SENSORS))
+
+
+@given(st.lists(st.integers(1, 255), min_size=2, max_size=20), st.sampled_from([CALIBRATION, HALVES]))
+@example([40 + 7 * n for n in range(-5, 16)], HALVES)
 def test_a_calibrated_glove_has_the_codes_that_the_live_recogniser_gives_it(
-    tmp_path_factory: pytest.TempPathFactory, raws: list[int]
+    tmp_path_factory: pytest.TempPathFactory, raws: list[int], calibration: GloveCalibration
 ) -> None:
-    session = replace(SESSION, calibration=CALIBRATION)
+    session = replace(SESSION, calibration=calibration)
     with Recorder(tmp_path_factory.mktemp("mcap") / "a.mcap", session) as recorder:
         for trial, raw in enumerate(raws, start=1):
             do(recorder, trial, "captured", trial, sensors=bytes((raw, raw, 1, 1)))
@@ -130,7 +180,7 @@ def test_a_calibrated_glove_has_the_codes_that_the_live_recogniser_gives_it(
         Calibration(number, joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
         for number, joint in enumerate(grasp_set.joints)
     ]
-    live = CodeTables(joints, SENSORS, CALIBRATION)
+    live = CodeTables(joints, SENSORS, calibration)
     assert grasp_set.codes.tolist() == [live.codes(bytes((raw, raw, 1, 1))) for raw in raws]
     assert {(joint.unit, joint.step) for joint in grasp_set.joints} == {("deg", 0.5)}
     assert all(cost.largest_error <= 0.25 + 1e-9 for cost in report.coding)

@@ -32,20 +32,19 @@ OPEN = np.array([60.0, 60, 60, 60])
 class Wearer:
     """A hand that does what it is asked for: closes a second after a trial has begun, opens when it was judged."""
 
-    def __init__(self, recorder: Recorder, redo: int = 0) -> None:
+    def __init__(self, recorder: Recorder, redo: int = 0, undo: int = 0) -> None:
         self.guide = Guide(planned(recorder.session.collection or COLLECTION), recorder, COUNTDOWN_US)
         self.truth: list[tuple[int, str, int]] = []  # when which grasp closed and opened: time, type, trial
-        self._redo, self._at, self._goal, self._closed = redo, OPEN.copy(), OPEN, 0
+        self._redo, self._undo, self._at, self._goal, self._closed = redo, undo, OPEN.copy(), OPEN, 0
         self._random = np.random.default_rng(4)
 
     def collect(self) -> None:
         """Go through all trials."""
         now, begun, judge = START_US, 0, 0
         self.guide.press(now, Key.ACCEPT)
-        while self.guide.stage is not Stage.OVER:
+        while self.guide.trial is not None:
             now += TICK_US
             trial = self.guide.trial
-            assert trial is not None
             counting = self.guide.stage is Stage.COUNTDOWN and self.guide.seconds_left(now) <= 1
             if counting and trial.grasp != "none" and begun != trial.number:
                 begun, (self._closed, goal) = trial.number, POSES[trial.grasp]
@@ -62,6 +61,10 @@ class Wearer:
                 again = trial.grasp != "none" and self._redo > 0
                 self._redo -= again
                 self.guide.press(now, Key.REDO if again else Key.ACCEPT)
+                if self._undo and trial.grasp != "none" and self.guide.trial is not None:
+                    self._undo -= 1
+                    self.guide.press(now, Key.UNDO)
+                    again = True
                 begun = 0 if again else begun
                 if self._closed:
                     self._closed, self._goal = 0, OPEN
@@ -129,6 +132,21 @@ def test_what_was_done_again_is_left_out_of_a_stream(tmp_path: Path) -> None:
     again = wearer.truth[1][0]  # the first grasp was let go, and is closed to once more
     assert grasp_set.is_none[grasp_set.times_us + start_of(recorder.path) < again].all()
     assert len(np.unique(grasp_set.trial_ids[~grasp_set.is_none])) == 4
+
+
+def test_what_was_undone_is_left_out_of_a_stream(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "a.mcap", SESSION) as recorder:
+        wearer = Wearer(recorder, undo=2)
+        wearer.collect()
+    assert [event.event for event in Reader(recorder.path) if isinstance(event, Label)].count("undone") == 2
+    grasp_set, _ = import_recordings([recorder.path], stream=True)
+    held = [trial for _, grasp, trial in wearer.truth if grasp != "none"]
+    assert len(held) > len(set(held))
+    assert len(np.unique(grasp_set.trial_ids[~grasp_set.is_none])) == len(set(held)) == 4
+    last = {trial: time for time, grasp, trial in wearer.truth if grasp != "none"}
+    times = (grasp_set.times_us + start_of(recorder.path))[~grasp_set.is_none]
+    trials = grasp_set.trials[~grasp_set.is_none]
+    assert all(time > last[trial] for time, trial in zip(times.tolist(), trials.tolist(), strict=True))
 
 
 def test_of_a_collection_without_the_empty_hand_only_what_is_held_is_known(tmp_path: Path) -> None:

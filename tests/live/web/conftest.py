@@ -110,7 +110,9 @@ class Run:
         if wired.cyberglove is not None:
             glove = msgspec.structs.replace(wired.cyberglove, calibration=str(folder / "calibration.toml"))
             wired = msgspec.structs.replace(wired, cyberglove=glove)
-        self.glove = Glove(scene.truth.build, wired, policy=FRANK, recordable=True)
+        self.stream, self.build = f"unix:{folder}/stream", build
+        sinks = [f"{self.stream}?detail"]
+        self.glove = Glove(scene.truth.build, wired, policy=FRANK, recordable=True, sinks=sinks, status=True)
         self.page = LivePage(self.glove, build, "127.0.0.1:0", token=None, recordings=self.recordings)
         stack.enter_context(self.page)
         stack.enter_context(self.glove)

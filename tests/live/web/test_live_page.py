@@ -1,6 +1,7 @@
 """The live page in a real browser: what it shows is what was published, and what is pressed happens."""
 
 from collections.abc import Callable
+from threading import Event, Thread
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ from thenar.runtime.live.replay import replayed
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Mark
+from thenar.runtime.web.monitor import StreamMonitor
 from thenar.runtime.web.server import Server, message
 
 pytestmark = pytest.mark.slow
@@ -59,6 +61,27 @@ def bars_are(browser: Any, scene: Any) -> bool:
     share = browser.script(_BARS)[found.grasp]
     near: bool = abs(float(share.removesuffix(" %")) - 100 * found.probability) < 0.11
     return near
+
+
+def test_the_page_of_a_run_elsewhere_shows_the_same(run: Callable[[], Any], browser: Any) -> None:
+    running, stop = run(), Event()
+    scene, truth = running.scene, running.scene.truth
+    with StreamMonitor(running.stream, "127.0.0.1:0", token=None, build=running.build) as monitor:
+        thread = Thread(target=monitor.run, args=(stop,))
+        thread.start()
+        try:
+            browser.open(monitor.server.url)
+            for row in range(0, len(truth.performance), 7):
+                shown(browser, scene, row)
+                browser.wait(lambda: bars_are(browser, scene))
+            browser.wait(lambda: len(browser.texts("#devices tr")) == 2)
+            assert not browser.driver.find_element("id", "record-panel").is_displayed()
+            assert not browser.driver.find_element("id", "types-say").is_displayed()
+            assert browser.texts("#types .name") == list(truth.build.manifest.answers)
+            browser.driver.get("about:blank")
+        finally:
+            stop.set()
+            thread.join()
 
 
 def test_the_posed_hand_follows_the_joints(run: Callable[[], Any], browser: Any) -> None:

@@ -44,10 +44,12 @@ def of_types(build: Build, count: int, types: int = 4) -> list[str]:
     return [build.grasps[number % types] for number in range(count)]
 
 
-def test_shares_of_on_are_read_off_the_tables(build: Build) -> None:
-    assert on_shares(build.tables) == pytest.approx(SHARES)
-    flat = replace(build.tables, switch_rows=np.zeros((4, 4), np.int16))
+def test_shares_of_on_are_told_and_in_older_builds_read_off_the_tables(build: Build) -> None:
+    assert on_shares(build) == pytest.approx(SHARES)
+    flat = Build(build.manifest, replace(build.tables, switch_rows=np.zeros((4, 4), np.int16)))
     assert all(np.isnan(on_shares(flat)))
+    told = tuple(changed(switch, closed_share=0.125) for switch in build.manifest.switches)
+    assert on_shares(Build(changed(build.manifest, switches=told), build.tables)) == [0.125] * 4
 
 
 def test_patience_is_the_number_of_misses_that_chance_does_not_explain() -> None:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.recording.guide import FRESH_US, MOVING_US, Guide, Key, Stage, planned
+from thenar.runtime.recording.guide import FRESH_US, MOVING_US, Guide, Key, Stage, planned, read_journal
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Collection, Label, Session, Task
 from thenar.runtime.recording.writer import Recorder
@@ -60,9 +60,10 @@ def test_one_key_a_trial_leads_through_all(guide: Guide, recorder: Recorder) -> 
         guide.take(now, whole(now))
         assert stage(guide) is Stage.REVIEW
         guide.press(now, Key.ACCEPT)
+    assert stage(guide) is Stage.DONE
+    assert (guide.trial, guide.done, guide.total) == (None, 4, 4)
+    guide.press(now, Key.ACCEPT)
     assert stage(guide) is Stage.OVER
-    assert guide.trial is None
-    assert guide.accepted == 4
     assert events(recorder) == [(event, number) for number in (1, 2, 3, 4) for event in ("captured", "accepted")]
 
 
@@ -179,7 +180,7 @@ def test_an_empty_hand_moves_after_the_countdown_and_is_captured_then(tmp_path: 
             guide.take(moment, whole(moment))
         assert stage(guide) is Stage.REVIEW
         guide.press(now + MOVING_US, Key.ACCEPT)
-        assert (guide.trial, guide.accepted) == (planned(collection)[1], 1)
+        assert (guide.trial, guide.done) == (planned(collection)[1], 1)
     assert events(recorder) == [("captured", 1), ("accepted", 1)]
     found = labels(recorder)
     assert [label.event for label in found] == ["begun", "begun", "begun", "captured", "accepted"]
@@ -187,13 +188,18 @@ def test_an_empty_hand_moves_after_the_countdown_and_is_captured_then(tmp_path: 
     assert {label.grasp for label in found} == {"none"}
 
 
-def test_nothing_left_is_over_at_once(recorder: Recorder) -> None:
-    assert Guide([], recorder, 0).stage is Stage.OVER
+def test_where_nothing_is_left_one_may_still_undo(recorder: Recorder) -> None:
+    guide = Guide(planned(COLLECTION), recorder, 0, (3, 1, 2, 4))
+    assert (guide.stage, guide.done) == (Stage.DONE, 4)
+    guide.press(0, Key.UNDO)
+    assert stage(guide) is Stage.READY
+    assert guide.trial == planned(COLLECTION)[3]
+    assert labels(recorder)[-1].event == "undone"
 
 
 @settings(deadline=None)
 @given(st.lists(st.sampled_from([*Key, None]), max_size=40))
-def test_whatever_is_pressed_each_trial_is_accepted_once_and_in_order(
+def test_whatever_is_pressed_each_trial_counts_once_and_in_order(
     tmp_path_factory: pytest.TempPathFactory, presses: list[Key | None]
 ) -> None:
     session = Session(thenar="1", switches=("s",), sensors=(), collection=COLLECTION)
@@ -205,11 +211,19 @@ def test_whatever_is_pressed_each_trial_is_accepted_once_and_in_order(
             else:
                 guide.press(20 * time_us, press)
     told = events(recorder)
-    accepted = [trial for event, trial in told if event == "accepted"]
-    assert accepted == list(range(1, guide.accepted + 1))
-    for (event, trial), (before, other) in zip(told[1:], told, strict=False):
-        assert (event == "captured") != (before == "captured")
-        assert event == "captured" or trial == other
+    accepted: list[int] = []
+    for (event, trial), (before, other) in zip(told, [("", 0), *told], strict=False):
+        # A capture is judged, nothing else is but by a skip, and what is judged is what was captured.
+        assert (before == "captured") <= (event in ("accepted", "redone", "skipped"))
+        assert (event in ("accepted", "redone")) <= (before == "captured")
+        assert before != "captured" or trial == other
+        if event == "accepted":
+            accepted.append(trial)
+        elif event == "undone" and trial in accepted:
+            assert accepted.pop() == trial
+    assert accepted == sorted(set(accepted))
+    assert len(accepted) == guide.done
+    assert set(read_journal(recorder.path).accepted) == set(accepted)
 
 
 def test_nothing_is_captured_while_a_taxel_cannot_be_read(tmp_path: Path, session: Session) -> None:
@@ -228,3 +242,119 @@ def test_nothing_is_captured_while_a_taxel_cannot_be_read(tmp_path: Path, sessio
                 assert guide.problem.endswith(problem)
                 assert (guide.problem == "") == (problem == "")
             assert stage(guide) is Stage.REVIEW
+
+
+def take(guide: Guide, now: int) -> int:
+    """Let the countdown end and the grasp be captured; return when."""
+    now += COUNTDOWN_US
+    guide.take(now, whole(now))
+    assert stage(guide) is Stage.REVIEW
+    return now
+
+
+def test_the_last_trial_is_undone_and_comes_again_at_once(guide: Guide, recorder: Recorder) -> None:
+    first, second, *_ = planned(COLLECTION)
+    assert Key.UNDO not in guide.offered()
+    guide.press(0, Key.UNDO)
+    assert (stage(guide), guide.trial) == (Stage.READY, first)
+    guide.press(0, Key.ACCEPT)
+    now = take(guide, 0)
+    guide.press(now, Key.ACCEPT)
+    assert guide.offered()[Key.UNDO] == f"undo the last ({first.grasp})"
+    now = take(guide, now)
+    # The second was captured, and is not judged: it is dropped with the first.
+    guide.press(now, Key.UNDO)
+    assert (stage(guide), guide.trial, guide.done) == (Stage.COUNTDOWN, first, 0)
+    for trial in (first, second):
+        assert guide.trial == trial
+        now = take(guide, now)
+        guide.press(now, Key.ACCEPT)
+    assert events(recorder) == [
+        ("captured", 1),
+        ("accepted", 1),
+        ("captured", 2),
+        ("redone", 2),
+        ("undone", 1),
+        ("captured", 1),
+        ("accepted", 1),
+        ("captured", 2),
+        ("accepted", 2),
+    ]
+    assert read_journal(recorder.path).accepted == (1, 2)
+
+
+def test_a_trial_is_skipped_whatever_it_is_doing_and_is_left_for_another_time(guide: Guide, recorder: Recorder) -> None:
+    guide.press(0, Key.SKIP)
+    assert stage(guide) is Stage.READY
+    guide.press(0, Key.ACCEPT)
+    guide.press(1, Key.SKIP)
+    assert stage(guide) is Stage.COUNTDOWN
+    assert guide.seconds_left(1) == 3.0
+    now = take(guide, 1)
+    guide.press(now, Key.SKIP)
+    assert (guide.done, guide.skipped, guide.trial) == (0, 3, planned(COLLECTION)[3])
+    now = take(guide, now)
+    guide.press(now, Key.ACCEPT)
+    assert (stage(guide), guide.done, guide.skipped) == (Stage.DONE, 1, 3)
+    assert Key.SKIP not in guide.offered()
+    assert read_journal(recorder.path).accepted == (4,)
+    # The skipped one is the last but one.
+    guide.press(now, Key.UNDO)
+    guide.press(now, Key.UNDO)
+    assert (stage(guide), guide.trial) == (Stage.READY, planned(COLLECTION)[2])
+    assert read_journal(recorder.path).accepted == ()
+
+
+def test_a_pause_ends_the_countdown_and_nothing_is_recorded_meanwhile(guide: Guide, recorder: Recorder) -> None:
+    guide.press(0, Key.PAUSE)
+    assert stage(guide) is Stage.READY
+    guide.press(0, Key.ACCEPT)
+    guide.take(1, whole(1))
+    before = recorder.messages
+    guide.press(2, Key.PAUSE)
+    guide.take(2 * COUNTDOWN_US, whole(2 * COUNTDOWN_US, closed=0b11))
+    assert (stage(guide), recorder.messages) == (Stage.PAUSED, before)
+    # Seen it is all the same.
+    assert guide.captured[0] == SwitchFrame(2 * COUNTDOWN_US, 0b11)
+    now = 2 * COUNTDOWN_US
+    guide.press(now, Key.SKIP)
+    assert (stage(guide), guide.trial) == (Stage.PAUSED, planned(COLLECTION)[1])
+    guide.press(now, Key.UNDO)
+    assert (stage(guide), guide.trial) == (Stage.PAUSED, planned(COLLECTION)[0])
+    guide.press(now, Key.PAUSE)
+    assert stage(guide) is Stage.COUNTDOWN
+    assert guide.seconds_left(now) == 3.0
+    now = take(guide, now)
+    assert Key.PAUSE not in guide.offered()
+    guide.press(now, Key.PAUSE)
+    assert stage(guide) is Stage.REVIEW
+
+
+def test_what_is_offered_does_something_and_nothing_else_does(guide: Guide) -> None:
+    quiet = {Key.REDO, Key.QUIT, Key.PAUSE}
+    now = 0
+    for press in (Key.ACCEPT, None, Key.ACCEPT, Key.PAUSE, Key.ACCEPT, None):
+        for key in set(Key) - set(guide.offered()) - quiet:
+            step = guide.step
+            guide.press(now, key)
+            assert guide.step == step, (guide.stage, key)
+        step = guide.step
+        now = now if press is not None else take(guide, now)
+        if press is not None:
+            guide.press(now, press)
+        assert guide.step > step
+
+
+def test_a_later_sitting_may_undo_what_an_earlier_one_accepted(tmp_path: Path, session: Session) -> None:
+    wanted = replace(session, collection=COLLECTION)
+    with Recorder(tmp_path / "a.mcap", wanted) as recorder:
+        guide = Guide(planned(COLLECTION), recorder, COUNTDOWN_US)
+        guide.press(0, Key.ACCEPT)
+        guide.press(take(guide, 0), Key.ACCEPT)
+    journal = read_journal(recorder.path)
+    with Recorder(recorder.path, wanted, tail=journal.tail) as recorder:
+        guide = Guide(planned(COLLECTION), recorder, COUNTDOWN_US, journal.accepted)
+        assert guide.trial == planned(COLLECTION)[1]
+        guide.press(0, Key.UNDO)
+        assert (stage(guide), guide.trial, guide.done) == (Stage.READY, planned(COLLECTION)[0], 0)
+    assert read_journal(recorder.path).accepted == ()

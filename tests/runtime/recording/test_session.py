@@ -21,7 +21,7 @@ def test_a_session_comes_back_from_its_texts(session: Session) -> None:
 
 def test_texts_are_readable_as_they_are(session: Session) -> None:
     texts = to_metadata(session)
-    assert texts["version"] == "2"
+    assert texts["version"] == "3"
     assert to_metadata(replace(session, collection=None))["version"] == "1"
     assert texts["harness"] == 'name = "bänk"\n'
     assert texts["sensors"] == '["thumb","index"]'
@@ -49,7 +49,7 @@ def test_a_session_of_before_there_were_segments_is_one_without(session: Session
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"version": "3"}, "of version 3, this thenar reads up to 2: update thenar"),
+        ({"version": "4"}, "of version 4, this thenar reads up to 3: update thenar"),
         ({"version": "9" * 5000}, "not a number"),
         ({"version": "x"}, "its version is 'x', not a number"),
         ({"version": "²"}, "not a number"),

@@ -3,14 +3,18 @@
 import socket
 import tracemalloc
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 from msgspec import json
+from msgspec.structs import replace
 
+from thenar.runtime.build import Build
+from thenar.runtime.live.recogniser import Moment
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import HealthReport, LiveGrasp
-from thenar.runtime.sinks import HealthLine, JointAngles, Line, SocketLines
+from thenar.runtime.sinks import DetailLine, HealthLine, JointAngles, Line, SocketLines
 from thenar.runtime.sinks.sockets import HANGING_S, MAX_OF_ONE, MAX_READERS, open_tcp, open_unix
 
 MakeGrasp = Callable[..., LiveGrasp]
@@ -294,3 +298,23 @@ def test_closing_ends_every_reader_and_may_be_done_twice(
     assert reader.number() == 1
     assert reader.lines.readline() == b""
     assert sink.report().readers == 0
+
+
+@pytest.mark.parametrize("detail", [False, True])
+def test_details_follow_their_grasps_for_those_who_asked_and_a_hundred_times_a_second(
+    make_build: Callable[..., Build], make_grasp: MakeGrasp, tmp_path: Path, detail: bool
+) -> None:
+    build = make_build()
+    with closing(open_unix(str(tmp_path / "grasps"), detail=detail)) as sink:
+        sink.begin(build)
+        reader = Reader(sink)
+        for number in range(20):
+            grasp = replace(make_grasp(number), time_us=1_000_000 + 2_500 * number)
+            sink.publish(grasp, None, None)
+            sink.moment(Moment(grasp, None, None, None))
+    with closing(reader):
+        lines = [json.decode(line, type=Line | DetailLine) for line in reader.lines]
+    details = [line for line in lines if isinstance(line, DetailLine)]
+    assert [line.number for line in details] == (list(range(0, 20, 4)) if detail else [])
+    assert {line.build for line in details} <= {build.manifest.checksum}
+    assert len(lines) == 20 + len(details)

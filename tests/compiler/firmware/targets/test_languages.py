@@ -3,7 +3,7 @@
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,12 @@ from msgspec import structs
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout, arrange
 from thenar.compiler.firmware.probes import Answers, Probes, lost_inputs
+from thenar.compiler.firmware.sensors import Sensor, sensors_of
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.tools import call, find
-from thenar.runtime.manifest import Manifest, Rejection
+from thenar.runtime.build import Build
+from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.manifest import Calibration, Manifest, Rejection, Threshold
 from thenar.runtime.softmax import Softmax
 from thenar.runtime.tables import IntegerTables, Pair, Slope
 
@@ -187,6 +190,116 @@ def test_margin_probability_and_refusal_are_python_s(
     assert shares == [*Softmax(tables.scale).probabilities(scores.tolist()), k, best]
 
 
+CONVERTING = {
+    "micropython": """
+import thenar_hand as library
+glove = library.Glove()
+print(*[glove.calibrated(sensor) + 0 for sensor in range({sensors})])
+for again in range(2):
+    for sensor in range({sensors}):
+        print(*[glove.code_of(sensor, reading) for reading in range({first}, {last})])
+    for sensor in range({sensors}):
+        print(glove.calibrate(sensor, 900, 100 + sensor) + 0, glove.calibrate(sensor, 7, 7) + 0)
+for sensor in range({sensors}):
+    glove.set_reading(sensor, 300 + 60 * sensor)
+glove.classify()
+print(*[glove.score(k) for k in range({classes})])
+""",
+    "rust": """
+use thenar_hand::*;
+fn main() {{
+    let mut glove = Glove::new();
+    println!("{{}}", Sensor::ALL.map(|each| (glove.calibrated(each) as u8).to_string()).join(" "));
+    for _ in 0..2 {{
+        for sensor in Sensor::ALL {{
+            for reading in {first}..{last} {{
+                print!("{{}} ", glove.code_of(sensor, reading));
+            }}
+            println!();
+        }}
+        for (number, sensor) in Sensor::ALL.into_iter().enumerate() {{
+            let line = glove.calibrate(sensor, 900, 100 + number as i32);
+            println!("{{}} {{}}", line as u8, glove.calibrate(sensor, 7, 7) as u8);
+        }}
+    }}
+    for (number, sensor) in Sensor::ALL.into_iter().enumerate() {{
+        glove.set_reading(sensor, 300 + 60 * number as i32);
+    }}
+    glove.classify();
+    println!("{{}}", Grasp::ALL.map(|each| glove.score(each).to_string()).join(" "));
+}}
+""",
+    "wasm": """
+import {{ readFileSync }} from "node:fs";
+import {{ load }} from "./thenar_hand.js";
+const {{ Glove, sensors }} = await load(readFileSync("thenar_hand.wasm"));
+const glove = new Glove();
+const other = new Glove();
+console.log(...sensors.map((_, sensor) => Number(glove.calibrated(sensor))));
+for (let again = 0; again < 2; again++) {{
+    sensors.forEach((_, sensor) => {{
+        const codes = [];
+        for (let reading = {first}; reading < {last}; reading++) {{
+            codes.push(glove.codeOf(sensor, reading));
+        }}
+        console.log(codes.join(" "));
+    }});
+    sensors.forEach((_, sensor) => {{
+        console.log(Number(glove.calibrate(sensor, 900, 100 + sensor)), Number(glove.calibrate(sensor, 7, 7)));
+    }});
+}}
+other.calibrate(0, 1, 2); // a glove of its own
+sensors.forEach((_, sensor) => glove.setReading(sensor, 300 + 60 * sensor));
+glove.classify();
+console.log(...glove.scores);
+""",
+}
+STREAM = """
+name = "glove"
+[[stream]]
+port = "/dev/ttyUSB0"
+joints = { j0 = [800, 100], j1 = [0, 1016], j2 = [-30, 500], j3 = [200, 454] }
+taxels = { pad = [0, 1023] }
+"""
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["of a glove", "not known"])
+def test_readings_become_python_s_codes(
+    make_tables: MakeTables, describe: Describe, language: str, tmp_path: Path, known: bool
+) -> None:
+    tables = make_tables(**SHAPES["small"])
+    manifest = describe(tables)
+    levels = [Threshold(code, 0.0, Calibration(0, "pad", "counts", 0, 0.0, 1, 1.0)) for code in (90, 400)]
+    low, high = (structs.replace(manifest.switches[n], threshold=level) for n, level in enumerate(levels))
+    joints = manifest.joints  # 0 to 1016 ohm: many codes midway between two
+    if known:
+        joints = tuple(structs.replace(joint, unit="ohm", code_a=0, code_b=508, value_b=1016.0) for joint in joints)
+    manifest = structs.replace(manifest, switches=(low, high, *manifest.switches[2:]), joints=joints)
+    sensors = sensors_of(manifest, parse_harness(STREAM, "glove.toml") if known else None)
+    library = Library("hand", manifest, arrange(tables), avr=False, glove=sensors)
+    readings = range(-90, 1100)
+    count = len(sensors.every)
+    given = {"sensors": count, "classes": tables.n_classes, "first": readings.start, "last": readings.stop}
+    text = printed(language, TARGETS[language].sources(library), CONVERTING[language].format(**given), tmp_path)
+    lines = [[int(word) for word in line.split()] for line in text.splitlines()]
+
+    def codes(every: Sequence[Sensor]) -> list[list[int]]:
+        return [[0 if each.readings is None else each.code(reading) for reading in readings] for each in every]
+
+    again = []
+    for n, each in enumerate(sensors.every):
+        first, second = (each.grid.code(count) if each.grid else count for count in (900, 100 + n))
+        again.append(replace(each, readings=(first, second)))
+    answers = [[int(one.readings[0] != one.readings[1]), 0] for one in again if one.readings]
+    assert lines[0] == [int(known)] * count
+    assert lines[1:-1] == [*codes(sensors.every), *answers, *codes(again), *answers]
+    found = [each.code(300 + 60 * n) for n, each in enumerate(again)]
+    bits = np.zeros(tables.n_switches, bool)
+    bits[:2] = found[-1] > 90, found[-1] > 400
+    held = np.array(found[:-1], np.uint16)
+    assert lines[-1] == Build(manifest, tables).scores(bits, held).tolist()
+
+
 def test_a_crate_is_free_of_warnings_and_tests_itself(
     tool: Callable[[str], str],
     make_tables: MakeTables,
@@ -257,6 +370,7 @@ extern const mp_obj_type_t mp_type_tuple, mp_type_str, mp_type_module, mp_type_I
 #define mp_const_none ((mp_obj_t)&mp_type_tuple)
 mp_int_t mp_obj_get_int(mp_const_obj_t o);
 bool mp_obj_is_true(mp_obj_t o);
+mp_obj_t mp_obj_new_bool(mp_int_t x);
 void mp_raise_msg(const mp_obj_type_t *type, const char *text) __attribute__((noreturn));
 void mp_arg_check_num(size_t n_args, size_t n_kw, size_t least, size_t most, bool keywords);
 void *mp_obj_malloc_helper(size_t bytes, const mp_obj_type_t *type);

@@ -11,8 +11,11 @@ from msgspec.structs import replace
 
 from thenar.compiler.firmware.classifier import Library as Files
 from thenar.compiler.firmware.layout import Layout, arrange
+from thenar.compiler.firmware.sensors import sensors_of
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
+from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
 
@@ -25,7 +28,7 @@ Describe = Callable[[IntegerTables], Manifest]
 ARDUINO = Path("/usr/share/arduino/hardware")
 BUILDER = Path("/usr/share/arduino-builder")  # where Debian's package says where the IDE's tools are
 BOARDS = {"uno": ("atmega328p", "arduino:avr:uno"), "mega": ("atmega2560", "arduino:avr:mega:cpu=atmega2560")}
-CODES = "-DCODE_OF(joint,reading)=((reading)>>2)"
+GLOVE = 'name = "glove"\n[[stream]]\nport = "/dev/ttyUSB0"\njoints = {{ {} }}\n'
 
 # As many as the board has pins for, but for simavr, in which inputs 12 to 14 of the larger part read full scale.
 ON_A_BOARD = {
@@ -34,12 +37,26 @@ ON_A_BOARD = {
 }
 
 
+def on_pins(manifest: Manifest) -> Manifest:
+    """Return a build of what a board's pins measured."""
+    return replace(manifest, joints=tuple(replace(j, unit="raw", code_a=1, code_b=255) for j in manifest.joints))
+
+
+def glove(manifest: Manifest) -> Harness:
+    """Return a board that sends the counts of its pins."""
+    return parse_harness(
+        GLOVE.format(", ".join(f"{joint.name} = [0, 1023]" for joint in manifest.joints)), "glove.toml"
+    )
+
+
 @pytest.fixture
 def library(describe: Describe, tmp_path: Path) -> Callable[..., Path]:
     """Return what writes the library "hand" of a layout."""
 
-    def library(layout: Layout, avr: bool = True) -> Path:
-        for name, text in TARGETS["arduino"].files(Files("hand", describe(layout.tables), layout, avr)).items():
+    def library(layout: Layout, avr: bool = True, known: bool = True) -> Path:
+        manifest = on_pins(describe(layout.tables))
+        sensors = sensors_of(manifest, glove(manifest)) if known and manifest.joints else None
+        for name, text in TARGETS["arduino"].files(Files("hand", manifest, layout, avr, glove=sensors)).items():
             path = tmp_path / "thenar_hand" / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
@@ -54,7 +71,7 @@ def sketch(tool: Callable[[str], str], tmp_path: Path, cores: Path) -> Callable[
     if not ARDUINO.is_dir():
         tool("arduino-core-avr")
 
-    def sketch(library: Path, board: str, given: str = CODES) -> Path:
+    def sketch(library: Path, board: str, given: str = "") -> Path:
         out = tmp_path / "out"
         out.mkdir(exist_ok=True)
         hardware = [f"-hardware={folder}" for folder in (BUILDER, ARDUINO)]
@@ -97,8 +114,9 @@ def test_the_example_prints_the_grasp_that_python_finds(
     elf = sketch(library(arrange(tables, entry_bits=entry_bits)), board)
     build = Build(describe(tables), tables)
     # Nothing is wired: pulled up, every switch is open; the simulator's analog inputs are at 0 V.
-    wanted = build.classify(np.zeros(tables.n_switches, bool), np.zeros(tables.n_joints, np.uint16))
-    assert wanted != build.classify(np.ones(tables.n_switches, bool), np.zeros(tables.n_joints, np.uint16))
+    codes = np.ones(tables.n_joints, np.uint16)
+    wanted = build.classify(np.zeros(tables.n_switches, bool), codes)
+    assert wanted != build.classify(np.ones(tables.n_switches, bool), codes)
     assert first_line(tool("simavr"), elf, BOARDS[board][0]) == wanted
 
 
@@ -115,15 +133,23 @@ def first_line(simavr: str, elf: Path, part: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("inputs", "said"),
-    [({"switches": 12, "joints": 6}, "too few pins"), ({"switches": 2, "joints": 7}, "too few analog inputs")],
-    ids=["switches", "joints"],
+    "inputs",
+    [{"switches": 12, "joints": 6}, {"switches": 2, "joints": 7}, {"switches": 40, "joints": 17, "bins": 3}],
+    ids=["switches", "joints", "both"],
 )
-def test_an_example_for_more_inputs_than_the_board_has_says_so(
-    make_tables: MakeTables, library: Library, sketch: Sketch, inputs: dict[str, int], said: str
+def test_an_example_for_more_inputs_than_the_board_has_reads_them_by_other_parts(
+    make_tables: MakeTables, library: Library, sketch: Sketch, inputs: dict[str, int]
 ) -> None:
-    made = library(arrange(make_tables(**inputs)))
-    with pytest.raises(AssertionError, match=f"#error .this board has {said} for every"):
+    sketch(library(arrange(make_tables(**inputs))), "uno")
+
+
+def test_an_example_for_more_inputs_than_multiplexers_bring_says_so(
+    make_tables: MakeTables, library: Library, sketch: Sketch
+) -> None:
+    made = library(arrange(make_tables(switches=2, joints=97, bins=3)))
+    with pytest.raises(
+        AssertionError, match=r"#error .this board has too few analog inputs, even for one to each multi"
+    ):
         sketch(made, "uno")
 
 
@@ -143,11 +169,12 @@ def test_a_mega_takes_33_switches_and_16_joints(make_tables: MakeTables, library
 def test_it_refuses_readings_of_which_nothing_is_known(
     make_tables: MakeTables, library: Library, sketch: Sketch
 ) -> None:
-    made = library(arrange(make_tables(highest=1000), bins="search"))
-    assert "0: j0: code 0 = 0 deg, 100 = 50 deg" in (made / "examples/Recognise/Recognise.ino").read_text()
-    sketch(made, "uno", "-DCODE_OF(joint,reading)=(reading)")
-    with pytest.raises(AssertionError, match=r"#error .say what the code of a joint is: #define CODE_OF"):
-        sketch(made, "uno", "")
+    made = library(arrange(make_tables(highest=1000), bins="search"), known=False)
+    assert "{0, 0}, /* j0: code 0 and code 50 */" in (made / "examples/Recognise/Recognise.ino").read_text()
+    for given in ("-DCALIBRATED=1", "-DSHOW_READINGS"):
+        sketch(made, "uno", given)
+    with pytest.raises(AssertionError, match=r"#error .unknown readings: thenar firmware --glove, or SHOW_READINGS"):
+        sketch(made, "uno")
 
 
 def test_the_properties_are_those_that_the_specification_asks_for(make_tables: MakeTables, library: Library) -> None:
@@ -164,7 +191,7 @@ def test_the_properties_are_those_that_the_specification_asks_for(make_tables: M
 
 def test_keywords_are_words_of_the_header_a_tab_and_a_kind(make_tables: MakeTables, library: Library) -> None:
     made = library(arrange(make_tables()))
-    header = (made / "src" / "thenar_hand.h").read_text()
+    header = "".join((made / "src" / f"thenar_hand{part}.h").read_text() for part in ("", "_codes"))
     rows = [line.split("\t") for line in (made / "keywords.txt").read_text().splitlines()]
     assert {kind for _, kind in rows} == {"KEYWORD1", "KEYWORD2", "LITERAL1"}
     assert all(re.search(rf"\b{word}\b", header) for word, _ in rows)
@@ -184,4 +211,4 @@ def test_names_that_are_no_words_of_c_do_no_harm(
     named = replace(manifest, switches=switches, joints=joints)
     odd = TARGETS["arduino"].files(Files("hand", named, layout, avr=True))
     (made / "examples/Recognise/Recognise.ino").write_text(odd["examples/Recognise/Recognise.ino"])
-    sketch(made, "uno")
+    sketch(made, "uno", "-DCALIBRATED=1")

@@ -1,169 +1,38 @@
 /* A glove that recognises by itself. It reads switches on port expanders, and tells the host of them and of the
    grasp type (protocol 1 of thenar's scanner board).
 
-   Where an input is missing (a chip that does not answer, joints that do not come) its mean stands in, and the grasp is
-   told as degraded. Without any input it is not known.
-
    A reset at any moment, even in the middle of a frame, ends that frame with a 00 and begins with a HELLO.
 
-   thenar 0.1.0, template avr/glove_main.c.j2. */
+   thenar 0.1.0, template avr/main.c.j2. */
 #include <avr/interrupt.h>
 #include <stdbool.h>
 #include <stdint.h>
-#include <string.h>
 
-#include "thenar_glove.h"
-#include "thenar_glove_decided.h"
 #include "thenar_board.h"
 #include "thenar_clock.h"
-#include "thenar_debounce.h"
-#include "thenar_due.h"
-#include "thenar_joints.h"
-#include "thenar_keys.h"
 #include "thenar_reset.h"
+#include "thenar_turn.h"
 #include "thenar_uart0.h"
-
-/* So many of the host's bytes are taken before it is looked whether a scan is due: they may come without end. */
-#define BYTES_A_TURN 16u
-
-#if THENAR_GLOVE_PORTS > THENAR_BITMAP_BYTES
-#error "the classifier's ports are more than the bytes of the board's keys"
-#endif
-
-static thenar_glove glove;
-
-/* What was there at the last scan: keys, and joints. */
-static uint8_t known_before[THENAR_BITMAP_BYTES];
-static bool joints_before = true;
-#define NOT_YET 0xFFFFu
-static uint16_t switches_lost = NOT_YET; /* switches */
 
 bool thenar_port_send(const uint8_t *frame, uint8_t length)
 {
     return thenar_uart0_send(frame, length);
 }
 
-/* Show the classifier which keys are closed: the bytes of its ports are the first of their bitmap. */
-static void show(const uint8_t *closed)
+bool thenar_port_receive(uint8_t *byte)
 {
-    (void)memcpy(glove.input.switches, closed, THENAR_GLOVE_PORTS);
-}
-
-static bool is_known(uint16_t number, const uint8_t *known)
-{
-    const uint16_t key = number;
-
-    return (known[key >> 3] & (uint8_t)(1u << (key & 7u))) != 0u;
-}
-
-/* Say to the classifier which inputs are missing, if that has changed. */
-static void lose(const uint8_t *known, bool joints)
-{
-    if ((switches_lost == NOT_YET) || (memcmp(known, known_before, sizeof known_before) != 0)) {
-        (void)memcpy(known_before, known, sizeof known_before);
-        switches_lost = 0u;
-        for (uint16_t number = 0u; number < THENAR_GLOVE_SWITCHES; number++) {
-            const bool lost = !is_known(number, known);
-
-            switches_lost = (uint16_t)(switches_lost + (lost ? 1u : 0u));
-            thenar_glove_lose_switch(&glove, (thenar_glove_switch)number, lost);
-        }
-    }
-    if (joints != joints_before) {
-        joints_before = joints;
-        for (uint16_t joint = 0u; joint < THENAR_GLOVE_JOINTS; joint++) {
-            thenar_glove_lose_joint(&glove, joint, !joints);
-        }
-    }
-}
-
-static void tell_grasp(uint8_t grasp, uint8_t flags, uint32_t now_us)
-{
-    const bool degraded = !joints_before || (switches_lost > 0u);
-    const bool nothing = !joints_before && (switches_lost == THENAR_GLOVE_SWITCHES);
-
-    if (nothing || (grasp == THENAR_NO_GRASP)) {
-        thenar_board_grasp(THENAR_NO_GRASP, 0u, THENAR_GRASP_DEGRADED, now_us);
-    } else {
-        const uint8_t held = grasp;
-
-        const uint8_t all = (uint8_t)(flags | (degraded ? THENAR_GRASP_DEGRADED : 0u));
-
-        thenar_board_grasp(held, thenar_glove_margin(&glove), all, now_us);
-    }
-}
-
-/* What was not read keeps its last state for the host, lost or not: so often everything is read. */
-#define WHOLE_US UINT32_C(50000)
-
-static uint32_t whole_at_us = 0u - WHOLE_US; /* so the first scan is one */
-
-/* Return whether this scan is to read everything. */
-static bool whole_is_due(uint32_t now_us)
-{
-    const bool due = (now_us - whole_at_us) >= WHOLE_US;
-
-    if (due) {
-        whole_at_us = now_us;
-    }
-    return due;
-}
-
-/* Read port by port, until no state of the others could change the grasp type. The classifier is shown the switches as
-   they are read, those not read yet as open; debouncing is for what the host is told of the keys. While an input is
-   missing, everything is read. */
-static void scan(uint32_t now_us)
-{
-    const bool joints = thenar_joints_read(&glove, now_us);
-    bool complete = joints && (switches_lost == 0u);
-    const bool whole = whole_is_due(now_us) || !complete;
-    bool decided = false;
-    uint8_t closed[THENAR_BITMAP_BYTES];
-    uint8_t known[THENAR_BITMAP_BYTES];
-    uint8_t grasp = THENAR_NO_GRASP;
-
-    (void)memset(closed, 0, sizeof closed);
-    (void)memset(known, 0, sizeof known);
-    for (uint8_t port = 0u; (port < THENAR_KEYS_PORTS) && !decided; port++) {
-        complete = thenar_keys_read(port, closed, known) && complete;
-        show(closed);
-        grasp = thenar_glove_update(&glove);
-        decided = complete && !whole && (port < (THENAR_KEYS_PORTS - 1u))
-            && thenar_glove_decided(&glove, port, grasp);
-    }
-    thenar_board_found(known);
-    thenar_debounce(closed, known, now_us);
-    thenar_board_scanned(closed, known, !decided, now_us);
-    if (!decided) {
-        lose(known, joints);
-        grasp = thenar_glove_update(&glove);
-    }
-    tell_grasp(grasp, decided ? THENAR_GRASP_EARLY : 0u, now_us);
+    return thenar_uart0_receive(byte);
 }
 
 int main(void)
 {
-    thenar_glove_init(&glove);
     thenar_uart0_begin();
     thenar_clock_begin();
     sei();
-    thenar_board_boot(thenar_clock_us());
-    thenar_keys_begin();
-    thenar_joints_begin();
-    thenar_due_begin(thenar_clock_us());
+    thenar_turn_begin();
     thenar_reset_watch();
     for (;;) {
-        uint32_t now_us = thenar_clock_us();
-        uint8_t byte;
-
-        for (uint8_t taken = 0u; (taken < BYTES_A_TURN) && thenar_uart0_receive(&byte); taken++) {
-            thenar_board_receive(byte, now_us);
-        }
-        thenar_joints_attend(now_us);
-        if (thenar_due(now_us)) {
-            thenar_keys_attend(now_us);
-            scan(thenar_clock_us());
-        }
+        thenar_turn();
         thenar_reset_watched();
     }
 }

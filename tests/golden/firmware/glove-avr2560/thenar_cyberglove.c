@@ -7,13 +7,13 @@
    joint 0: byte 1, thumb_rotation
    joint 1: byte 6, index_pij
 
-   thenar 0.1.0, template avr/thenar_cyberglove.c.j2. */
+   thenar 0.1.0, template board/thenar_cyberglove.c.j2. */
 #include "thenar_joints.h"
 
-#include <avr/pgmspace.h>
 #include <string.h>
 
 #include "thenar_clock.h"
+#include "thenar_flash.h"
 #include "thenar_uart1.h"
 
 #define SENSORS 18u

@@ -1,6 +1,6 @@
 /* When to scan: every thenar_board_scan_us(), at steady times.
 
-   thenar 0.1.0, template avr/thenar_due.h.j2. */
+   thenar 0.1.0, template board/thenar_due.h.j2. */
 #ifndef THENAR_DUE_H
 #define THENAR_DUE_H
 

@@ -3,13 +3,13 @@
    mcp23017 at 0x20
    pca9555 at 0x21
 
-   thenar 0.1.0, template avr/thenar_expanders.c.j2. */
+   thenar 0.1.0, template board/thenar_expanders.c.j2. */
 #include "thenar_keys.h"
 
-#include <avr/pgmspace.h>
 #include <string.h>
 
 #include "thenar_board.h"
+#include "thenar_flash.h"
 #include "thenar_twi.h"
 
 #define CHIPS 2u

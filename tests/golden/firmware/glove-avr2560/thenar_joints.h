@@ -1,6 +1,6 @@
 /* The joints: a CyberGlove on a UART.
 
-   thenar 0.1.0, template avr/thenar_joints.h.j2. */
+   thenar 0.1.0, template board/thenar_joints.h.j2. */
 #ifndef THENAR_JOINTS_H
 #define THENAR_JOINTS_H
 

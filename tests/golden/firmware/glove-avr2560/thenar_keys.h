@@ -1,6 +1,6 @@
 /* The keys: switches on port expanders.
 
-   thenar 0.1.0, template avr/thenar_keys.h.j2. */
+   thenar 0.1.0, template board/thenar_keys.h.j2. */
 #ifndef THENAR_KEYS_H
 #define THENAR_KEYS_H
 

@@ -1,6 +1,6 @@
-/* Master of the I2C bus, at 400000 Hz, by interrupt. No chip, present, absent or stuck, can hold it up for long.
+/* Master of the I2C bus, at 400000 Hz. No chip, present, absent or stuck, can hold it up for long.
 
-   thenar 0.1.0, template avr/thenar_twi.h.j2. */
+   thenar 0.1.0, template board/thenar_twi.h.j2. */
 #ifndef THENAR_TWI_H
 #define THENAR_TWI_H
 

@@ -1,6 +1,6 @@
-/* UART 1 at 115200 baud (off by +2.1%), 8 data bits, no parity, one stop bit, by interrupts.
+/* UART 1 at 115200 baud (off by +2.1%), by interrupts, 8 data bits, no parity, one stop bit.
 
-   thenar 0.1.0, template avr/thenar_uart.h.j2. */
+   thenar 0.1.0, template board/thenar_uart.h.j2. */
 #ifndef THENAR_UART1_H
 #define THENAR_UART1_H
 

@@ -1,4 +1,5 @@
-/* Timer 1 counts an eighth of 16000000 Hz and starts again every 20 ms, which its interrupt adds up.
+/* Timer 1 counts an eighth of 16000000 Hz and starts again every 20 ms, which its interrupt adds up. Interrupts must
+   never be off for 10000 us.
 
    thenar 0.1.0, template avr/thenar_clock.c.j2. */
 #include "thenar_clock.h"

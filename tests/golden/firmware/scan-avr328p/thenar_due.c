@@ -1,6 +1,6 @@
 /* When to scan; thenar_due.h says when that is.
 
-   thenar 0.1.0, template avr/thenar_due.c.j2. */
+   thenar 0.1.0, template board/thenar_due.c.j2. */
 #include "thenar_due.h"
 
 #include "thenar_board.h"

@@ -1,6 +1,6 @@
-/* UART 0 at 1000000 baud (off by +0.0%), 8 data bits, no parity, one stop bit, by interrupts.
+/* UART 0 at 1000000 baud (off by +0.0%), by interrupts, 8 data bits, no parity, one stop bit.
 
-   thenar 0.1.0, template avr/thenar_uart.h.j2. */
+   thenar 0.1.0, template board/thenar_uart.h.j2. */
 #ifndef THENAR_UART0_H
 #define THENAR_UART0_H
 

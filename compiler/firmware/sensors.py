@@ -1,0 +1,222 @@
+"""What the readings of joints and taxels mean on a board: the lines by which they become codes, and their C.
+
+A build says what its codes mean, and which of them two poses of a joint have. What a sensor reads in these poses is of
+the glove: its `glove.toml` and its calibrations say it, or the program that runs on the board.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from thenar.drivers.calibration import GloveCalibration, SensorCalibration, poses_of
+from thenar.drivers.errors import SettingError
+from thenar.firmware_templates.rendering import render
+from thenar.runtime.calibration import Meaning, codes_of_bytes, load_calibration, numbers_of, place_of
+from thenar.runtime.code_line import FARTHEST, FRACTION, CodeLine, Point, code_point
+from thenar.runtime.harness.wiring import Harness, Range, StreamWiring
+from thenar.runtime.manifest import Calibration, Threshold
+from thenar.runtime.sources.rows import JOINT_CODES, steps_of
+from thenar.runtime.taxels import TaxelCalibration, calibration_of, count_limit
+
+from . import FirmwareError
+from .words import Names, comment, identifiers
+
+_RAW = "raw"
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """The even grid on which the numbers of a stream are coded first: `low` as `first`, `high` as `last`."""
+
+    low: int
+    high: int
+    first: int
+    last: int
+
+    @property
+    def steps(self) -> int:
+        """How many steps lie between the two."""
+        return self.last - self.first
+
+    def code(self, reading: int) -> int:
+        """Return the code of a number, as `runtime.sources.rows` has it."""
+        ends = Point(self.low, 0), Point(self.high, self.steps << FRACTION)
+        return self.first + CodeLine(*ends, least=0, most=self.steps).code(reading)
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """A joint, or a taxel.
+
+    codes     of the two points that a calibration measures, in 2^-24 of a code
+    says      what they are: "0 deg" and "90 deg"
+    readings  what is read at them, as `grid` codes it; None where that is not known
+    grid      what codes the numbers of a stream first; None where readings are used as they are
+    """
+
+    name: str
+    codes: tuple[int, int]
+    says: tuple[str, str]
+    readings: tuple[int, int] | None = None
+    grid: Grid | None = None
+
+    def code(self, reading: int) -> int:
+        """Return the code of a reading, which is known: the same as the C's."""
+        assert self.readings is not None
+        first, second = map(Point, self.readings, self.codes)
+        return CodeLine(first, second).code(reading if self.grid is None else self.grid.code(reading))
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """The sensors of a build: joints, then taxels.
+
+    levels  of the taxels: the number of a switch, that of its taxel, and the code above which it is closed
+    """
+
+    joints: tuple[Sensor, ...]
+    taxels: tuple[Sensor, ...]
+    levels: tuple[tuple[int, int, int], ...]
+
+    @property
+    def every(self) -> tuple[Sensor, ...]:
+        """All of them, in the order of their numbers."""
+        return (*self.joints, *self.taxels)
+
+    @property
+    def sorts(self) -> str:
+        """What they are, in words: "joints, then taxels"."""
+        return ", then ".join(["joints"] * bool(self.joints) + ["taxels"] * bool(self.taxels))
+
+    @property
+    def known(self) -> bool:
+        """Whether it is known what every one reads."""
+        return all(sensor.readings is not None for sensor in self.every)
+
+    @property
+    def on_pins(self) -> bool:
+        """Whether every one is known by the numbers that a board sends of it: those of its pins."""
+        return self.known and all(sensor.grid is not None for sensor in self.every)
+
+
+def sensors_of(names: Names, harness: Harness | None = None, calibration: GloveCalibration | None = None) -> Sensors:
+    """Return the sensors of a build, as far as a glove's `harness` and the `calibration` of its joints know them.
+
+    Raises SettingError where these do not fit the build, FirmwareError where a stream's ranges are no whole numbers.
+    """
+    device = None if harness is None else harness.joint_device
+    if calibration is None and harness is not None and harness.calibration is not None:
+        calibration = load_calibration(Path(harness.calibration))
+    ranges = device.joints if isinstance(device, StreamWiring) else {}
+    meaning: Meaning = calibration
+    if calibration is None and ranges:
+        meaning = numbers_of(ranges)
+    if device is not None:
+        for joint in names.joints:
+            place_of(joint.name, device.sensor_names)
+    known = device is not None or calibration is not None
+    joints = tuple(_joint(joint, meaning, ranges.get(joint.name), known=known) for joint in names.joints)
+    thresholds = [(n, switch.threshold) for n, switch in enumerate(names.switches) if switch.threshold is not None]
+    coded = {threshold.taxel.name: threshold for _, threshold in thresholds}
+    places = {name: place for place, name in enumerate(coded)}
+    levels = tuple((n, places[threshold.taxel.name], threshold.code) for n, threshold in thresholds)
+    return Sensors(joints, _taxels(list(coded.values()), harness), levels)
+
+
+def _joint(joint: Calibration, meaning: Meaning, limits: Range | None, *, known: bool) -> Sensor:
+    points, unit = _points(joint), joint.unit
+    if not known:
+        return _sensor(joint, points)
+    codes_of_bytes(joint, meaning)  # whether they fit
+    grid = None if limits is None else _grid(joint.name, limits, *JOINT_CODES)
+    own = None if meaning is None or unit == _RAW else _line(joint.name, meaning.sensors)
+    if own is None:  # bytes are codes
+        return _sensor(joint, points, (joint.code_a, joint.code_b), grid)
+    return _sensor(joint, (own.value_a, own.value_b), (own.raw_a, own.raw_b), grid)
+
+
+def _line(name: str, lines: Sequence[SensorCalibration]) -> SensorCalibration:
+    return next(line for line in lines if line.name == name)
+
+
+def _points(coded: Calibration) -> tuple[float, float]:
+    """Return the values of the two points at which a sensor is to be read: two poses of a joint, rest and press."""
+    own = coded.value_a, coded.value_b
+    if coded.unit != "deg":
+        return own
+    bent = next(pose.degrees[coded.name] for pose in poses_of([coded.name])[1:] if coded.name in pose.degrees)
+    try:
+        return (0.0, bent) if code_point(coded, 0.0) != code_point(coded, bent) else own
+    except SettingError:  # codes so fine that no pose has one
+        return own
+
+
+def _sensor(
+    coded: Calibration, values: tuple[float, float], readings: tuple[int, int] | None = None, grid: Grid | None = None
+) -> Sensor:
+    first, second = (code_point(coded, value) for value in values)
+    if first == second:
+        raise FirmwareError(f"{coded.name!r} has one code at both points of its calibration: calibrate the glove again")
+    unit = "code" if coded.unit == _RAW else coded.unit
+    says = [f"code {value:g}" if unit == "code" else f"{value:g} {unit}" for value in values]
+    return Sensor(coded.name, (first, second), (says[0], says[1]), readings, grid)
+
+
+def _taxels(thresholds: Sequence[Threshold], harness: Harness | None) -> tuple[Sensor, ...]:
+    lines = None if harness is None else calibration_of(harness.taxel_settings)
+    ranges = {} if harness is None else {name: own for each in harness.streams for name, own in each.taxels.items()}
+    wired = () if harness is None else harness.taxel_names
+    return tuple(
+        _taxel(each, lines, ranges.get(each.taxel.name), known=each.taxel.name in wired) for each in thresholds
+    )
+
+
+def _taxel(threshold: Threshold, lines: TaxelCalibration | None, limits: Range | None, *, known: bool) -> Sensor:
+    coded = threshold.taxel
+    if not known:
+        return _sensor(coded, (coded.value_a, coded.value_b))
+    count_limit(threshold, lines)  # whether they fit
+    grid = None if limits is None else _grid(coded.name, limits, 0, steps_of(limits))
+    own = None if lines is None else lines.line(coded.name)
+    if own is None:  # counts are codes
+        return _sensor(coded, (coded.value_a, coded.value_b), (coded.code_a, coded.code_b), grid)
+    return _sensor(coded, (0.0, own.value), (own.rest, own.press), grid)
+
+
+def _grid(name: str, limits: Range, first: int, last: int) -> Grid:
+    low, high = limits
+    whole = float(low).is_integer() and float(high).is_integer()
+    if not whole or max(abs(low), abs(high), abs(high - low)) > FARTHEST:
+        raise FirmwareError(
+            f"the range of {name!r} in glove.toml, {low:g} to {high:g}, is not of whole numbers within {FARTHEST}: "
+            "a board converts the counts of its own converter; give that range"
+        )
+    return Grid(int(low), int(high), first, last)
+
+
+def codes_files(name: str, sensors: Sensors, *, code_bits: int, avr: bool) -> dict[str, str]:
+    """Return the texts of thenar_`name`_codes.h and .c, which go with the classifier; none of a build of switches."""
+    if not sensors.every:
+        return {}
+    values = {
+        "name": name,
+        "upper": name.upper(),
+        "avr": avr,
+        "sensors": sensors.every,
+        "n_joints": len(sensors.joints),
+        "n_taxels": len(sensors.taxels),
+        "levels": sensors.levels,
+        "sorts": sensors.sorts.capitalize(),
+        "put": " or ".join(
+            ["the code of a joint"] * bool(sensors.joints)
+            + ["which levels of a taxel are closed"] * bool(sensors.taxels)
+        ),
+        "known": sensors.known,
+        "clipped": code_bits == 8,
+        "grids": any(sensor.grid for sensor in sensors.every),
+        "words": identifiers([sensor.name for sensor in sensors.every]),
+        "comments": [comment(f"{sensor.name}: {' and '.join(sensor.says)}") for sensor in sensors.every],
+        "fraction": FRACTION,
+        "farthest": FARTHEST,
+    }
+    return {f"thenar_{name}_codes{end}": render(f"codes/thenar_NAME_codes{end}.j2", **values) for end in (".h", ".c")}

@@ -1,0 +1,112 @@
+"""What stands in for a lost input: the row by which all others explain the recordings best.
+
+A mean row is what an input adds on average. But the others often say the same as it does, or the opposite, and are
+weighed as if it were there: without it, some grasp types are too probable on the whole and others not enough. So each
+input is left out of the rows that were trained on, and what stands in for it changes until every type is as probable in
+sum as it is frequent: there the likelihood is the highest that a constant row can give. A step adds ln(frequency / sum
+of the probabilities) to each type, which never lowers it (J. N. Darroch and D. Ratcliff, Ann. Math. Stat. 43, 1972).
+
+Where a build has switches and joints, all of a kind may be lost at once, and the sum of their rows stands in. Steps of
+single inputs miss what that sum lacks; the least squares of both kinds of remainders say how a step is shared.
+
+An entry stays between the least and the most that the input adds to its type: then no sum can leave its bounds. The
+steps are few, as those that follow suit the rows trained on more than others, above all where several are lost.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.tables import IntegerTables
+
+from ..elementary import log, softmax
+
+# Steps from the mean rows; distinct rows that are looked at.
+STEPS, ROWS = 20, 1000
+# Probabilities are added up in whole parts of this, so that their order is no matter.
+_WHOLE = 2.0**32
+# A type that no row has, or that is given no share, is neither impossible nor certain.
+_DOUBT = 0.5
+Steps = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+
+def fit_lost(
+    tables: IntegerTables, bits: NDArray[np.bool_], codes: NDArray[np.uint16], labels: NDArray[np.intp]
+) -> IntegerTables:
+    """Return the tables with what stands in for each lost switch and joint fitted to the rows trained on.
+
+    Parameters
+    ----------
+    tables : IntegerTables
+        Their mean rows are where the fit begins.
+    bits : array of bool, shape (n, s)
+        The kept switches.
+    codes : array of uint16, shape (n, j)
+        The codes of the kept joints.
+    labels : array of int, shape (n,)
+        The number of each row's class.
+    """
+    rows, often = _distinct(bits, codes, labels)
+    bits, codes, labels = bits[rows], codes[rows], labels[rows]
+    wanted = np.asarray(np.bincount(labels, often, tables.n_classes) + _DOUBT, np.float64)
+    switch_rows = tables.switch_rows.astype(np.int64)
+    closed, joints = bits.astype(np.int64) @ switch_rows, tables.joint_sums(codes).astype(np.int64)
+    whole = closed + joints
+    # Of each input, and then of all of its kind: the scores of the rows without.
+    switches = [whole - bits[:, switch, np.newaxis] * row for switch, row in enumerate(switch_rows)]
+    each = [whole - joints + _without(tables, codes, [joint]) for joint in range(tables.n_joints)]
+    if switches and each:
+        switches.append(joints)
+        each.append(closed + _without(tables, codes, range(tables.n_joints)))
+    added = [tables.choices(joint)[1].sum(axis=0) for joint in range(tables.n_joints)]
+    ends = np.minimum(switch_rows, 0), np.maximum(switch_rows, 0)
+    spans = tuple(np.array([end(rows, axis=0) for rows in added]).reshape(-1, len(wanted)) for end in (np.min, np.max))
+
+    def fitted(means: NDArray[np.int16], others: Sequence[Steps], ends: tuple[Steps, ...]) -> NDArray[np.int16]:
+        found = means.astype(np.int64)
+        for _ in range(STEPS if len(found) else 0):
+            rows = [*found, found.sum(axis=0)][: len(others)]
+            lacks = [_lack(scores + row, often, wanted, tables.scale) for scores, row in zip(others, rows, strict=True)]
+            steps = np.array(lacks[: len(found)])
+            if len(lacks) > len(found):
+                steps += (lacks[-1] - steps.sum(axis=0)) / (1 + len(found))
+            found = np.clip(found + np.rint(steps).astype(np.int64), *ends)
+        return found.astype(np.int16)
+
+    return replace(
+        tables,
+        switch_means=fitted(tables.switch_means, switches, ends),
+        joint_means=fitted(tables.joint_means, each, spans),
+    )
+
+
+def _distinct(
+    bits: NDArray[np.bool_], codes: NDArray[np.uint16], labels: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], Floats]:
+    """Return numbers of rows of which no two are the same, ROWS of them at most, and how often each is there: whatever
+    the order of the rows is, the same rows.
+    """
+    held = np.column_stack([labels, np.packbits(bits, axis=1), codes])
+    _, rows, often = np.unique(held, axis=0, return_index=True, return_counts=True)
+    number = min(len(rows), ROWS)
+    some = np.arange(number) * len(rows) // max(number, 1)
+    return rows[some], often[some].astype(np.float64)
+
+
+def _without(tables: IntegerTables, codes: NDArray[np.uint16], joints: Sequence[int]) -> Steps:
+    """Return the bias and what the joints add but for these, (n, K): a lost joint of a pair has code 0 there."""
+    left = codes.copy()
+    left[:, list(joints)] = 0
+    own = [tables.binned(joint)[1][0].astype(np.int64) for joint in joints]
+    found: Steps = tables.joint_sums(left).astype(np.int64) - np.sum(own, axis=0)
+    return found
+
+
+def _lack(scores: Steps, often: Floats, wanted: Floats, scale: float) -> Floats:
+    """Return how many steps of score each type lacks, (K,), to be as probable as it is `wanted`."""
+    shares = softmax(np.ascontiguousarray(scores.T / scale))
+    given = np.rint(shares * often * _WHOLE).sum(axis=1) / _WHOLE + _DOUBT
+    return scale * log(wanted / given)

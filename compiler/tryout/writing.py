@@ -1,0 +1,245 @@
+"""`try_html`: the page of a build, its tables, its hand and some of its rows in one file."""
+
+import base64
+import hashlib
+import re
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from importlib.resources import files
+
+import msgspec
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from thenar.runtime.errors import ThenarError
+from thenar.runtime.hand import HandDrawing
+from thenar.runtime.harness.wiring import Harness, StreamWiring
+from thenar.runtime.manifest import Calibration, Manifest, Threshold
+from thenar.runtime.rejection import none_leads
+from thenar.runtime.sources.rows import steps_of
+from thenar.runtime.taxels import TaxelSettings, calibration_of, count_limit
+
+from ..text import counted, listed
+
+MOST_BYTES = 500_000
+_MOST_ROWS = 400
+# For the page itself to remain small beside the rows.
+_ROWS_BYTES = 200_000
+# In this order: what one takes from another stands before it.
+_MODULES = ("tables.js", "lines.js", "scanner.js", "cyberglove.js", "serial.js", "try.js")
+_EXPORT = re.compile(r"^export (?:async )?(?:function|class|const) (\w+)", re.MULTILINE)
+
+Json = Mapping[str, object]
+
+
+def try_html(
+    manifest: Manifest,
+    tables: bytes,
+    hand: HandDrawing,
+    harness: Harness | None,
+    rows: tuple[NDArray[np.bool_], NDArray[np.uint16], NDArray[np.intp]],
+) -> bytes | None:
+    """Return the page in UTF-8, at most MOST_BYTES; None where tables and hand alone are larger.
+
+    Parameters
+    ----------
+    manifest, tables, hand : Manifest, bytes, HandDrawing
+        What `build.json`, `tables.bin` and `hand.json` hold.
+    harness : Harness or None
+        The wiring that the build was compiled for.
+    rows : bits (n, s), codes (n, j), labels (n,)
+        The rows trained on, as the build reads them; some of each grasp type go into the page.
+    """
+    bits, codes, labels = rows
+    data = {
+        "answers": manifest.answers,
+        "tables": base64.b64encode(tables).decode(),
+        "refusal": _refusal(manifest),
+        "switches": [_switch(switch.name, switch.threshold) for switch in manifest.switches],
+        "joints": [_joint(joint, codes[:, number]) for number, joint in enumerate(manifest.joints)],
+        "hand": hand,
+        "wiring": _wiring(manifest, harness),
+    }
+    bare = _rendered(manifest, {**data, "rows": []})
+    some: list[object] = []
+    left = min(MOST_BYTES - len(bare), _ROWS_BYTES)
+    if left < 0:
+        return None
+    for row in sample(labels, len(manifest.grasps)):
+        each = [int(labels[row]), _hexadecimal(bits[row]), codes[row].tolist()]
+        left -= len(msgspec.json.encode(each)) + 1
+        if left < 0:
+            break
+        some.append(each)
+    return _rendered(manifest, {**data, "rows": some})
+
+
+def sample(labels: NDArray[np.intp], classes: int) -> list[int]:
+    """Return numbers of rows: of each grasp type as many, evenly spaced among its own, one type after the other."""
+    each = max(1, _MOST_ROWS // classes)
+    found = []
+    for label in range(classes):
+        mine = np.flatnonzero(labels == label)
+        found.append(mine[np.unique(np.linspace(0, len(mine) - 1, each).astype(int))].tolist() if len(mine) else [])
+    # Should there be room for a few alone, they are of all types.
+    turns = max(map(len, found), default=0)
+    return [mine[turn] for turn in range(turns) for mine in found if turn < len(mine)]
+
+
+def _hexadecimal(bits: NDArray[np.bool_]) -> str:
+    """Return a digit for every four switches, the first of them in its lowest bit."""
+    padded = np.append(bits, np.zeros(-len(bits) % 4, np.bool_)).reshape(-1, 4)
+    return "".join(f"{digit:x}" for digit in (padded @ np.array([1, 2, 4, 8])).tolist())
+
+
+def _refusal(manifest: Manifest) -> Json | None:
+    held = manifest.rejection
+    if held is None:
+        return None
+    return {
+        "least": held.least_scores,
+        "closed": held.closed,
+        "ranges": held.ranges,
+        "outside": held.outside,
+        "leads": none_leads(held, manifest.proof.scale),
+    }
+
+
+def _line(joint: Calibration) -> dict[str, object]:
+    given = msgspec.structs.asdict(joint)
+    return {name: given[name] for name in ("name", "unit", "code_a", "value_a", "code_b", "value_b")}
+
+
+def _switch(name: str, threshold: Threshold | None) -> Json:
+    if threshold is None:
+        return {"name": name}
+    return {"name": name, "code": threshold.code, "taxel": _line(threshold.taxel)}
+
+
+def _joint(joint: Calibration, codes: NDArray[np.uint16]) -> Json:
+    low, middle, high = np.percentile(codes, (0, 50, 100), method="lower").tolist() if len(codes) else (0, 0, 1)
+    return {**_line(joint), "range": [int(low), max(int(high), int(low) + 1)], "typical": int(middle)}
+
+
+def _wiring(manifest: Manifest, harness: Harness | None) -> Json:
+    """Return which input of the build is what of the first board, the CyberGlove and the first stream of a wiring."""
+    found: dict[str, object] = {"scanner": None, "cyberglove": None, "stream": None}
+    if harness is None:
+        return found
+    baud = {}
+    if harness.scanners:
+        board = harness.scanners[0]
+        baud["scanner"] = board.baud
+        bits = {switch.name: bit for bit, switch in enumerate(manifest.switches) if switch.threshold is None}
+        levels = _levels(manifest, board.taxels, harness.taxel_settings)
+        found["scanner"] = {"keys": [bits.get(name) for name in board.switches], "taxels": levels}
+    if harness.cyberglove is not None and harness.cyberglove.joints:
+        found["cyberglove"] = harness.cyberglove.joints
+    if harness.streams:
+        found["stream"] = _stream(harness.streams[0])
+        baud["lines"] = harness.streams[0].baud
+    return {**found, "baud": baud}
+
+
+def _levels(manifest: Manifest, taxels: Sequence[str], settings: TaxelSettings) -> list[tuple[int, int, int]]:
+    """Return (channel, limit of its counts, switch) of levels; none where counts mean nothing without a calibration."""
+    try:
+        calibration = calibration_of(settings)
+        return [
+            (taxels.index(switch.source), count_limit(switch.threshold, calibration), bit)
+            for bit, switch in enumerate(manifest.switches)
+            if switch.threshold is not None and switch.source in taxels
+        ]
+    except (ThenarError, OSError):
+        return []
+
+
+def _stream(stream: StreamWiring) -> Json:
+    return {
+        "columns": stream.columns or None,
+        "threshold": stream.threshold,
+        "thresholds": stream.thresholds,
+        "low": stream.closed == "low",
+        "joints": stream.joints,
+        "taxels": {name: (*limits, steps_of(limits)) for name, limits in stream.taxels.items()},
+    }
+
+
+def _rendered(manifest: Manifest, data: Json) -> bytes:
+    style, script = _style(), _script()
+    levels = sum(switch.threshold is not None for switch in manifest.switches)
+    inputs = (
+        (len(manifest.switches) - levels, "switch", "switches"),
+        (levels, "level of taxels", "levels of taxels"),
+        (len(manifest.joints), "joint"),
+    )
+    read = [counted(*each) for each in inputs if each[0]]
+    page = (
+        _environment()
+        .get_template("try.html.j2")
+        .render(
+            style=Markup(style),
+            style_sha256=_sha256(style),
+            script=Markup(script),
+            script_sha256=_sha256(script),
+            sentence=f"It distinguishes {len(manifest.answers)} answers by {listed(read)}.",
+            levels=levels,
+            checksum=manifest.checksum[:16],
+            version=manifest.thenar,
+            data=embedded(data),
+        )
+    )
+    return page.encode()
+
+
+def embedded(data: object) -> Markup:
+    """Return JSON between tags: whatever a name holds, no tag begins or ends in it, and no entity is one."""
+    text = msgspec.json.encode(data).decode()
+    for letter in "<>&":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    return Markup(text)
+
+
+def _sha256(text: str) -> str:
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+
+
+@lru_cache(maxsize=1)
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader(__package__, "page"),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+
+
+def _own(name: str) -> str:
+    return files(__package__).joinpath("page", name).read_text(encoding="utf-8")
+
+
+def _shared(name: str) -> str:
+    return files("thenar.runtime.web").joinpath("pages", name).read_text(encoding="utf-8")
+
+
+@lru_cache(maxsize=1)
+def _style() -> str:
+    return f"{_shared('hand.css')}{_own('try.css')}"
+
+
+@lru_cache(maxsize=1)
+def _script() -> str:
+    """Return all modules as one, each in a scope of its own from which its exports are taken."""
+    return "".join(map(scoped, (_shared("hand.js"), *map(_own, _MODULES))))
+
+
+def scoped(module: str) -> str:
+    """Return a module's text as a statement that declares what it exports."""
+    names, body = _EXPORT.findall(module), _EXPORT.sub(lambda found: found[0].removeprefix("export "), module)
+    taken = f"const {{ {', '.join(names)} }} = " if names else ""
+    given = f"return {{ {', '.join(names)} }};\n" if names else ""
+    return f"{taken}(() => {{\n{body}{given}}})();\n"

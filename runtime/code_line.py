@@ -1,0 +1,79 @@
+"""From a raw reading to a code, in integers alone: the same number in Python and in the C of firmware.
+
+A calibration says which codes the readings of two points have. Between them, and beyond, runs a straight line. What
+lies midway between two codes gets the even one. The codes of the two points are rounded once, to 2^-24 of a code.
+"""
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import NamedTuple
+
+from thenar.drivers.errors import SettingError
+
+from .manifest import Calibration
+
+HIGHEST_CODE = 65535
+# Readings are integers from -65535 to 65535; those beyond count as the nearest.
+FARTHEST = 65535
+# Bits of a point's code behind the point, and the most that it has before it: so all fits into 64 bits.
+FRACTION, _WHOLE = 24, 20
+
+
+class Point(NamedTuple):
+    """A reading, and the code that it has, in 2^-24 of a code."""
+
+    reading: int
+    code: int
+
+
+@dataclass(frozen=True, slots=True)
+class CodeLine:
+    """The line through two points, whose codes are held to `least` to `most`.
+
+    Raises ValueError if the two have one reading, or lie further apart than the C can hold.
+    """
+
+    a: Point
+    b: Point
+    least: int = 0
+    most: int = HIGHEST_CODE
+
+    def __post_init__(self) -> None:
+        farthest = max(abs(self.a.reading), abs(self.b.reading), abs(self.b.reading - self.a.reading))
+        if self.a.reading == self.b.reading or farthest > FARTHEST:
+            raise ValueError(f"readings {self.a.reading} and {self.b.reading} make no line")
+        if max(abs(self.a.code), abs(self.b.code)) >= 1 << FRACTION + _WHOLE:
+            raise ValueError(f"codes beyond 2^{_WHOLE} make no line")
+
+    def code(self, reading: int) -> int:
+        """Return the code of a reading."""
+        (first, low), (last, high) = sorted((self.a, self.b))
+        span, above = last - first, min(max(reading, -FARTHEST), FARTHEST) - first
+        whole, rest = divmod(low * span + (high - low) * above + (span << FRACTION - 1), span << FRACTION)
+        nearest = whole - (whole & 1) if rest == 0 else whole
+        return min(max(nearest, self.least), self.most)
+
+
+def code_point(coded: Calibration, value: float) -> int:
+    """Return the code that a build gives to a value of a joint or a taxel, in 2^-24 of a code.
+
+    Raises SettingError where that is none, or lies far beyond all codes.
+    """
+    try:
+        step = (coded.value_b - coded.value_a) / (coded.code_b - coded.code_a)
+        code = coded.code_a + (value - coded.value_a) / step
+    except ZeroDivisionError:
+        raise SettingError(f"the two points of {coded.name!r} in the build are no line: compile it again") from None
+    if not isfinite(code):
+        raise SettingError(f"the calibration of {coded.name!r} is no number: calibrate the glove again")
+    if abs(code) >= 1 << _WHOLE:
+        raise SettingError(
+            f"the calibration of {coded.name!r} has {value:g} {coded.unit} at one of its points, which is far beyond "
+            f"the {HIGHEST_CODE + 1} codes of the build: calibrate the glove again"
+        )
+    return round(code * (1 << FRACTION))
+
+
+def code_line(coded: Calibration, a: tuple[int, float], b: tuple[int, float]) -> CodeLine:
+    """Return the line through two readings and their values, in the unit that a build codes. Raises SettingError."""
+    return CodeLine(Point(a[0], code_point(coded, a[1])), Point(b[0], code_point(coded, b[1])))

@@ -1,0 +1,150 @@
+// The page of a guided collection: which grasp to take next, the countdown, what the glove sees, and the keys.
+import { drawHand } from "./hand.js";
+import { keys, leaving } from "./keys.js";
+import { connect, say } from "./wire.js";
+
+const $ = (id) => document.getElementById(id);
+const LETTERS = { accept: "Enter", redo: "r", undo: "u", skip: "s", pause: "p", quit: "q" };
+const SHOWN = 5;
+
+let names = { switches: [], sensors: [], taxels: [] };
+let glove = null, pose = null, now = null, shown = "", ended = false, read = "";
+
+function percent(share) {
+  return (100 * share).toFixed(0);
+}
+
+function listed(words, most = SHOWN) {
+  return words.length > most ? `${words.slice(0, most).join(", ")} and ${words.length - most} more` : words.join(", ");
+}
+
+const send = connect({
+  open: () => link("connected", "good"),
+  closed: () => {
+    if (ended) link("ended", "good");
+    else link("not connected", "bad");
+    offer({});
+  },
+  collection: (told) => {
+    names = told;
+    say($("subject"), told.subject);
+  },
+  hands: (told) => {
+    glove = drawHand($("glove"), told.glove);
+    pose = drawHand($("pose"), told.pose);
+    shown = "";
+    if (now) show(now);
+  },
+  guide: (told) => show((now = told)),
+  study: studied,
+});
+
+const press = (key) => now && send({ do: key, step: now.step });
+const offer = keys($("keys"), LETTERS, (key) => (key === "quit" ? $("leaving").showModal() : press(key)));
+leaving($("leaving"), $("leave"), $("stay"), () => press("quit"));
+
+function link(words, is) {
+  say($("link"), words);
+  $("link").dataset.is = is;
+}
+
+function show(guide) {
+  ended = guide.stage === "over";
+  const skipped = guide.skipped ? `, ${guide.skipped} skipped` : "";
+  say($("count"), `${guide.done} of ${guide.total} trials done${skipped}`);
+  $("progress").max = guide.total;
+  $("progress").value = guide.done;
+  $("task").dataset.step = guide.step;
+  task(guide);
+  const doing = guide.trial?.none ? "move so" : "hold it";
+  const stages = {
+    ready: "Enter starts the countdown",
+    countdown: `take the grasp: ${doing} in`,
+    moving: "move so for",
+    review: "captured: keep it?",
+    paused: "paused; nothing is recorded meanwhile",
+    done: "all trials are done",
+    over: "the collection has ended",
+  };
+  if (guide.trial?.none) stages.countdown = "move so in";
+  say($("stage"), guide.stage === "done" && guide.skipped ? "no trial is left; the skipped ones come another time" : stages[guide.stage]);
+  const counts = guide.stage === "countdown" || guide.stage === "moving";
+  say($("number"), counts ? String(Math.ceil(guide.left_s)) : guide.stage === "review" ? "✓" : "");
+  say($("problem"), guide.problem ? `not captured: ${guide.problem}` : "");
+  tell(guide, stages[guide.stage]);
+  sees(guide);
+  offer(guide.offered);
+  $("task").dataset.stage = guide.stage;
+}
+
+// Read out once for each stage of each trial.
+function tell(guide, stage) {
+  const what = guide.stage === "countdown" || guide.stage === "ready" ? `${$("title").textContent}, ${$("detail").textContent}: ` : "";
+  const time = guide.stage === "countdown" ? ` ${Math.ceil(guide.left_s)} s` : "";
+  if (read === `${guide.step}`) return;
+  read = `${guide.step}`;
+  say($("told"), `${what}${stage}${time}`);
+}
+
+function task(guide) {
+  const key = JSON.stringify(guide.trial);
+  if (key === shown) return;
+  shown = key;
+  const trial = guide.trial;
+  say($("title"), trial ? trial.title : "No trial is left");
+  say($("detail"), trial ? trial.detail : "");
+  const picture = trial?.pose ?? null;
+  $("pose").toggleAttribute("hidden", picture === null);
+  if (picture !== null && pose) {
+    pose.setPose(picture);
+    $("pose").setAttribute("aria-label", `picture of the hand: ${trial.title}`);
+  }
+}
+
+function sees(guide) {
+  const closed = [...guide.closed], parts = [];
+  if (glove) {
+    glove.setClosed(closed.map((letter) => letter === "1"), closed.map((letter) => letter === "x"));
+    glove.setPose(guide.joints);
+  }
+  if (names.switches.length) {
+    parts.push(`${closed.filter((letter) => letter === "1").length} of ${names.switches.length} switches closed`);
+    const lost = names.switches.filter((_, bit) => closed[bit] === "x");
+    if (lost.length) parts.push(`not read: ${listed(lost)}`);
+  }
+  if (names.taxels.length) parts.push(`taxels ${listed(names.taxels.map((name, at) => `${name} ${guide.taxels[at] ?? "–"}`))}`);
+  if (names.sensors.length) parts.push(guide.joints.length ? `${guide.joints.filter((value) => value !== null).length} of ${names.sensors.length} joints measured` : "no joint measured");
+  say($("sees"), parts.join("; "));
+  while ($("devices").children.length > guide.devices.length) $("devices").lastChild.remove();
+  guide.devices.forEach((device, at) => {
+    const row = $("devices").children[at] ?? $("devices").appendChild(document.createElement("li"));
+    row.dataset.is = device.connected ? "good" : "bad";
+    say(row, `${device.connected ? "✓" : "✗"} ${device.name}${device.connected ? "" : `: ${device.error}`}`);
+  });
+}
+
+function studied(told) {
+  if (told.problem) {
+    say($("study"), told.problem);
+    return;
+  }
+  const ends = `${percent(told.low)} to ${percent(told.high)} %`;
+  say($("study"), `${told.correct} of ${told.total} trials (${percent(told.correct / told.total)} %; 95 % interval ${ends}), each from all others, by a quick model`);
+  const weak = told.types.filter((type) => type.correct < type.total).slice(0, 3);
+  const why = weak.length ? weak : told.types.slice(0, 1);
+  say($("more"), `More trials help most with: ${why.map((type) => type.grasp).join(", ")}`);
+  $("study-table").hidden = false;
+  $("types").replaceChildren(
+    ...told.types.map((type) => {
+      const row = document.createElement("tr");
+      const cells = [type.grasp, `${type.correct} of ${type.total}`, `${percent(type.low)} to ${percent(type.high)} %`, type.taken_for];
+      cells.forEach((text, at) => {
+        const cell = document.createElement(at ? "td" : "th");
+        if (!at) cell.scope = "row";
+        cell.textContent = text;
+        row.append(cell);
+      });
+      return row;
+    }),
+  );
+}

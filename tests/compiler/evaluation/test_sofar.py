@@ -1,0 +1,115 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.compiler import GraspSet
+from thenar.compiler.evaluation.folds import EvaluationError
+from thenar.compiler.evaluation.sofar import (
+    _CONSTANT,
+    _PENALTY,
+    _inputs,
+    left_out_scores,
+    recognition_so_far,
+    recording_so_far,
+)
+from thenar.compiler.recordings.graspset import Joint
+from thenar.compiler.recordings.taxonomy import own
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.recording.session import Collection, Label, Session, Task
+from thenar.runtime.recording.writer import Recorder
+
+
+def trained(inputs: np.ndarray, label: np.ndarray, weight: np.ndarray, penalty: float, constant: float) -> np.ndarray:
+    """The same model from its normal equations: weights (p + 1, K), the constant last."""
+    design = np.hstack([inputs, np.ones((len(inputs), 1))])
+    wanted = 2.0 * np.eye(3)[label] - 1.0
+    penalties = np.diag([penalty] * inputs.shape[1] + [penalty / constant])
+    return np.linalg.solve(design.T @ (design * weight[:, None]) + penalties, design.T @ (wanted * weight[:, None]))
+
+
+def test_leaving_a_trial_out_is_training_without_its_rows() -> None:
+    random = np.random.default_rng(7)
+    trial = np.repeat(np.arange(9), [1, 3, 1, 2, 1, 1, 4, 1, 2])
+    label = (np.arange(9) % 3)[trial]
+    inputs = random.normal(size=(len(trial), 6)) + label[:, None]
+    scores = left_out_scores(inputs, label, trial)
+    mean = (inputs**2).sum() / len(inputs)
+    for one in range(9):
+        rest = trial != one
+        weight = 1.0 / np.bincount(trial)[trial]
+        # The constant's column is worth _CONSTANT times the mean of the others.
+        model = trained(inputs[rest], label[rest], weight[rest], _PENALTY * mean, _CONSTANT * mean)
+        alone = np.hstack([inputs[~rest], np.ones(((~rest).sum(), 1))]) @ model
+        np.testing.assert_allclose(scores[~rest], alone, rtol=1e-5, atol=1e-6)
+
+
+def grasps(repetitions: int, *, noise: float, seed: int = 3) -> GraspSet:
+    """Three types by one joint and switches; the third is like the second but for noise."""
+    random = np.random.default_rng(seed)
+    labels = np.tile(np.arange(3), repetitions)
+    centres = np.array([60, 150, 150])
+    return GraspSet(
+        switches=np.array([[1, 0, 0], [0, 1, 0], [0, 1, 0]], bool)[labels],
+        switch_names=("a", "b", "c"),
+        codes=(centres[labels] + random.normal(0, noise, len(labels)))[:, None].astype(np.uint16),
+        joints=(Joint("j", "raw", 1, 1.0, 255, 255.0),),
+        grasps=np.array(["cup", "pen", "rod"])[labels],
+        taxonomy=own(["cup", "pen", "rod"]),
+        subjects=np.full(len(labels), "A"),
+        objects=np.full(len(labels), "thing"),
+        trials=np.arange(len(labels)),
+    )
+
+
+def test_types_that_are_taken_for_each_other_come_first_and_say_so() -> None:
+    found = recognition_so_far(grasps(12, noise=3))
+    assert found.total == 36
+    assert found.correct == sum(one.correct for one in found.types)
+    assert found.types[-1].grasp == "cup"
+    assert (found.types[-1].correct, found.types[-1].taken_for) == (12, "")
+    for one in found.types[:2]:
+        assert one.correct < 12
+        assert one.taken_for == {"pen": "rod", "rod": "pen"}[one.grasp]
+        assert one.low <= one.correct / one.total < one.high
+    assert [one.low for one in found.types] == sorted(one.low for one in found.types)
+
+
+def test_of_equally_good_types_that_with_fewer_trials_comes_first() -> None:
+    whole = grasps(10, noise=3)
+    cups = np.flatnonzero(whole.grasps == "cup")
+    few = whole.rows(np.setdiff1d(np.flatnonzero(whole.grasps != "rod"), cups[3:]))
+    found = recognition_so_far(few)
+    assert [(one.grasp, one.correct, one.total) for one in found.types] == [("cup", 3, 3), ("pen", 10, 10)]
+
+
+def test_rows_of_a_trial_are_one_trial_and_an_input_that_never_changes_is_none() -> None:
+    whole = grasps(6, noise=3)
+    thrice = whole.rows(np.repeat(np.arange(len(whole)), 3))
+    one, three = recognition_so_far(whole), recognition_so_far(thrice)
+    assert three.total == one.total == 18
+    assert (_inputs(whole)[:, 2] == 0).all()
+
+
+def test_one_type_alone_is_taken_for_nothing_else() -> None:
+    whole = grasps(4, noise=1)
+    with pytest.raises(EvaluationError, match="all trials are of one grasp type"):
+        recognition_so_far(whole.rows(np.flatnonzero(whole.grasps == "cup")))
+
+
+def test_a_recording_is_read_while_it_is_written(tmp_path: Path) -> None:
+    tasks = (Task("cup", ("mug",)), Task("pen", ("biro",)))
+    collection = Collection("A", "own", ("cup", "pen"), tasks, 3, 0)
+    session = Session(thenar="1", switches=("a", "b"), sensors=("j",), collection=collection)
+    path = tmp_path / "a.mcap"
+    with Recorder(path, session) as recorder:
+        for number in range(1, 7):
+            recorder.switches(SwitchFrame(10 * number, 1 + number % 2))
+            recorder.glove(GloveFrame(10 * number, bytes((100 + 50 * (number % 2),))))
+            name, thing = (("pen", "biro"), ("cup", "mug"))[number % 2]
+            for event in ("begun", "captured", "accepted"):
+                recorder.label(Label(10 * number, event, number, name, "A", thing))  # type: ignore[arg-type]
+            found = recording_so_far(path)
+            assert (found is None) == (number == 1)
+    assert found is not None
+    assert (found.total, found.correct) == (6, 6)

@@ -1,0 +1,82 @@
+"""What stands in for lost inputs: likelier than the mean rows, within bounds, in whatever order the rows come."""
+
+from collections.abc import Callable
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.tables.collapse import collapse
+from thenar.compiler.tables.quantise import quantise
+from thenar.compiler.tables.standing_in import fit_lost
+from thenar.runtime.tables import IntegerTables
+
+MakeStumps = Callable[..., Stumps]
+Rows = tuple[np.ndarray, np.ndarray, np.ndarray]
+K, SWITCHES = 4, 6
+
+
+def _rows(seed: int, n: int, joints: int) -> Rows:
+    """Return bits, codes and labels: some switches close together, as a hand's do."""
+    random = np.random.default_rng(seed)
+    labels = random.integers(0, K, n)
+    bits = random.random((n, SWITCHES)) < np.where(labels[:, np.newaxis] == np.arange(SWITCHES) // 2, 0.9, 0.1)
+    bits[:, 1] = bits[:, 0] ^ (random.random(n) < 0.1)
+    codes = random.integers(0, 60, (n, joints)) + 50 * labels[:, np.newaxis]
+    return bits, codes.astype(np.uint16), labels
+
+
+def _both(stumps: Stumps, rows: Rows) -> tuple[IntegerTables, IntegerTables]:
+    """Return tables with mean rows, and with what is fitted."""
+    tables = quantise(collapse(stumps, SWITCHES), rows[0], rows[1])
+    return tables, fit_lost(tables, *rows)
+
+
+def _loss(tables: IntegerTables, rows: Rows, switch: int) -> float:
+    """Return the mean of -ln P(label) of all rows where a switch is lost."""
+    bits, codes, labels = rows
+    there = bits.astype(np.int64)
+    there[:, switch] = 0
+    scores = tables.joint_sums(codes) + there @ tables.switch_rows.astype(np.int64) + tables.switch_means[switch]
+    scores = scores / tables.scale
+    own = scores[np.arange(len(labels)), labels]
+    return float((np.logaddexp.reduce(scores, axis=1) - own).mean())
+
+
+@given(seed=st.integers(0, 100))
+def test_a_lost_switch_leaves_the_rows_likelier_than_its_mean_row_does(make_stumps: MakeStumps, seed: int) -> None:
+    rows = _rows(seed, 200, joints=0)
+    before, after = _both(make_stumps(seed, classes=K, switches=SWITCHES, joints=0), rows)
+    losses = np.array([[_loss(tables, rows, switch) for switch in range(SWITCHES)] for tables in (before, after)])
+    assert np.all(losses[1] <= losses[0] + 2 / before.scale)
+
+
+def test_what_the_others_say_already_is_not_said_again(make_stumps: MakeStumps) -> None:
+    rows = _rows(1, 400, joints=0)
+    tables, fitted = _both(make_stumps(3, rounds=60, classes=K, switches=SWITCHES, joints=0), rows)
+    gains = [_loss(tables, rows, switch) - _loss(fitted, rows, switch) for switch in range(SWITCHES)]
+    assert max(gains) > 0.05
+
+
+@given(seed=st.integers(0, 100), n=st.integers(1, 60), joints=st.integers(0, 3))
+def test_what_stands_in_lies_within_what_the_input_adds(
+    make_stumps: MakeStumps, seed: int, n: int, joints: int
+) -> None:
+    before, after = _both(make_stumps(seed, classes=K, switches=SWITCHES, joints=joints), _rows(seed, n, joints))
+    rows = before.switch_rows
+    assert np.all((np.minimum(rows, 0) <= after.switch_means) & (after.switch_means <= np.maximum(rows, 0)))
+    for joint, mean in enumerate(after.joint_means):
+        added = before.choices(joint)[1].sum(axis=0)
+        assert np.all((added.min(axis=0) <= mean) & (mean <= added.max(axis=0)))
+    assert (after.bound, after.scale) == (before.bound, before.scale)
+
+
+@given(seed=st.integers(0, 30))
+def test_the_order_of_the_rows_is_no_matter(make_stumps: MakeStumps, seed: int) -> None:
+    bits, codes, labels = _rows(seed, 1500, joints=2)
+    tables, fitted = _both(make_stumps(seed, classes=K, switches=SWITCHES, joints=2), (bits, codes, labels))
+    order = np.random.default_rng(seed).permutation(len(labels))
+    again = fit_lost(tables, bits[order], codes[order], labels[order])
+    assert np.array_equal(fitted.switch_means, again.switch_means)
+    assert np.array_equal(fitted.joint_means, again.joint_means)

@@ -1,0 +1,781 @@
+"""try.html as a visitor has it: opened from its file in a real browser, clicked, dragged, typed at, fed by gloves."""
+
+import base64
+import csv
+import io
+import json
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.remote.webelement import WebElement
+from selenium.webdriver.support.select import Select
+from selenium.webdriver.support.wait import WebDriverWait
+
+from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.recordings.export import to_csv
+from thenar.compiler.recordings.graspset import Joint
+from thenar.compiler.recordings.taxonomy import own
+from thenar.compiler.tryout import writing
+from thenar.drivers.calibration import GloveCalibration, SensorCalibration
+from thenar.drivers.cyberglove_protocol import SENSORS_22
+from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts, GloveState
+from thenar.drivers.emulated.scanner import ScannerBoard
+from thenar.drivers.lines import Header, parsed
+from thenar.drivers.scanner_protocol import (
+    WITHOUT_DIODES,
+    Event,
+    Frame,
+    FrameDecoder,
+    FromBoard,
+    Heartbeat,
+    Hello,
+    Lost,
+    encode,
+    frame,
+)
+from thenar.drivers.scanner_state import ambiguous
+from thenar.runtime import Build
+from thenar.runtime.calibration import CodeTables, codes_of_bytes
+from thenar.runtime.manifest import Calibration
+from thenar.runtime.tables import PAIRED, PLAIN, SLOPED
+from thenar.simulator.handmaps.handmap import hand_map
+
+Make = Callable[..., GraspSet]
+
+pytestmark = pytest.mark.slow
+
+FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1400,1000")
+PATIENCE_S = 30
+
+# A navigator.serial whose one port says what it is fed, and keeps what it is told.
+FAKE_SERIAL = """
+    globalThis.fake = { written: [], options: null, closed: false };
+    const port = {
+      async open(options) {
+        fake.options = options;
+        this.readable = new ReadableStream({ start(controller) { fake.controller = controller; } });
+        this.writable = new WritableStream({ write(chunk) { fake.written.push(...chunk); } });
+      },
+      async close() { fake.closed = true; },
+    };
+    Object.defineProperty(navigator, "serial", { value: { requestPort: async () => port } });
+"""
+
+
+class Trier:
+    """A browser with one page open."""
+
+    def __init__(self, driver: webdriver.Chrome) -> None:
+        self.driver = driver
+
+    def open(self, path: Path) -> None:
+        self.log("performance")
+        self.log("browser")
+        self.scheme("light")
+        self.driver.get(path.as_uri())
+
+    def scheme(self, name: str) -> None:
+        """Let the reader's system be "light" or "dark"."""
+        features = [{"name": "prefers-color-scheme", "value": name}]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+
+    def script(self, text: str, *arguments: object) -> Any:
+        return self.driver.execute_script(text, *arguments)
+
+    def wait(self, until: Callable[[], object]) -> None:
+        WebDriverWait(self.driver, PATIENCE_S, poll_frequency=0.02).until(lambda _: until())
+
+    def one(self, selector: str) -> WebElement:
+        return self.driver.find_element(By.CSS_SELECTOR, selector)
+
+    def text(self, ident: str) -> str:
+        return self.driver.find_element(By.ID, ident).text
+
+    def log(self, kind: str) -> list[dict[str, Any]]:
+        entries: list[dict[str, Any]] = self.driver.get_log(kind)  # type: ignore[no-untyped-call]
+        return entries
+
+    def requests(self) -> list[str]:
+        """Return the addresses that were asked for since the page was opened."""
+        messages = [json.loads(entry["message"])["message"] for entry in self.log("performance")]
+        sent = [message for message in messages if message["method"] == "Network.requestWillBeSent"]
+        return [message["params"]["request"]["url"] for message in sent]
+
+
+def _driver(tool: Callable[[str], str]) -> webdriver.Chrome:
+    options = webdriver.ChromeOptions()
+    options.binary_location = tool("chromium")
+    for flag in FLAGS:
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    return webdriver.Chrome(options=options, service=Service(executable_path=tool("chromedriver")))
+
+
+@pytest.fixture(scope="module")
+def trier(tool: Callable[[str], str]) -> Iterator[Trier]:
+    driver = _driver(tool)
+    yield Trier(driver)
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def gloved_trier(tool: Callable[[str], str]) -> Iterator[Trier]:
+    """Return a browser whose pages find a glove on Web Serial."""
+    driver = _driver(tool)
+    driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": FAKE_SERIAL})
+    yield Trier(driver)
+    driver.quit()
+
+
+ASK = "return arguments[0].map(([bits, codes, lost, dull]) => thenar.recognise(bits, codes, lost, dull))"
+
+
+def rows_of(build: Build, grasp_set: GraspSet) -> tuple[np.ndarray, np.ndarray]:
+    """Return the bits and the codes of all rows of a set, as the build reads them."""
+    columns = [
+        grasp_set.switches[:, switch.column]
+        if switch.threshold is None
+        else grasp_set.taxels[:, switch.threshold.taxel.column] > switch.threshold.code
+        for switch in build.manifest.switches
+    ]
+    bits = np.stack(columns, axis=1)
+    return bits, grasp_set.codes[:, [joint.column for joint in build.manifest.joints]]
+
+
+def frames_of(build: Build, grasp_set: GraspSet, lossy: bool) -> list[list[list[int]]]:
+    """Return frames: bits, codes, and what is lost of both; of losses, each input in every seventh row."""
+    bits, codes = rows_of(build, grasp_set)
+    random = np.random.default_rng(11)
+    lost, dull = (lossy & (random.random(shape) < 1 / 7) for shape in (bits.shape, codes.shape))
+    parts = (bits.astype(int), codes.astype(int), lost.astype(int), dull.astype(int))
+    return [[part.tolist() for part in row] for row in zip(*parts, strict=True)]
+
+
+def differing(build: Build, frames: list[list[list[int]]], answers: list[dict[str, Any]]) -> list[int]:
+    """Return the numbers of the frames of which the page says something else than Python."""
+    found = []
+    for number, ((bits, codes, lost, dull), told) in enumerate(zip(frames, answers, strict=True)):
+        flags = [np.array(each, bool) for each in (bits, lost, dull)]
+        said = build.recognise(flags[0], np.array(codes, np.uint16), flags[1], flags[2])
+        lanes = build.scorer.lanes_without(flags[0], np.array(codes, np.uint16), flags[1], flags[2])
+        scores = [lane - 32768 for lane in lanes]
+        whole = (said.grasp, said.margin, said.degraded) == (told["grasp"], told["margin"], told["degraded"])
+        probable = abs(said.probability - told["probabilities"][told["number"]]) < 1e-12
+        if not (whole and probable and told["scores"][: len(scores)] == scores):
+            found.append(number)
+    return found
+
+
+@pytest.fixture(scope="module")
+def with_none_too(make_set: Make, with_none: Callable[[GraspSet], GraspSet]) -> GraspSet:
+    return with_none(make_set(rows=60))
+
+
+KINDS: dict[str, tuple[int, dict[str, Any]]] = {
+    "plain": (PLAIN, {"trainer": "logitboost", "rounds": 8}),
+    "slopes": (SLOPED, {"trainer": "logit", "linear": 1}),
+    "pairs": (PAIRED, {"trainer": "pairs"}),
+}
+
+
+def compiled(grasp_set: GraspSet, folder: Path, **options: Any) -> Build:
+    compile_build(grasp_set, folder, folds=0, **options)
+    return Build.load(folder)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_all_rows_have_pythons_scores_and_answers(trier: Trier, make_set: Make, tmp_path: Path, kind: str) -> None:
+    version, options = KINDS[kind]
+    grasp_set = make_set()
+    build = compiled(grasp_set, tmp_path / "build", **options)
+    assert (tmp_path / "build" / "tables.bin").read_bytes()[8] == version
+    trier.open(tmp_path / "build" / "try.html")
+    for lossy in (False, True):
+        frames = frames_of(build, grasp_set, lossy)
+        assert differing(build, frames, trier.script(ASK, frames)) == []
+    assert trier.log("browser") == []
+
+
+def test_a_build_with_a_class_of_none_and_one_that_refuses_say_none_as_python_does(
+    trier: Trier, make_set: Make, with_none_too: GraspSet, tmp_path: Path
+) -> None:
+    for name, grasp_set in (("class", with_none_too), ("refusing", make_set())):
+        build = compiled(grasp_set, tmp_path / name, rounds=8)
+        assert (build.rejector is None) == (name == "class")
+        trier.open(tmp_path / name / "try.html")
+        frames = frames_of(build, grasp_set, lossy=True)
+        # Nothing closed, everything closed: unlike all grasps.
+        s, j = build.tables.n_switches, build.tables.n_joints
+        frames += [[[bit] * s, [code] * j, [0] * s, [0] * j] for bit in (0, 1) for code in (0, 65535)]
+        # Of grasps, more and more switches lost, down to none that is known to be closed.
+        frames += [
+            [bits, codes, [1] * lost + [0] * (s - lost), dull]
+            for lost in range(s + 1)
+            for bits, codes, _, dull in frames[:9]
+        ]
+        answers = trier.script(ASK, frames)
+        assert differing(build, frames, answers) == []
+        assert "none" in {answer["grasp"] for answer in answers}
+
+
+def test_a_changed_entry_of_the_tables_is_noticed(trier: Trier, make_set: Make, tmp_path: Path) -> None:
+    grasp_set = make_set()
+    build = compiled(grasp_set, tmp_path / "build", rounds=8)
+    page = tmp_path / "build" / "try.html"
+    tables = bytearray((tmp_path / "build" / "tables.bin").read_bytes())
+    first_bias = 56 + 16 + 2 * build.tables.n_joints
+    written = base64.b64encode(tables).decode()
+    assert written in page.read_text()
+    tables[first_bias] ^= 1
+    page.write_text(page.read_text().replace(written, base64.b64encode(tables).decode()))
+    trier.open(page)
+    frames = frames_of(build, grasp_set, lossy=False)
+    assert differing(build, frames, trier.script(ASK, frames)) == list(range(len(frames)))
+
+
+# ---- Of the page ----
+
+
+@pytest.fixture(scope="module")
+def gloved(make_set: Make) -> GraspSet:
+    """Return a set that switches of the shipped glove, and joints of a CyberGlove, have recorded."""
+    made = make_set()
+    names = ("index_mpj", "index_pij", "thumb_abduction")
+    joints = tuple(replace(joint, name=name) for joint, name in zip(made.joints, names, strict=True))
+    return replace(made, switch_names=hand_map().names[::11][: len(made.switch_names)], joints=joints)
+
+
+@pytest.fixture(scope="module")
+def folder(gloved: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    where = tmp_path_factory.mktemp("gloved") / "build"
+    compile_build(gloved, where, hand=hand_map(), folds=0, rounds=8)
+    return where
+
+
+@pytest.fixture
+def opened(trier: Trier, folder: Path) -> Iterator[Trier]:
+    """Return the browser with the page open; nothing may have been complained of or asked for when the test ends."""
+    trier.open(folder / "try.html")
+    yield trier
+    assert trier.log("browser") == []
+    assert trier.requests() == [(folder / "try.html").as_uri()]
+
+
+def said_of(build: Build, bits: list[int], codes: list[int]) -> tuple[str, str]:
+    """Return what Python recognises in the page's words."""
+    found = build.recognise(np.array(bits, bool), np.array(codes, np.uint16))
+    return found.grasp, f"{100 * found.probability:.1f} %, ahead by {found.margin} steps"
+
+
+def codes_now(trier: Trier) -> list[int]:
+    return [
+        int(value)
+        for value in trier.script(
+            "return [...document.querySelectorAll('#joints [type=range]')].map((one) => one.value)"
+        )
+    ]
+
+
+def pressed(trier: Trier) -> list[int]:
+    flags = trier.script(
+        "return [...document.querySelectorAll('#hand [role=button]')].map((one) => one.getAttribute('aria-pressed'))"
+    )
+    return [int(flag == "true") for flag in flags]
+
+
+def bits_now(trier: Trier, build: Build) -> list[int]:
+    names = trier.script(
+        "return [...document.querySelectorAll('#hand [role=button]')].map((one) => one.getAttribute('aria-label'))"
+    )
+    closed = dict(zip(names, pressed(trier), strict=True))
+    return [closed[switch.name] for switch in build.manifest.switches]
+
+
+def test_a_click_on_a_switch_closes_it_and_the_answer_is_pythons(opened: Trier, folder: Path) -> None:
+    build = Build.load(folder)
+    buttons = opened.driver.find_elements(By.CSS_SELECTOR, "#hand [role=button]")
+    assert len(buttons) == build.tables.n_switches
+    for button in (buttons[0], buttons[-1]):
+        button.find_element(By.CSS_SELECTOR, ".area").click()
+        assert (opened.text("grasp"), opened.text("margin")) == said_of(
+            build, bits_now(opened, build), codes_now(opened)
+        )
+    assert sum(pressed(opened)) == 2
+    opened.one("#open-all").click()
+    assert sum(pressed(opened)) == 0
+
+
+def test_the_keyboard_alone_reaches_and_works_everything(opened: Trier, folder: Path) -> None:
+    build, body = Build.load(folder), opened.one("body")
+    body.send_keys(Keys.TAB)
+    reached = []
+    for _ in range(200):
+        focused = opened.driver.switch_to.active_element
+        if focused.tag_name == "body":
+            break
+        reached.append(focused)
+        if focused.get_attribute("role") == "button" and len(reached) % 2:
+            focused.send_keys(Keys.SPACE if len(reached) % 3 else Keys.ENTER)
+        elif (focused.get_attribute("id") or "").startswith("joint-"):
+            focused.send_keys(Keys.ARROW_RIGHT)
+        ActionChains(opened.driver).send_keys(Keys.TAB).perform()
+    identities = {one.get_attribute("id") for one in reached}
+    assert {"lose", "open-all", "joint-0", "row", "play", "file", "kind", "baud", "connect"} <= identities
+    assert sum(one.get_attribute("role") == "button" for one in reached) == build.tables.n_switches
+    assert sum(pressed(opened)) > 0
+    assert (opened.text("grasp"), opened.text("margin")) == said_of(build, bits_now(opened, build), codes_now(opened))
+
+
+def test_dragging_a_finger_bends_its_joint(opened: Trier, folder: Path) -> None:
+    build = Build.load(folder)
+    number = [joint.name for joint in build.manifest.joints].index("index_mpj")
+    before = codes_now(opened)
+    handle = opened.script(
+        "return [...document.querySelectorAll('#hand .held')]"
+        ".find((one) => one.querySelector('title').textContent === 'index_mpj')"
+    )
+    opened.script("arguments[0].scrollIntoView({block: 'center'})", handle)
+    # Towards the palm, which is to the left of the finger as it is seen, and down.
+    ActionChains(opened.driver).click_and_hold(handle).move_by_offset(-70, 60).release().perform()
+    after = codes_now(opened)
+    assert after[number] > before[number]
+    assert [code for at, code in enumerate(after) if at != number] == [
+        code for at, code in enumerate(before) if at != number
+    ]
+    assert (opened.text("grasp"), opened.text("margin")) == said_of(build, bits_now(opened, build), after)
+
+
+def test_rows_are_replayed_and_the_bars_show_all_answers(opened: Trier, folder: Path, gloved: GraspSet) -> None:
+    build = Build.load(folder)
+    assert re.match(
+        r"Recorded rows in this page: 96 rows, of 96 with a known grasp \d+ are recognised\.", opened.text("rows-said")
+    )
+    opened.script("const row = document.getElementById('row'); row.value = 9; row.dispatchEvent(new Event('input'))")
+    assert opened.text("truth").startswith("Row 10 of 96: was ")
+    bits, codes = bits_now(opened, build), codes_now(opened)
+    kept, joints = rows_of(build, gloved)
+    at = [row for row in range(len(gloved)) if kept[row].astype(int).tolist() == bits and joints[row].tolist() == codes]
+    assert gloved.grasps[at[0]] in opened.text("truth")
+    assert (opened.text("grasp"), opened.text("margin")) == said_of(build, bits, codes)
+    rows = [row.text for row in opened.driver.find_elements(By.CSS_SELECTOR, "#bars tr")]
+    assert [row.removeprefix("▶ ").split()[0] for row in rows] == list(build.manifest.answers)
+    (best,) = [row for row in rows if row.startswith("▶")]
+    assert best.split()[1] == opened.text("grasp")
+    opened.one("#play").click()
+    opened.wait(lambda: not opened.text("truth").startswith("Row 10 of"))
+    opened.one("#play").click()
+
+
+def test_a_table_that_the_visitor_opens_is_recognised_as_python_does(
+    opened: Trier, folder: Path, gloved: GraspSet, tmp_path: Path
+) -> None:
+    build, path = Build.load(folder), tmp_path / "rows.csv"
+    path.write_text(to_csv(gloved))
+    opened.one("#file").send_keys(str(path))
+    bits, codes = rows_of(build, gloved)
+    right = sum(build.classify(*row) == truth for *row, truth in zip(bits, codes, gloved.grasps, strict=True))
+    opened.wait(
+        lambda: opened.text("rows-said") == f"rows.csv: 96 rows, of 96 with a known grasp {right} are recognised."
+    )
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
+    opened.one("#file").send_keys(str(tmp_path / "other.csv"))
+    opened.wait(lambda: "other.csv has none of the build's columns, such as" in opened.text("rows-said"))
+
+
+def test_a_lost_switch_counts_by_its_mean(opened: Trier, folder: Path) -> None:
+    build = Build.load(folder)
+    opened.one("#lose").click()
+    name = opened.one("#hand [role=button]").get_attribute("aria-label")
+    opened.one("#hand [role=button] .area").click()
+    lost = np.array([switch.name == name for switch in build.manifest.switches])
+    found = build.recognise(np.zeros(len(lost), bool), np.array(codes_now(opened), np.uint16), lost, None)
+    assert opened.text("margin").startswith(
+        f"{100 * found.probability:.1f} %, ahead by {found.margin} steps; degraded: 1 input is lost"
+    )
+
+
+def test_a_taxel_goes_from_level_to_level_and_recorded_values_are_levels(
+    trier: Trier, make_set: Make, tmp_path: Path
+) -> None:
+    made = make_set()
+    held = np.where(made.switches[:, 2:4], 2500, 300) + np.random.default_rng(3).integers(0, 1200, (len(made), 2))
+    padded = replace(
+        made,
+        switches=made.switches[:, :2],
+        switch_names=("a", "b"),
+        taxels=held.astype(np.uint16),
+        taxel_columns=(Joint("pad", "N", 0, 0.0, 4095, 20.0), Joint("pull-up", "V", 0, 5.0, 4095, 0.0)),
+    )
+    build = compiled(padded, tmp_path / "build", rounds=8, levels=4)
+    taxels = Counter(switch.source for switch in build.manifest.switches if switch.threshold is not None)
+    name, levels = max(taxels.items(), key=lambda each: each[1])
+    assert levels > 1
+    trier.open(tmp_path / "build" / "try.html")
+    button = trier.one(f"#hand [role=button][aria-label^='{name}']")
+    rising = sorted(
+        (switch.threshold.code, bit)
+        for bit, switch in enumerate(build.manifest.switches)
+        if switch.threshold is not None and switch.source == name
+    )
+    for press in range(1, levels + 2):
+        button.find_element(By.CSS_SELECTOR, ".area").click()
+        closed = press % (levels + 1)
+        assert button.get_attribute("aria-label") == f"{name}, {closed} of {levels} levels closed"
+        bits = np.zeros(build.tables.n_switches, np.intp)
+        bits[[bit for _, bit in rising[:closed]]] = 1
+        assert (trier.text("grasp"), trier.text("margin")) == said_of(build, bits.tolist(), codes_now(trier))
+    (tmp_path / "rows.csv").write_text(to_csv(padded))
+    trier.one("#file").send_keys(str(tmp_path / "rows.csv"))
+    right = sum(
+        build.classify(*row) == truth for *row, truth in zip(*rows_of(build, padded), padded.grasps, strict=True)
+    )
+    said = f"rows.csv: 96 rows, of 96 with a known grasp {right} are recognised."
+    trier.wait(lambda: trier.text("rows-said") == said)
+    assert trier.log("browser") == []
+
+
+@pytest.mark.parametrize("width", [1400, 400])
+def test_it_fits_the_screen_in_light_and_dark_with_letters_that_can_be_read(opened: Trier, width: int) -> None:
+    metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
+    opened.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    try:
+        opened.wait(lambda: opened.script("return innerWidth") == width)
+        opened.wait(lambda: opened.script("return document.documentElement.scrollWidth <= innerWidth"))
+        small = """return [...document.querySelectorAll('svg text')].filter((text) => {
+            const at = text.getScreenCTM();
+            return parseFloat(getComputedStyle(text).fontSize) * Math.hypot(at.a, at.b) < 8; }).length"""
+        opened.wait(lambda: opened.script(small) == 0)
+        look = """return ['body', '.shut', '.skin'].map((one) => document.querySelector(one))
+            .map((one) => getComputedStyle(one).color + getComputedStyle(one).fill)"""
+        light = opened.script(look)
+        opened.scheme("dark")
+        opened.wait(lambda: all(one != other for one, other in zip(light, opened.script(look), strict=True)))
+    finally:
+        opened.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_names_that_hold_scripts_run_nothing(trier: Trier, make_set: Make, tmp_path: Path) -> None:
+    made = make_set()
+    types = (
+        "<script>alert(1)</script>",
+        "<img src=x onerror=\"document.title='owned'\">",
+        "</script><b>",
+        "a & b ${x}",
+    )
+    nasty = replace(
+        made,
+        grasps=np.array(types)[made.labels],
+        taxonomy=own(types),
+        switch_names=tuple(f"{types[number % 4]} {number}" for number in range(len(made.switch_names))),
+        joints=tuple(replace(joint, name=f"joint {types[at]}") for at, joint in enumerate(made.joints)),
+    )
+    compile_build(nasty, tmp_path / "build", folds=0, rounds=8)
+    trier.open(tmp_path / "build" / "try.html")
+    assert trier.driver.title == "thenar: try a build"
+    assert trier.driver.find_elements(By.CSS_SELECTOR, "img, b, main script") == []
+    heads = [row.text.removeprefix("▶ ") for row in trier.driver.find_elements(By.CSS_SELECTOR, "#bars th")]
+    assert set(types) <= set(heads)
+    trier.one("#hand [role=button] .area").click()
+    assert trier.log("browser") == []
+    assert trier.requests() == [(tmp_path / "build" / "try.html").as_uri()]
+
+
+# ---- Gloves on Web Serial ----
+
+
+class Wire:
+    """The far end of the page's port: what the page wrote, and what it is fed."""
+
+    def __init__(self, trier: Trier) -> None:
+        self.trier = trier
+
+    def written(self) -> bytes:
+        return bytes(self.trier.script("return fake.written.splice(0)"))
+
+    def feed(self, data: bytes) -> None:
+        if data:
+            self.trier.script("fake.controller.enqueue(Uint8Array.from(arguments[0]))", list(data))
+
+    def until(self, said: Callable[[], bool], turn: Callable[[bytes], bytes]) -> None:
+        """Answer what the page writes, until it says so."""
+
+        def step() -> bool:
+            self.feed(turn(self.written()))
+            return said()
+
+        self.trier.wait(step)
+
+
+def chosen(trier: Trier, kind: str) -> None:
+    """Choose what the glove is, and connect it."""
+    Select(trier.one("#kind")).select_by_value(kind)
+    trier.one("#connect").click()
+
+
+def connected(trier: Trier, page: Path, kind: str) -> Wire:
+    trier.open(page)
+    chosen(trier, kind)
+    trier.wait(lambda: trier.script("return Boolean(fake.controller)"))
+    return Wire(trier)
+
+
+def test_a_scanner_board_is_read_key_by_key(gloved_trier: Trier, folder: Path) -> None:
+    build, trier = Build.load(folder), gloved_trier
+    keys = build.tables.n_switches
+    wire, board, now = connected(trier, folder / "try.html", "scanner"), ScannerBoard(1, keys), 0
+    wire.feed(b"noise\x00" + b"".join(board.boot(0)))
+    closed = 0
+
+    def turn(heard: bytes) -> bytes:
+        nonlocal now
+        now += 30_000
+        return b"".join([*board.receive(heard, now), *board.scan(closed, now)])
+
+    for closed in (0b101, 0b10, (1 << keys) - 1):
+        board.touch(now)
+        wanted = [closed >> key & 1 for key in range(keys)]
+        wire.until(lambda wanted=wanted: bits_now(trier, build) == wanted, turn)  # type: ignore[misc]
+    codes, dull = codes_now(trier), np.ones(build.tables.n_joints, bool)
+    found = build.recognise(np.ones(keys, bool), np.array(codes, np.uint16), None, dull)
+    assert trier.text("grasp") == found.grasp
+    assert f"degraded: {len(codes)} inputs are lost" in trier.text("margin")
+    assert f"board of {keys} keys" in trier.text("serial-said")
+    # A frame is lost: nothing is known before the board has told all of its keys again.
+    lossy = b"".join(board.scan(closed ^ 1, now + 60_000)) or b"x"
+    wire.feed(lossy[:-3] + b"\x00")
+    wire.until(lambda: bits_now(trier, build)[0] == 0, turn)
+    trier.one("#connect").click()
+    trier.wait(lambda: trier.script("return fake.closed"))
+    assert trier.script("return fake.options.baudRate") == 1_000_000
+    assert trier.log("browser") == []
+
+
+def test_a_cyberglove_is_asked_what_it_is_and_its_bytes_become_codes(
+    gloved_trier: Trier, folder: Path, tmp_path: Path
+) -> None:
+    build, trier = Build.load(folder), gloved_trier
+    names = [joint.name for joint in build.manifest.joints]
+    calibration = GloveCalibration(
+        sensors=tuple(SensorCalibration(name, 40 + 10 * at, 0.0, 200, 90.5) for at, name in enumerate(names))
+    )
+    (tmp_path / "calibration.toml").write_text(calibration.to_toml())
+    state = GloveState(22, 0)
+    box = CyberGloveBox(state, "a glove", Doubts(stop_echo=True))
+    trier.open(folder / "try.html")
+    trier.one("#calibration").send_keys(str(tmp_path / "calibration.toml"))
+    trier.wait(lambda: trier.text("serial-said") == f"Calibration of {len(names)} sensors.")
+    chosen(trier, "cyberglove")
+    trier.wait(lambda: trier.script("return Boolean(fake.controller)"))
+    wire = Wire(trier)
+
+    def turn(heard: bytes) -> bytes:
+        said = b"".join(each for each in box.feed(heard) if isinstance(each, bytes))
+        return said + (state.record(streamed=True) if box.streaming else b"")
+
+    tables = CodeTables(build.manifest.joints, SENSORS_22, calibration)
+    for values in (bytes(range(100, 122)), bytes([ord("S"), ord("G")] * 11)):
+        state.set(values)
+        wanted = list(tables.codes(values))
+        shown = [min(max(code, low), high) for code, (low, high) in zip(wanted, ranges(trier), strict=True)]
+        wire.until(lambda shown=shown: codes_now(trier) == shown, turn)  # type: ignore[misc]
+        found = build.recognise(
+            np.zeros(build.tables.n_switches, bool),
+            np.array(wanted, np.uint16),
+            np.ones(build.tables.n_switches, bool),
+            None,
+        )
+        said = f"{100 * found.probability:.1f} %, ahead by {found.margin} steps"
+        trier.wait(lambda said=said: trier.text("margin").startswith(said))  # type: ignore[misc]
+    state.plugged = False
+    wire.until(lambda: "unplugged" in trier.text("serial-said"), turn)
+    inputs = build.tables.n_switches + build.tables.n_joints
+    trier.wait(lambda: f"degraded: {inputs} inputs are lost" in trier.text("margin"))
+    assert trier.log("browser") == []
+
+
+def ranges(trier: Trier) -> list[tuple[int, int]]:
+    ends = trier.script(
+        "return [...document.querySelectorAll('#joints [type=range]')].map((one) => [one.min, one.max])"
+    )
+    return [(int(low), int(high)) for low, high in ends]
+
+
+def test_a_glove_without_its_calibration_is_refused_in_words(gloved_trier: Trier, folder: Path) -> None:
+    trier = gloved_trier
+    trier.open(folder / "try.html")
+    chosen(trier, "cyberglove")
+    trier.wait(lambda: "not in the glove's bytes: open its calibration" in trier.text("serial-said"))
+
+
+def test_lines_of_numbers_are_rows_of_the_build(gloved_trier: Trier, folder: Path, gloved: GraspSet) -> None:
+    build, trier = Build.load(folder), gloved_trier
+    wire = connected(trier, folder / "try.html", "lines")
+    bits, codes = rows_of(build, gloved)
+    names = [*(switch.name for switch in build.manifest.switches), *(joint.name for joint in build.manifest.joints)]
+    for row, form in enumerate(("header", "pairs", "json", "order")):
+        joints = [
+            joint.value_a + (code - joint.code_a) * (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a)
+            for joint, code in zip(build.manifest.joints, codes[row].tolist(), strict=True)
+        ]
+        values = [*bits[row].astype(int).tolist(), *joints]
+        order = ",".join(map(str, values))
+        line = {
+            "header": f"ms,{','.join(names)}\n12,{order}\n",
+            "pairs": "12,what\n"
+            + ",".join(f"{name}:{value}" for name, value in zip(names, values, strict=True))
+            + "\n",
+            "json": json.dumps(dict(zip(names, values, strict=True))) + "\n",
+            "order": f"{order}\n",
+        }[form].encode()
+        wire.feed(line[:7])
+        wire.feed(line[7:])
+        wanted = said_of(build, bits[row].tolist(), codes[row].tolist())
+        trier.wait(lambda wanted=wanted: (trier.text("grasp"), trier.text("margin")) == wanted)  # type: ignore[misc]
+        assert bits_now(trier, build) == bits[row].astype(int).tolist()
+    trier.wait(lambda: trier.text("serial-said") == 'Connected: 4 rows; lines that hold none: 1, such as "12,what".')
+    assert trier.log("browser") == []
+
+
+# ---- The parts that are Python's, in JavaScript ----
+
+PARTS = (
+    *("parseCalibration", "codeOf", "codesOfBytes", "rounded"),
+    *("parsedLine", "parseCsv", "encodeFrame", "FrameDecoder", "ScannerBoard"),
+)
+
+
+@pytest.fixture(scope="module")
+def parts(trier: Trier, tmp_path_factory: pytest.TempPathFactory) -> Trier:
+    """Return a browser in which `parts` holds functions of the page's modules."""
+    modules = [Path(writing.__file__).with_name("page") / name for name in ("tables.js", "lines.js", "scanner.js")]
+    script = "".join(writing.scoped(module.read_text()) for module in modules)
+    page = tmp_path_factory.mktemp("parts") / "parts.html"
+    page.write_text(f"<script type=module>{script}globalThis.parts = {{ {', '.join(PARTS)} }};</script>")
+    trier.open(page)
+    return trier
+
+
+TEXTS = (
+    *("12,0,1,1023", "12;0,5;-1,25", "1 2\t3", " 7 ", "ms,thumb,index", "ms thumb index", "thumb", "12,what", "1,,3"),
+    *("1,nan,-inf,-", "nan", "ms:12,thumb:0,flex:1023", "a:1 b:2", "a: 1, b :2", "a:1,a:2", ":1", "a:x"),
+    *('{"ms": 12, "thumb": NaN}', '[1, null, true, "2"]', '{"a": {"b": 1}}', "{broken", "[]", "{}"),
+    *("[NaN, -Infinity, 3]", '"1","2"', "1e5,.5,5.,+3", "1e1234", "\ufeffa,b", "_a,b", "1a,2b", "é,ß", "-", "a,a"),
+    *("time;x", "12, 13 ,14", "0x10", "1_000", "garbage!", "a,", ",", "1,2,"),
+)
+
+
+def test_a_line_holds_what_the_driver_finds_in_it(parts: Trier) -> None:
+    told = parts.script("return arguments[0].map((text) => parts.parsedLine(text))", TEXTS)
+    for text, found in zip(TEXTS, told, strict=True):
+        row = parsed(text.encode())
+        wanted: dict[str, Any] | None = None
+        if isinstance(row, Header):
+            wanted = {"header": list(row.names)}
+        elif row is not None:
+            wanted = {"names": None if row.names is None else list(row.names), "values": list(row.values)}
+        assert found == wanted, text
+
+
+def test_frames_of_a_board_are_encoded_and_decoded_as_by_the_driver(parts: Trier) -> None:
+    random = np.random.default_rng(4)
+    for size in (0, 1, 35, 248, 249, 250):
+        for high in (2, 256):
+            payload = random.integers(0, high, size).astype(np.uint8).tobytes()
+            wire = encode(Frame(4, 17, payload))
+            assert bytes(parts.script("return [...parts.encodeFrame(4, 17, arguments[0])]", list(payload))) == wire
+            again = "return new parts.FrameDecoder().feed(arguments[0]).map((one) => one && [...one.payload])"
+            assert parts.script(again, [7, 0, *wire, 0, *wire]) == [None, list(payload), list(payload)]
+            if size:
+                wrong = bytes([wire[0], wire[1] ^ 32, *wire[2:]])
+                assert [frame.payload for frame in FrameDecoder().feed(wrong)] == []
+                assert parts.script(again, list(wrong)) == [None]
+
+
+HEAR = """const [board, sent] = [globalThis.board, globalThis.sent];
+    const found = board.received(Uint8Array.from(arguments[0]));
+    return [found && found.closed.map(Number), found && found.known.map(Number), sent.splice(0).map((one) => one[1])]"""
+
+
+def test_keys_are_known_while_nothing_is_missing_of_what_the_board_told(parts: Trier) -> None:
+    parts.script("globalThis.sent = []; globalThis.board = new parts.ScannerBoard((bytes) => sent.push([...bytes]))")
+    hello = Hello(1, 0, 0, 7, 1, 0, 0, 1, 3, 1000, 0, 50_000, 0, 0, 0)
+
+    def hear(*messages: tuple[FromBoard, int]) -> tuple[list[int] | None, list[int] | None]:
+        wire = b"".join(encode(frame(message, number)) for message, number in messages)
+        closed, known, _ = parts.script(HEAR, list(wire))
+        return closed, known
+
+    assert hear((Heartbeat(0, 1, 3), 9)) == (None, None)
+    assert hear((hello, 10)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(5, 0b101, 3), 11)) == ([1, 0, 1], [1, 1, 1])
+    assert hear((Event(6, 1, 1), 12)) == ([1, 1, 1], [1, 1, 1])
+    # A frame is missing, which may have been an EVENT or a LOST: a HEARTBEAT alone does not say that all can be read.
+    assert hear((Event(7, 1, 0), 14)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(8, 0b100, 3), 16)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(9, 0b100, 3), 17)) == ([0, 0, 1], [1, 1, 1])
+    assert hear((Lost(0b100, 3), 18), (Heartbeat(9, 0b101, 3), 19)) == ([1, 0, 0], [1, 1, 0])
+    # A sound frame that such a board cannot send: nothing holds any more.
+    assert hear((Heartbeat(9, 0b1101, 4), 20), (Event(9, 7, 1), 21)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(9, 0b1, 3), 22)) == ([0, 0, 0], [0, 0, 0])
+    assert hear((Heartbeat(9, 0b1, 3), 23)) == ([1, 0, 0], [1, 1, 1])
+    assert parts.script(HEAR, list(b"\x05damaged\x00"))[1] == [0, 0, 0]
+
+
+def test_ghosts_of_a_matrix_without_diodes_are_unknown(parts: Trier) -> None:
+    parts.script("globalThis.sent = []; globalThis.board = new parts.ScannerBoard((bytes) => sent.push([...bytes]))")
+    hello = Hello(1, WITHOUT_DIODES, 0, 7, 1, 0, 0, 3, 4, 1000, 0, 50_000, 0, 0, 0)
+    random = np.random.default_rng(8)
+    parts.script(HEAR, list(encode(frame(hello, 0))))
+    for number in range(1, 40):
+        closed = int(random.integers(0, 1 << 12) & random.integers(0, 1 << 12))
+        _, known, _ = parts.script(HEAR, list(encode(frame(Heartbeat(0, closed, 12), number))))
+        wanted = ~ambiguous(closed, 3, 4)
+        assert known == [wanted >> key & 1 for key in range(12)]
+
+
+def test_values_and_bytes_become_the_codes_that_python_makes_of_them(parts: Trier) -> None:
+    random = np.random.default_rng(6)
+    for joint in (
+        Calibration(0, "a", "deg", 0, -250.0, 1000, 250.0),
+        Calibration(0, "a", "deg", 200, 3.1, 7, 90.7),
+        Calibration(0, "a", "raw", 1, 1.0, 255, 255.0),
+    ):
+        coded = {name: getattr(joint, name) for name in ("name", "unit", "code_a", "value_a", "code_b", "value_b")}
+        values = [*random.uniform(-400, 400, 200).tolist(), *np.arange(-30, 30, 0.25).tolist()]
+        told = parts.script("return arguments[1].map((value) => parts.codeOf(arguments[0], value))", coded, values)
+        recorded = Joint(joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
+        assert told == np.clip(recorded.code(np.array(values)), 0, 65535).astype(int).tolist()
+        line = SensorCalibration("a", 31, -12.5, 222, 95.25)
+        meaning = GloveCalibration(sensors=(line,))
+        ends = {name: getattr(line, name) for name in ("raw_a", "value_a", "raw_b", "value_b")}
+        told = parts.script("return parts.codesOfBytes(arguments[0], arguments[1])", coded, ends)
+        same = Calibration(**{**coded, "column": 0, "unit": "deg"})
+        assert told == list(codes_of_bytes(same, meaning))
+
+
+def test_a_calibration_that_was_written_is_read(parts: Trier) -> None:
+    lines = (SensorCalibration('a "b" \\', 1, -0.5, 255, 1e-3), SensorCalibration("index_mpj", 96, 0.0, 161, 90.0))
+    text = GloveCalibration(subject="anna", sensors=lines).to_toml()
+    inline = 'unit = "deg"\nsensor = [\n { name = "x", raw_a = 9, value_a = 0.0, raw_b = 16, value_b = 9.5 },\n]\n'
+    read = "return [...parts.parseCalibration(arguments[0])]"
+    fields = ("raw_a", "value_a", "raw_b", "value_b")
+    assert parts.script(read, text) == [[line.name, {name: getattr(line, name) for name in fields}] for line in lines]
+    assert parts.script(read, inline) == [["x", dict(zip(fields, (9, 0, 16, 9.5), strict=True))]]
+
+
+def test_a_table_in_csv_is_split_as_python_splits_it(parts: Trier) -> None:
+    text = '\ufeffa,"b ""c"", d",\r\n1,"two\nlines",3\n\n4,,\n'
+    assert parts.script("return parts.parseCsv(arguments[0])", text) == [
+        row for row in csv.reader(io.StringIO(text.removeprefix("\ufeff"), newline="")) if row
+    ]

@@ -1,0 +1,102 @@
+"""What is written into the page, without a browser."""
+
+import base64
+import hashlib
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.artifact.documents import Documents
+from thenar.compiler.pictures import PALETTE
+from thenar.compiler.tryout import writing
+from thenar.compiler.tryout.writing import MOST_BYTES, embedded, sample, scoped
+
+Make = Callable[..., GraspSet]
+
+
+@pytest.fixture(scope="module")
+def build(make_set: Make, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("tried") / "build"
+    compile_build(make_set(), folder, documents=Documents(), rounds=3, folds=0)
+    return folder
+
+
+def test_the_pages_policy_names_its_script_and_its_style_and_allows_no_request(build: Path) -> None:
+    page = (build / "try.html").read_text()
+    (policy,) = re.findall(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
+    (script,) = re.findall(r'<script type="module">(.*?)</script>', page, re.DOTALL)
+    (style,) = re.findall(r"<style>(.*?)</style>", page, re.DOTALL)
+    for kind, text in (("script", script), ("style", style)):
+        digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        assert f"{kind}-src 'sha256-{digest}'" in policy
+    assert policy.startswith("default-src 'none'; ")
+    assert "unsafe" not in policy
+    assert not re.search(r"\son\w+=|https?://(?!www\.w3\.org/2000/svg)", page)
+    assert len(re.findall("<script", page)) == 2
+
+
+def test_the_page_holds_the_very_tables_and_rows_of_every_type(build: Path) -> None:
+    page = (build / "try.html").read_text()
+    data = json.loads(re.findall(r'id="try-data">(.*?)</script>', page, re.DOTALL)[0])
+    assert base64.b64decode(data["tables"]) == (build / "tables.bin").read_bytes()
+    assert data["hand"] == json.loads((build / "hand.json").read_bytes())
+    manifest = json.loads((build / "build.json").read_bytes())
+    assert {row[0] for row in data["rows"]} == set(range(len(manifest["grasps"])))
+    assert len(page.encode()) <= MOST_BYTES
+    assert '<a href="try.html">' in (build / "report.html").read_text()
+
+
+def test_rows_are_fewer_where_there_is_no_room_and_a_page_that_is_too_large_is_none(
+    make_set: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    size = len((_compiled(make_set, tmp_path / "whole") / "try.html").read_bytes())
+    monkeypatch.setattr(writing, "MOST_BYTES", size - 500)
+    page = (_compiled(make_set, tmp_path / "less") / "try.html").read_bytes()
+    assert size - 700 < len(page) <= size - 500
+    monkeypatch.setattr(writing, "MOST_BYTES", 20_000)
+    bare = _compiled(make_set, tmp_path / "none")
+    assert not (bare / "try.html").exists()
+    assert "try.html" not in (bare / "report.html").read_text()
+
+
+def _compiled(make_set: Make, folder: Path) -> Path:
+    return compile_build(make_set(), folder, documents=Documents(), rounds=3, folds=0).folder
+
+
+def test_a_sample_takes_turns_among_the_types() -> None:
+    labels = np.array([2, 0, 0, 2, 0, 2, 2])
+    assert sample(labels, 3) == [1, 0, 2, 3, 4, 5, 6]
+    many = sample(np.arange(10_000) % 4, 4)
+    assert (len(many), len(set(many))) == (400, 400)
+    assert len(sample(np.arange(1000), 1000)) == 1000
+
+
+def test_data_end_no_tag() -> None:
+    text = embedded({"a": "</script><!-- & \u2028"})
+    assert not set("<>&") & set(text)
+    assert json.loads(text) == {"a": "</script><!-- & \u2028"}
+
+
+def test_a_module_becomes_a_scope_that_gives_its_exports() -> None:
+    module = "const own = 1;\nexport async function a() {}\nexport class B {}\nexport const c = own;\n"
+    text = scoped(module)
+    assert text.startswith("const { a, B, c } = (() => {\n")
+    assert text.endswith("return { a, B, c };\n})();\n")
+    assert "export" not in text
+    assert scoped("go();\n") == "(() => {\ngo();\n})();\n"
+
+
+def test_the_hand_has_the_colours_of_the_report() -> None:
+    css = (Path(writing.__file__).parents[1].parent / "runtime" / "web" / "pages" / "hand.css").read_text()
+    light, dark = css.split("@media", maxsplit=1)
+    named = dict(re.findall(r"--([\w-]+): (#\w{6});", light))
+    shaded = dict(re.findall(r"--([\w-]+): (#\w{6});", dark))
+    assert len(named) > 8
+    assert {name: (named[name], shaded[name]) for name in named if name in shaded} == {
+        name: PALETTE[name] for name in named
+    }

@@ -1,0 +1,286 @@
+"""Readings become codes in the C of firmware as they do in Python: every reading, of many calibrations."""
+
+import ctypes
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.compiler.firmware import FirmwareError
+from thenar.compiler.firmware.classifier import Library
+from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.sensors import Sensor, Sensors, sensors_of
+from thenar.compiler.firmware.words import Numbered, numbered
+from thenar.drivers.calibration import GloveCalibration, SensorCalibration
+from thenar.drivers.errors import SettingError
+from thenar.runtime.calibration import CodeTables, codes_of_bytes, numbers_of
+from thenar.runtime.code_line import FARTHEST, CodeLine, Point
+from thenar.runtime.harness.loading import load_harness, parse_harness
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.manifest import Calibration, Switch, Threshold
+from thenar.runtime.sources.rows import _Grid, steps_of
+from thenar.runtime.tables import IntegerTables
+from thenar.runtime.taxels import TaxelCalibration, TaxelLine, count_limit
+
+SharedLibrary = Callable[..., ctypes.CDLL]
+
+READINGS = range(-FARTHEST - 300, FARTHEST + 301)
+SWEEP = """
+#include "thenar_hand_codes.h"
+void sweep(const thenar_hand_codes *codes, uint16_t sensor, int32_t from, int32_t to, uint16_t *found);
+void sweep(const thenar_hand_codes *codes, uint16_t sensor, int32_t from, int32_t to, uint16_t *found)
+{
+    for (int32_t reading = from; reading < to; ++reading) {
+        found[reading - from] = thenar_hand_code_of(codes, sensor, reading);
+    }
+}
+"""
+TAKE = """
+#include "thenar_hand_codes.h"
+uint32_t take(const thenar_hand_codes *codes, uint16_t sensor, int32_t reading);
+uint32_t take(const thenar_hand_codes *codes, uint16_t sensor, int32_t reading)
+{
+    thenar_hand glove;
+    thenar_hand_init(&glove);
+    thenar_hand_set_reading(&glove, codes, sensor, reading);
+    %s
+}
+"""
+
+
+class Codes:
+    """The C of some sensors, begun."""
+
+    def __init__(self, library: ctypes.CDLL, sensors: int) -> None:
+        self.library, self.state = library, (ctypes.c_int32 * (2 * sensors))()
+        library.thenar_hand_codes_init(self.state)
+        library.thenar_hand_calibrate.restype = library.thenar_hand_calibrated.restype = ctypes.c_bool
+
+    def sweep(self, sensor: int, readings: range = READINGS) -> list[int]:
+        found = (ctypes.c_uint16 * len(readings))()
+        self.library.sweep(self.state, sensor, readings.start, readings.stop, found)
+        return list(found)
+
+    def calibrate(self, sensor: int, first: int, second: int) -> bool:
+        return bool(self.library.thenar_hand_calibrate(self.state, sensor, first, second))
+
+
+@pytest.fixture
+def compiled(shared_library: SharedLibrary) -> Callable[..., Codes]:
+    """Return what compiles the codes of some names."""
+
+    def compiled(
+        names: Numbered, sensors: Sensors | None = None, take: str = "return 0u;", highest: int = 900
+    ) -> Codes:
+        layout = arrange(tables_of(names, highest), bins="search")
+        files = Library("hand", names, layout, avr=False, glove=sensors).whole
+        library = shared_library({**files, "sweep.c": SWEEP, "take.c": TAKE % take}, "-Wall", "-Wextra", "-Wconversion")
+        return Codes(library, len((sensors or sensors_of(names)).every))
+
+    return compiled
+
+
+def tables_of(names: Numbered, highest: int) -> IntegerTables:
+    random = np.random.default_rng(1)
+    s, j, k = len(names.switches), len(names.joints), 3
+
+    def rows(*shape: int) -> np.ndarray:
+        return random.integers(-20, 21, shape).astype(np.int16)
+
+    steps = np.array([7, highest], np.uint16)
+    return IntegerTables(
+        rows(k), rows(s, k), (steps,) * j, tuple(rows(3, k) for _ in range(j)), rows(s, k), rows(j, k), 100.0
+    )
+
+
+def names_of(joints: Sequence[Calibration], switches: Sequence[Switch] = ()) -> Numbered:
+    zeros = [np.zeros(shape, np.int16) for shape in (3, (1, 3), (1, 3), (0, 3))]
+    tables = IntegerTables(zeros[0], zeros[1], (), (), zeros[2], zeros[3], 1.0)
+    return replace(numbered(tables), joints=tuple(joints), switches=tuple(switches) or (Switch(0, "s0", 0.0),))
+
+
+def joint(
+    name: str, unit: str = "deg", points: tuple[int, float, int, float] = (0, -250.0, 1000, 250.0)
+) -> Calibration:
+    return Calibration(0, name, unit, *points)
+
+
+def in_python(sensor: Sensor, first: int, second: int, readings: range = READINGS) -> list[int]:
+    """What the runtime makes of readings, where a sensor read these two at its points."""
+    line = CodeLine(Point(first, sensor.codes[0]), Point(second, sensor.codes[1]))
+    return [line.code(reading) for reading in readings]
+
+
+def random_joint(random: np.random.Generator, number: int) -> Calibration:
+    """Grids of all kinds: half degrees, of which many codes lie midway between two, and any others."""
+    if number % 2:
+        return joint(f"j{number}")
+    low, high = np.sort(random.uniform(-300, 300, 2)).tolist()
+    codes = random.choice(65536, 2, replace=False).tolist()
+    return joint(f"j{number}", points=(codes[0], low, codes[1], high + 1.0))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_reading_has_python_s_code_by_any_calibration_that_a_program_sets(
+    compiled: Callable[..., Codes], seed: int
+) -> None:
+    random = np.random.default_rng(seed)
+    names = names_of([random_joint(random, number) for number in range(6)])
+    sensors = sensors_of(names)
+    codes = compiled(names)
+    for number, sensor in enumerate(sensors.every):
+        assert not codes.library.thenar_hand_calibrated(codes.state, number)
+        assert set(codes.sweep(number, range(-9, 9))) == {0}
+        spans = [1, 2, 60, 120, 254, 1023, 4095, FARTHEST]
+        span = int(random.choice(spans))
+        first = int(random.integers(-FARTHEST, FARTHEST + 1 - span))
+        ends = (first, first + span) if random.integers(2) else (first + span, first)
+        assert codes.calibrate(number, *ends)
+        assert codes.sweep(number) == in_python(sensor, *ends)
+
+
+def test_what_makes_no_line_is_refused_and_changes_nothing(compiled: Callable[..., Codes]) -> None:
+    codes = compiled(names_of([joint("index_mpj")]))
+    assert codes.calibrate(0, 100, 300)
+    before = list(codes.state)
+    for sensor, first, second in (
+        (0, 5, 5),
+        (1, 0, 9),
+        (0, -1, FARTHEST),
+        (0, 0, FARTHEST + 1),
+        (0, 2**31 - 1, -(2**31)),
+    ):
+        assert not codes.calibrate(sensor, first, second)
+        assert list(codes.state) == before
+
+
+def hand(random: np.random.Generator, names: Sequence[str]) -> GloveCalibration:
+    lines = []
+    for name in names:
+        first, second = random.choice(np.arange(1, 256), 2, replace=False).tolist()
+        lines.append(SensorCalibration(name, first, 0.0, second, float(random.choice([90.0, 100.0, 72.5, 33.3]))))
+    return GloveCalibration(sensors=tuple(lines))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_cyberglove_s_bytes_have_the_codes_that_a_run_gives_them(compiled: Callable[..., Codes], seed: int) -> None:
+    random = np.random.default_rng(seed)
+    joints = [random_joint(random, number) for number in range(8)]
+    calibration = hand(random, [each.name for each in joints])
+    names = names_of(joints)
+    codes = compiled(names, sensors_of(names, calibration=calibration))
+    for number, each in enumerate(joints):
+        assert codes.sweep(number, range(256)) == list(codes_of_bytes(each, calibration))
+
+
+STREAM = """
+name = "glove"
+[[stream]]
+port = "/dev/ttyUSB0"
+columns = ["a", "b", "c", "pad"]
+joints = { a = [800, 2800], b = [1023, 0], c = [-100, 154] }
+taxels = { pad = [0, 1023] }
+"""
+
+
+def live_codes(
+    harness: Harness, joints: Sequence[Calibration], calibration: GloveCalibration | None
+) -> list[list[int]]:
+    """What a run makes of the numbers of a stream: bytes, and of these, codes."""
+    ranges = harness.streams[0].joints
+    tables = CodeTables(joints, list(ranges), calibration or numbers_of(ranges))
+    grids = [_Grid(limits, 1, 255) for limits in ranges.values()]
+    found = []
+    for number in READINGS:
+        numbers = bytes(min(max(grid.code(float(number)), 1), 255) for grid in grids)
+        found.append(list(tables.codes(numbers)[: len(joints)]))
+    return [list(column) for column in zip(*found, strict=True)]
+
+
+@pytest.mark.parametrize("case", ["raw", "numbers", "degrees"])
+def test_a_stream_s_numbers_have_the_codes_that_a_run_gives_them(
+    compiled: Callable[..., Codes], tmp_path: Path, case: str
+) -> None:
+    points = {"raw": (1, 1.0, 255, 255.0), "numbers": (0, -40.0, 1000, 960.0), "degrees": (0, -250.0, 1000, 250.0)}[
+        case
+    ]
+    joints = [joint(name, {"raw": "raw", "numbers": "ohm", "degrees": "deg"}[case], points) for name in "cab"]
+    calibration = hand(np.random.default_rng(2), "abc") if case == "degrees" else None
+    harness = parse_harness(STREAM, "glove.toml")
+    if calibration is not None:
+        (tmp_path / "anna.toml").write_text(calibration.to_toml())
+        (tmp_path / "glove.toml").write_text(STREAM.replace("joints =", 'calibration = "anna.toml"\njoints ='))
+        harness = load_harness(tmp_path / "glove.toml")
+    names = names_of(joints)
+    sensors = sensors_of(names, harness)
+    assert sensors.on_pins
+    codes = compiled(names, sensors)
+    assert [codes.sweep(number) for number in range(3)] == live_codes(harness, joints, calibration)
+    # Calibrated anew on the board, the numbers are bytes first, as `thenar calibrate` takes them.
+    assert codes.calibrate(0, 10, 60)
+    grid = sensors.joints[0].grid
+    assert grid is not None
+    again = replace(sensors.joints[0], readings=(grid.code(10), grid.code(60)))
+    assert codes.sweep(0) == [again.code(reading) for reading in READINGS]
+
+
+@pytest.mark.parametrize("calibrated", [False, True], ids=["counts", "calibrated"])
+def test_a_taxel_s_levels_close_as_a_run_closes_them(
+    compiled: Callable[..., Codes], tmp_path: Path, calibrated: bool
+) -> None:
+    points = (130, 0.0, 700, 2.5) if calibrated else (0, 0.0, 1, 1.0)
+    coded = Calibration(0, "pad", "N" if calibrated else "counts", *points)
+    levels = [Threshold(code, 0.0, coded) for code in (90, 400, 1000)]
+    switches = [Switch(0, "s0", 0.0), *(Switch(1, f"level {n}", 0.0, level) for n, level in enumerate(levels))]
+    (tmp_path / "pads.toml").write_text(TaxelCalibration(unit="N", taxels=(TaxelLine("pad", 900, 222, 2.5),)).to_toml())
+    settings = '[taxels]\ncalibration = "pads.toml"\n' if calibrated else ""
+    (tmp_path / "glove.toml").write_text(STREAM + settings)
+    harness = load_harness(tmp_path / "glove.toml")
+    names = names_of([joint("a", "raw", (1, 1.0, 255, 255.0))], switches)
+    sensors = sensors_of(names, harness)
+    codes = compiled(names, sensors, take="return glove.input.switches[0];")
+    lines = TaxelCalibration(unit="N", taxels=(TaxelLine("pad", 900, 222, 2.5),)) if calibrated else None
+    grid = _Grid((0, 1023), 0, steps_of((0, 1023)))
+    for reading in range(-3, 1030):
+        count = min(max(grid.code(reading), 0), 1023)
+        limits = [count_limit(level, lines) for level in levels]
+        closed = [(count if limit >= 0 else ~count) > limit for limit in limits]
+        assert codes.library.take(codes.state, 1, reading) == sum(2 << n for n, each in enumerate(closed) if each)
+    assert codes.library.take(codes.state, 0, 900) == 0  # another sensor closes nothing
+
+
+def test_a_reading_goes_into_the_input_held_to_what_a_code_has_room_for(compiled: Callable[..., Codes]) -> None:
+    names = names_of([joint("a"), joint("b")])
+    codes = compiled(names, take="return glove.input.codes[1];", highest=254)
+    assert codes.calibrate(1, 0, 100)  # 0 and 90 degrees: codes 500 and 680
+    assert codes.library.take(codes.state, 1, 0) == 255
+    assert codes.library.take(codes.state, 1, -200) == 140
+    assert codes.library.take(codes.state, 0, 7) == 0
+
+
+def test_what_a_glove_does_not_know_is_said() -> None:
+    harness = parse_harness(STREAM, "glove.toml")
+    with pytest.raises(SettingError, match="no sensor of that name"):
+        sensors_of(names_of([joint("d", "ohm")]), harness)
+    fine = parse_harness(STREAM.replace("[800, 2800]", "[0.0, 3.3]"), "glove.toml")
+    with pytest.raises(FirmwareError, match=r"range of 'a' in glove.toml, 0 to 3.3, is not of whole numbers"):
+        sensors_of(names_of([joint("a", "raw", (1, 1.0, 255, 255.0))]), fine)
+    with pytest.raises(SettingError, match="not in the glove's bytes"):
+        sensors_of(names_of([joint("index_mpj")]), parse_harness('name = "g"\n[cyberglove]\nport = "x"\n', "g"))
+
+
+def test_a_build_of_switches_alone_has_no_codes() -> None:
+    names = names_of([])
+    whole = Library("hand", names, arrange(tables_of(names, 9), bins="search"), avr=False).whole
+    assert not [path for path in whole if "codes" in path]
+
+
+def test_points_of_degrees_are_poses_unless_codes_are_too_fine() -> None:
+    sensors = sensors_of(names_of([joint("index_mpj"), joint("mine"), joint("fine", points=(0, 0.0, 60000, 0.6))]))
+    assert [sensor.says for sensor in sensors.joints] == [
+        ("0 deg", "90 deg"),
+        ("0 deg", "90 deg"),
+        ("0 deg", "0.6 deg"),
+    ]

@@ -1,0 +1,11 @@
+/* The Wi-Fi that the board joins. Copy this file to secrets.h, beside it, and fill that in: thenar neither writes nor
+   reads it, and it belongs into no repository.
+
+   thenar 0.1.0, template sketch/secrets.example.h.j2. */
+#ifndef THENAR_SECRETS_H
+#define THENAR_SECRETS_H
+
+#define THENAR_WIFI_SSID ""
+#define THENAR_WIFI_PASSWORD ""
+
+#endif

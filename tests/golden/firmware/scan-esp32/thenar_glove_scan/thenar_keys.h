@@ -1,0 +1,19 @@
+/* The keys: switches on pins.
+
+   thenar 0.1.0, template board/thenar_keys.h.j2. */
+#ifndef THENAR_KEYS_H
+#define THENAR_KEYS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Bitmaps: key k is bit k % 8 of byte k / 8, and the bits beyond the last key are 0. */
+
+/* Make the pins what they are to be. */
+void thenar_keys_begin(void);
+
+/* Read every key into `closed`, and into `known` which of them were read; those that were not are 0 in both. Return
+   whether all were, and none can be a ghost. */
+bool thenar_keys_scan(uint8_t *closed, uint8_t *known);
+
+#endif

@@ -1,0 +1,216 @@
+"""Commands that serve a page, on emulated devices, and browsers that have it open."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.wait import WebDriverWait
+
+from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
+from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.serial_line import PtyLine
+from thenar.simulator.playing.performance import Performance
+
+PATIENCE_S = 60
+GLOVE = """name = "bench"
+[cyberglove]
+port = "{folder}/glove"
+calibration = "{folder}/wearer.toml"
+[[scanner]]
+port = "{folder}/scanner"
+switches = {switches}
+"""
+
+
+class Browser:
+    """A browser with one page open, used by keyboard alone."""
+
+    def __init__(self, driver: webdriver.Chrome) -> None:
+        self.driver = driver
+
+    def open(self, url: str, width: int = 1400, height: int = 1000, scheme: str = "light") -> "Browser":
+        self.driver.execute_cdp_cmd(
+            "Emulation.setDeviceMetricsOverride",
+            {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500},
+        )
+        features = [{"name": "prefers-color-scheme", "value": scheme}]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+        self.driver.get(url)
+        self.wait(lambda: self.text("link") == "connected")
+        return self
+
+    def text(self, name: str) -> str:
+        found = self.script("return document.getElementById(arguments[0])?.textContent ?? ''", name)
+        assert isinstance(found, str)
+        return found
+
+    def script(self, text: str, *arguments: object) -> object:
+        return self.driver.execute_script(text, *arguments)
+
+    def wait(self, until: Callable[[], object]) -> None:
+        WebDriverWait(self.driver, PATIENCE_S, poll_frequency=0.02).until(lambda _: until())
+
+    def stage(self) -> str:
+        found = self.script("return document.getElementById('task').dataset.stage")
+        assert isinstance(found, str)
+        return found
+
+    def until(self, *stages: str) -> str:
+        """Wait for one of these stages, and return which it is."""
+        self.wait(lambda: self.stage() in stages)
+        return self.stage()
+
+    def press(self, key: str) -> None:
+        """Type a key that changes something, and wait until the page shows that."""
+        step = self.step()
+        self.type(key)
+        self.wait(lambda: self.step() != step)
+
+    def step(self) -> object:
+        return self.script("return document.getElementById('task').dataset.step")
+
+    def type(self, *keys: str) -> None:
+        ActionChains(self.driver).send_keys(*keys).perform()
+
+    def offered(self) -> list[str]:
+        """Return the keys that do something now, as their buttons say."""
+        return [button.text for button in self.driver.find_elements(By.CSS_SELECTOR, "nav button") if button.text]
+
+    def complaints(self) -> list[dict[str, Any]]:
+        found: list[dict[str, Any]] = self.driver.get_log("browser")  # type: ignore[no-untyped-call]
+        return found
+
+    def overflow(self) -> object:
+        """Return by how many pixels the page is wider than its window."""
+        return self.script("return document.documentElement.scrollWidth - innerWidth")
+
+    def picture(self, name: str) -> None:
+        """Keep a picture of the page where THENAR_PICTURES names a folder for them."""
+        if folder := os.environ.get("THENAR_PICTURES"):
+            self.driver.save_screenshot(f"{folder}/{name}.png")
+
+
+ENTER = Keys.ENTER
+
+
+@pytest.fixture(scope="module")
+def drivers(tool: Callable[[str], str]) -> Iterator[Callable[[int], Browser]]:
+    """Return the browsers of a module, by number: each is started when it is first asked for."""
+    with ExitStack() as stack:
+        made: list[Browser] = []
+
+        def browser(number: int) -> Browser:
+            while len(made) <= number:
+                options = webdriver.ChromeOptions()
+                for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1400,1000"):
+                    options.add_argument(flag)
+                options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+                driver = webdriver.Chrome(options=options, service=Service(tool("chromedriver")))
+                stack.callback(driver.quit)
+                made.append(Browser(driver))
+            return made[number]
+
+        yield browser
+
+
+@pytest.fixture
+def browser(drivers: Callable[[int], Browser]) -> Iterator[Browser]:
+    yield drivers(0)
+    drivers(0).driver.get("about:blank")
+
+
+@pytest.fixture
+def other(drivers: Callable[[int], Browser]) -> Iterator[Browser]:
+    yield drivers(1)
+    drivers(1).driver.get("about:blank")
+
+
+class Wearer:
+    """The emulated devices of a glove with the hand of a performance in it."""
+
+    def __init__(self, performance: Performance, folder: Path, stack: ExitStack) -> None:
+        self.performance, self.folder = performance, folder
+        names = list(performance.switch_names)
+        (folder / "wearer.toml").write_text(performance.calibration.to_toml())
+        (folder / "glove.toml").write_text(GLOVE.format(folder=folder, switches=names))
+        sensors = len(performance.calibration.sensors)
+        scanner_line = stack.enter_context(PtyLine(folder / "scanner", 1_000_000))
+        glove_line = stack.enter_context(PtyLine(folder / "glove"))
+        self.scanner = stack.enter_context(EmulatedScanner(scanner_line, len(names)))
+        self.glove = stack.enter_context(EmulatedCyberGlove(glove_line, sensors=sensors))
+        self.show(0)
+
+    def show(self, row: int) -> int:
+        """Hold what a row of the performance holds; return how many switches are closed."""
+        bits = self.performance.switches[row]
+        self.scanner.set(sum(1 << number for number, closed in enumerate(bits.tolist()) if closed))
+        self.glove.set(self.performance.sensors[row].tobytes())
+        return int(bits.sum())
+
+
+@pytest.fixture
+def wearer(stage: Any, tmp_path: Path) -> Iterator[Wearer]:
+    with ExitStack() as stack:
+        yield Wearer(stage.performance, tmp_path, stack)
+
+
+class Command:
+    """A command with --web, as a service would run it: nobody types."""
+
+    def __init__(self, folder: Path, *arguments: object) -> None:
+        line = [sys.executable, "-m", "thenar.cli", *map(str, arguments), "--web", "127.0.0.1:0"]
+        self._said = folder / "said"
+        with self._said.open("wb") as said:
+            self.process = subprocess.Popen(
+                line, stdin=subprocess.DEVNULL, stdout=said, stderr=said, start_new_session=True, cwd=folder
+            )
+
+    @property
+    def said(self) -> str:
+        return self._said.read_text()
+
+    @property
+    def url(self) -> str:
+        """Where the page is, once that is said."""
+        for _ in range(PATIENCE_S * 20):
+            if found := re.search(r"the page is at (\S+)", self.said):
+                return found[1]
+            try:
+                self.process.wait(0.05)
+                break
+            except subprocess.TimeoutExpired:
+                continue
+        raise AssertionError(self.said)
+
+    def finish(self) -> int:
+        return self.process.wait(PATIENCE_S)
+
+    def kill(self) -> None:
+        if self.process.poll() is None:
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.wait()
+
+
+@pytest.fixture
+def command(tmp_path: Path) -> Iterator[Callable[..., Command]]:
+    begun: list[Command] = []
+
+    def begin(*arguments: object) -> Command:
+        begun.append(Command(tmp_path, *arguments))
+        return begun[-1]
+
+    yield begin
+    for one in begun:
+        one.kill()

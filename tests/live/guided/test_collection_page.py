@@ -1,0 +1,153 @@
+"""`thenar record --web` in real browsers, on emulated devices, by keyboard alone."""
+
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from thenar.cli import run
+from thenar.compiler import GraspSet
+from thenar.compiler.evaluation.sofar import recognition_so_far
+from thenar.runtime.recording.guide import read_journal
+
+from .conftest import ENTER, Browser, Command, Wearer
+
+pytestmark = pytest.mark.slow
+
+OBJECTS = 'PoS = ["bottle"]\nTip = ["<script>alert(1)</script>"]\n'
+
+
+@pytest.fixture
+def record(wearer: Wearer, command: Callable[..., Command], tmp_path: Path) -> Callable[..., Command]:
+    (tmp_path / "objects.toml").write_text(OBJECTS)
+
+    def begin(*more: object) -> Command:
+        options: list[object] = ["--glove", "glove.toml", "--objects", "objects.toml", "--subject", "A"]
+        options += ["--repetitions", 3, "--countdown", 0.3, "--seed", 5, "-o", "set.grasps", *more]
+        return command("record", *options)
+
+    return begin
+
+
+def captured(page: Browser, start: str = ENTER) -> None:
+    """Let the next grasp be captured; the countdown begins again while devices are on their way."""
+    page.press(start)
+    while page.until("review", "ready") == "ready":
+        page.press(ENTER)
+
+
+def test_a_whole_collection_by_keyboard(
+    record: Callable[..., Command], wearer: Wearer, browser: Browser, tmp_path: Path
+) -> None:
+    going = record("--none")
+    page = browser.open(going.url)
+    page.until("ready")
+    page.picture("collect-ready-1400-light")
+    assert page.text("subject") == "A"
+    assert page.text("count") == "0 of 9 trials done"
+    seen = set()
+    for number in range(9):
+        closed = wearer.show(number)
+        captured(page)
+        seen.add(page.text("title"))
+        assert page.text("stage") == "captured: keep it?"
+        assert page.text("sees").startswith(f"{closed} of {len(wearer.performance.switch_names)} switches closed")
+        lit = page.script("return document.querySelectorAll('#glove .spot.closed').length")
+        assert lit == closed
+    page.picture("collect-review-1400-light")
+    page.type(ENTER)
+    page.until("done")
+    assert page.text("count") == "9 of 9 trials done"
+    assert "Power grip, standard type (PoS)" in seen
+    assert any(title.startswith("Nothing held: ") for title in seen)
+    page.wait(lambda: "of 9 trials" in page.text("study"))
+    page.picture("collect-done-1400-light")
+    told = page.text("study"), page.script("return document.querySelectorAll('#types tr').length")
+    page.type(ENTER)
+    assert going.finish() == 0, going.said
+    page.wait(lambda: page.text("link") == "ended")
+    grasp_set = GraspSet.load(tmp_path / "set.grasps")
+    assert len(set(grasp_set.trials.tolist())) == 9
+    so_far = recognition_so_far(grasp_set)
+    assert told[0].startswith(f"{so_far.correct} of 9 trials (")
+    assert told[1] == len(so_far.types) == 3
+    assert run(["import", str(tmp_path / "set.mcap"), "-o", str(tmp_path / "again.grasps")]) == 0
+    assert (tmp_path / "again.grasps").read_bytes() == (tmp_path / "set.grasps").read_bytes()
+    complaints = [one for one in page.complaints() if "WebSocket" not in one["message"]]
+    assert complaints == []
+
+
+def test_undo_skip_and_pause_in_two_browsers_and_a_kill(
+    record: Callable[..., Command], wearer: Wearer, browser: Browser, other: Browser, tmp_path: Path
+) -> None:
+    going = record("--no-none", "--countdown", 1.5)
+    page = browser.open(going.url, 400, 800, "dark")
+    page.until("ready")
+    assert page.offered()[0] == "start the countdown Enter"
+    page.press("s")
+    assert page.text("count") == "0 of 6 trials done, 1 skipped"
+    captured(page)
+    page.picture("collect-review-400-dark")
+    assert page.overflow() == 0
+    page.press(ENTER)
+    second = other.open(going.url)
+    page.until("review")
+    # Both show the same, and a key counts in either, once.
+    second.until("review")
+    assert [one.text("title") for one in (page, second)] == [page.text("title")] * 2
+    assert [one.text("count") for one in (page, second)] == ["1 of 6 trials done, 1 skipped"] * 2
+    step = second.step()
+    second.press(ENTER)
+    page.wait(lambda: page.text("count") == "2 of 6 trials done, 1 skipped")
+    assert page.step() != step
+    # Text that would be a tag is text.
+    for one in (page, second):
+        assert one.script("return document.querySelectorAll('main script').length") == 0
+    page.until("review")
+    page.press("u")
+    page.press("p")
+    assert page.text("stage") == "paused; nothing is recorded meanwhile"
+    second.until("paused")
+    assert second.text("count") == "1 of 6 trials done, 1 skipped"
+    # Who closes the browser in the middle of a trial loses nothing.
+    second.type(ENTER)
+    page.until("countdown", "review")
+    for one in (page, second):
+        one.driver.get("about:blank")
+    back = browser.open(going.url, 1400, 1000, "dark")
+    if back.until("review", "ready") == "ready":
+        captured(back)
+    back.picture("collect-review-1400-dark")
+    back.press(ENTER)
+    assert back.text("count") == "2 of 6 trials done, 1 skipped"
+    os.killpg(going.process.pid, signal.SIGKILL)
+    going.process.wait()
+    back.wait(lambda: back.text("link") == "not connected")
+    assert back.offered() == []
+    assert len(read_journal(tmp_path / "set.mcap").accepted) == 2
+
+    again = record("--no-none")
+    back.open(again.url)
+    assert back.text("count") == "2 of 6 trials done"
+    back.type("q")
+    back.wait(lambda: back.script("return document.getElementById('leaving').open"))
+    back.type(ENTER)
+    assert again.finish() == 0, again.said
+    assert sorted(GraspSet.load(tmp_path / "set.grasps").trials.tolist()) == sorted(
+        read_journal(tmp_path / "set.mcap").accepted
+    )
+
+
+def test_without_devices_there_is_neither_a_page_nor_a_file(
+    record: Callable[..., Command], wearer: Wearer, tmp_path: Path
+) -> None:
+    wearer.scanner.close()
+    wearer.glove.close()
+    (tmp_path / "glove.toml").write_text('name = "gone"\n[cyberglove]\nport = "nowhere"\n')
+    going = record("--no-none")
+    assert going.finish() == 2
+    assert "there is no such port" in going.said
+    assert "the page is at" not in going.said
+    assert not list(tmp_path.glob("set.*"))

@@ -1,0 +1,76 @@
+"""What people see of a moment is what the build makes of it."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from msgspec import json
+from msgspec.structs import replace
+
+from thenar.runtime.build import Build
+from thenar.runtime.detail import Details
+from thenar.runtime.frames import SwitchFrame
+from thenar.runtime.live.recogniser import Moment
+from thenar.runtime.manifest import Calibration, Rejection
+from thenar.runtime.published import LiveGrasp
+from thenar.runtime.sinks import DetailLine
+from thenar.runtime.sinks.jsonl import encode_detail
+
+MakeBuild = Callable[..., Build]
+MakeGrasp = Callable[..., LiveGrasp]
+
+
+def mask(bits: np.ndarray) -> int:
+    return sum(1 << number for number, bit in enumerate(bits) if bit)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_probabilities_are_those_of_the_build_and_joints_are_in_their_unit(
+    make_build: MakeBuild, make_grasp: MakeGrasp, seed: int
+) -> None:
+    made = make_build(seed)
+    degrees = tuple(
+        Calibration(number, f"j{number}", "deg", 10, -5.0, 210, 95.0) for number in range(made.tables.n_joints)
+    )
+    least = (-32768,) * made.tables.n_classes
+    rejection = Rejection(0.01, least, ((0, 6),) * len(least), (((0, 255),) * 3,) * len(least), 3)
+    random = np.random.default_rng(seed)
+    for build in (made, Build(replace(made.manifest, joints=degrees, rejection=rejection), made.tables)):
+        bits, codes = random.random(6) < 0.5, random.integers(1, 256, 3)
+        frame = SwitchFrame(0, mask(bits), unread=0b100)
+        scores = build.scorer.lanes(bits, codes)
+        moment = Moment(make_grasp(7), frame, None, codes.tolist(), scores=scores)
+        detail = Details(build)(moment)
+        assert [letter == "1" for letter in detail.closed] == bits.tolist()
+        assert detail.unread == "001000"
+        found = build.recognise(bits, codes)
+        assert detail.probabilities is not None
+        assert len(detail.probabilities) == len(build.manifest.answers)
+        at = build.manifest.answers.index(found.grasp)
+        assert detail.probabilities[at] == max(detail.probabilities) == pytest.approx(found.probability, abs=6e-5)
+        assert detail.joints is not None
+        expected = codes if build is made else -5.0 + (codes - 10) / 2
+        assert detail.joints == pytest.approx(expected.tolist())
+        line = json.decode(encode_detail(detail, 7, "sum"), type=DetailLine)
+        assert (line.number, line.build, line.closed) == (7, "sum", detail.closed)
+
+
+def test_a_refused_frame_shows_that_nothing_is_held(make_build: MakeBuild, make_grasp: MakeGrasp) -> None:
+    made = make_build(1)
+    rejection = Rejection(0.01, (0,) * 4, ((0, 6),) * 4, (((0, 255),) * 3,) * 4, 3)
+    build = Build(replace(made.manifest, rejection=rejection), made.tables)
+    scores = build.scorer.lanes([True] * 6, [9, 9, 9])
+    details = Details(build)
+    shares = [
+        details(Moment(make_grasp(), None, None, None, scores=scores, refused=refused)).probabilities
+        for refused in (False, True)
+    ]
+    assert shares[0] is not None
+    assert shares[1] is not None
+    assert shares[0][-1] == 0.0
+    assert shares[1][-1] == max(shares[1]) > 0.7
+
+
+def test_before_anything_was_read_nothing_is_claimed(make_build: MakeBuild, make_grasp: MakeGrasp) -> None:
+    detail = Details(make_build())(Moment(make_grasp(), None, None, None))
+    assert (detail.closed, detail.joints, detail.probabilities) == ("000000", None, None)

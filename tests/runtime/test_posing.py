@@ -1,0 +1,98 @@
+import pytest
+
+from thenar.drivers.calibration import FLAT, POSES
+from thenar.drivers.cyberglove_protocol import SENSORS_18
+from thenar.runtime.posing import SETTLE_US, PoseGuide, PoseKey, PoseStage
+
+HOLD_US = 1_000_000
+ALL = (FLAT, *POSES)
+
+
+@pytest.fixture
+def guide() -> PoseGuide:
+    return PoseGuide(SENSORS_18, HOLD_US)
+
+
+def hold(guide: PoseGuide, raw: bytes, now: int = 0) -> PoseStage:
+    """Hold a pose to its end; before, and while it settles, the hand was elsewhere."""
+    guide.take(now, bytes([200] * 18))
+    guide.press(now, PoseKey.ACCEPT)
+    assert guide.stage is PoseStage.HELD
+    assert guide.seconds_left(now) == pytest.approx((SETTLE_US + HOLD_US) / 1e6)
+    guide.take(now + SETTLE_US - 1, bytes([200] * 18))
+    for time_us in (SETTLE_US, SETTLE_US + HOLD_US - 1, SETTLE_US + HOLD_US):
+        assert guide.stage is PoseStage.HELD
+        guide.take(now + time_us, raw)
+    return guide.stage
+
+
+def through(guide: PoseGuide, first: int = 0) -> None:
+    for number in range(first, len(ALL)):
+        assert guide.pose is ALL[number]
+        hold(guide, bytes([60 + 20 * number] * 18))
+
+
+def test_poses_one_after_the_other_make_the_lines(guide: PoseGuide) -> None:
+    through(guide)
+    assert guide.stage is PoseStage.DONE
+    calibration = guide.calibration("anna")
+    assert {line.name: (line.raw_a, line.raw_b) for line in calibration.sensors} == {
+        name: (60, 60 + 20 * number) for number, pose in enumerate(ALL) for name in pose.degrees if name in SENSORS_18
+    }
+    guide.press(0, PoseKey.ACCEPT)
+    assert (guide.stage, guide.left) == (PoseStage.OVER, False)
+    assert guide.offered() == {}
+
+
+def test_a_doubtful_pose_is_held_again_or_kept(guide: PoseGuide) -> None:
+    hold(guide, bytes([60] * 18))
+    assert hold(guide, bytes([60] * 18)) is PoseStage.DOUBTED
+    assert "index_mpj went from 60 to 60 only: was the joint moved?" in guide.problems
+    guide.press(0, PoseKey.BACK)
+    assert guide.stage is PoseStage.DOUBTED
+    guide.press(0, PoseKey.ACCEPT)
+    assert (guide.stage, guide.pose.name) == (PoseStage.READY, "fist")
+    assert hold(guide, bytes([60] * 18)) is PoseStage.DOUBTED
+    guide.press(0, PoseKey.KEEP)
+    assert (guide.stage, guide.pose.name) == (PoseStage.READY, "bent thumb")
+
+
+def test_one_goes_back_pose_by_pose_also_from_the_end(guide: PoseGuide) -> None:
+    assert PoseKey.BACK not in guide.offered()
+    through(guide)
+    guide.press(0, PoseKey.BACK)
+    assert (guide.stage, guide.pose) == (PoseStage.READY, ALL[-1])
+    guide.press(0, PoseKey.BACK)
+    assert guide.pose is ALL[-2]
+    through(guide, first=len(ALL) - 2)
+    assert guide.stage is PoseStage.DONE
+
+
+@pytest.mark.parametrize("stage", [PoseStage.READY, PoseStage.HELD, PoseStage.DOUBTED, PoseStage.DONE])
+def test_one_may_leave_at_any_time(guide: PoseGuide, stage: PoseStage) -> None:
+    if stage is PoseStage.HELD:
+        guide.press(0, PoseKey.ACCEPT)
+    elif stage is PoseStage.DOUBTED:
+        hold(guide, bytes([1] * 18))
+    elif stage is PoseStage.DONE:
+        through(guide)
+    assert guide.stage is stage
+    guide.press(0, PoseKey.QUIT)
+    assert (guide.stage, guide.left) == (PoseStage.OVER, True)
+
+
+def test_saturated_dead_and_unmeasured_sensors_are_told(guide: PoseGuide) -> None:
+    assert guide.states() == []
+    index, thumb = SENSORS_18.index("index_mpj"), SENSORS_18.index("thumb_mpj")
+    for number in range(2):
+        raw = [60 + 60 * number] * 18
+        raw[index] = raw[thumb] = 60
+        guide.press(0, PoseKey.ACCEPT)
+        for time_us in (SETTLE_US, SETTLE_US + HOLD_US):
+            guide.take(time_us, bytes(raw))
+        guide.press(0, PoseKey.KEEP)
+    said = dict(zip(SENSORS_18, guide.states(), strict=True))
+    # The thumb has not been asked to bend.
+    assert {name: state for name, state in said.items() if state} == {"index_mpj": "dead: it never moved"}
+    guide.take(0, bytes([0, 1, 255, *[100] * 15]))
+    assert guide.states()[:4] == ["not measured", "at the end of its range", "at the end of its range", ""]
