@@ -1,37 +1,54 @@
-"""`thenar monitor`: the page of a run elsewhere."""
+"""`thenar monitor`: the page of a run elsewhere, or of a recording."""
 
 from pathlib import Path
 
 import click
 
-from .common import existing_folder
+from .common import existing_file, existing_folder
 from .lines import echo
 from .web_options import HERE, say_page, token_for, web_token_option
 
 
 @click.command("monitor")
-@click.argument("source", metavar="ADDRESS")
+@click.argument("source", metavar="ADDRESS|RECORDING")
 @click.option(
-    "-b", "--build", metavar="BUILD", type=existing_folder, help="The build that runs there: lists its types."
+    "-b",
+    "--build",
+    metavar="BUILD",
+    type=existing_folder,
+    help="The build that runs there, or that a recording is scored by.",
 )
 @click.option("--web", metavar="ADDRESS", default=HERE, show_default=True, help="Where the page is.")
 @web_token_option
 def command(source: str, build: Path | None, web: str, web_token: bool) -> None:
-    """Show a run elsewhere on a page in the browser.
+    """Show a run elsewhere, or a recording, on a page in the browser.
 
     ADDRESS is where that run publishes: tcp:HOST:PORT or unix:PATH, as its --sink has it. With ?detail there and
     --build here the page shows switches, joints and all types' probabilities as well. What is cut is opened again.
+
+    RECORDING is an .mcap file: the page goes to any moment of it, plays it, and shows what was labelled beside what was
+    recognised; with --build also the hand as it was, and the other types' probabilities.
+
     SIGINT, SIGTERM and SIGHUP end it, with exit code 0.
 
     \b
     Example:
         thenar run build/ --glove glove.toml --sink "unix:/tmp/grasps?detail" --status
         thenar monitor unix:/tmp/grasps --build build/
+        thenar monitor run.mcap --build build/
     """
     from thenar.runtime.web.monitor import StreamMonitor
 
     from .ending import ended_by_signals
 
+    if Path(source).is_file() or source.endswith(".mcap"):
+        from thenar.runtime.web.replay import ReplayPage
+
+        path = existing_file.convert(source, None, None)
+        with ended_by_signals() as stop, ReplayPage(path, web, token=token_for(web_token), build=build) as page:
+            say_page(page.server.url)
+            page.run(stop)
+        return
     with ended_by_signals() as stop, StreamMonitor(source, web, token=token_for(web_token), build=build) as monitor:
         say_page(monitor.server.url)
         monitor.run(stop, lambda source: echo(source.error or f"{source.where}: connected", err=True))

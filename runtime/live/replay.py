@@ -1,6 +1,6 @@
 """A recording run through once more: by its own build, or by another that reads the same inputs."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -13,7 +13,7 @@ from ..harness.loading import parse_harness
 from ..names import list_names
 from ..policy import Policy
 from ..published import LiveGrasp
-from ..recording.reader import Reader
+from ..recording.reader import Entry, Reader
 from ..recording.session import Session
 from ..taxels import Taxels, count_limit
 from .recogniser import LiveRecognizer, Moment
@@ -42,7 +42,7 @@ def moments(
 ) -> Iterator[tuple[LiveGrasp, Moment]]:
     """Yield what was recognised and all that is known now; see `replayed`."""
     reader = Reader(recording)
-    recognizer = _system(build, reader, policy).recognizer()
+    recognizer = _system(build, reader.session, reader.path.name, policy).recognizer()
     switches: SwitchFrame | None = None
     glove: GloveFrame | None = None
     for entry in reader:
@@ -68,32 +68,61 @@ def recognised(build: Build, recording: Path, warn: Callable[[str], None] = lamb
     if reader.session.build == build.manifest.checksum:
         yield from (moment for _, moment in moments(build, recording, None, warn))
         return
-    periods, inputs = _periods_us(recording), _Inputs(build, reader)
-    recognizer = inputs.recognizer(*periods)
-    switches: SwitchFrame | None = None
-    glove: GloveFrame | None = None
+    stepper = Stepper(build, recording.name, periods_us(Reader(recording)))
     for entry in reader:
-        if isinstance(entry, Session):
-            # Another clock: what came before it is of another time.
-            inputs = _Inputs(build, reader)
-            recognizer, switches, glove = inputs.recognizer(*periods), None, None
-        elif isinstance(entry, SwitchFrame):
-            switches = inputs.of(entry)
-        elif isinstance(entry, GloveFrame):
-            glove = entry
-        session = reader.session
-        if isinstance(entry, LiveGrasp):
-            yield recognizer.step(entry.time_us, entry.unix_us, switches, glove)
-        elif isinstance(entry, SwitchFrame | GloveFrame) and not session.build:
-            yield recognizer.step(entry.time_us, session.clock_ns // 1000 + entry.time_us, switches, glove)
+        if (moment := stepper.take(entry)) is not None:
+            yield moment
     for fault in reader.faults():
         warn(fault.message)
 
 
-def _periods_us(recording: Path) -> tuple[int | None, int | None]:
-    """Return how often switches and records of the glove came in a recording; None where none did."""
+class Stepper:
+    """Takes the entries of a recording one by one, a session first, from wherever in the file; `session` is theirs.
+
+    What is recognised in its own build's recordings is decided as it was then. Raises SettingError if the recording
+    lacks an input of the build.
+    """
+
+    def __init__(self, build: Build, name: str, periods: tuple[int | None, int | None]) -> None:
+        """Take the build, the file's name, and the periods of its frames (`periods_us`)."""
+        self._build, self._name, self._periods = build, name, periods
+        self.session: Session | None = None
+        self.switches: SwitchFrame | None = None
+        self.glove: GloveFrame | None = None
+
+    def take(self, entry: Entry) -> Moment | None:
+        """Return the moment that an entry makes: of a run each grasp, of other recordings each frame."""
+        if isinstance(entry, Session):
+            self._begin(entry)
+        elif isinstance(entry, SwitchFrame):
+            self.switches = entry if self._inputs is None else self._inputs.of(entry)
+        elif isinstance(entry, GloveFrame):
+            self.glove = entry
+        session = self.session
+        if session is None:
+            return None
+        if isinstance(entry, LiveGrasp):
+            return self._recognizer.step(entry.time_us, entry.unix_us, self.switches, self.glove)
+        if isinstance(entry, SwitchFrame | GloveFrame) and not session.build:
+            unix_us = session.clock_ns // 1000 + entry.time_us
+            return self._recognizer.step(entry.time_us, unix_us, self.switches, self.glove)
+        return None
+
+    def _begin(self, session: Session) -> None:
+        """Begin with a session, which has another clock: what came before it is of another time."""
+        self.session, self.switches, self.glove = session, None, None
+        if session.build == self._build.manifest.checksum:
+            self._inputs: _Inputs | None = None
+            self._recognizer = _system(self._build, session, self._name, None).recognizer()
+        else:
+            self._inputs = _Inputs(self._build, session, self._name)
+            self._recognizer = self._inputs.recognizer(*self._periods)
+
+
+def periods_us(entries: Iterable[Entry]) -> tuple[int | None, int | None]:
+    """Return how often switches and records of the glove came among these entries; None where none did."""
     times: dict[type, list[int]] = {SwitchFrame: [], GloveFrame: []}
-    for entry in Reader(recording):
+    for entry in entries:
         if isinstance(entry, SwitchFrame | GloveFrame):
             times[type(entry)].append(entry.time_us)
     steps = [sorted(b - a for a, b in pairwise(each) if b > a) or [0] * len(each[:1]) for each in times.values()]
@@ -104,10 +133,10 @@ def _periods_us(recording: Path) -> tuple[int | None, int | None]:
 class _Inputs:
     """What a build reads of a recording that is not its own. Raises SettingError if the recording lacks an input."""
 
-    def __init__(self, build: Build, reader: Reader) -> None:
-        self._build, self._session = build, reader.session
-        harness = parse_harness(self._session.harness, reader.path.name)
-        manifest, session, pins = build.manifest, self._session, set(harness.switches)
+    def __init__(self, build: Build, session: Session, name: str) -> None:
+        self._build, self._session = build, session
+        harness = parse_harness(session.harness, name)
+        manifest, pins = build.manifest, set(harness.switches)
         pairs, lacking = list[tuple[int, int]](), list[str]()
         levels: dict[str, list[tuple[int, int]]] = {name: [] for name in session.taxels}
         for number, switch in enumerate(manifest.switches):
@@ -121,7 +150,7 @@ class _Inputs:
         lacking += [joint.name for joint in manifest.joints if joint.name not in session.sensors]
         if lacking:
             raise SettingError(
-                f"{reader.path.name} was recorded without {list_names(lacking)}, which the build reads: take a build "
+                f"{name} was recorded without {list_names(lacking)}, which the build reads: take a build "
                 "of what it holds, or record all that the build reads"
             )
         self._turn = Rewired(pairs)
@@ -147,16 +176,15 @@ class _Inputs:
         )
 
 
-def _system(build: Build, reader: Reader, policy: Policy | None) -> System:
-    session = reader.session
+def _system(build: Build, session: Session, name: str, policy: Policy | None) -> System:
     if session.build != build.manifest.checksum:
         raise SettingError(
-            f"{reader.path.name} was recorded with another build: replay it with its own, or let "
+            f"{name} was recorded with another build: replay it with its own, or let "
             "`thenar segment` find what this one sees"
         )
-    harness = parse_harness(session.harness, reader.path.name)
+    harness = parse_harness(session.harness, name)
     scan = System.map_of(build, harness)
     system = System(build, harness, scan, session.sensors, session.calibration, policy or session.policy or Policy())
     if session.switches != system.switch_names:
-        raise SettingError(f"{reader.path.name} names other switches than its build has: it is damaged")
+        raise SettingError(f"{name} names other switches than its build has: it is damaged")
     return system

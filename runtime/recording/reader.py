@@ -75,6 +75,10 @@ class Decoder:
         self._indexed = False
         self._codes: tuple[int | None, tuple[int | None, ...]] = None, ()
 
+    def channel(self, content: bytes) -> int | None:
+        """Return which of our channels a message is of; None of a foreign one, and of one that is cut short."""
+        return self._channels.get(int.from_bytes(content[:2], "little")) if len(content) >= _MESSAGE.size else None
+
     def entries(self, record: RawRecord) -> Iterator[Entry]:
         """Yield what the record holds. Raises McapError, which goes on from "the record at byte 17 "."""
         # Indices of its messages follow a chunk. They repeat what it holds.

@@ -81,8 +81,12 @@ class RecordStream:
                 )
 
     def __iter__(self) -> Iterator[RawRecord]:
+        return self.since(len(MAGIC))
+
+    def since(self, offset: int) -> Iterator[RawRecord]:
+        """Iterate from the record at `offset` on, where a record is known to begin."""
         with open_file(self._path, McapError) as file:
-            file.seek(len(MAGIC))
+            file.seek(offset)
             while (record := self._next(file)) is not None:
                 yield record
                 if record.opcode == Opcode.FOOTER:

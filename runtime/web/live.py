@@ -12,9 +12,11 @@ from typing import Self
 
 import msgspec
 
+from ..build import Build
 from ..detail import Details
 from ..glove import Glove
 from ..hand import load_hand
+from ..harness.wiring import Harness
 from ..live.recogniser import Moment
 from ..published import HealthReport, LiveGrasp
 from ..recording.writer import Recorder
@@ -56,7 +58,7 @@ class LivePage:
     """
 
     def __init__(self, glove: Glove, folder: Path, address: str, *, token: str | None, recordings: Path) -> None:
-        self._glove, self._frames = glove, FrameText(glove)
+        self._glove, self._frames = glove, FrameText(glove.system.build, glove.system.harness)
         self._health: HealthReport | None = None
         self._progress: object = None
         self._past = Past()
@@ -151,9 +153,8 @@ class FrameText:
     and `taxels`: how far each taxel that was read and is calibrated is pressed, by name: 0 at rest, 1 at its press.
     """
 
-    def __init__(self, glove: Glove) -> None:
-        harness = glove.system.harness
-        self._details = Details(glove.system.build)
+    def __init__(self, build: Build, harness: Harness) -> None:
+        self._details = Details(build)
         calibration = calibration_of(harness.taxel_settings)
         self._taxels = [None if calibration is None else calibration.line(name) for name in harness.taxel_names]
 

@@ -218,3 +218,55 @@ def test_monitor_shows_a_run_elsewhere(
         assert run.end() == 0
         told(live, "source", lambda source: not source["connected"])
     assert monitor.end() == 0
+
+
+@pytest.fixture
+def recording(thenar: Thenar, build_folder: Path, glove: Path, tmp_path: Path) -> Path:
+    path = tmp_path / "run.mcap"
+    done = thenar(
+        "run", build_folder, "--glove", glove, "--frames", "20", "--record", path, "--sink", "jsonl:/dev/null"
+    )
+    assert done.returncode == 0, done.stderr
+    return path
+
+
+def test_a_recording_is_shown_from_any_moment_of_it(
+    start: Callable[..., Command], build_folder: Path, recording: Path
+) -> None:
+    monitor = start("monitor", recording, "--build", build_folder, "--web", "127.0.0.1:0")
+    with monitor.page() as live:
+        assert told(live, "build")["name"] == "run.mcap"
+        assert told(live, "hand")["switches"]
+        state = told(live, "replay", lambda state: state["share"] == 1)
+        assert (state["playing"], state["speed"], state["truth"], state["faults"]) == (False, 1.0, None, [])
+        assert told(live, "overview")["answers"][0][1] == "unknown"
+        ask(live, do="seek", value=state["last_us"])
+        assert told(live, "frame", lambda frame: frame["number"] == 19)["time_us"] == state["last_us"]
+        ask(live, do="seek", value=0)
+        assert told(live, "frame", lambda frame: frame["number"] == 0)["grasp"] == "unknown"
+        ask(live, do="speed", value=10)
+        ask(live, do="play")
+        told(live, "frame", lambda frame: frame["number"] == 19)
+        told(live, "replay", lambda state: not state["playing"])
+        for wrong in ({"do": "seek", "value": "x"}, {"do": "seek", "value": 2**70}, {"do": "seek", "value": True}):
+            ask(live, **wrong)
+            assert "a moment is a number of microseconds" in told(live, "refused")["why"]
+        ask(live, do="speed", value=1e9)
+        assert "a speed is one of 0.1, 0.25" in told(live, "refused")["why"]
+        ask(live, do="delete")
+        assert "a page can ask to seek, play, pause or for a speed, not 'delete'" in told(live, "refused")["why"]
+    assert monitor.end() == 0
+
+
+def test_what_is_no_recording_is_refused(thenar: Thenar, build_folder: Path, recording: Path, tmp_path: Path) -> None:
+    (tmp_path / "text.mcap").write_text("no")
+    for name, said in (("none.mcap", "does not exist"), ("text.mcap", "does not begin as an MCAP file does")):
+        done = thenar("monitor", tmp_path / name)
+        assert done.returncode == 2, done.stderr
+        assert said in " ".join(done.stderr.split())
+        assert "Traceback" not in done.stderr
+    other = recording.read_bytes().replace(b"scanner", b"scannen")
+    (tmp_path / "other.mcap").write_bytes(other)
+    done = thenar("monitor", tmp_path / "other.mcap", "--build", build_folder)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr

@@ -8,8 +8,8 @@ const LANES = [
 ];
 const HEALTH = { ok: "--good", changing: "--main", degraded: "--warn", unknown: "--bad" };
 // Okabe and Ito's colours; what is of the same colour is told apart by its name, and by a line at its foot.
-const COLOURS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#999999"];
-const DARK_ON = new Set(["#e69f00", "#56b4e9", "#f0e442", "#cc79a7", "#999999", "#009e73"]);
+export const COLOURS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#999999"];
+export const DARK_ON = new Set(["#e69f00", "#56b4e9", "#f0e442", "#cc79a7", "#999999", "#009e73"]);
 const GAP_US = 1_000_000;
 const LETTERS = 14;
 

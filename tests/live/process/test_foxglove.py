@@ -37,7 +37,7 @@ def test_what_foxglove_reads_is_what_the_run_published_and_both_end_together(run
         assert client.end() == 0
         came: dict[str, list[tuple[int, Any]]] = {topic: [] for topic in topics.values()}
         with suppress(ConnectionClosed):
-            while data := reader.recv(20.0):
+            while data := reader.recv(20.0, decode=False):
                 _, channel, time_ns = unpack_from("<BIQ", data)
                 came[topics[channel]].append((time_ns, json.loads(data[13:])))
     lines = {grasp.number: grasp for grasp in scene.grasps.all}

@@ -61,6 +61,12 @@ def serve() -> Iterator[Callable[..., Client]]:
 
 
 @pytest.fixture
+def visit() -> Callable[[Server], Client]:
+    """Return what gives a client of a server."""
+    return Client
+
+
+@pytest.fixture
 def hear_one() -> Callable[[ClientConnection], dict[str, Any]]:
     return told
 

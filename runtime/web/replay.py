@@ -1,0 +1,371 @@
+"""The page of a recording: what the glove saw and what was recognised at any moment of it, beside what was labelled.
+
+The file is scanned while the page is open already; what was scanned can be shown. All pages show the same moment.
+"""
+
+from bisect import bisect_left
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Event, Thread
+from time import monotonic
+from typing import Any, Self
+
+import msgspec
+from msgspec.structs import replace
+
+from thenar.drivers.errors import SettingError, ThenarError
+
+from ..build import Build
+from ..hand import load_hand
+from ..harness.loading import parse_harness
+from ..harness.wiring import Harness
+from ..live.replay import Stepper, periods_us
+from ..published import LiveGrasp
+from ..recording.index import Index
+from ..recording.session import Label, Mark, Session
+from .live import PAST_US, FrameText
+from .server import Server, message
+
+SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
+# What is recognised again is so from this long before the moment that is shown, so that it has settled.
+LEAD_US = 1_500_000
+# Of the answers of a run one is looked at in so long; of changes so many are kept.
+_SAMPLE_US, _MOST_CHANGES = 20_000, 100_000
+_FRAME_S, _IDLE_S, _TOLD_S = 0.02, 0.2, 0.5
+_PERIODS_OF = 20_000
+_MOST_MARKS = 10_000
+_encode = msgspec.json.Encoder().encode
+
+
+class State(msgspec.Struct, frozen=True):
+    """Where the pages are: moments in microseconds since 1970; `share` of the file was scanned, `faults` are its.
+
+    first_us, last_us  the span that can be shown
+    truth              the grasp type that was labelled at `at_us`; null without a label
+    """
+
+    at_us: int
+    first_us: int
+    last_us: int
+    playing: bool
+    speed: float
+    share: float
+    truth: str | None
+    faults: tuple[str, ...]
+
+
+Change = tuple[int, str, str, str, str, int, str, int | None]
+
+
+class Overview:
+    """What a whole recording comes to: changes of what is recognised, spans that were labelled, marks.
+
+    A trial's span is from its beginning to its judgement; what was done again has none.
+    """
+
+    def __init__(self) -> None:
+        self.changes: list[Change] = []
+        self.truth: list[tuple[int, int, str]] = []
+        self.marks: list[tuple[int, str]] = []
+        self._begun: tuple[int, str] | None = None
+
+    def take(self, unix_us: int, entry: object) -> None:
+        """Take an entry, or what was recognised."""
+        if isinstance(entry, LiveGrasp):
+            self._change(entry)
+        elif isinstance(entry, Label):
+            self._label(unix_us, entry)
+        elif isinstance(entry, Mark) and len(self.marks) < _MOST_MARKS:
+            self.marks.append((unix_us, entry.text))
+        elif isinstance(entry, Session):
+            self._begun = None
+
+    def truth_at(self, unix_us: int) -> str | None:
+        """Return what was labelled at a moment."""
+        at = bisect_left(self.truth, (unix_us + 1,)) - 1
+        return self.truth[at][2] if at >= 0 and unix_us < self.truth[at][1] else None
+
+    def past(self, unix_us: int) -> bytes:
+        """Return the message of what was recognised before a moment, as of a live run."""
+        first = max(bisect_left(self.changes, (unix_us - PAST_US,)) - 1, 0)
+        last = bisect_left(self.changes, (unix_us,))
+        return message("past", changes=self.changes[first:last], until_us=unix_us)
+
+    def text(self) -> bytes:
+        """Return the message of all of it: spans of what was announced, and of what was labelled, and marks."""
+        spans: list[tuple[int, str]] = []
+        for unix_us, _, grasp, *_ in self.changes:
+            if not spans or spans[-1][1] != grasp:
+                spans.append((unix_us, grasp))
+        return message("overview", answers=spans, truth=self.truth, marks=self.marks)
+
+    def _change(self, grasp: LiveGrasp) -> None:
+        entry = grasp.candidate, grasp.grasp, grasp.health, grasp.state, grasp.segment, grasp.segment_type
+        change = (grasp.time_us, *entry, grasp.segment_us)
+        last = self.changes[-1] if self.changes else None
+        if last is not None and grasp.time_us < last[0]:  # clocks of two sessions that overlap
+            return
+        # Of a recording without end, changes of what is announced are kept for longest.
+        most = _MOST_CHANGES if last is None or change[2] == last[2] else 2 * _MOST_CHANGES
+        if (last is None or change[1:] != last[1:]) and len(self.changes) < most:
+            self.changes.append(change)
+
+    def _label(self, unix_us: int, label: Label) -> None:
+        if label.event == "begun" or self._begun is None:
+            self._begun = unix_us, label.grasp
+        if label.event == "accepted" and len(self.truth) < _MOST_CHANGES:
+            self.truth.append((self._begun[0], unix_us, label.grasp))
+        if label.event in ("accepted", "redone"):
+            self._begun = None
+
+
+class ReplayPage:
+    """Serves the page of a recording; a context manager.
+
+    Parameters
+    ----------
+    path : Path
+        The recording.
+    address, token
+        As for `Server`.
+    build : Path, optional
+        The folder of a build: the hand is drawn, and every frame scored by it. What a run of the same build recognised
+        is shown as it was then; of other recordings, what this build recognises.
+
+    Attributes
+    ----------
+    server : Server
+        What serves it.
+
+    Raises
+    ------
+    McapError, OSError
+        If `path` is no recording of thenar's.
+    BuildError, SettingError
+        If the build cannot be read, or the recording lacks an input of it; and as `Server` does.
+    """
+
+    def __init__(self, path: Path, address: str, *, token: str | None, build: Path | None = None) -> None:
+        self._index, self._overview = Index(path), Overview()
+        self._build = None if build is None else Build.load(build)
+        first = self._index.session
+        self._own = self._build is not None and first.build == self._build.manifest.checksum
+        self._walk = _Walk(self._index, self._build)
+        self._asked = SimpleQueue[Mapping[str, object]]()
+        self._faults = list[str]()
+        if build is None:
+            which = "the one that ran" if first.build else "any that reads these inputs"
+            self._faults.append(f"Without a build there is no hand: name one with --build, {which}.")
+        self._at_us, self._playing, self._speed, self._sought = 0, False, 1.0, True
+        self._first = self._described(path.name, build)
+        self._scanned = Event()
+        self._told = 0.0
+        self._stop = Event()
+        self._thread = Thread(target=self._scan, name="thenar scan", daemon=True)
+        self.server = Server("replay", address, token=token, on_message=self._take, hello=lambda: self._first)
+
+    def run(self, stop: Event) -> None:
+        """Show the recording, as pages ask for it, until `stop` is set."""
+        self._thread.start()
+        before = monotonic()
+        while not stop.is_set():
+            self._do(_FRAME_S if self._playing else _IDLE_S)
+            now = monotonic()
+            self._advance(now - before)
+            before = now
+            self._show()
+
+    def close(self) -> None:
+        """End the page."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self.server.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _described(self, name: str, folder: Path | None) -> Sequence[bytes]:
+        build = self._build
+        if build is None or folder is None:
+            return (
+                message(
+                    "build", name=name, grasps=(), switches=(), joints=(), preshapes=False, records=False, partial=True
+                ),
+            )
+        names = [switch.name for switch in build.manifest.switches]
+        joints = [joint.name for joint in build.manifest.joints]
+        described = message(
+            "build",
+            name=name,
+            grasps=build.manifest.answers,
+            switches=names,
+            joints=joints,
+            preshapes=False,
+            records=False,
+        )
+        return described, message("hand", load_hand(folder, build.manifest))
+
+    def _scan(self) -> None:
+        """Find out what the whole recording comes to."""
+        try:
+            for unix_us, entry in self._answered():
+                self._overview.take(unix_us, entry)
+                if self._stop.is_set():
+                    return
+        except ThenarError as wrong:
+            self._faults.append(str(wrong))
+        except OSError as wrong:
+            self._faults.append(f"{self._index.path.name} cannot be read: {wrong.strerror}")
+        if self._index.fault:
+            self._faults.append(self._index.fault)
+        self._scanned.set()
+
+    def _answered(self) -> Iterator[tuple[int, object]]:
+        """Yield labels, marks, and what was recognised; by the build where the recording is not its own."""
+        if self._build is None or self._own:
+            for unix_us, entry in self._index.scan(_SAMPLE_US):
+                clock_us = unix_us - entry.time_us if isinstance(entry, LiveGrasp) else 0
+                yield unix_us, _dated(entry, clock_us) if isinstance(entry, LiveGrasp) else entry
+            return
+        stepper = Stepper(self._build, self._index.path.name, self._walk.periods)
+        for unix_us, entry in self._index.scan():
+            moment = stepper.take(entry)
+            yield unix_us, entry if moment is None else _dated(moment.grasp, unix_us - moment.grasp.time_us)
+
+    def _take(self, asked: Mapping[str, object]) -> None:
+        do, value = asked["do"], asked.get("value")
+        number = value if isinstance(value, int | float) and not isinstance(value, bool) else None
+        if do not in ("seek", "play", "pause", "speed"):
+            raise SettingError(f"a page can ask to seek, play, pause or for a speed, not {str(do)[:20]!r}")
+        if do == "seek" and (number is None or not abs(number) < 2**62):
+            raise SettingError("a moment is a number of microseconds since 1970")
+        if do == "speed" and number not in SPEEDS:
+            raise SettingError(f"a speed is one of {', '.join(map(str, SPEEDS))}")
+        self._asked.put(asked)
+
+    def _do(self, wait_s: float) -> None:
+        """Do what pages ask for, waiting for it a little."""
+        try:
+            asked: Mapping[str, Any] = self._asked.get(timeout=wait_s)
+            while True:
+                if asked["do"] == "seek":
+                    self._at_us, self._sought = int(asked["value"]), True
+                elif asked["do"] == "speed":
+                    self._speed = float(asked["value"])
+                else:
+                    self._playing = asked["do"] == "play"
+                asked = self._asked.get_nowait()
+        except Empty:
+            return
+
+    def _advance(self, passed_s: float) -> None:
+        first, last = self._index.first_us, self._index.last_us
+        if first is None or last is None:
+            return
+        if self._playing and self._at_us >= last and self._scanned.is_set() and not self._sought:
+            self._playing = False
+        if self._playing and not self._sought:
+            self._at_us += round(1e6 * passed_s * self._speed)
+        self._at_us = min(max(self._at_us, first), last)
+
+    def _show(self) -> None:
+        first, last = self._index.first_us, self._index.last_us
+        if first is None or last is None:
+            if self._scanned.is_set():
+                self._tell(0, 0)
+            return
+        if self._sought:
+            self.server.publish("past", self._overview.past(self._at_us))
+        try:
+            if self._walk.to(self._at_us):
+                self.server.publish("frame", self._walk.text())
+        except (ThenarError, OSError) as wrong:
+            if str(wrong) not in self._faults:
+                self._faults.append(str(wrong))
+        self._sought = False
+        self._tell(first, last)
+
+    def _tell(self, first_us: int, last_us: int) -> None:
+        share = 1.0 if self._scanned.is_set() else self._index.scanned / max(self._index.size, 1)
+        truth = self._overview.truth_at(self._at_us)
+        state = State(self._at_us, first_us, last_us, self._playing, self._speed, share, truth, tuple(self._faults[:8]))
+        self.server.publish("replay", message("replay", state))
+        now = monotonic()
+        if self._told < float("inf") and now - self._told >= _TOLD_S:
+            self._told = float("inf") if self._scanned.is_set() else now
+            self.server.publish("overview", self._overview.text())
+
+
+class _Walk:
+    """Goes through a recording to any moment, and knows what was there."""
+
+    def __init__(self, index: Index, build: Build | None) -> None:
+        self._index, self._build = index, build
+        self.periods = (None, None)
+        name = index.path.name
+        if build is not None:
+            head = islice(Index(index.path).scan(), _PERIODS_OF)
+            self.periods = periods_us(entry for _, entry in head)  # type: ignore[assignment]
+            Stepper(build, name, self.periods).take(index.session)
+            self._harness = parse_harness(index.session.harness, name) if index.session.harness else Harness(name="")
+            self._text = FrameText(build, self._harness)
+        self._entries: Iterator[tuple[int, object]] = iter(())
+        self._next: tuple[int, Any] | None = None
+        self._at_us = -1
+        self._shown: object = None
+        self._grasp: LiveGrasp | None = None
+        self._moment: Any = None
+
+    def to(self, unix_us: int) -> bool:
+        """Go to a moment; return whether what is to be shown is another than before."""
+        if not self._at_us <= unix_us <= self._at_us + 2 * LEAD_US:
+            self._entries = self._index.since(unix_us - LEAD_US)
+            self._stepper = None if self._build is None else Stepper(self._build, self._index.path.name, self.periods)
+            self._next, self._grasp, self._moment = None, None, None
+        self._at_us = unix_us
+        while True:
+            if self._next is None:
+                self._next = next(self._entries, None)
+            # Where nothing was recognised yet, the first that is, is shown.
+            none_yet = self._moment is None and self._grasp is None
+            if self._next is None or self._next[0] > unix_us + LEAD_US * none_yet:
+                break
+            self._take(*self._next)
+            self._next = None
+        newest = self._moment or self._grasp
+        changed, self._shown = newest is not None and newest is not self._shown, newest
+        if self._next is None:
+            self._at_us = -1  # what is scanned later begins anew
+        return changed
+
+    def text(self) -> bytes:
+        """Return the message of the newest moment."""
+        if self._moment is not None:
+            return self._text(self._moment)
+        return message("frame", self._grasp)
+
+    def _take(self, unix_us: int, entry: Any) -> None:
+        moment = None if self._stepper is None else self._stepper.take(entry)
+        if isinstance(entry, LiveGrasp):
+            self._grasp = _dated(entry, unix_us - entry.time_us)
+        if moment is not None:
+            recorded = self._grasp if self._is_own else None
+            moment.grasp = recorded or _dated(moment.grasp, unix_us - moment.grasp.time_us)
+            self._moment = moment
+
+    @property
+    def _is_own(self) -> bool:
+        session = None if self._stepper is None else self._stepper.session
+        return session is not None and self._build is not None and session.build == self._build.manifest.checksum
+
+
+def _dated(grasp: LiveGrasp, clock_us: int) -> LiveGrasp:
+    """Return a grasp with times since 1970 in place of those of its session's clock."""
+    began_us = None if grasp.segment_us is None else grasp.segment_us + clock_us
+    return replace(grasp, time_us=grasp.time_us + clock_us, segment_us=began_us)
