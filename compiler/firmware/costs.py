@@ -79,10 +79,10 @@ CORTEX_M4 = Core(
 
 # Of a class where four entries of 8 bits share a word.
 _BIASED_CLASS = 3
-_REPLACING, _REPLACING_PART = 13, 32  # of a row in update(), but for its words; more for each part but the first
+_REPLACING, _REPLACING_PART = 10, 32  # of a row in update(), but for its words; more for each part but the first
 # More than for a code that is looked up directly: a byte clamped below and above, where it can lie there; a code of 16
 # bits clamped; a code searched, and each step of the search.
-_BELOW, _ABOVE, _WIDE = 6, 4, 10
+_BELOW, _ABOVE, _WIDE = 5, 4, 10
 _SEARCHED, _SEARCH_STEP = 16, 11
 # The distance of a code, looked up or not; in each part all but the products; and of each word of sums, at the end and
 # where entries are upper halves. In update(), the change of a distance; and of it in each part all but the words.
@@ -171,7 +171,7 @@ def _flash(layout: Layout) -> int:
     starts = 2 * len(parts.firsts) * (2 * parts.width + 8)  # of the sums, constant and as they are in the beginning
     starts += 2 * layout.tables.n_classes + 4 * lookups  # scores, and rows added, in the beginning
     code = _BYTES + (_BYTES_PARTS if len(parts.firsts) > 1 else 0) + _BYTES_CLASS * parts.width
-    code += words * (_BYTES_WORD * lookups + _BYTES_START)
+    code += words * ((_BYTES_WORD + 2 * layout.biased) * lookups + _BYTES_START)
     code += words * _BYTES_QUAD * len(layout.batches) if layout.biased else 0
     if slopes := len(layout.tables.slopes):
         lanes = -(-parts.width // 2)
