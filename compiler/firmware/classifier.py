@@ -28,7 +28,8 @@ _HIGHEST = 65535  # no code is above it
 # 8-bit entries that are added up in 8 bits. Where 8-bit entries are added up in 16, of four 8-bit entries a, b, c, d
 # the even and the odd ones are added up apart, each with 16 bits of room: no sum of them is above 65535, for it is
 # the difference of two scores. The odd ones are not masked: (b, c, d) is 256 c more than b + 65536 d, and the sum of
-# all c, the upper half of the even sum, is subtracted once, in the end.
+# all c, the upper half of the even sum, is subtracted once, in the end. Rows whose
+# largest entries add up to at most 255, a batch, are added as they are before they are taken apart.
 
 
 def portable_values(name: str, layout: Layout) -> dict[str, object]:
@@ -55,7 +56,8 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
         "word_macros": _narrow_macros(parts.width) if biased else _sum_macros(parts.width, bits),
         "start": _start_lines(_in_parts(layout.start, parts), lanes),
         "finds": [_find(name, layout, lookup) for lookup in layout.lookups],
-        "adding": adding,
+        "batches": layout.batches,
+        "taking_apart": adding if biased else [],
         "began": [f"start[{lane}]" if _started(lane, biased, layout.entry_shift) else "0u" for lane in range(n_lanes)],
         "finishing": _finishing(n_lanes, biased, layout.entry_shift),
         "replacing": replacing,
@@ -117,10 +119,11 @@ def _start_lines(starts: Sequence[Sequence[int]], lanes: Sequence[tuple[int, int
 
 
 def _arithmetic(lanes: int, biased: bool, shift: int) -> tuple[list[str], list[str]]:
-    """Return the statements that add a row to the words sum[], and those that replace one."""
+    """Return the statements that add a batch w0, w1... to the sums s0, s1..., and those that replace a row in sum[]."""
     adding, replacing = [], []
     for lane in range(lanes):
-        row, before, after = (f"{each}[{lane // 2 if biased else lane}]" for each in ("entry", "before", "after"))
+        row = f"w{lane // 2}"
+        before, after = (f"{each}[{lane // 2 if biased else lane}]" for each in ("before", "after"))
         if biased:
             row = f"{row} >> 8" if lane % 2 else f"{row} & 0x00FF00FFu"
             before, after = (f"({each}{' >> 8' if lane % 2 else ''} & 0x00FF00FFu)" for each in (before, after))
@@ -201,7 +204,8 @@ def _distance(name: str, layout: Layout, at: int) -> str:
     slope = layout.tables.slopes[at]
     code = f"input->codes[{slope.joint}]"
     if layout.stores_distances:
-        return f"thenar_{name}_distance_of[{at}][{code}]"
+        beyond = 256 * (at - len(layout.tables.slopes) // 2)  # from the middle, cores reach twice as many
+        return f"distances[(int32_t){code} {'-' if beyond < 0 else '+'} {abs(beyond)}]"
     above = f"clamped({code}, {slope.low}u, {slope.high - slope.low}u)"
     shift = f" {'<<' if slope.gain > 0 else '>>'} {abs(slope.gain)}" if slope.gain else ""
     return f"(int16_t)(({above}{shift}) - {slope.zero})"

@@ -39,9 +39,9 @@ class Cost:
 @dataclass(frozen=True, slots=True)
 class Core:
     """Instructions of an answer; of a class, and how many more where classes are added up in parts; of a look-up, and
-    of a joint in it; in each part of a look-up, of a word of two 16-bit entries, of four 8-bit entries, and of all of
-    those together; in update() of a word of two or of four that is replaced, and more of four upper halves; of a word
-    of two sums that a slope adds to, and of one in update(); of a threshold that is compared.
+    of a joint in it; in each part of a look-up, and of a word of its entries; of a word of a batch of 8-bit entries
+    that is taken apart; in update() of a word of two or of four that is replaced, and more of four upper halves; of a
+    word of two sums that a slope adds to, and of one in update(); of a threshold that is compared.
     """
 
     fixed: int
@@ -53,7 +53,6 @@ class Core:
     part: int
     pair: int
     quad: int
-    quads: int
     replaced_pair: int
     replaced_quad: int
     replaced_halves: int
@@ -63,15 +62,14 @@ class Core:
 
 
 CORTEX_M4 = Core(
-    fixed=22,
+    fixed=40,
     a_class=6,
     in_parts=9,
     lookup=0,
     found=5,
     part=0,
     pair=2,
-    quad=4,
-    quads=2,
+    quad=2,
     replaced_pair=8,
     replaced_quad=21,
     replaced_halves=0,
@@ -81,10 +79,10 @@ CORTEX_M4 = Core(
 
 # Of a class where four entries of 8 bits share a word.
 _BIASED_CLASS = 3
-_REPLACING, _REPLACING_PART = 13, 32  # of a row in update(), but for its words; more for each part but the first
+_REPLACING, _REPLACING_PART = 10, 32  # of a row in update(), but for its words; more for each part but the first
 # More than for a code that is looked up directly: a byte clamped below and above, where it can lie there; a code of 16
 # bits clamped; a code searched, and each step of the search.
-_BELOW, _ABOVE, _WIDE = 6, 4, 10
+_BELOW, _ABOVE, _WIDE = 5, 4, 10
 _SEARCHED, _SEARCH_STEP = 16, 11
 # The distance of a code, looked up or not; in each part all but the products; and of each word of sums, at the end and
 # where entries are upper halves. In update(), the change of a distance; and of it in each part all but the words.
@@ -108,13 +106,15 @@ def word_cost(layout: Layout, core: Core) -> Cost:
     parts, classes = len(layout.parts.firsts), layout.tables.n_classes
     words, finding = _words(layout), sum(_finding(layout, joint, core) for joint in layout.joints)
     finding += _MISSING + _FIELD * sum(map(len, layout.fields))
-    word, replaced = (core.quad, core.replaced_quad) if layout.biased else (core.pair, core.replaced_pair)
+    replaced = core.replaced_quad if layout.biased else core.replaced_pair
     replaced += core.replaced_halves if layout.entry_shift else 0
-    adding = parts * (core.part + (core.quads if layout.biased else 0) + words * word)
+    adding = parts * len(layout.lookups) * (core.part + words * core.pair)
+    adding += parts * len(layout.batches) * words * core.quad * layout.biased
     replacing = _REPLACING + _REPLACING_PART * (parts - 1) + parts * words * replaced
     a_class = core.a_class + _BIASED_CLASS * layout.biased + (core.in_parts if parts > 1 else 0)
     answering = a_class * classes + finding + core.fixed
-    classify, update = (len(layout.lookups) * (core.lookup + each) + answering for each in (adding, replacing))
+    looking_up = len(layout.lookups) * core.lookup + answering
+    classify, update = looking_up + adding, looking_up + len(layout.lookups) * replacing
     multiplying, moving = _multiplying(layout, core)
     classify, update = classify + multiplying, update + moving
     flash = _flash(layout) + NAME_BYTES * (classes + 1)
@@ -171,7 +171,8 @@ def _flash(layout: Layout) -> int:
     starts = 2 * len(parts.firsts) * (2 * parts.width + 8)  # of the sums, constant and as they are in the beginning
     starts += 2 * layout.tables.n_classes + 4 * lookups  # scores, and rows added, in the beginning
     code = _BYTES + (_BYTES_PARTS if len(parts.firsts) > 1 else 0) + _BYTES_CLASS * parts.width
-    code += words * ((_BYTES_QUAD if layout.biased else _BYTES_WORD) * lookups + _BYTES_START)
+    code += words * ((_BYTES_WORD + 2 * layout.biased) * lookups + _BYTES_START)
+    code += words * _BYTES_QUAD * len(layout.batches) if layout.biased else 0
     if slopes := len(layout.tables.slopes):
         lanes = -(-parts.width // 2)
         code += _BYTES_MULTIPLYING + _BYTES_PRODUCT * lanes + _BYTES_DISTANCE * slopes

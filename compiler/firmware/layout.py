@@ -33,6 +33,7 @@ from . import FirmwareError
 
 MOST_INLINE = 8  # thresholds are compared one by one; where there are more, they are searched
 MOST_ROWS = 256  # a bin is one byte
+MOST_ENTRY = 255  # that a byte without a sign holds
 MOST_BYTE = 127  # the largest bound of scores that are added up in a byte
 MOST_BINS = 256  # and so is what is left of a code when the first of a joint's bins is taken from it
 
@@ -260,6 +261,23 @@ class Layout:
         """The joints that have thresholds, in the order of their bins; the others are part of the start."""
         return tuple(joint for lookup in self.lookups for joint in lookup.joints)
 
+    @cached_property
+    def batches(self) -> list[list[int]]:
+        """The look-ups, in their order, in batches: where entries are smaller than sums, those whose rows add up to
+        what an entry holds, whichever rows they are; else all of them.
+        """
+        found: list[list[int]] = []
+        held = np.zeros(self.tables.n_classes, np.int64)
+        for number, lookup in enumerate(self.lookups):
+            most = lookup.rows.max(axis=0).astype(np.int64)
+            if found and (not self.biased or (held + most).max() <= MOST_ENTRY):
+                found[-1].append(number)
+                held += most
+            else:
+                found.append([number])
+                held = most
+        return found
+
     @property
     def n_rows(self) -> int:
         """Rows of all look-ups together."""
@@ -484,8 +502,8 @@ def _entries(rows: NDArray[np.int64], entry_bits: int, sum_bits: int, what: str)
         return rows.astype(np.int16)
     if sum_bits == 8:
         return rows.astype(np.int8)
-    if rows.max() > 255:
+    if rows.max() > MOST_ENTRY:
         raise FirmwareError(
-            f"{what} spans {rows.max()} steps, an 8-bit entry holds 255: compile the build with --table-bits 8"
+            f"{what} spans {rows.max()} steps, an 8-bit entry holds {MOST_ENTRY}: compile the build with --table-bits 8"
         )
     return rows.astype(np.uint8)

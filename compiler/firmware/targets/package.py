@@ -230,7 +230,6 @@ XTENSA = Bare(
         part=0,
         pair=2,
         quad=5,
-        quads=0,
         replaced_pair=8,
         replaced_quad=22,
         replaced_halves=5,

@@ -21,7 +21,7 @@ PARTS = tuple(CORES)
 # Of classify() for 33 switches and 16 joints with 14 classes.
 MOST_INSTRUCTIONS = {
     ("cortex-m0plus", 16): 810,
-    ("cortex-m0plus", 8): 1150,
+    ("cortex-m0plus", 8): 1090,
     ("cortex-m4", 16): 540,
     ("cortex-m4", 8): 640,
     ("rv32imac", 16): 570,

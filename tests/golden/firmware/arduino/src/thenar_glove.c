@@ -121,6 +121,21 @@ static void shift_start(thenar_glove *glove, uint16_t k, uint16_t steps)
     thenar_glove_stand_in = thenar_glove_start_without;
 }
 #else
+/* Compilers that may reorder look-ups load many rows before they add one, and run out of registers; and where they know
+   how many bytes a row has, or where it lies, they work that out in more steps than a product takes. A core of ARMv6-M
+   has too few registers to gain by it: there all rows are found first. */
+#if defined(__GNUC__) && !defined(__ARM_ARCH_6M__)
+#define HIDE(value) __asm volatile("" : "+r"(value))
+#else
+#define HIDE(value) ((void)0)
+#endif
+/* RISC-V takes two instructions for a large constant: there it stays in a register. */
+#if defined(__GNUC__) && defined(__riscv)
+#define KEEP(constant) HIDE(constant)
+#else
+#define KEEP(constant) ((void)0)
+#endif
+
 /* Find the rows that an input adds. */
 static void find(const thenar_glove_frame *input, thenar_glove_seen *found)
 {
@@ -155,33 +170,27 @@ static void store_two(uint32_t sums, int16_t *score)
 }
 
 /* Take the upper bits of the word, the sum of class k, for the largest sum if it is. */
-static void take(uint32_t word, uint_fast16_t k, largest *best)
+static void take(uint32_t word, uint_fast16_t k, uint32_t ones, largest *best)
 {
     if (word > best->sum) {
-        best->sum = word | 0xFFFFu;
+        best->sum = word | ones;
         best->grasp = k;
     }
 }
 
 /* Store the sums of a part as scores, and take them. */
 #define ANSWER(first, best) do { \
+    uint32_t ones = 0xFFFFu; \
+    KEEP(ones); \
     store_two(s0, &glove->scores[0]); \
     store(s1, &glove->scores[(first) + 2u]); \
-    take(s0 << 16, (first) + 0u, (best)); \
-    take(s0, (first) + 1u, (best)); \
-    take(s1 << 16, (first) + 2u, (best)); \
+    take(s0 << 16, (first) + 0u, ones, (best)); \
+    take(s0, (first) + 1u, ones, (best)); \
+    take(s1 << 16, (first) + 2u, ones, (best)); \
 } while (false)
 
 static const thenar_glove_row nothing = {0u};
 
-/* Compilers that may reorder look-ups load many rows before they add one, and run out of registers; and where they know
-   how many bytes a row has, or where it lies, they work that out in more steps than a product takes. A core of ARMv6-M
-   has too few registers to gain by it: there all rows are found first. */
-#if defined(__GNUC__) && !defined(__ARM_ARCH_6M__)
-#define HIDE(value) __asm volatile("" : "+r"(value))
-#else
-#define HIDE(value) ((void)0)
-#endif
 #ifdef __ARM_ARCH_6M__
 #define ROW(lookup, number) found.rows[lookup]
 #else
@@ -253,6 +262,7 @@ static void replace_all(thenar_glove *glove, uint_fast16_t part, const thenar_gl
 
         if (found->rows[i] != before) {
             replace(before, found->rows[i], sum);
+            glove->seen.rows[i] = found->rows[i];
         }
     }
 }
@@ -290,7 +300,6 @@ thenar_glove_class thenar_glove_update(thenar_glove *glove)
         const uint32_t s1 = sum[1];
         ANSWER(0u, &best);
     }
-    glove->seen = found;
     return (thenar_glove_class)best.grasp;
 }
 
