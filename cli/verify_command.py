@@ -50,7 +50,7 @@ def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bo
     smaller of ATmega328P and ATmega2560 that holds the build, in simavr; cortex-m on an M0+ and an M4, riscv on an
     RV32IMAC, xtensa on an LX106, in qemu.
 
-    With --faults, every fault is put to every row: each input lost, whose mean row stands in, and stuck at each of its
+    With --faults, every fault is put to every row: each input lost, and its row standing in, and stuck at each of its
     values; each port, chip and board of the build's scan map dead; and any two inputs lost.
 
     Exits with 1 if a bound does not hold or an answer differs. The recordings need not be those that the build was

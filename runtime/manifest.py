@@ -359,7 +359,7 @@ class Faulty(Struct, frozen=True, forbid_unknown_fields=True):
 class Faults(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """The worst fault of each kind on the rows trained on, in trials: of `total`, `correct` are recognised without one.
 
-    lost   one input lost, whose mean row stands in; stuck: one input stuck at a value
+    lost   one input lost, for which its row stands in; stuck: one input stuck at a value
     dead   all levels of a taxel lost, all on a port, a chip or a scanner board, where a wiring is known, or all joints
     pair   two inputs lost; None of one input, and of so many that pairs were not looked at
     """

@@ -1,7 +1,7 @@
 """What faults of inputs leave of recognition: every fault on every row, counted from the integer tables.
 
 Scores are sums, so a fault changes one term of each: an input that is stuck adds the row of the value at which it is
-stuck, one that is lost its mean row, as the runtime has it. Trials are counted, each recognised as most of its frames.
+stuck, one that is lost the row that stands in. Trials are counted, each recognised as most of its frames.
 
 Answers are found without sorting: with scores S_k, the largest of S_k * K + (K - 1 - k) names the class of the largest
 score, the lowest of several, by its remainder.
