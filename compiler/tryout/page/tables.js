@@ -91,7 +91,8 @@ export class Recogniser {
 
   #refuses(scores, bits, codes, lostSwitches, lostJoints) {
     const { least, closed, ranges, outside } = this.refusal, best = Math.max(...scores), candidate = scores.indexOf(best);
-    if (best < least[candidate]) return true;
+    const whole = !Array.from(lostSwitches).some(Boolean) && !Array.from(lostJoints).some(Boolean);
+    if (best < least[candidate] && whole) return true;
     const { s } = this.tables, [fewest, most] = closed[candidate];
     let seen = 0, doubtful = 0;
     for (let at = 0; at < s; at++) {
