@@ -11,9 +11,11 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from PIL import Image
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.support.wait import WebDriverWait
@@ -67,7 +69,8 @@ def main() -> None:
             sized["height"] = driver.execute_script("return document.documentElement.scrollHeight")
             driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", sized)
             wait.until(lambda _: driver.execute_script(_READY, GRASPS))
-            options.picture.write_bytes(driver.get_screenshot_as_png())
+            with Image.open(BytesIO(driver.get_screenshot_as_png())) as taken:
+                taken.convert("RGB").quantize(48, dither=Image.Dither.NONE).save(options.picture, optimize=True)
         finally:
             driver.quit()
 
