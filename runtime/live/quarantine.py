@@ -21,10 +21,11 @@ was seen to close: the share of grasps in which it did when it should have, in t
 A fault makes other inputs look wrong. So of several sums that reach h together only the largest counts; then the last
 grasps are weighed again without the switch that it is of.
 
-**A grasp** is one observation, however many frames it lasts: contacts that have not changed by half for SETTLED_US. The
-frame with the fewest contacts between two grasps, however short, is one, too, if it differs by half from both. There a
-switch counts as closed that was never seen open in between: a hand that opens opens all of its switches. So next to no
-other contact a switch that works is taken to stay closed in no less than 1/100 of the cases.
+**A grasp** is one observation, however many frames it lasts: contacts that have not changed by half for SETTLED_US. A
+switch that cannot be read for a while counts as it last was: an outage begins no grasp. The frame with the fewest
+contacts between two grasps, however short, is one, too, if it differs by half from both. There a switch counts as
+closed that was never seen open in between: a hand that opens opens all of its switches. So next to no other contact a
+switch that works is taken to stay closed in no less than 1/100 of the cases.
 
 **Chatter.** A change of a switch costs 1/20 s. A switch that is a second in debt changes faster than a hand, which is
 what a loose contact does; it behaves again once the debt is paid, at the latest 2 s after the last change.
@@ -287,7 +288,10 @@ class Quarantine:
         self.out: tuple[Mask, Mask] = 0, 0
         self.found: tuple[Quarantined, ...] = ()
         self._seen_us = self._joints_us = self._since_us = -1
+        # What switches showed when they were last read, the contacts of the grasp, and what was read as it began.
+        self._shown: Mask = 0
         self._contacts: Mask = 0
+        self._read: Mask = 0
         self._weighed = True
         self._state: tuple[Mask, Mask, Mask] = 0, 0, 0
         # Since the last grasp: what stayed closed, and the frame with the fewest contacts, its scores and what is lost.
@@ -335,13 +339,14 @@ class Quarantine:
         if (state := (frame.closed, read, lost)) == self._state and self._weighed:
             return
         closed = frame.closed & read
-        self._state, contacts = state, closed & ~lost
+        self._shown = closed | self._shown & ~read
+        self._state, contacts = state, self._shown & ~(lost & read)
         self._stayed &= closed | ~read
         if self._fewest is None or contacts.bit_count() < self._fewest[0].bit_count():
             self._fewest = contacts, closed, read, lanes, lost
         if _differ(contacts, self._contacts):
-            self._contacts, self._since_us, self._weighed = contacts, time_us, False
-        elif not self._weighed and time_us - self._since_us >= SETTLED_US:
+            self._contacts, self._since_us, self._read, self._weighed = contacts, time_us, read, False
+        elif not self._weighed and time_us - self._since_us >= SETTLED_US and not self._read & ~read:
             self._contacts, self._weighed = contacts, True
             quiet = ~self._chattering.switches
             least, kept, seen, scores, without = self._fewest

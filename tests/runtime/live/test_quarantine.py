@@ -243,6 +243,28 @@ def test_a_grasp_that_is_held_or_repeated_by_resting_fingers_is_one_observation(
     assert hand.live.quarantine.found == ()
 
 
+def test_a_grasp_is_one_observation_however_often_its_switches_cannot_be_read(make_build: MakeBuild) -> None:
+    """As those of a board whose datagrams get lost: all of them are unknown until it was asked."""
+    shares = closing()
+    # Every switch is closed, also those that no recording closes; it lasts for 100 s.
+    hand, every = Hand(exact(make_build, shares)), (1 << SWITCHES) - 1
+    for number in range(1000):
+        for later_us, lost in ((0, every), (SETTLED_US // 5, 0), (6 * SETTLED_US // 5, 0)):
+            now_us = number * 2 * SETTLED_US + later_us
+            hand.live.step(now_us, 0, SwitchFrame(now_us, 0 if lost else every, lost), None)
+    assert hand.live.quarantine.found == ()
+
+
+def test_a_stuck_switch_is_found_though_switches_cannot_be_read_now_and_then(make_build: MakeBuild) -> None:
+    shares, every = closing(), (1 << SWITCHES) - 1
+    hand = Hand(exact(make_build, shares))
+    for closed in drawn(shares, 40, 3):
+        hand.grasp(closed, stuck=1)
+        hand.live.step(hand.now_us, 0, SwitchFrame(hand.now_us, 0, every), None)
+        hand.now_us += SETTLED_US // 10
+    assert hand.found == (Quarantined("s0", STUCK_CLOSED),)
+
+
 def chattering(live: LiveRecognizer, start_us: int, frames: int, every: int, period_us: int = 5000) -> list[bool]:
     """Change switch 0 every so many frames; return whether it is lost."""
     lost = []
