@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from .build import Build
 from .frames import Mask
 
 if TYPE_CHECKING:
+    from .build import Build
     from .live.recogniser import Moment
 
 
@@ -32,7 +32,7 @@ class Detail(msgspec.Struct, frozen=True):
 class Details:
     """Says what the moments of a run of `build` came of."""
 
-    def __init__(self, build: Build) -> None:
+    def __init__(self, build: "Build") -> None:
         self._switches, self._scale = build.tables.n_switches, build.tables.scale
         self._none_leads = None if build.rejector is None else build.none_leads
         self._joints = [

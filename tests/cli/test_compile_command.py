@@ -107,6 +107,8 @@ def test_it_says_what_the_firmware_in_the_build_is_laid_out_for(thenar: Thenar, 
         "thenar_glove.c",
         "thenar_glove.h",
         "thenar_glove_avr.S",
+        "thenar_glove_codes.c",
+        "thenar_glove_codes.h",
         "thenar_glove_tables.c",
         "thenar_glove_tables.h",
     ]

@@ -170,7 +170,12 @@ def _on_a_base_install(*arguments: object, but: str = "") -> "subprocess.Complet
 
 def test_the_extras_in_hints_are_those_of_the_project() -> None:
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
-    called = {"scikit-learn": "sklearn", "mujoco-core": "mujoco", "python-calamine": "python_calamine"}
+    called = {
+        "scikit-learn": "sklearn",
+        "mujoco-core": "mujoco",
+        "python-calamine": "python_calamine",
+        "foxglove-sdk": "foxglove",
+    }
     needed = {
         extra: {called.get(name, name) for name in (re.split("[>=<]", package)[0] for package in packages)}
         for extra, packages in project["optional-dependencies"].items()

@@ -96,6 +96,8 @@ void thenar_hand_init(thenar_hand *glove);
 uint8_t thenar_hand_classify(thenar_hand *glove);
 uint8_t thenar_hand_update(thenar_hand *glove);
 void thenar_hand_set_switch(thenar_hand *glove, thenar_hand_switch number, bool closed);
+uint16_t thenar_hand_margin(const thenar_hand *glove);
+uint16_t thenar_hand_probability(const thenar_hand *glove, thenar_hand_class grasp);
 const char *thenar_hand_grasp(thenar_hand_class grasp);
 """,
     "thenar_hand.c": """
@@ -106,6 +108,11 @@ uint8_t thenar_hand_update(thenar_hand *glove) { glove->scores[1]--; return 4; }
 void thenar_hand_set_switch(thenar_hand *glove, thenar_hand_switch number, bool closed)
 {
     if (number == 1 && closed) glove->scores[2]++;
+}
+uint16_t thenar_hand_margin(const thenar_hand *glove) { return (uint16_t)(glove->scores[0] + 7); }
+uint16_t thenar_hand_probability(const thenar_hand *glove, thenar_hand_class grasp)
+{
+    return (uint16_t)(100 * grasp - glove->scores[1]);
 }
 const char *thenar_hand_grasp(thenar_hand_class grasp) { return grasp == 4 ? "last" : ""; }
 """,
@@ -118,6 +125,8 @@ def test_update_is_called_for_every_frame_and_then_switches_are_set_one_by_one(m
     assert full.classes.tolist() == [3, 3, 3]
     assert full.scores[:, :3].tolist() == [[1, 0, 0], [2, 0, 0], [3, 0, 0]]
     assert full.names == ("", "", "", "", "last")
+    assert full.margins.tolist() == [8, 9, 10]
+    assert full.shares.tolist() == [0, 100, 200]
     updated = HOST.run(STAND_IN, "hand", layout, frames, incremental=True)
     assert updated.classes.tolist() == [4, 4, 4]
     assert updated.scores[:, :3].tolist() == [[0, -1, 1], [0, -2, 2], [0, -3, 3]]
