@@ -111,7 +111,8 @@ class ScannerCounts(FrameCounts):
 # Opening the port of an Arduino resets it, and its boot loader answers nobody for up to two seconds.
 _BOOT_S = 3.0
 _GREETING_S = 0.3
-_ASK_AGAIN_S = 0.1
+# What was asked for and does not come; and from one loss that was made good to the next.
+_ASK_AGAIN_S, _ASK_ANEW_S = 0.1, 0.02
 
 
 class Scanner(Closing):
@@ -148,7 +149,7 @@ class Scanner(Closing):
         self.times = BoardTimes()
         self._waiting: deque[tuple[int, Received]] = deque()  # when it came in, in the host's monotonic microseconds
         self._misfits = self._asked = 0
-        self._ask_at = self._channels_at = self._segments_at = 0.0
+        self._asked_at = self._ask_at = self._channels_at = self._segments_at = 0.0
         self._told: dict[int, _Setting] = {}
         self._token = 0
 
@@ -366,9 +367,11 @@ class Scanner(Closing):
     def _ask_again(self) -> None:
         """Ask for a full bitmap where keys cannot be trusted, for channels where nothing answered that; and again."""
         now = monotonic()
-        if not self._keys.trusted and now >= self._ask_at:
+        if self._keys.trusted:
+            self._ask_at = min(self._ask_at, self._asked_at + _ASK_ANEW_S)
+        elif now >= self._ask_at:
             _LOG.info("%s: what the board said of its keys cannot be trusted: all of them are asked for", self.url)
-            self._ask_at = now + _ASK_AGAIN_S
+            self._asked_at, self._ask_at = now, now + _ASK_AGAIN_S
             self._asked += 1
             self._send(GetState())
         asked = self._told.get(SetChannels.KIND)

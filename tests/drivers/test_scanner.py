@@ -508,6 +508,24 @@ def test_the_state_is_asked_for_again_while_it_does_not_come(line: PtyLine) -> N
     assert asked == [0x14, 0x13, 0x13, 0x13]
 
 
+def test_once_the_state_came_the_next_loss_is_asked_about_without_waiting(
+    line: PtyLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("thenar.drivers.scanner._ASK_AGAIN_S", 10 * LONG_S)
+    board, end = Scripted(line), monotonic() + LONG_S
+    with driver(line) as scanner:
+        board.say(Heartbeat(0, 0, KEYS))
+        for closed in range(1, 6):
+            board.number += 1  # a frame gets lost
+            board.say(State(0, KEYS))
+            until(scanner, lambda reading: not reading.known)
+            while scanner.counts.asked < closed:
+                assert monotonic() < end, scanner.counts
+                scanner.read(0.01)
+            board.say(Heartbeat(0, closed, KEYS))
+            until(scanner, lambda reading, closed=closed: reading.known and reading.closed == closed)
+
+
 def test_an_event_out_of_range_is_a_misfit_and_the_state_is_asked_for(line: PtyLine) -> None:
     board = Scripted(line)
     with driver(line) as scanner:
