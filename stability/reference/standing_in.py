@@ -4,7 +4,7 @@ From the mean rows on, 20 times, each class of each row gains scale * ln(wanted 
 wanted is the number of rows of the class and 1/2, given the sum of its probabilities over all rows without the input
 and 1/2. Where a further set of scores says what the rows have without all inputs of the kind, the sum of their rows
 gains as much; what it lacks beyond the sum of the single gains is shared out among the inputs and itself. No entry
-leaves the ends of its input.
+leaves the ends of its input; an input whose ends are equal stays as it is and takes no share.
 
 Doubles compute the same up to a last bit, and a whole number of steps hangs on that bit only next to a half. What they
 may lose is worked out at every step; where a half lies within, both whole numbers are followed.
@@ -25,7 +25,7 @@ DOUBT = mpf(1) / 2
 Row = tuple[int, ...]
 Rows = tuple[Row, ...]
 _U = mpf(2) ** -53
-# Sums of probabilities are taken in whole parts of 2^-32: each row's may be half a part off.
+# Sums of probabilities, of fewer than 2^20 rows, are taken in whole parts of this: each row's is half a part off at most.
 _PART = mpf(2) ** -32
 
 
@@ -66,16 +66,20 @@ def stand_ins(kind: Kind, means: Iterable[Rows]) -> set[Rows]:
 
 
 def _step(kind: Kind, shares: Sequence[Sequence[Sequence[mpf]]], rows: Rows) -> Iterator[Rows]:
-    n, sums = len(rows), tuple(map(sum, zip(*rows, strict=True)))
-    pairs = zip(kind.without, shares, (*rows, sums), strict=False)
-    lacks, doubts = zip(*(_lack(kind, scores, of, row) for scores, of, row in pairs), strict=True)
-    gains, classes = list(lacks[:n]), range(len(sums))
+    sums = tuple(map(sum, zip(*rows, strict=True)))
+    says = [least != most for least, most in kind.ends]
+    pairs = zip(kind.without, shares, (*rows, sums), (*says, True), strict=False)
+    lacks, doubts = zip(*(_lack(kind, scores, of, row) for scores, of, row, counts in pairs if counts), strict=True)
+    n, classes = sum(says), range(len(sums))
+    gains = list(lacks[:n])
     if len(lacks) > n:
         beyond = [(lacks[n][k] - mpmath.fsum(lack[k] for lack in gains)) / (1 + n) for k in classes]
         gains = [[lack[k] + beyond[k] for k in classes] for lack in gains]
     # A gain is off by what its own lack is, and by a (1 + n)-th of what all are; n + 4 roundings add and divide them.
     most = [2 * (max(of[k] for of in doubts) + (n + 4) * _U * max(abs(of[k]) for of in lacks)) for k in classes]
-    yield from _rounded(rows, gains, [most] * n, kind.ends)
+    moves = iter(gains)
+    all_gains = [next(moves) if counts else [mpf(0)] * len(sums) for counts in says]
+    yield from _rounded(rows, all_gains, [most] * len(rows), kind.ends)
 
 
 def _lack(
