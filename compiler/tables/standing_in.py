@@ -7,7 +7,8 @@ sum as it is frequent: there the likelihood is the highest that a constant row c
 of the probabilities) to each type, which never lowers it (J. N. Darroch and D. Ratcliff, Ann. Math. Stat. 43, 1972).
 
 Where a build has switches and joints, all of a kind may be lost at once, and the sum of their rows stands in. Steps of
-single inputs miss what that sum lacks; the least squares of both kinds of remainders say how a step is shared.
+single inputs miss what that sum lacks; the least squares of both kinds of remainders say how a step is shared. Inputs
+that add the same whatever they read take no part: a silent joint more changes nothing for the others.
 
 An entry stays between the least and the most that the input adds to its type: then no sum can leave its bounds. The
 steps are few, as those that follow suit the rows trained on more than others, above all where several are lost.
@@ -25,8 +26,6 @@ from ..elementary import log, softmax
 
 # Steps from the mean rows; distinct rows that are looked at.
 STEPS, ROWS = 20, 1000
-# Probabilities are added up in whole parts of this, so that their order is no matter.
-_WHOLE = 2.0**32
 # A type that no row has, or that is given no share, is neither impossible nor certain.
 _DOUBT = 0.5
 Steps = NDArray[np.int64]
@@ -55,31 +54,36 @@ def fit_lost(
     switch_rows = tables.switch_rows.astype(np.int64)
     closed, joints = bits.astype(np.int64) @ switch_rows, tables.joint_sums(codes).astype(np.int64)
     whole = closed + joints
-    # Of each input, and then of all of its kind: the scores of the rows without.
-    switches = [whole - bits[:, switch, np.newaxis] * row for switch, row in enumerate(switch_rows)]
-    each = [whole - joints + _without(tables, codes, [joint]) for joint in range(tables.n_joints)]
-    if switches and each:
-        switches.append(joints)
-        each.append(closed + _without(tables, codes, range(tables.n_joints)))
     added = [tables.choices(joint)[1].sum(axis=0) for joint in range(tables.n_joints)]
     ends = np.minimum(switch_rows, 0), np.maximum(switch_rows, 0)
     spans = tuple(np.array([end(rows, axis=0) for rows in added]).reshape(-1, len(wanted)) for end in (np.min, np.max))
+    # Of each input that says something, and then of all of its kind if others do: the scores of the rows without.
+    of_switches, of_joints = (np.flatnonzero((least != most).any(axis=1)) for least, most in (ends, spans))
+    switches = [whole - bits[:, switch, np.newaxis] * switch_rows[switch] for switch in of_switches]
+    each = [whole - joints + _without(tables, codes, [joint]) for joint in of_joints.tolist()]
+    if switches and (joints != joints[0]).any():
+        switches.append(joints)
+    if each and (closed != closed[0]).any():
+        each.append(closed + _without(tables, codes, range(tables.n_joints)))
 
-    def fitted(means: NDArray[np.int16], others: Sequence[Steps], ends: tuple[Steps, ...]) -> NDArray[np.int16]:
+    def fitted(
+        means: NDArray[np.int16], chosen: NDArray[np.intp], others: Sequence[Steps], ends: tuple[Steps, ...]
+    ) -> NDArray[np.int16]:
         found = means.astype(np.int64)
-        for _ in range(STEPS if len(found) else 0):
-            rows = [*found, found.sum(axis=0)][: len(others)]
+        for _ in range(STEPS if len(chosen) else 0):
+            rows = [*found[chosen], found.sum(axis=0)][: len(others)]
             lacks = [_lack(scores + row, often, wanted, tables.scale) for scores, row in zip(others, rows, strict=True)]
-            steps = np.array(lacks[: len(found)])
-            if len(lacks) > len(found):
-                steps += (lacks[-1] - steps.sum(axis=0)) / (1 + len(found))
-            found = np.clip(found + np.rint(steps).astype(np.int64), *ends)
+            steps = np.array(lacks[: len(chosen)])
+            if len(lacks) > len(chosen):
+                steps += (lacks[-1] - steps.sum(axis=0)) / (1 + len(chosen))
+            found[chosen] += np.rint(steps).astype(np.int64)
+            found = np.clip(found, *ends)
         return found.astype(np.int16)
 
     return replace(
         tables,
-        switch_means=fitted(tables.switch_means, switches, ends),
-        joint_means=fitted(tables.joint_means, each, spans),
+        switch_means=fitted(tables.switch_means, of_switches, switches, ends),
+        joint_means=fitted(tables.joint_means, of_joints, each, spans),
     )
 
 
@@ -108,5 +112,7 @@ def _without(tables: IntegerTables, codes: NDArray[np.uint16], joints: Sequence[
 def _lack(scores: Steps, often: Floats, wanted: Floats, scale: float) -> Floats:
     """Return how many steps of score each type lacks, (K,), to be as probable as it is `wanted`."""
     shares = softmax(np.ascontiguousarray(scores.T / scale))
-    given = np.rint(shares * often * _WHOLE).sum(axis=1) / _WHOLE + _DOUBT
+    # Added up in whole parts, so few that a double holds their sum: its order is no matter.
+    parts = 2.0 ** min(32, 52 - int(wanted.sum()).bit_length())
+    given = np.rint(shares * often * parts).sum(axis=1) / parts + _DOUBT
     return scale * log(wanted / given)

@@ -20,6 +20,7 @@ from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.tree import Tree
 from thenar.compiler.tables.collapse import ScoreTables, collapse
 from thenar.compiler.tables.quantise import quantise
+from thenar.compiler.tables.standing_in import fit_lost
 from thenar.runtime.tables import HIGHEST_CODE, IntegerTables
 
 from ..checks.class_rounds import ClassRound, Step, branches, class_rounds, grown, step_of
@@ -133,7 +134,7 @@ def learn(hard: HardSet, rounds: int = ROUNDS) -> Learnt:
     """Learn from `hard` all that there is to learn. ID3 knows no weights."""
     stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, weights=hard.weights)
     tables = collapse(stumps, hard.n_switches)
-    integers = quantise(tables, hard.bits, hard.codes)
+    integers = fit_lost(quantise(tables, hard.bits, hard.codes), hard.bits, hard.codes, hard.labels)
     return Learnt(grow_id3(hard.X, hard.labels), stumps, falling, tables, integers)
 
 
@@ -160,7 +161,7 @@ def numbers(learnt: Learnt, inputs: Sequence[int], classes: Sequence[int]) -> It
     yield "integer bias", integers.bias[order]
     yield "integer switch rows", integers.switch_rows[switches][:, order]
     yield "integer joint rows", _stacked([integers.joint_rows[joint][:, order] for joint in joints], integers.bias)
-    yield "integer means", np.concatenate([integers.switch_means[switches], integers.joint_means[joints]])[:, order]
+    yield "stand-ins", np.concatenate([integers.switch_means[switches], integers.joint_means[joints]])[:, order]
 
 
 def _counts(tree: Tree, order: list[int]) -> NDArray[np.int64]:

@@ -1,4 +1,4 @@
-"""Ports that do not answer and joints that fall silent; mean rows stand in for them."""
+"""Ports that do not answer and joints that fall silent; what is fitted to the rows trained on stands in for them."""
 
 from collections.abc import Iterator, Sequence
 from itertools import product
@@ -18,7 +18,8 @@ from ..finding import Case, Finding, Worst
 from ..inputs.hard_tables import Bits, Codes
 from ..inputs.small_sets import SmallBuild, small_build, small_set
 from ..reference.numbers import precisely
-from ..reference.tables import mean_row, mean_switch, table_scores
+from ..reference.standing_in import Kind, Rows, stand_ins, whole
+from ..reference.tables import balanced, mean_row, mean_switch, table_scores
 
 
 class Loss(NamedTuple):
@@ -48,7 +49,7 @@ def every_loss(build: Build, width: int) -> Iterator[Loss]:
 
 
 def changes(tables: IntegerTables, sign: int) -> list[NDArray[np.int64]]:
-    """Return per input, times `sign`, what its mean adds to a score beyond what each value adds, (values, K) steps."""
+    """Return per input, times `sign`, what stands in adds to a score beyond what each value adds, (values, K) steps."""
     pairs = [
         (np.stack([0 * row, row]), mean) for row, mean in zip(tables.switch_rows, tables.switch_means, strict=True)
     ]
@@ -79,29 +80,42 @@ def worst_frames(tables: IntegerTables) -> Iterator[tuple[Bits, Codes]]:
 _T = TypeVar("_T")
 
 
-class ExactMeans:
-    """The score tables of a build and the means of its recordings, in steps."""
+class ExactTables:
+    """The score tables of a build, balanced, in steps; and what stands in for lost inputs, in whole steps as it is
+    fitted to the recordings with the build's own whole rows.
+
+    strays  by how many steps what stands in for each input of the build is off at the most: switches, then joints
+    """
 
     @precisely()
     def __init__(self, small: SmallBuild) -> None:
-        tables, scale = small.tables, small.build.tables.scale
-        self._bias = _scaled(tables.bias.tolist(), scale)
+        tables, integers, scale = small.tables, small.build.tables, small.build.tables.scale
+        bias, joints = balanced(tables.bias.tolist(), [rows.tolist() for rows in tables.joint_rows])
+        self._bias = _scaled(bias, scale)
         self._switches = [_scaled(row, scale) for row in tables.switch_rows.tolist()]
         self._thresholds = [steps.tolist() for steps in tables.thresholds]
-        self._joints = [[_scaled(row, scale) for row in rows.tolist()] for rows in tables.joint_rows]
-        pairs = zip(self._switches, small.bits.T.tolist(), strict=True)
-        self._switch_means = [mean_switch(row, bits) for row, bits in pairs]
-        joints = zip(self._thresholds, self._joints, small.codes.T.tolist(), strict=True)
-        self._joint_means = [mean_row(steps, rows, codes) for steps, rows, codes in joints]
+        self._joints = [[_scaled(row, scale) for row in rows] for rows in joints]
+        of_switches = zip(self._switches, small.bits.T.tolist(), strict=True)
+        of_joints = zip(self._thresholds, self._joints, small.codes.T.tolist(), strict=True)
+        means = [mean_switch(row, bits) for row, bits in of_switches], [mean_row(*joint) for joint in of_joints]
+        got = integers.switch_means.tolist(), integers.joint_means.tolist()
+        self._stand_ins: list[tuple[int, ...]] = []
+        self.strays: list[int] = []
+        for kind, of_kind, rows in zip(_kinds(small), means, got, strict=True):
+            starts = whole(of_kind, _float_slack(small), kind.ends)
+            strays, fitted = min((_strays(each, rows), each) for each in stand_ins(kind, starts))
+            self._stand_ins += fitted
+            self.strays += strays
 
     def scores(self, bits: Sequence[bool], codes: Sequence[int], loss: Loss) -> list[mpf]:
-        """Return the scores (K,) of a frame that lost some inputs: tables in which these have nothing but a mean."""
+        """Return the scores (K,) of a frame that lost some inputs: these have one row, whatever they read."""
         switches, joints = loss.switches.tolist(), loss.joints.tolist()
+        for_switches, for_joints = self._stand_ins[: len(switches)], self._stand_ins[len(switches) :]
         return table_scores(
             self._bias,
-            _swapped(self._switches, self._switch_means, switches),
+            _swapped(self._switches, for_switches, switches),
             _swapped(self._thresholds, [[] for _ in joints], joints),
-            _swapped(self._joints, [[mean] for mean in self._joint_means], joints),
+            _swapped(self._joints, [[row] for row in for_joints], joints),
             [lost or bit for lost, bit in zip(switches, bits, strict=True)],
             codes,
         )
@@ -110,8 +124,8 @@ class ExactMeans:
     def most(self, loss: Loss) -> list[mpf]:
         """Return the most (K,) that the loss can change each score, up or down.
 
-        What is lost adds its mean instead of one of its rows, whatever the other inputs say; so that is, for each
-        direction, the sum over lost inputs of the most that one can change.
+        What stands in for an input is added instead of one of its rows, whatever the other inputs say; so that is, for
+        each direction, the sum over lost inputs of the most that one can change.
         """
         lost = [rows for rows, is_lost in zip(self.changes(), loss.inputs, strict=True) if is_lost]
         return [
@@ -121,13 +135,37 @@ class ExactMeans:
 
     @precisely()
     def changes(self) -> list[list[list[mpf]]]:
-        """Return per input, for each of its values, what its mean adds to the scores (K,) beyond what that adds."""
-        means = [*self._switch_means, *self._joint_means]
+        """Return per input, for each of its values, what stands in adds to the scores (K,) beyond what that adds."""
         inputs = [*([[mpf(0)] * len(row), row] for row in self._switches), *self._joints]
         return [
-            [[a - b for a, b in zip(mean, row, strict=True)] for row in rows]
-            for mean, rows in zip(means, inputs, strict=True)
+            [[a - b for a, b in zip(lost, row, strict=True)] for row in rows]
+            for lost, rows in zip(self._stand_ins, inputs, strict=True)
         ]
+
+
+def _kinds(small: SmallBuild) -> tuple[Kind, Kind]:
+    """Return the switches and the joints of a build with what its whole rows add to the rows that it was trained on."""
+    tables, labels = small.build.tables, small.labels.tolist()
+    choices = [np.stack([0 * row, row]).astype(np.int64) for row in tables.switch_rows]
+    values: list[NDArray[np.intp]] = list(small.bits.T.astype(np.intp))
+    for steps, rows, codes in zip(tables.thresholds, tables.joint_rows, small.codes.T, strict=True):
+        choices.append(rows.astype(np.int64))
+        values.append(np.searchsorted(steps, codes))
+    adds = np.array([rows[of_row] for rows, of_row in zip(choices, values, strict=True)])
+    scores = tables.bias + adds.sum(axis=0)
+
+    def kind(inputs: slice) -> Kind:
+        without = [*(scores - adds[inputs]), scores - adds[inputs].sum(axis=0)]
+        ends = [(tuple(rows.min(axis=0).tolist()), tuple(rows.max(axis=0).tolist())) for rows in choices[inputs]]
+        return Kind([each.tolist() for each in without], labels, ends, tables.scale)
+
+    return kind(slice(tables.n_switches)), kind(slice(tables.n_switches, None))
+
+
+def _strays(one: Rows, other: Sequence[Sequence[int]]) -> list[int]:
+    """Return how far each row of one is at the most from that of the other."""
+    pairs = zip(one, other, strict=True)
+    return [max(abs(a - b) for a, b in zip(*rows, strict=True)) for rows in pairs]
 
 
 def _scaled(row: Sequence[float], scale: float) -> list[mpf]:
@@ -140,7 +178,7 @@ def _swapped(all_: Sequence[_T], others: Sequence[_T], which: Sequence[bool]) ->
 
 CASE = Case(
     title="Missing ports and silent joints",
-    danger="with means in place of what is missing a score strays further than proved, or nobody is told",
+    danger="with a fitted row in place of what is missing a score strays further than proved, or nobody is told",
 )
 
 _SUBSETS = "every subset of ports and joints"
@@ -167,8 +205,9 @@ def findings(full: bool) -> Iterator[Finding]:
     codes = np.vstack([small.codes[:recorded], *(of_frame for _, of_frame in hard)])
     losses = [loss for width in (8, 16) for loss in every_loss(small.build, width)]
     cases = [Lost(loss, bits, codes, _scores(small, loss, bits, codes)) for loss in losses]
-    yield _means(small)
-    yield from _exactly(small, cases)
+    exact = ExactTables(small)
+    yield _fitted(exact)
+    yield from _exactly(small, exact, cases)
     yield _integers(small, cases)
     yield _sums(small, cases)
     yield from _told(small, cases)
@@ -180,29 +219,25 @@ def _scores(small: SmallBuild, loss: Loss, bits: Bits, codes: Codes) -> NDArray[
     return np.array(lanes) - LANE_OFFSET
 
 
-def _means(small: SmallBuild) -> Finding:
-    """Hold what each mean adds beyond each row of its input against the exact difference."""
-    tables, exact = small.build.tables, ExactMeans(small)
-    # Half a step for the mean and for the row; what doubles lose is as in _float_slack, all of it in one input.
-    worst = Worst("mean rows, beside every row", "exact means, 60 digits", 1 + 2 * _float_slack(small), "steps")
-    columns = [*([0, 1] for _ in range(tables.n_switches)), *([0, *(steps + 1)] for steps in small.tables.thresholds)]
-    for number, (values, truths) in enumerate(zip(columns, exact.changes(), strict=True)):
-        got = changes(tables, 1)[number]
-        joint = number - tables.n_switches
-        bins = values if joint < 0 else np.searchsorted(tables.thresholds[joint], values)
-        for row, truth in zip(got[bins].tolist(), truths, strict=True):
-            with precisely():
-                worst.see(float(max(abs(a - b) for a, b in zip(row, truth, strict=True))), f"input {number}", len(row))
+def _fitted(exact: ExactTables) -> Finding:
+    """Hold what stands in for each input against the same fit at 60 digits.
+
+    All of it is whole numbers, so nothing may differ. A number next to a half may be rounded either way, where what
+    doubles lose decides (reference/standing_in.py): what follows from either is right.
+    """
+    worst = Worst("what stands in for each input", "the fit at 60 digits", 0, "steps")
+    for number, strays in enumerate(exact.strays):
+        worst.see(strays, f"input {number}")
     return worst.finding()
 
 
-def _exactly(small: SmallBuild, cases: list[Lost]) -> Iterator[Finding]:
-    """Hold scores against the exact ones with exact means, and against those of the whole frame."""
-    # Half a step for the bias and for what each input says, be it a row or a mean.
+def _exactly(small: SmallBuild, exact: ExactTables, cases: list[Lost]) -> Iterator[Finding]:
+    """Hold scores against the exact ones with what stands in, and against those of the whole frame."""
+    # Half a step for the bias and for the row of each input; what stands in is whole.
     rounding = (small.tables.n_inputs + 1) / 2 + _float_slack(small)
-    means = Worst(f"scores, {_SUBSETS} lost", "exact means, 60 digits", rounding, "steps")
+    scores = Worst(f"scores, {_SUBSETS} lost", "the fit at 60 digits", rounding, "steps")
     proved = Worst(f"what losing {_SUBSETS} changes", "the whole frame, 60 digits", 1, "of the proved bound")
-    exact, nothing = ExactMeans(small), cases[0].loss
+    nothing = cases[0].loss
     frames = list(zip(cases[0].bits.tolist(), cases[0].codes.tolist(), strict=True))
     whole = [exact.scores(*frame, nothing) for frame in frames]
     for case in cases:
@@ -210,10 +245,10 @@ def _exactly(small: SmallBuild, cases: list[Lost]) -> Iterator[Finding]:
             allowed = [most + rounding for most in exact.most(case.loss)]
             for frame, of_whole, got in zip(frames, whole, case.scores.tolist(), strict=True):
                 truth = exact.scores(*frame, case.loss)
-                means.see(float(max(abs(a - b) for a, b in zip(truth, got, strict=True))), case.loss.name)
+                scores.see(float(max(abs(a - b) for a, b in zip(truth, got, strict=True))), case.loss.name)
                 shares = (abs(a - b) / most for a, b, most in zip(of_whole, got, allowed, strict=True))
                 proved.see(float(max(shares)), case.loss.name)
-    yield means.finding()
+    yield scores.finding()
     yield proved.finding()
 
 

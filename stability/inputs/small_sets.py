@@ -56,12 +56,15 @@ def parity(inputs: int) -> GraspSet:
 
 
 class SmallBuild(NamedTuple):
-    """A build, the score tables it was quantised from, and the kept switches (n, s) and codes (n, j) trained on."""
+    """A build, the score tables it was quantised from, and the kept switches (n, s), codes (n, j) and classes (n,)
+    trained on.
+    """
 
     build: Build
     tables: ScoreTables
     bits: NDArray[np.bool_]
     codes: NDArray[np.uint16]
+    labels: NDArray[np.intp]
 
 
 def small_set(seed: int, rows: int, switches: int, joints: int, types: int, noise: float) -> GraspSet:
@@ -82,4 +85,5 @@ def small_build(grasps: GraspSet, rounds: int, prune: int = 0) -> SmallBuild:
         build = Build.load(where)
         stumps = ensemble_from_bytes((where / ENSEMBLE_NAME).read_bytes())
     bits, codes = select_inputs(grasps, build.manifest)
-    return SmallBuild(build, collapse(stumps, bits.shape[1]), bits, codes)
+    labels = np.unique(grasps.labels, return_inverse=True)[1]
+    return SmallBuild(build, collapse(stumps, bits.shape[1]), bits, codes, labels)

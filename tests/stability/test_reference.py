@@ -3,7 +3,7 @@
 import json
 import math
 from fractions import Fraction
-from itertools import pairwise, product
+from itertools import combinations, pairwise, product
 from pathlib import Path
 
 import mpmath
@@ -38,6 +38,7 @@ from thenar.stability.reference.information import (
 )
 from thenar.stability.reference.intervals import normal_quantile, student, student_quantile, wilson
 from thenar.stability.reference.numbers import DIGITS, added, cos, distance, exact, precisely, sin, solve, turn, ulps
+from thenar.stability.reference.standing_in import Kind, stand_ins, whole
 from thenar.stability.reference.tables import balanced, mean_row, mean_switch, score_tables, steps, table_scores
 
 HAIR = mpf(10) ** (8 - DIGITS)  # a few roundings of 60 digits
@@ -361,6 +362,43 @@ def test_balanced_tables_have_the_same_scores_and_no_bias_where_there_is_room() 
 def test_means_are_over_the_rows_trained_on() -> None:
     assert mean_row([3, 9], [[0.0], [1.0], [5.0]], [3, 4, 9, 10]) == [mpf(7) / 4]
     assert mean_switch([2.0, -8.0], [True, False, False, False]) == [0.5, -2]
+
+
+@pytest.mark.parametrize("counts", [(30, 10), (5, 12, 40), (1, 1, 1, 97)])
+def test_where_the_others_say_nothing_what_stands_in_says_how_frequent_each_class_is(counts: tuple[int, ...]) -> None:
+    labels = [label for label, count in enumerate(counts) for _ in range(count)]
+    rows = [[0] * len(counts)] * len(labels)
+    ends = ((-9000,) * len(counts), (9000,) * len(counts))
+    for starts in ({((0,) * len(counts),)}, {((500, *[-300] * (len(counts) - 1)),)}):
+        ((found,),) = stand_ins(Kind([rows], labels, [ends], 1000.0), starts)
+        for one, other in combinations(range(len(counts)), 2):
+            assert found[one] - found[other] == pytest.approx(1000 * math.log(counts[one] / counts[other]), abs=2)
+
+
+def test_what_stands_in_stays_between_its_ends() -> None:
+    kind = Kind([[[0, 0]] * 40], [0] * 30 + [1] * 10, [((-7, -3), (9, 2))], 1000.0)
+    assert stand_ins(kind, {((0, 0),)}) == {((9, -3),)}
+
+
+def test_the_sum_of_a_kind_makes_up_for_what_its_inputs_say_twice() -> None:
+    # Each of two equal inputs is said by the other already, so nothing stands in for one alone; both are lost at once.
+    labels = [0] * 30 + [1] * 10
+    known, nothing = [[549, -549]] * 40, [[0, 0]] * 40
+    ends = [((-9000, -9000), (9000, 9000))] * 2
+    none = {((0, 0), (0, 0))}
+    ((alone, _),) = stand_ins(Kind([known, known], labels, ends, 1000.0), none)
+    ((one, other),) = stand_ins(Kind([known, known, nothing], labels, ends, 1000.0), none)
+    assert max(map(abs, alone)) <= 1
+    assert one == other
+    assert 100 < one[0] < 549
+
+
+def test_a_step_next_to_a_half_is_followed_both_ways() -> None:
+    assert whole([[mpf("2.5"), mpf("-1.25")]], 1e-9, [((-9, -9), (9, 9))]) == {((2, -1),), ((3, -1),)}
+    assert whole([[mpf("2.5"), mpf("-1.25")]], 1e-9, [((-9, -9), (2, 9))]) == {((2, -1),)}
+    lack = math.log(30.5 / 20.5)
+    kind = Kind([[[0, 0]] * 40], [0] * 30 + [1] * 10, [((0, 0), (1, 0))], 0.5 / lack)
+    assert len(stand_ins(kind, {((0, 0),)})) == 2
 
 
 @given(st.integers(1, 10**6).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))

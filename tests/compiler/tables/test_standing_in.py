@@ -1,6 +1,7 @@
 """What stands in for lost inputs: likelier than the mean rows, within bounds, in whatever order the rows come."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import given
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.tables.collapse import collapse
 from thenar.compiler.tables.quantise import quantise
-from thenar.compiler.tables.standing_in import fit_lost
+from thenar.compiler.tables.standing_in import _lack, fit_lost
 from thenar.runtime.tables import IntegerTables
 
 MakeStumps = Callable[..., Stumps]
@@ -80,3 +81,34 @@ def test_the_order_of_the_rows_is_no_matter(make_stumps: MakeStumps, seed: int) 
     again = fit_lost(tables, bits[order], codes[order], labels[order])
     assert np.array_equal(fitted.switch_means, again.switch_means)
     assert np.array_equal(fitted.joint_means, again.joint_means)
+
+
+def test_neither_is_it_where_millions_of_rows_are_added_up() -> None:
+    random = np.random.default_rng(5)
+    scores, often = random.integers(-900, 900, (300, K)), random.integers(1, 1_000_000, 300).astype(np.float64)
+    wanted = np.full(K, often.sum() / K)
+    for _ in range(20):
+        order = random.permutation(300)
+        assert np.array_equal(_lack(scores, often, wanted, 300.0), _lack(scores[order], often[order], wanted, 300.0))
+
+
+@given(seed=st.integers(0, 30))
+def test_inputs_that_add_nothing_change_nothing_for_the_others(make_stumps: MakeStumps, seed: int) -> None:
+    bits, codes, labels = _rows(seed, 200, joints=1)
+    scores = collapse(make_stumps(seed, classes=K, switches=SWITCHES, joints=1), SWITCHES)
+    tables = quantise(scores, bits, codes, width=15)
+    fitted = fit_lost(tables, bits, codes, labels)
+    none, constant = np.zeros((1, K), np.int16), np.full((1, K), 7, np.int16)
+    more = replace(
+        tables,
+        switch_rows=np.vstack([none, tables.switch_rows]),
+        switch_means=np.vstack([none, tables.switch_means]),
+        thresholds=(*tables.thresholds, np.zeros(0, np.uint16)),
+        joint_rows=(*tables.joint_rows, constant),
+        joint_means=np.vstack([tables.joint_means, constant]),
+        bias=(tables.bias - 7).astype(np.int16),
+    )
+    silent = np.zeros((len(labels), 1))
+    again = fit_lost(more, np.hstack([silent > 0, bits]), np.hstack([codes, silent.astype(np.uint16)]), labels)
+    assert np.array_equal(again.switch_means, np.vstack([none, fitted.switch_means]))
+    assert np.array_equal(again.joint_means, np.vstack([fitted.joint_means, constant]))

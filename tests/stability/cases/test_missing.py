@@ -11,11 +11,12 @@ from thenar.runtime.build import Build, Recognition
 from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 from thenar.stability.cases import missing
-from thenar.stability.cases.missing import ExactMeans, changes, every_loss
+from thenar.stability.cases.missing import ExactTables, changes, every_loss
 from thenar.stability.checks.integer_sums import bare_build
 from thenar.stability.finding import Finding
 from thenar.stability.inputs.hard_tables import every_frame, whole_numbers
 from thenar.stability.inputs.small_sets import SmallBuild, small_build, small_set
+from thenar.stability.reference.tables import balanced
 
 Spoil = Callable[[IntegerTables], IntegerTables]
 
@@ -74,45 +75,52 @@ def test_a_frame_is_degraded_if_and_only_if_something_is_lost(lost: list[bool]) 
 
 
 def test_the_exact_scores_are_those_of_fractions(small: SmallBuild) -> None:
-    exact, tables, random = ExactMeans(small), small.tables, np.random.default_rng(3)
+    exact, tables, random = ExactTables(small), small.tables, np.random.default_rng(3)
+    integers, scale = small.build.tables, Fraction(small.build.tables.scale)
+    bias, joint_rows = balanced(tables.bias.tolist(), [rows.tolist() for rows in tables.joint_rows])
     for loss in list(every_loss(small.build, 16))[::5]:
         row = int(random.integers(len(small.bits)))
         bits, codes = small.bits[row], small.codes[row]
-        scores = [Fraction(value) for value in tables.bias.tolist()]
+        rows = [[scale * Fraction(float(value)) for value in bias]]
         for switch, (weights, lost) in enumerate(zip(tables.switch_rows.tolist(), loss.switches, strict=True)):
-            share = Fraction(int(small.bits[:, switch].sum()), len(small.bits)) if lost else int(bits[switch])
-            scores = [score + share * Fraction(weight) for score, weight in zip(scores, weights, strict=True)]
-        for joint, (steps, rows, lost) in enumerate(
-            zip(tables.thresholds, tables.joint_rows, loss.joints, strict=True)
-        ):
-            read = small.codes[:, joint] if lost else codes[joint : joint + 1]
-            picked = rows[np.searchsorted(steps, read)].T.tolist()
-            scores = [
-                s + sum(map(Fraction, column), Fraction(0)) / len(column)
-                for s, column in zip(scores, picked, strict=True)
-            ]
-        truth = [float(score * Fraction(small.build.tables.scale)) for score in scores]
+            if lost:
+                rows.append(integers.switch_means[switch].tolist())
+            elif bits[switch]:
+                rows.append([scale * Fraction(weight) for weight in weights])
+        for joint, (steps, of_joint, lost) in enumerate(zip(tables.thresholds, joint_rows, loss.joints, strict=True)):
+            picked = of_joint[int(np.searchsorted(steps, codes[joint]))]
+            read = [scale * Fraction(float(value)) for value in picked]
+            rows.append(integers.joint_means[joint].tolist() if lost else read)
+        truth = [float(sum(column)) for column in zip(*rows, strict=True)]
         got = [float(score) for score in exact.scores(bits.tolist(), codes.tolist(), loss)]
-        assert got == truth
+        assert got == pytest.approx(truth, abs=1e-9)
 
 
-def _shifted(rows: np.ndarray, by: int) -> np.ndarray:
+def test_what_stands_in_is_to_the_step_what_the_reference_fits(small: SmallBuild) -> None:
+    assert not any(ExactTables(small).strays)
+
+
+def _shifted(rows: np.ndarray) -> np.ndarray:
+    """Return the rows with one number a step nearer to zero: the bound of the sums stays as it is."""
     moved = rows.copy()
-    moved[0, 0] += by
+    at = np.unravel_index(np.abs(rows).argmax(), rows.shape)
+    moved[at] -= np.sign(rows[at])
     return moved
 
 
 @pytest.mark.parametrize(
     ("spoil", "caught"),
     [
-        (lambda of: replace(of, switch_means=_shifted(of.switch_means, 2)), "mean rows, beside every row"),
-        (lambda of: replace(of, joint_means=_shifted(of.joint_means, -2)), "mean rows, beside every row"),
-        (lambda of: replace(of, switch_means=0 * of.switch_means), "exact means"),
-        (lambda of: replace(of, joint_means=0 * of.joint_means), "exact means"),
+        (lambda of: replace(of, switch_means=_shifted(of.switch_means)), "what stands in for each input"),
+        (lambda of: replace(of, joint_means=_shifted(of.joint_means)), "what stands in for each input"),
+        (lambda of: replace(of, switch_means=0 * of.switch_means), "lost the fit at 60 digits"),
+        (lambda of: replace(of, joint_means=0 * of.joint_means), "lost the fit at 60 digits"),
     ],
-    ids=["a switch's mean 2 off", "a joint's mean 2 off", "no switch means", "no joint means"],
+    ids=["one step for a switch", "one step for a joint", "nothing for switches", "nothing for joints"],
 )
-def test_wrong_means_are_caught(small: SmallBuild, monkeypatch: pytest.MonkeyPatch, spoil: Spoil, caught: str) -> None:
+def test_what_should_not_stand_in_is_caught(
+    small: SmallBuild, monkeypatch: pytest.MonkeyPatch, spoil: Spoil, caught: str
+) -> None:
     spoiled = small._replace(build=Build(small.build.manifest, spoil(small.build.tables)))
     monkeypatch.setattr(missing, "small_build", lambda *_, **__: spoiled)
     failed = [f"{finding.check} {finding.reference}" for finding in missing.findings(full=False) if not finding.holds]
