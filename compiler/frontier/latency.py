@@ -290,7 +290,7 @@ class Pace(Struct, frozen=True):
     asked: float = 1.0
 
 
-@stored(4)
+@stored(5)
 def latencies(
     samples: Samples,
     rows: Rows,
@@ -307,7 +307,8 @@ def latencies(
             at costs learnt from them. None: segments have the usual costs
     """
     wanted = tuple(dict.fromkeys(pace.tabled for pace in paces))
-    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, wanted, training)}
+    asked = any(pace.slow_us is not None for pace in paces)
+    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, wanted, training, lost=asked)}
     whole = tuple(dict.fromkeys(pace.tabled for pace in paces if "segments" in pace.decisions))
     learnt = moving.segmenting(columns, whole, training) if moving and whole else {}
 

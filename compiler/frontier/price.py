@@ -13,6 +13,7 @@ from ..evaluation.folds import Fold, Rows
 from ..samples import Columns, Samples
 from ..tables.collapse import collapse
 from ..tables.quantise import quantise
+from ..tables.standing_in import fit_lost
 from ..trainers.base import Training
 from .cache import stored
 from .equipment import Equipment
@@ -58,7 +59,7 @@ class PricedTables(Struct, frozen=True):
         return max(scan_us, joints_us) + self.classified[0].us
 
 
-@stored(2)
+@stored(3)
 def price(
     samples: Samples,
     names: tuple[str, ...],
@@ -71,11 +72,12 @@ def price(
     """Train on all rows, on the switches `columns`, which have these names, and the joints; see what the tables cost.
 
     held  how early scans end is seen on the test rows of a fold, by tables of its training rows, trained so, as rows
-          that were trained on end them too soon; None: on all rows, where nobody asks about scans that end early
+          that were trained on end them too soon; None: on all rows, and with mean rows for lost inputs, where nobody
+          asks about scans that end early or for each byte of flash
     """
     rows = np.arange(len(samples.labels))
-    made = list(tables_of(samples, rows, columns, tables, training))
-    scanned = made if held is None else list(tables_of(samples, held[0].train, columns, tables, held[1]))
+    made = list(tables_of(samples, rows, columns, tables, training, lost=held is not None))
+    scanned = made if held is None else list(tables_of(samples, held[0].train, columns, tables, held[1], lost=True))
     tested = rows if held is None else held[0].test
     spread = tested[np.linspace(0, len(tested) - 1, min(_FRAMES, len(tested))).astype(np.intp)]
     frames = samples.kept(columns)[spread]
@@ -92,9 +94,19 @@ def price(
 
 
 def tables_of(
-    samples: Samples, rows: Rows, columns: Columns, tables: tuple[Tabled, ...], training: Training
+    samples: Samples,
+    rows: Rows,
+    columns: Columns,
+    tables: tuple[Tabled, ...],
+    training: Training,
+    *,
+    lost: bool = False,
 ) -> Iterator[tuple[Tabled, IntegerTables, float]]:
-    """Yield the tables that are asked for, of one training on some rows, and how many seconds each took."""
+    """Yield the tables that are asked for, of one training on some rows, and how many seconds each took.
+
+    lost  fit what stands in for lost inputs, as in a build: when a scan may end, and how many bytes of flash hold it,
+          hang on that, scores of whole frames do not. Without, it is mean rows
+    """
     began, most = time.perf_counter(), max(one.rounds for one in tables)
     kept = samples.rows(rows).keeping(columns)
     models = training.stages(kept, [one.rounds for one in tables])
@@ -103,6 +115,7 @@ def tables_of(
         began = time.perf_counter()
         scores = collapse(model, kept.n_switches)
         made = quantise(scores, kept.switches, kept.codes, tabled.shape.width, tabled.shape.table_bits)
+        made = fit_lost(made, kept.switches, kept.codes, kept.labels) if lost else made
         yield tabled, made, training_s * tabled.rounds / most + time.perf_counter() - began
 
 

@@ -69,11 +69,17 @@ def fit_lost(
     def fitted(
         means: NDArray[np.int16], chosen: NDArray[np.intp], others: Sequence[Steps], ends: tuple[Steps, ...]
     ) -> NDArray[np.int16]:
-        found = means.astype(np.int64)
+        found, before, lacks = means.astype(np.int64), list[Steps](), list[Floats]()
         for _ in range(STEPS if len(chosen) else 0):
             rows = [*found[chosen], found.sum(axis=0)][: len(others)]
-            lacks = [_lack(scores + row, often, wanted, tables.scale) for scores, row in zip(others, rows, strict=True)]
-            steps = np.array(lacks[: len(chosen)])
+            # A row that has not moved lacks what it did.
+            lacks = [
+                lacks[number]
+                if before and np.array_equal(before[number], row)
+                else _lack(others[number] + row, often, wanted, tables.scale)
+                for number, row in enumerate(rows)
+            ]
+            before, steps = rows, np.array(lacks[: len(chosen)])
             if len(lacks) > len(chosen):
                 steps += (lacks[-1] - steps.sum(axis=0)) / (1 + len(chosen))
             found[chosen] += np.rint(steps).astype(np.int64)

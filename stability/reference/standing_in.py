@@ -25,7 +25,7 @@ DOUBT = mpf(1) / 2
 Row = tuple[int, ...]
 Rows = tuple[Row, ...]
 _U = mpf(2) ** -53
-# Sums of probabilities, of fewer than 2^20 rows, are taken in whole parts of this: each is off by half a part.
+# Sums of probabilities, of fewer than 2^20 rows, are taken in whole parts of this; each is at most half a part off.
 _PART = mpf(2) ** -32
 
 
