@@ -5,8 +5,9 @@
 33 switches and 16 joints (a byte each) of the simulated scene kamakura, 14 grasp types: the first of the four folds of
 benchmarks/firmware.py. Every classifier is compiled by gcc with -O2 and run in qemu, which counts every instruction:
 the middle and the most over 300 test rows. Peers are emlearn's forests, and logistic regression with int8 weights
-written by hand: 13 sums, to which each joint adds a product and each group of switches a row. A layout is one than
-which none is both faster and smaller by the cost model of a Cortex-M4. emlearn is left out where it is not installed.
+written by hand: 13 sums, to which each joint adds a product and each group of switches a row. Lines
+"switches alone" are of builds without joints. A layout is one than which none is both faster and smaller by the cost
+model of a Cortex-M4. emlearn is left out where it is not installed.
 """
 
 import sys
@@ -39,6 +40,9 @@ OURS = (
     Ours("logitboost", 8, (("rounds", 100), BINS)),
     Ours("logit", 16, (BINS,)),
     Ours("logit", 8, LINE),
+    Ours("logitboost", 8, (("rounds", 100), BINS), joints=False),
+    Ours("logit", 8, (BINS,), joints=False),
+    Ours("logit", 8, (BINS,), joints=False, width=8),
 )
 ROWS = 300
 GROUPS = (Groups(1, 3), Groups(4, 4), Groups(8, 3))
@@ -112,9 +116,9 @@ def of_peer(text: str, rows: NDArray[np.uint8], core: Bare) -> tuple[NDArray[np.
     return found[1:, 0], (int(np.median(counted)), int(counted.max()))
 
 
-def of_ours(layout: Layout, fold: Fold, core: Bare) -> tuple[int, int]:
+def of_ours(layout: Layout, rows: NDArray[np.uint8], core: Bare, *, joints: bool) -> tuple[int, int]:
     """Return the same of a layout, all of whose scores are compared."""
-    frames, library = split(fold.asked[:ROWS]), Library("glove", numbered(layout.tables), layout, avr=False)
+    frames, library = split(rows, joints=joints), Library("glove", numbered(layout.tables), layout, avr=False)
     answers = core.run(library.files, "glove", layout, layout.frame_bytes(*frames))
     if answers.cost is None or (answers.scores != layout.scores(*frames)).any():
         raise FirmwareError(f"{core.part} gives other scores than Python")
@@ -127,8 +131,8 @@ def ours(fold: Fold) -> Iterator[Line]:
     for what in track(OURS, "thenar"):
         for layout, cost in choose(what.integers(fold), target, entry_bits=what.bits).frontier:
             if cost.flash <= flash_shares(target)[1]:
-                right = np.mean(layout.scores(*split(fold.asked)).argmax(axis=1) == fold.truth)
-                counts = {core.part: of_ours(layout, fold, core) for core in CORES}
+                right = np.mean(layout.scores(*split(fold.asked, joints=what.joints)).argmax(axis=1) == fold.truth)
+                counts = {core.part: of_ours(layout, fold.asked[:ROWS], core, joints=what.joints) for core in CORES}
                 yield Line(f"{what.name}: {features(layout, target)}", 100 * float(right), counts)
 
 
@@ -159,7 +163,7 @@ def main() -> None:
         table.add_column(column, justify="right" if column else "left")
     for line in lines:
         counts = (f"{middle:,} ({most:,})" for middle, most in line.counts.values())
-        table.add_row(line.name, f"{line.accuracy:.1f}", *counts, f"{line.ratio:.2f}")
+        table.add_row(line.name, f"{line.accuracy:.1f}", *counts, f"{line.ratio:.3f}")
     console.print(table)
 
 

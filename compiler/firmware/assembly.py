@@ -54,7 +54,7 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
         "stride": stride,
         "frame_size": layout.frame_size,
         "kept": kept_registers(layout),
-        "borrowed": [register for low in _borrowed(layout) for register in (low, low + 1)],
+        "borrowed": borrowed_registers(layout),
         "seen": seen_size(layout),
         "sources": FLAGS + layout.frame_size + _n_found(layout),
         "halves": layout.entry_shift == 8,
@@ -231,6 +231,11 @@ def _pairs(layout: Layout) -> set[int]:
 def _borrowed(layout: Layout) -> list[int]:
     """Return the pairs besides Y that update() must save whenever it finds a row."""
     return sorted(_pairs(layout) & _spare(layout) - {_POINTER})
+
+
+def borrowed_registers(layout: Layout) -> list[int]:
+    """Return the registers with sums that are saved while update() finds a row."""
+    return [register for low in _borrowed(layout) for register in (low, low + 1)]
 
 
 def kept_registers(layout: Layout) -> list[int]:

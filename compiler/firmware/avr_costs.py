@@ -19,6 +19,7 @@ from thenar.firmware_templates.rendering import render
 
 from .assembly import (
     assembly_values,
+    borrowed_registers,
     calls_are_near,
     compared_bytes,
     far,
@@ -221,8 +222,9 @@ _LARGE = 5  # numbers from here on are multiplied by `mul`
 _SET_SWITCH, _GRASP, _INIT, _PAGE = 80, 40, 70, 256
 _LOSING, _LOSING_JOINTS = 400, 300
 _POINTER = 2  # bytes of variables: what is done while an input is missing, and the glove, where rows are found first
-# Return addresses of update(), of what it calls about a change and of what that calls; a row's number in between.
-_CALLS_DEEP = 3
+# Return addresses of update() and of what it calls about a change; then either registers that finding a row borrows, or
+# a row's number and the return address of what adds the row.
+_CALLS_DEEP = 2
 
 
 Frame = tuple[NDArray[np.bool_], NDArray[np.uint16]]
@@ -350,7 +352,8 @@ class AvrCosts:
     @property
     def ram(self) -> int:
         """Bytes of a glove, of variables and of the deepest stack, return address included."""
-        stack = _CALLS_DEEP * self._counter + len(kept_registers(self._layout)) + 1
+        deepest = max(len(borrowed_registers(self._layout)), 1 + self._counter)
+        stack = len(kept_registers(self._layout)) + _CALLS_DEEP * self._counter + deepest
         variables = _POINTER * (1 + finds_first(self._layout)) + found_size(self._layout)
         return glove_size(self._layout) + variables + stack
 

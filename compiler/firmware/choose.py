@@ -58,7 +58,8 @@ def choose(
     flash: int | None = None,
     entry_bits: int | None = None,
 ) -> Choice:
-    """Return the fastest layout of `tables` that takes at most `flash` bytes, of equally fast ones the smallest.
+    """Return the layout of `tables` whose classify() is the fastest in at most `flash` bytes, of equally fast ones the
+    smallest. Every layout has the same scores, however wide its entries are.
 
     ports say how the switches come, as in `arrange`.
 

@@ -1,8 +1,9 @@
 """What a classifier costs: in portable C, which adds words of two sums, by a model that is rough but not too low.
 
 The model is fitted to what qemu counts of code by arm-none-eabi-gcc 12 with -O2, for 3 to 30 classes and 2 to 33
-look-ups, from the bytes of ports: 1 to 37 % above on an M0+ and on an M4; with two look-ups more. Entries of 8 bits
-that are added up in 16 take longer there than those of 16 bits, for they must be taken apart before they are added.
+look-ups, from the bytes of ports: 1 to 62 % above on an M0+, 1 to 42 % on an M4, most where classes or look-ups are
+few. In classify(), entries of 8 bits that are added up in 16 are faster than those of 16 bits where many rows fit in a
+batch, and slower where few do; in update() they are always slower, for each row is taken apart by itself.
 Other compilers and cores differ.
 """
 
@@ -58,18 +59,18 @@ class Core:
     replaced_halves: int
     product: int = 2
     moved: int = 6
-    compared: int = 4
+    compared: int = 2
 
 
 CORTEX_M4 = Core(
-    fixed=40,
+    fixed=30,
     a_class=6,
     in_parts=9,
     lookup=0,
     found=5,
-    part=0,
+    part=1,
     pair=2,
-    quad=2,
+    quad=3,
     replaced_pair=8,
     replaced_quad=21,
     replaced_halves=0,
@@ -82,7 +83,7 @@ _BIASED_CLASS = 3
 _REPLACING, _REPLACING_PART = 10, 32  # of a row in update(), but for its words; more for each part but the first
 # More than for a code that is looked up directly: a byte clamped below and above, where it can lie there; a code of 16
 # bits clamped; a code searched, and each step of the search.
-_BELOW, _ABOVE, _WIDE = 5, 4, 10
+_BELOW, _ABOVE, _WIDE = 4, 2, 8
 _SEARCHED, _SEARCH_STEP = 16, 11
 # The distance of a code, looked up or not; in each part all but the products; and of each word of sums, at the end and
 # where entries are upper halves. In update(), the change of a distance; and of it in each part all but the words.

@@ -24,7 +24,7 @@ MEMBER = Bare(
     ram=16 << 10,
     clock_hz=108_000_000,
     kind="riscv",
-    core=replace(CORTEX_M4, fixed=65, quad=4),
+    core=replace(CORTEX_M4, fixed=40, in_parts=7, part=2, quad=4),
     compiler=RISCV_COMPILER,
     size=(("riscv64-unknown-elf-size",), "binutils-riscv64-unknown-elf"),
     flags=("-march=rv32imac", "-mabi=ilp32", "-misa-spec=2.2", "-O2", "-ffreestanding"),

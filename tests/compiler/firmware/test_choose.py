@@ -10,7 +10,9 @@ from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.choose import Choice, Option, choose, flash_shares, frontier
 from thenar.compiler.firmware.costs import Cost
 from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.probes import extreme_frames, joined, random_frames
 from thenar.compiler.firmware.targets import TARGETS, Target
+from thenar.compiler.tables.quantise import integer_scores
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -105,15 +107,52 @@ def test_narrow_entries_are_chosen_where_the_tables_allow_them_and_they_are_allo
         choose(wide_tables, SMALL, entry_bits=8)
 
 
-@pytest.mark.parametrize("part", ["cortex-m0plus", "cortex-m4", "host"])
-def test_where_narrow_entries_are_slower_they_are_chosen_for_flash_alone(tables: IntegerTables, part: str) -> None:
-    target = TARGETS[part]
-    wide, narrow = (target.cost(arrange(tables, entry_bits=bits)) for bits in (16, 8))
-    assert wide.cycles < narrow.cycles
-    assert wide.flash > narrow.flash
+# Parts whose compilers make the portable C, which adds words of 16-bit sums.
+IN_WORDS = pytest.mark.parametrize("part", ["cortex-m0plus", "cortex-m4", "rv32imac", "host"])
+
+
+@IN_WORDS
+def test_narrow_entries_are_chosen_where_many_rows_are_added_before_they_are_taken_apart(
+    tables: IntegerTables, part: str
+) -> None:
+    """Four 8-bit entries share a word; what update() replaces is taken apart row by row, but classify() decides."""
+    target, (wide, narrow) = TARGETS[part], (arrange(tables, entry_bits=bits) for bits in (16, 8))
+    assert narrow.sum_bits == 16
+    assert len(narrow.batches) < len(narrow.lookups) / 4
+    slower, faster = target.cost(wide), target.cost(narrow)
+    assert faster.cycles < slower.cycles
+    assert faster.flash < slower.flash
+    assert faster.update_cycles > slower.update_cycles
+    assert choose(tables, target).layout.entry_bits == 8
+
+
+@IN_WORDS
+def test_where_few_rows_fill_a_byte_narrow_entries_are_slower_and_chosen_for_flash_alone(
+    make_tables: MakeTables, part: str
+) -> None:
+    tables, target = make_tables(1, classes=14, switches=33, joints=16, bins=16, reach=40), TARGETS[part]
+    wide, narrow = (arrange(tables, group_size=3, entry_bits=bits) for bits in (16, 8))
+    assert len(narrow.batches) > len(narrow.lookups) / 4
+    faster, slower = target.cost(wide), target.cost(narrow)
+    assert faster.cycles < slower.cycles
+    assert faster.flash > slower.flash
     found = choose(tables, target)
     assert found.layout.entry_bits == 16
     assert choose(tables, target, flash=found.frontier[-1][1].flash).layout.entry_bits == 8
+
+
+@pytest.mark.parametrize("part", list(TARGETS))
+def test_scores_are_the_proved_ones_however_wide_the_entries_chosen_are(
+    tables: IntegerTables, wide_tables: IntegerTables, part: str
+) -> None:
+    """Rows of a build that was compiled with 16 table bits may fit in bytes, and are exact there too."""
+    for each, width in ((tables, 8), (wide_tables, 16)):
+        layout = choose(each, TARGETS[part], flash=min(TARGETS[part].flash, 64 << 10)).layout
+        assert layout.entry_bits == width
+        frames = joined(extreme_frames(each), random_frames(each, 200, 1))
+        scores = integer_scores(each, frames.bits, frames.codes)
+        assert np.abs(scores).max() > 127
+        assert np.array_equal(layout.scores(frames.bits, frames.codes), scores)
 
 
 def test_builds_of_both_widths_share_a_frontier(
