@@ -153,7 +153,8 @@ class Model(ScannerBoard):
     def __init__(self, config: BoardConfig, clock_us: int) -> None:
         how = asdict(config)
         press_us, release_us, _ = (how.pop(name) for name in ("press_us", "release_us", "fastest_us"))
-        super().__init__(**how, clock_us=clock_us)
+        bits = how.pop("code_bits")
+        super().__init__(**how, bits=bits, clock_us=clock_us)
         self.debounce = SetDebounce(press_us, release_us)
         self.full = False
         self.beaten = self.untold = False
