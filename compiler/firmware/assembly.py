@@ -70,7 +70,7 @@ def finds_first(layout: Layout) -> bool:
     """Return whether classify() finds all rows before it adds any: where classes are added up in parts, or where their
     sums leave no registers to find rows with.
     """
-    return len(layout.parts.firsts) > 1 or bool(_pairs(layout) & _spare(layout))
+    return len(layout.parts.firsts) > 1 or bool(_pairs(layout) & spare_registers(layout))
 
 
 def compared_bytes(layout: Layout, lookup: Lookup) -> list[int]:
@@ -207,7 +207,7 @@ def group_lines(fields: Sequence[Field]) -> list[str]:
     return lines
 
 
-def _spare(layout: Layout) -> set[int]:
+def spare_registers(layout: Layout) -> set[int]:
     """Return the registers that are needed to find rows; of pairs the lower."""
     beyond = max(layout.frame_size - 1, layout.frame_size + _n_found(layout) - 1)
     return {_POINTER, *(_WIDE if layout.code_bits == 16 else ()), *(_FAR if far(beyond) else ())}
@@ -217,7 +217,7 @@ def _registers(layout: Layout) -> list[int]:
     """Return the registers of the sums of a pass; of pairs the lower. Those that finding rows needs are the last to be
     taken.
     """
-    spare = _spare(layout)
+    spare = spare_registers(layout)
     pairs = sorted((*_FREE, *_KEPT), key=lambda low: (low == _POINTER, low in spare))
     found = pairs if layout.sum_bits == 16 else [low + half for low in pairs for half in (0, 1)]
     return sorted(found[: layout.parts.width])
@@ -230,7 +230,7 @@ def _pairs(layout: Layout) -> set[int]:
 
 def _borrowed(layout: Layout) -> list[int]:
     """Return the pairs besides Y that update() must save whenever it finds a row."""
-    return sorted(_pairs(layout) & _spare(layout) - {_POINTER})
+    return sorted(_pairs(layout) & spare_registers(layout) - {_POINTER})
 
 
 def borrowed_registers(layout: Layout) -> list[int]:

@@ -28,6 +28,7 @@ from .assembly import (
     found_size,
     glove_size,
     kept_registers,
+    spare_registers,
 )
 from .costs import NAME_BYTES, Cost
 from .layout import Field, JointLayout, Layout, Lookup
@@ -304,6 +305,10 @@ class AvrCosts:
         self._near = calls_are_near(layout)
         kind = layout.entry_bits, layout.sum_bits, layout.entry_shift, layout.code_bits, layout.adding
         self._of_all = (layout.tables.n_classes, layout.tables.relative, layout.tables.slopes, *kind)
+        if spare_registers(layout) != spare_registers(replace(layout, lookups=layout.lookups[:1])):
+            # With so many look-ups that X is needed as well, each takes more than it takes alone.
+            self._counts = self._count(*layout.lookups)
+            return
         ordered = sorted(layout.lookups, key=lambda lookup: not lookup.joints)
         self._counts, rest = self._count(*ordered[:1]), ordered[1:]
         kinds = {bool(lookup.joints): lookup for lookup in layout.lookups}

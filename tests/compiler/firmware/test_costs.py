@@ -26,7 +26,8 @@ Tool = Callable[[str], str]
 
 AVRS = ("avr328p", "avr2560")
 # Classes, switches, joints and highest threshold: one pass and several, no joint, no switch, codes of 16 bits alone and
-# where sums take all registers, more look-ups than rcall reaches across, members of the input beyond the reach of ldd.
+# where sums take all registers, more look-ups than rcall reaches across, members of the input,
+# and of what is found, beyond the reach of ldd.
 SHAPES = [
     (14, 13, 3, 200),
     (5, 9, 2, 254),
@@ -37,6 +38,7 @@ SHAPES = [
     (3, 330, 20, 254),
     (4, 12, 2, 900),
     (14, 12, 2, 900),
+    (14, 60, 16, 900),
 ]
 WAYS: list[tuple[Bins, Adding, int]] = [
     ("direct", "called", 16),

@@ -107,6 +107,8 @@ uint8_t thenar_hand_classify(thenar_hand *glove);
 uint8_t thenar_hand_update(thenar_hand *glove);
 void thenar_hand_set_switch(thenar_hand *glove, thenar_hand_switch number, bool closed);
 const char *thenar_hand_grasp(thenar_hand_class grasp);
+uint16_t thenar_hand_margin(const thenar_hand *glove);
+uint16_t thenar_hand_probability(const thenar_hand *glove, thenar_hand_class grasp);
 """
 STATE = """
 #include "thenar_hand.h"
@@ -116,6 +118,11 @@ void thenar_hand_set_switch(thenar_hand *glove, thenar_hand_switch number, bool 
     if (number == 1 && closed) glove->scores[2]++;
 }
 const char *thenar_hand_grasp(thenar_hand_class grasp) { return grasp == 4 ? "last" : ""; }
+uint16_t thenar_hand_margin(const thenar_hand *glove) { return glove->input.codes[0]; }
+uint16_t thenar_hand_probability(const thenar_hand *glove, thenar_hand_class grasp)
+{
+    return (uint16_t)(glove->input.codes[0] + grasp);
+}
 """
 UPDATE = "uint8_t thenar_hand_update(thenar_hand *glove) { return thenar_hand_classify(glove); }\n"
 
