@@ -523,7 +523,8 @@ def test_once_the_state_came_the_next_loss_is_asked_about_without_waiting(
                 assert monotonic() < end, scanner.counts
                 scanner.read(0.01)
             board.say(Heartbeat(0, closed, KEYS))
-            until(scanner, lambda reading, closed=closed: reading.known and reading.closed == closed)
+            while (reading := until(scanner, lambda reading: bool(reading.known))).closed != closed:
+                assert monotonic() < end, reading
 
 
 def test_an_event_out_of_range_is_a_misfit_and_the_state_is_asked_for(line: PtyLine) -> None:

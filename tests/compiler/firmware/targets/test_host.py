@@ -125,7 +125,9 @@ def test_update_is_called_for_every_frame_and_then_switches_are_set_one_by_one(m
     assert full.classes.tolist() == [3, 3, 3]
     assert full.scores[:, :3].tolist() == [[1, 0, 0], [2, 0, 0], [3, 0, 0]]
     assert full.names == ("", "", "", "", "last")
+    assert full.margins is not None
     assert full.margins.tolist() == [8, 9, 10]
+    assert full.shares is not None
     assert full.shares.tolist() == [0, 100, 200]
     updated = HOST.run(STAND_IN, "hand", layout, frames, incremental=True)
     assert updated.classes.tolist() == [4, 4, 4]
