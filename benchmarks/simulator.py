@@ -3,7 +3,7 @@
     python benchmarks/simulator.py [SCENE] [--repetitions N] [--no-memory]
 
 The hands are told the same by both: the scene's own effects vary posture, object and grip. A grasp's ON set are the
-switches that bear more than the scene's threshold. Prints the tables of docs/contact-models.md.
+switches that bear more than the scene's threshold. Prints the tables of docs/explanation/simulator.md.
 """
 
 import argparse

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
 _BOARD = "board"
 # What a point of a frontier says.
 _SETTLED = ("preset", "prune", "inputs", "table_bits", "method", "keep", "width", "trainer")
-# Chosen by measurement: docs/commands.md shows what each brings. None sets both --keep and --prune.
+# Chosen by measurement: docs/reference/commands.md shows what each brings. None sets both --keep and --prune.
 PRESETS: dict[str, dict[str, str]] = {
     "smallest": {"method": "elimination", "keep": "8", "max-bins": "8", "table-bits": "8"},
     "fastest": {"method": "elimination", "keep": "16", "inputs": "switches", "table-bits": "8"},

@@ -90,7 +90,7 @@ class Members(Mapping[str, M], Generic[M]):
             said = f"cannot be loaded: {shortened(str(error))}; mend or uninstall it"
             raise MemberError(f"{self._where(point)} {said}") from error
         if not isinstance(member, self.shape):
-            said = f"is no {self.shape.__name__}: docs/extending.md says what one defines"
+            said = f"is no {self.shape.__name__}: docs/how-to/extend.md says what one defines"
             raise MemberError(f"{self._where(point)} {said}")
         return member
 

@@ -84,7 +84,7 @@ def _arff(X: NDArray[np.int64], labels: NDArray[np.intp], n_classes: int) -> str
     return "\n".join([*lines, ""])
 
 
-# Distributions further apart than this have parted: what docs/weka-parity.md calls agreement.
+# Distributions further apart than this have parted: what docs/project/weka-parity.md calls agreement.
 PARTED = 1e-9
 
 ROUNDS = 100

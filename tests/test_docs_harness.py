@@ -1,4 +1,4 @@
-"""docs/harness.md: its examples are loaded, its keys and defaults are the structs', its times are the arithmetic's."""
+"""docs/reference/harness.md: its examples are loaded, its keys and defaults are the structs', its times are the arithmetic's."""
 
 import re
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ from thenar.runtime.scanning import plan as order
 from thenar.runtime.scanning.timing import port_us, select_us
 from thenar.runtime.taxels import TaxelSettings
 
-PAGE = (Path(__file__).parents[1] / "docs" / "harness.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[1] / "docs" / "reference" / "harness.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 TABLES: dict[str, type[msgspec.Struct]] = {
     "": Harness,

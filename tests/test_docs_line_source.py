@@ -1,4 +1,4 @@
-"""docs/line-source.md: its harnesses are loaded, its lines are rows, its counts are those that health shows."""
+"""docs/how-to/own-board.md: its harnesses are loaded, its lines are rows, its counts are those that health shows."""
 
 import re
 from dataclasses import fields
@@ -10,7 +10,7 @@ from thenar.runtime.sinks.base import SINKS
 from thenar.runtime.sources.base import SOURCES
 from thenar.runtime.sources.rows import _TAXEL_STEPS, JOINT_CODES, RowCounts, RowKind
 
-PAGE = (Path(__file__).parents[1] / "docs" / "line-source.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[1] / "docs" / "how-to" / "own-board.md").read_text(encoding="utf-8")
 
 
 def cells(heading: str) -> list[str]:

@@ -171,7 +171,7 @@ def test_the_home_made_glove_goes_from_its_table_to_firmware_in_at_most_ten_comm
     script = (EXAMPLES / "home_glove.sh").read_text()
     commands = [line for line in script.splitlines() if line.startswith("thenar ")]
     assert len(commands) <= 10
-    page = (EXAMPLES.parent / "docs" / "home-glove.md").read_text()
+    page = (EXAMPLES.parent / "docs" / "tutorials" / "home-glove.md").read_text()
     for command in commands:
         shown = command.replace('"$TABLE"', "table.csv").replace(" --overwrite", "")
         assert f"    {shown}\n" in page

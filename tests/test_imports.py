@@ -1,4 +1,4 @@
-"""Imports run one way between the rooms of the house (docs/architecture.md), read off the sources."""
+"""Imports run one way between the rooms of the house (docs/project/architecture.md), read off the sources."""
 
 import ast
 import sys

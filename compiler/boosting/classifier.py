@@ -169,7 +169,7 @@ class LogitBoostClassifier(AdditiveClassifier):
 
     References
     ----------
-    Friedman, Hastie, Tibshirani, Annals of Statistics 28 (2000), algorithm 6; docs/weka-parity.md.
+    Friedman, Hastie, Tibshirani, Annals of Statistics 28 (2000), algorithm 6; docs/project/weka-parity.md.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """The iCub's recordings, exported, cross-validated by the real Weka: the same rows recognised as by `thenar evaluate`.
 
 At Weka's default of ten rounds. At the paper's hundred these recordings are learned by heart, and there Weka's answers
-hang on rounding (docs/weka-parity.md).
+hang on rounding (docs/project/weka-parity.md).
 """
 
 import re

@@ -37,7 +37,7 @@ MATRIX = (
 CHIP = '[[chip]]\nkind = "mcp23017"\naddress = 0x20\npins = { GPA0 = "a" }\n'
 
 
-PAGE = Path(__file__).parents[3] / "docs" / "board-wiring.md"
+PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "wire-a-board.md"
 
 
 def complaint(text: str) -> str:

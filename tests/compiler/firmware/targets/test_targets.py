@@ -24,7 +24,7 @@ def test_every_target_says_what_it_is_and_what_to_do_with_its_folder(name: str) 
 
 
 def test_the_page_on_firmware_names_every_target() -> None:
-    page = (Path(__file__).parents[4] / "docs" / "firmware.md").read_text()
+    page = (Path(__file__).parents[4] / "docs" / "how-to" / "firmware.md").read_text()
     assert [name for name in TARGETS if f"`{name}`" not in page] == []
 
 
