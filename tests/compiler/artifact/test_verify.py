@@ -161,7 +161,7 @@ def test_codes_that_mean_something_else_are_refused(folder: Path, grasp_set: Gra
         grasp_set.switches, grasp_set.switch_names, grasp_set.codes, joints,
         grasp_set.grasps, grasp_set.taxonomy, grasp_set.subjects, grasp_set.objects, grasp_set.trials,
     )  # fmt: skip
-    with pytest.raises(CompileError, match="joint j1 is coded differently here: code 0 is 10 deg, but 0 deg in the build"):
+    with pytest.raises(CompileError, match="j1 is coded differently here: code 0 is 10 deg, but 0 deg in the build"):
         verify(folder, other)
 
 
