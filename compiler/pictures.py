@@ -23,7 +23,11 @@ PALETTE: Mapping[str, tuple[str, str]] = MappingProxyType(
         **{"paper": ("#ffffff", "#12161b"), "ink": ("#1b1f24", "#e7ebf0"), "soft": ("#57606a", "#a3adb8")},
         **{"line": ("#d0d7de", "#343c46"), "pale": ("#f5f7f9", "#1b2129"), "link": ("#0550ae", "#79b8ff")},
         **{"switches": ("#0072b2", "#6cb0ff"), "joints": ("#009e73", "#4cc38a"), "both": ("#d55e00", "#ff9d5c")},
-        **{"rival-1": ("#a86f00", "#e0b04c"), "rival-2": ("#a3457c", "#ec9bc6"), "rival-3": ("#6b6b6b", "#a9a9a9")},
+        **{
+            "baseline-1": ("#a86f00", "#e0b04c"),
+            "baseline-2": ("#a3457c", "#ec9bc6"),
+            "baseline-3": ("#6b6b6b", "#a9a9a9"),
+        },
         **{"picked": ("#d1242f", "#ff6b74"), "hit": ("#1f5fa8", "#4b93dd"), "miss": ("#c2410c", "#e8743b")},
         **{"leaf": ("#cfe6d4", "#23482f"), "decision": ("#d3e0f2", "#24405f")},
         **{"skin": ("#f9f1e9", "#2a2622"), "side": ("#eee3d8", "#221f1c"), "outline": ("#57493e", "#b8a594")},

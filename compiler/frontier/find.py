@@ -133,7 +133,7 @@ def find_frontier(
     target : str
         What classifies, one of `thenar.compiler.frontier.targets.TARGETS`.
     search : Search, optional
-        How much is tried. Rivals that are not installed are left out.
+        How much is tried. Baselines that are not installed are left out.
     wanted : Wanted, optional
         Which point to pick.
     build : Path, optional
@@ -255,11 +255,11 @@ def _wirings(grasp_set: GraspSet, harness: Harness | None, target: str) -> tuple
 
 
 def _installed(search: Search) -> tuple[Search, tuple[str, ...]]:
-    """Return the search without rivals that are not installed, and a sentence on each of these."""
-    missing = [name for name in search.rivals if not METHODS[name].installed]
-    there = tuple(name for name in search.rivals if name not in missing)
+    """Return the search without baselines that are not installed, and a sentence on each of these."""
+    missing = [name for name in search.baselines if not METHODS[name].installed]
+    there = tuple(name for name in search.baselines if name not in missing)
     said = (f"{name} was left out: it needs {METHODS[name].install}, which is not installed" for name in missing)
-    return replace(search, rivals=there), tuple(said)
+    return replace(search, baselines=there), tuple(said)
 
 
 @contextmanager
@@ -323,7 +323,7 @@ def foreseen(survey: Survey) -> dict[str, float]:
     several = {name: len(sizes) * (wired if METHODS[name].uses_joints else min(wired, 1)) for name in search.methods}
     methods = [name for name, count in several.items() for _ in range(count)]
     choices = sum(len(ways(name, size)) for name in search.methods for size in sizes) * wired + ("joints" in kinds)
-    rivals = sum(len(curve_ways(name, sizes[-1])) for name in search.rivals)
+    baselines = sum(len(curve_ways(name, sizes[-1])) for name in search.baselines)
     trainers = [search.alone(name) for name in search.trainers]
     last, again = min(search.finalists + _MARKED, choices), min(_WIDER * search.finalists, choices)
     few = papers_depth(search)
@@ -338,11 +338,11 @@ def foreseen(survey: Survey) -> dict[str, float]:
 
     return {
         "placements": sum(path_s(name, n) for name in methods for n in (rows, *train)),
-        "rivals": sum(path_s(name, n) for name in search.rivals for n in train) if wired else 0.0,
+        "baselines": sum(path_s(name, n) for name in search.baselines for n in train) if wired else 0.0,
         "settings": settling(trainers[:1], (rows, *train)),
         f"settings{OTHER_TRAINERS}": settling(trainers[1:], (rows, *train)),
         "finalists' settings": settling(trainers, more),
-        "screening": (_DIFFERENT * choices + rivals) * screening(trainers[:1]),
+        "screening": (_DIFFERENT * choices + baselines) * screening(trainers[:1]),
         f"screening{FEWER_JOINTS}": fewer * screening(trainers[:1]),
         f"screening{OTHER_TRAINERS}": again * screening(trainers[1:]),
         "times": _DIFFERENT * choices * QUICK_PRICE_S,

@@ -146,7 +146,7 @@ class _Hysteresis:
         held = decision.update(times[0], standing)
         yield times[0], held
         if held != standing.candidate and self._changes(times[-1], standing):
-            # Rival and support stand still: once the time for a change has come, it has come for good.
+            # The candidate and its support stand still: once the time for a change has come, it has come for good.
             first = bisect_left(times, True, key=lambda time_us: self._changes(time_us, standing))
             yield times[first], decision.update(times[first], standing)
         decision.update(times[-1], standing)

@@ -30,7 +30,7 @@ _COLOURS: dict[Inputs, str] = {inputs: on_paper(inputs) for inputs in ("switches
 _SHAPES: dict[Inputs, str] = {"switches": "o", "joints": "^", "both": "s"}
 _NAMES: dict[Inputs, str] = {"switches": "switches alone", "joints": "joints alone", "both": "switches and joints"}
 # Our curves are blue, as switches alone are everywhere; dashes distinguish what shares a colour.
-_RIVALS = tuple(on_paper(f"rival-{number}") for number in (1, 2, 3))
+_BASELINES = tuple(on_paper(f"baseline-{number}") for number in (1, 2, 3))
 _DASHES: "tuple[Dash, ...]" = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 1.5, 1, 1.5)), (0, (9, 3)))
 # Ids of a point's marker and of the ring around the featured one, in SVG.
 POINT_ID, RING_ID = "point-", "featured"
@@ -265,7 +265,7 @@ def _draw_trainers(labels: Labels, tried: Sequence[tuple[float, Tried]]) -> None
         places = [(x, each.rate.mean) for x, each in tried if each.trainer == name]
         best = front(places, lambda place: place[0], lambda place: place[1])
         xs, ys = [*(x for x, _ in best), labels.axes.get_xlim()[1]], [*(y for _, y in best), best[-1][1]]
-        colour, dash = _RIVALS[number % len(_RIVALS)], _DASHES[1 + number % (len(_DASHES) - 1)]
+        colour, dash = _BASELINES[number % len(_BASELINES)], _DASHES[1 + number % (len(_DASHES) - 1)]
         labels.axes.step(xs, ys, where="post", color=colour, lw=1.1, ls=dash, zorder=2, label=f"{shorten(name)}, tried")
         for (x, y), (after, higher) in pairwise(zip(xs, ys, strict=True)):
             labels.avoid_line((x, after, after), (y, y, higher))
@@ -342,13 +342,13 @@ def _shown(curves: tuple[Curve, ...]) -> list[Rate]:
 
 
 def _draw_curves(labels: Labels, curves: Sequence[Curve]) -> Iterator[Label]:
-    """Draw ours and the rivals' curves, and yield their names, ours first."""
-    ours, rivals = ([curve for curve in curves if curve.ours == wanted] for wanted in (True, False))
+    """Draw ours and the baselines' curves, and yield their names, ours first."""
+    ours, baselines = ([curve for curve in curves if curve.ours == wanted] for wanted in (True, False))
     for number, curve in enumerate(ours):
         yield from _draw_curve(labels, curve, _COLOURS["switches"], _DASHES[number % len(_DASHES)])
-    for number, curve in enumerate(rivals):
-        turn, colour = divmod(number, len(_RIVALS))
-        yield from _draw_curve(labels, curve, _RIVALS[colour], _DASHES[turn % len(_DASHES)])
+    for number, curve in enumerate(baselines):
+        turn, colour = divmod(number, len(_BASELINES))
+        yield from _draw_curve(labels, curve, _BASELINES[colour], _DASHES[turn % len(_DASHES)])
 
 
 def _draw_curve(labels: Labels, curve: Curve, colour: str, dash: "Dash") -> Iterator[Label]:

@@ -152,7 +152,7 @@ class Tried(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True)
 
 
 class Curve(Struct, frozen=True, forbid_unknown_fields=True):
-    """Recognition against the number of switches, switches alone: one method; `ours` or a rival."""
+    """Recognition against the number of switches, switches alone: one method; `ours` or a baseline."""
 
     method: str
     what: str

@@ -34,7 +34,7 @@ class Screened:
 
 def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     """Return how well and how fast every choice is that may be built, with the first trainer; and everybody's curves,
-    rivals' included.
+    baselines' included.
     """
     search, cuts, sizes = survey.search, survey.cuts, {most: len(survey.elements(most)) for most in survey.levels}
     inputs, first = available_inputs(sizes[survey.levels[-1]], survey.n_joints), search.trainers[0]
@@ -44,17 +44,17 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
         for kind in inputs
         for way, most in (every if kind != "joints" else ((NO_SWITCHES, None),))
     ]
-    rivals = [
+    baselines = [
         Candidate(way, "switches", first, levels=survey.levels[-1])
-        for name in search.rivals
+        for name in search.baselines
         for way in curve_ways(name, sizes[survey.levels[-1]])
     ]
     survey.choose("placements", choices, (cuts.everything, *cuts.screening))
     # A placement that keeps nothing is none.
     choices = [one for one in choices if one.way == NO_SWITCHES or survey.columns(one, cuts.everything)]
-    survey.choose("rivals", rivals, cuts.screening)
-    rates = _rates(survey, "", choices, rivals)
-    names = dict.fromkeys([*search.methods, *search.rivals])
+    survey.choose("baselines", baselines, cuts.screening)
+    rates = _rates(survey, "", choices, baselines)
+    names = dict.fromkeys([*search.methods, *search.baselines])
     curves = tuple(_curve(survey, name, rates) for name in names if "switches" in inputs)
     return _screened(survey, "", choices, rates), curves
 
@@ -75,10 +75,10 @@ def screen_others(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, 
 
 
 def _rates(
-    survey: Survey, stage: str, choices: Sequence[Candidate], rivals: Sequence[Candidate] = ()
+    survey: Survey, stage: str, choices: Sequence[Candidate], baselines: Sequence[Candidate] = ()
 ) -> dict[Candidate, Judged]:
-    """Return the rates of choices and rivals; the rivals, which choose from no more than the folds, settle nothing."""
-    search, cuts, every = survey.search, survey.cuts, [*choices, *rivals]
+    """Return the rates of choices and baselines; baselines choose within the folds only and settle nothing."""
+    search, cuts, every = survey.search, survey.cuts, [*choices, *baselines]
     survey.settle(f"settings{stage}", survey.typical(choices), (cuts.everything, *cuts.screening))
     rounds = {name: search.alone(name).screened for name in search.trainers}
     fits = survey.fit(f"screening{stage}", every, cuts.screening, lambda one: ((rounds[one.trainer],), ()))

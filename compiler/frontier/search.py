@@ -11,11 +11,11 @@ from ..placement.methods.base import METHODS, usual
 from ..trainers.base import TRAINERS, Number, Training, changed
 from .points import FrontierError, Way
 
-# Rivals are only seen beside ours: a few sizes show their curves.
+# Baselines are only seen beside ours: a few sizes show their curves.
 CURVE_SIZES = (4, 8, 16, 33, 66)
 # The placement of inputs without switches.
 NO_SWITCHES = Way("none", 0.0)
-USUAL_RIVALS = ("rfe", "forest", "mrmr", "mutual-information", "random", "sspoc", "qr")
+USUAL_BASELINES = ("rfe", "forest", "mrmr", "mutual-information", "random", "sspoc", "qr")
 ROUNDS = (1, 2, 3, 5, 8, 12, 20, 30, 50, 75, 100, 150, 200, 300)
 
 
@@ -75,7 +75,7 @@ class Search:
     ----------
     methods : tuple of str
         Placement methods that points are built from.
-    rivals : tuple of str
+    baselines : tuple of str
         Placement methods of which only curves are seen beside those.
     folds, repeats, seed : int
         The stratified folds are cut `repeats` times, with seeds seed, seed + 1, ...
@@ -104,7 +104,7 @@ class Search:
     """
 
     methods: tuple[str, ...] = field(default_factory=lambda: usual(ours=True))
-    rivals: tuple[str, ...] = field(default_factory=lambda: usual(ours=False))
+    baselines: tuple[str, ...] = field(default_factory=lambda: usual(ours=False))
     folds: int = 4
     repeats: int = 3
     seed: int = 1
@@ -116,7 +116,7 @@ class Search:
     settings: Mapping[str, Number] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
-        for name in (*self.methods, *self.rivals):
+        for name in (*self.methods, *self.baselines):
             METHODS.named(name)
         if min(self.repeats, self.screening, self.rounds, self.finalists) < 1 or not self.methods:
             raise FrontierError("a frontier needs a method, a repeat, a round and a finalist at least")
@@ -182,7 +182,7 @@ def ways(method: str, n_switches: int) -> tuple[Way, ...]:
 
 
 def curve_ways(method: str, n_switches: int) -> tuple[Way, ...]:
-    """Return the placements of a rival that its curve goes through."""
+    """Return the placements of a baseline that its curve goes through."""
     return tuple(Way(method, float(size)) for size in CURVE_SIZES if size <= n_switches)
 
 

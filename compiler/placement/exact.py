@@ -49,14 +49,14 @@ def first_best(plus: Counts, minus: Counts, costs: Counts | None = None) -> int:
     parts = (np.where(part > 1, part, 0) for part in (plus, minus))
     terms = np.concatenate([np.sort(part, axis=1) for part in parts], axis=1)
     prices = [1] * len(terms) if costs is None else costs.tolist()
-    best, rivals = 0, np.arange(len(terms))
+    best, others = 0, np.arange(len(terms))
     while True:
-        rivals = rivals[(terms[rivals] != terms[rivals[0]]).any(axis=1)]
-        if not len(rivals):
+        others = others[(terms[others] != terms[others[0]]).any(axis=1)]
+        if not len(others):
             return best
-        rival = int(rivals[0])
-        if compare(plus[rival], minus[rival], plus[best], minus[best], prices[best], prices[rival]) > 0:
-            best = rival
+        other = int(others[0])
+        if compare(plus[other], minus[other], plus[best], minus[best], prices[best], prices[other]) > 0:
+            best = other
 
 
 def compare(

@@ -37,7 +37,7 @@ _CAPTIONS = {
         "alone are not on it."
     ),
     "switches": (
-        "Recognition rate against the number of switches. Curves are of switches alone: ours are blue, the rivals' are "
+        "Recognition rate against the number of switches. Curves are of switches alone: ours are blue, baselines' are "
         "thin. Points without switches are not on it."
     ),
     "latency": (
@@ -257,7 +257,7 @@ def _points(frontier: Frontier) -> PlainTable:
 
 
 def _tables(frontier: Frontier) -> Iterator[PlainTable]:
-    """Yield what to compare with, the rivals, what was screened and how far models are off, where there are any."""
+    """Yield what to compare with, the baselines, what was screened and how far models are off, where there are any."""
     kept = elements_of(frontier).capitalize()
     if frontier.marks:
         marks = tuple(

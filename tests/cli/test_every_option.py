@@ -35,7 +35,7 @@ LINES: dict[str, tuple[str, str]] = {
     "segment": ("movements.grasps", "-b build -o new.csv"),
     "frontier": (
         "set.grasps",
-        "-o new --methods elimination --rivals none --rounds 2 --repeats 1 --finalists 1 --jobs 1",
+        "-o new --methods elimination --baselines none --rounds 2 --repeats 1 --finalists 1 --jobs 1",
     ),
     "compile": ("set.grasps", "-o new --rounds 2 --folds 0 --no-report"),
     "verify": ("build set.grasps", ""),

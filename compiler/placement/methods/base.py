@@ -45,7 +45,7 @@ class Method:
         What the chooser takes: how many switches to keep at most, or the paper's S, the number of rows below which a
         node of a tree decides nothing.
     ours : bool
-        Whether it is the paper's or thenar's own; the others are rivals, shown for comparison.
+        Whether it is the paper's or thenar's own; the others are baselines, shown for comparison.
     uses_joints : bool
         Whether the choice depends on the joints' codes, where there are any.
     uses_ports : bool
@@ -143,7 +143,7 @@ METHODS: Members[Method] = Members("placement method", Method, "thenar.compiler.
 
 
 def usual(*, ours: bool, wired: bool = False) -> tuple[str, ...]:
-    """Return the methods, ours or the rivals, that a frontier tries without being asked to."""
+    """Return the methods, ours or the baselines, that a frontier tries without being asked to."""
     when = ("always", "wired" if wired else "unwired")
     return tuple(name for name, method in METHODS.items() if method.ours == ours and method.tried in when)
 

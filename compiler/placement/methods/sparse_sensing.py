@@ -1,4 +1,4 @@
-"""Rivals from PySensors: sparse sensors for classification (SSPOC), and for reconstruction by pivoted QR."""
+"""Baselines from PySensors: sparse sensors for classification (SSPOC), and for reconstruction by pivoted QR."""
 
 from typing import Any
 

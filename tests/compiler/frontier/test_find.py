@@ -45,7 +45,7 @@ def asked(folder: Path, grasp_set: GraspSet, **changes: Any) -> Request:
     """Return arguments of find_frontier; `changes` are of its search or of itself."""
     search: dict[str, Any] = {
         "methods": ("elimination", "id3"),
-        "rivals": ("mrmr",),
+        "baselines": ("mrmr",),
         "rounds": 6,
         "trainer": "logitboost",
     }
@@ -143,7 +143,7 @@ def rows_recognised(grasp_set: GraspSet, point: Point, train: Rows, test: Rows) 
 def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_path: Path, make_set: Make) -> None:
     """Stratified folds, and each subject from the others; all of it done here once more, one by one."""
     grasp_set = make_set(subjects=3)
-    found = found_of(asked(tmp_path, grasp_set, repeats=2, rivals=()))
+    found = found_of(asked(tmp_path, grasp_set, repeats=2, baselines=()))
     labels = np.unique(grasp_set.labels, return_inverse=True)[1]
     for point in found.points:
         pooled = [rows_recognised(grasp_set, point, fold.train, fold.test) for fold in weka_folds(labels, 4, 1)]
@@ -160,7 +160,7 @@ def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_pat
 def test_frames_of_a_trial_are_on_one_side_of_every_fold(tmp_path: Path, make_set: Make) -> None:
     """Every row ten times: with copies on both sides of a fold every rate would be 100 %, over 960 units."""
     grasp_set = make_set(subjects=2)
-    request = {"methods": ("id3",), "rivals": (), "by": "trial"}
+    request = {"methods": ("id3",), "baselines": (), "by": "trial"}
     repeated = found_of(asked(tmp_path / "ten", grasp_set.rows(np.repeat(np.arange(96), 10)), **request))
     assert (repeated.rows, repeated.trials, repeated.by) == (960, 96, "pooled")
     assert repeated.points
@@ -201,7 +201,7 @@ def test_running_again_finds_everything_in_the_store(first: tuple[Request, Front
 
 
 def test_a_store_of_the_older_form_is_computed_anew_and_that_is_said(tmp_path: Path, make_set: Make) -> None:
-    request = asked(tmp_path, make_set(), methods=("id3",), rivals=())
+    request = asked(tmp_path, make_set(), methods=("id3",), baselines=())
     first = found_of(request)
     store = request["output"] / "store.jsonl"
     store.write_bytes(OLD_HEADERS[-1] + store.read_bytes().split(b"\n", 1)[1])
@@ -215,7 +215,7 @@ def test_a_store_of_the_older_form_is_computed_anew_and_that_is_said(tmp_path: P
 
 def test_without_a_folder_nothing_is_kept(tmp_path: Path, make_set: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert found_of(asked(tmp_path, make_set(), output=None, methods=("id3",), rivals=())).points
+    assert found_of(asked(tmp_path, make_set(), output=None, methods=("id3",), baselines=())).points
     assert not list(tmp_path.iterdir())
 
 
@@ -278,7 +278,7 @@ def test_a_glove_of_fewer_switches_serves_the_placements_within_it(tmp_path: Pat
 
 def test_what_ports_cost_is_part_of_the_question(tmp_path: Path, make_set: Make) -> None:
     methods = ("id3-cost",)
-    request = asked(tmp_path, make_set(), methods=methods, rivals=())
+    request = asked(tmp_path, make_set(), methods=methods, baselines=())
     names = [f"s{number}" for number in range(14)]
     glove = propose_harness(names[::-1], "pca9555")
     alone = found_of({**request, "output": tmp_path / "alone", "harness": glove})
@@ -291,7 +291,7 @@ def test_what_ports_cost_is_part_of_the_question(tmp_path: Path, make_set: Make)
 
 
 def test_another_stream_is_another_question(tmp_path: Path, make_set: Make) -> None:
-    request = asked(tmp_path, make_set(), methods=("id3",), rivals=())
+    request = asked(tmp_path, make_set(), methods=("id3",), baselines=())
     found_of(request)
     before = keys_in(request["output"] / "store.jsonl")
     found_of({**request, "stream": make_set(seed=7)})
@@ -309,7 +309,7 @@ def test_recordings_that_are_trained_on_are_no_stream(tmp_path: Path, make_set: 
 def test_a_build_is_marked_with_what_it_recognises(tmp_path: Path, make_set: Make) -> None:
     grasp_set = make_set()
     build = compile_build(grasp_set, tmp_path / "mine", rounds=5, folds=4).folder
-    found = found_of(asked(tmp_path, grasp_set, build=build, methods=("id3",), rivals=()))
+    found = found_of(asked(tmp_path, grasp_set, build=build, methods=("id3",), baselines=()))
     assert found.marks[-1].name == "build mine"
 
 
@@ -329,14 +329,14 @@ def test_a_build_of_other_switches_is_refused(tmp_path: Path, make_set: Make) ->
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_an_unknown_rival_is_told(tmp_path: Path, make_set: Make) -> None:
+def test_an_unknown_baseline_is_told(tmp_path: Path, make_set: Make) -> None:
     with pytest.raises(MemberError, match="there is no placement method 'nonsense'"):
-        found_of(asked(tmp_path, make_set(), rivals=("nonsense",)))
+        found_of(asked(tmp_path, make_set(), baselines=("nonsense",)))
 
 
 def test_two_workers_of_a_cluster_find_the_same(tmp_path: Path, make_set: Make) -> None:
     grasp_set = make_set(subjects=2)
-    few = {"methods": ("id3",), "rivals": (), "target": "avr328p"}
+    few = {"methods": ("id3",), "baselines": (), "target": "avr328p"}
     here = found_of(asked(tmp_path / "here", grasp_set, **few))
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0") as cluster:
         there = found_of(asked(tmp_path / "there", grasp_set, **few, cluster=cluster.scheduler_address))
@@ -355,7 +355,7 @@ def _timeless(found: Frontier) -> tuple[object, ...]:
 def test_every_trainer_is_on_one_picture_and_what_compile_makes_of_a_point_is_what_the_point_says(
     tmp_path: Path, make_set: Make
 ) -> None:
-    request = asked(tmp_path, make_set(subjects=2), methods=("id3",), rivals=(), trainer="auto", settings={})
+    request = asked(tmp_path, make_set(subjects=2), methods=("id3",), baselines=(), trainer="auto", settings={})
     found = found_of(request)
     assert set(found.trainers) == {name for name, trainer in TRAINERS.items() if trainer.tried}
     drawn = (tmp_path / "out" / "frontier.svg").read_text()
@@ -383,7 +383,7 @@ def test_every_trainer_is_on_one_picture_and_what_compile_makes_of_a_point_is_wh
 
 def test_a_trainer_may_be_forced(tmp_path: Path, make_set: Make) -> None:
     found = found_of(
-        asked(tmp_path, make_set(), methods=("id3",), rivals=(), trainer="logit", settings={"penalty": 1.0})
+        asked(tmp_path, make_set(), methods=("id3",), baselines=(), trainer="logit", settings={"penalty": 1.0})
     )
     assert found.trainers == ("logit",)
     assert {point.setting.trainer for point in found.points} == {"logit"}
@@ -413,7 +413,7 @@ def test_points_may_read_some_of_the_joints_and_what_is_built_of_them_reads_thes
     tmp_path: Path, make_set: Make
 ) -> None:
     grasp_set = with_sensors(make_set(switches=3, subjects=2), 5)
-    found = found_of(asked(tmp_path, grasp_set, finalists=6, rivals=(), methods=("elimination",)))
+    found = found_of(asked(tmp_path, grasp_set, finalists=6, baselines=(), methods=("elimination",)))
     fewer = [point for point in found.points if point.joints]
     assert fewer
     for point in found.points:

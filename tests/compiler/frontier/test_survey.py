@@ -21,7 +21,7 @@ from thenar.compiler.tables.quantise import quantise
 from thenar.runtime.scores import Scorer
 
 COLUMNS = (3, 0, 7, 9)
-SEARCH = Search(methods=("id3",), rivals=(), repeats=2)
+SEARCH = Search(methods=("id3",), baselines=(), repeats=2)
 
 
 @pytest.fixture(scope="module")
