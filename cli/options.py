@@ -10,7 +10,7 @@ from click.shell_completion import CompletionItem
 
 from thenar.runtime.manifest import AUTO
 
-from .common import Command, ListOf, Number, OneOf, existing_file, parted, warning
+from .common import Command, ListOf, Number, OneOf, comma_separated, existing_file, warning
 
 if TYPE_CHECKING:
     from thenar.compiler.hand import HandShape
@@ -80,7 +80,7 @@ prune_option = click.option(
 
 
 def _names(_: click.Context, __: click.Parameter, text: str | None) -> tuple[str, ...]:
-    return () if text is None else parted(text)
+    return () if text is None else comma_separated(text)
 
 
 def limit_options(command: Command) -> Command:
