@@ -1,4 +1,4 @@
-"""docs/how-to/simulate.md against the structs that decode a scene: every key, every default and every limit is what it says."""
+"""docs/how-to/simulate.md against the structs that decode a scene: every key, default and limit."""
 
 import json
 import re
