@@ -272,7 +272,7 @@ def _point(
     return Point(
         number=number,
         setting=Recipe(
-            way=choice.way,
+            placement=choice.placement,
             inputs=choice.inputs,
             rounds=tabled.rounds if TRAINERS.named(training.trainer).staged else None,
             width=tabled.shape.width,
@@ -290,7 +290,7 @@ def _point(
         rate=corrected(design.judged.rate, luck),
         luck=luck,
         frames=close.frames.get(tabled),
-        beside=close.beside.get(tabled),
+        other_rate=close.other.get(tabled),
         scan=design.scan,
         transfer=design.transfer,
         classify=design.classify,

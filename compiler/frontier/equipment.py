@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from .cache import Cache, stored
 from .timing.classify_times import ClassifyModel
 from .timing.python_times import PythonCost
-from .timing.scan_times import NO_RECORDS, Beside, Records, beside_wire
+from .timing.scan_times import NO_RECORDS, Overhead, Records, overhead_of
 from .timing.wirings import Wiring
 
 # Expected seconds.
@@ -19,7 +19,7 @@ class Equipment:
 
     model: ClassifyModel
     wirings: tuple[Wiring, ...]
-    beside: Beside
+    overhead: Overhead
     records: Records = NO_RECORDS
 
     def fitting(self, names: Sequence[str]) -> tuple[Wiring, ...]:
@@ -28,12 +28,12 @@ class Equipment:
 
 
 @stored(1, where="process")
-def calibrate(target: str) -> tuple[PythonCost | None, Beside]:
+def calibrate(target: str) -> tuple[PythonCost | None, Overhead]:
     """Measure here what classifying takes in Python, where that is asked, and a transaction besides the wire."""
-    return ClassifyModel(target).python, beside_wire(target)
+    return ClassifyModel(target).python, overhead_of(target)
 
 
 def equipment_for(target: str, wirings: tuple[Wiring, ...], cache: Cache, records: Records = NO_RECORDS) -> Equipment:
     """Return what may be built for `target`, measured here once."""
-    ((python, beside),) = cache.ask("calibration", [calibrate.call(_CALIBRATION_S, target)])
-    return Equipment(ClassifyModel(target, python=python), wirings, beside, records)
+    ((python, overhead),) = cache.ask("calibration", [calibrate.call(_CALIBRATION_S, target)])
+    return Equipment(ClassifyModel(target, python=python), wirings, overhead, records)

@@ -38,7 +38,7 @@ class Close:
     stages: dict[int, Rate]
     tables: dict[Tabled, Judged]
     frames: dict[Tabled, Rate]
-    beside: dict[Tabled, Rate]
+    other: dict[Tabled, Rate]
     priced: tuple[PricedTables, ...]
     choosing_s: float
 
@@ -99,7 +99,7 @@ def _errors(one: Screened) -> float:
 
 def _different(screened: Sequence[Screened]) -> list[Screened]:
     return list(
-        {(replace(one.choice, way=NO_SWITCHES), *sorted(one.columns)): one for one in reversed(screened)}.values()
+        {(replace(one.choice, placement=NO_SWITCHES), *sorted(one.columns)): one for one in reversed(screened)}.values()
     )[::-1]
 
 
@@ -199,5 +199,5 @@ def _judged(
         each: cuts.frames({fold: fit.frames[row][column] for fold, fit in fits.items()})
         for each, (row, column) in (places.items() if len(cuts.people) < len(cuts.trials) else ())
     }
-    beside = {} if cuts.beside is None else {each: judged.rate for each, judged in tables(cuts.beside).items()}
-    return stages, tables(cuts.by), frames, beside
+    other = {} if cuts.other is None else {each: judged.rate for each, judged in tables(cuts.other).items()}
+    return stages, tables(cuts.by), frames, other

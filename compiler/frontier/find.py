@@ -38,9 +38,9 @@ from .latency import Pace, latencies
 from .measure import TRIAL_S, measured
 from .moving import Moving
 from .plots import PICTURES, pictures
-from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, Way, frontier_to_bytes
+from .points import SCHEMA, Frontier, FrontierError, Mark, PlacementChoice, Point, Tried, frontier_to_bytes
 from .screen import FEWER_JOINTS, OTHER_TRAINERS, QUICK_PRICE_S, Screened, screen, screen_fewer, screen_others
-from .search import JOINTS, TAXEL_LEVELS, Candidate, Search, available_inputs, curve_ways, ways
+from .search import JOINTS, TAXEL_LEVELS, Candidate, Search, available_inputs, curve_placements, tried_placements
 from .stream import Stream, stream_of
 from .survey import Cuts, Survey, fit_s, path_s, settle_s
 from .timing.scan_times import Records, records_of, scan_times
@@ -322,8 +322,10 @@ def foreseen(survey: Survey) -> dict[str, float]:
     # Once, or for each of the inputs if a method learns from joints.
     several = {name: len(sizes) * (wired if METHODS[name].uses_joints else min(wired, 1)) for name in search.methods}
     methods = [name for name, count in several.items() for _ in range(count)]
-    choices = sum(len(ways(name, size)) for name in search.methods for size in sizes) * wired + ("joints" in kinds)
-    baselines = sum(len(curve_ways(name, sizes[-1])) for name in search.baselines)
+    choices = sum(len(tried_placements(name, size)) for name in search.methods for size in sizes) * wired + (
+        "joints" in kinds
+    )
+    baselines = sum(len(curve_placements(name, sizes[-1])) for name in search.baselines)
     trainers = [search.alone(name) for name in search.trainers]
     last, again = min(search.finalists + _MARKED, choices), min(_WIDER * search.finalists, choices)
     few = papers_depth(search)
@@ -447,7 +449,7 @@ def _tried(screened: Sequence[Screened], closes: Sequence[Close], search: Search
     then = [(close.screened, rounds, rate) for close in closes for rounds, rate in close.stages.items()]
     return tuple(
         Tried(
-            one.choice.way,
+            one.choice.placement,
             one.choice.inputs,
             len(one.columns),
             rounds if searches[one.choice.trainer].staged else None,
@@ -477,10 +479,10 @@ def choices_to_mark(
     """
     if not n_switches:
         return {}
-    marked = {Way(PAPERS, prune): f"paper, S = {prune:g}" for prune in _PAPERS}
+    marked = {PlacementChoice(PAPERS, prune): f"paper, S = {prune:g}" for prune in _PAPERS}
     # Whichever method says so, to keep all of them is the same.
-    marked[Way(BEST, float(n_switches))] = f"all of {n_switches}"
-    alone = {Candidate(way, "switches", trainer, levels=levels): name for way, name in marked.items()}
+    marked[PlacementChoice(BEST, float(n_switches))] = f"all of {n_switches}"
+    alone = {Candidate(choice, "switches", trainer, levels=levels): name for choice, name in marked.items()}
     with_joints = {replace(one, inputs="both"): f"{name}, joints" for one, name in alone.items()}
     return alone | (with_joints if n_joints else {})
 
@@ -520,7 +522,7 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     above_codes = [0 if switch.threshold is None else switch.threshold.code for switch in manifest.switches]
     bits = above(grasp_set.switches, grasp_set.taxels, tuple(map(Element, sources, above_codes)))
     codes = grasp_set.codes[:, _places(joints, [joint.name for joint in grasp_set.joints], folder)]
-    scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.beside).full_us for wiring in fitting]
+    scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.overhead).full_us for wiring in fitting]
     frame_us = max(min(scans, default=0.0), equipment.records.of(len(joints)).us) + options[0].us
     return Mark(
         f"build {folder.name}", len(names), Rate.counted((pooled[0].correct,), pooled[0].total, of="pooled"), frame_us

@@ -60,7 +60,7 @@ def measured(
         cost = LEAST * TRIAL_S if model.part else _CHECK_S
         (checks,) = cache.ask("checks", [run_checks.call(cost, _contents(designs), model, cache.jobs)])
     wire, without = check_wire()
-    said = (lack, model.note, equipment.beside.what, equipment.records.what, without)
+    said = (lack, model.note, equipment.overhead.what, equipment.records.what, without)
     return found, (*checks, *wire), tuple(sentence for sentence in said if sentence)
 
 

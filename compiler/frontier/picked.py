@@ -51,8 +51,8 @@ class Picked:
             settled["rounds"] = setting.rounds
         if setting.inputs == "joints":
             return settled
-        parameter = "keep" if METHODS[setting.way.method].by_number else "prune"
-        return {**settled, "placement": setting.way.method, parameter: int(setting.way.parameter)}
+        parameter = "keep" if METHODS[setting.placement.method].by_number else "prune"
+        return {**settled, "placement": setting.placement.method, parameter: int(setting.placement.parameter)}
 
     def wired(self, given: Harness | None) -> Harness | Callable[[Sequence[str]], Harness] | None:
         """Return the wiring to build for, as `compile_build` takes it: the given one where the point is wired so, else
@@ -128,12 +128,12 @@ def _check(point: Point, grasp_set: GraspSet, what: str) -> None:
     levels = [taxel_and_code(name) or (name, 0) for name in point.switches]
     if not set(grasp_set.element_names).issuperset(name for name, _ in levels):
         raise FrontierError(f"{what} keeps switches that the recordings do not have: run thenar frontier on these")
-    if setting.inputs != "joints" and setting.way.method not in METHODS:
-        raise FrontierError(f"{what} takes a method that is not there: {shortened(repr(setting.way.method))}")
-    least = 1 if setting.inputs != "joints" and METHODS[setting.way.method].by_number else 0
-    if not (setting.way.parameter.is_integer() and setting.way.parameter >= least):
+    if setting.inputs != "joints" and setting.placement.method not in METHODS:
+        raise FrontierError(f"{what} takes a method that is not there: {shortened(repr(setting.placement.method))}")
+    least = 1 if setting.inputs != "joints" and METHODS[setting.placement.method].by_number else 0
+    if not (setting.placement.parameter.is_integer() and setting.placement.parameter >= least):
         raise FrontierError(
-            f"{what} takes {setting.way.parameter} for its method: it is a whole number from {least} on"
+            f"{what} takes {setting.placement.parameter} for its method: it is a whole number from {least} on"
         )
     if setting.trainer not in TRAINERS:
         raise FrontierError(f"{what} takes a trainer that is not there: {shortened(repr(setting.trainer))}")

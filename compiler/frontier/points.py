@@ -46,7 +46,7 @@ class Time(Struct, frozen=True, forbid_unknown_fields=True):
     how: How
 
 
-class Way(Struct, frozen=True, forbid_unknown_fields=True):
+class PlacementChoice(Struct, frozen=True, forbid_unknown_fields=True):
     """How switches are chosen: a name of `METHODS`, and its parameter (S, or a number of switches)."""
 
     method: str
@@ -66,7 +66,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     levels      how many levels of a taxel there were to choose from; None: there are no taxels, or none are read
     """
 
-    way: Way
+    placement: PlacementChoice
     inputs: Inputs
     rounds: Annotated[int, Meta(ge=1, le=10**6)] | None
     width: Annotated[int, Meta(ge=4, le=16)]
@@ -105,7 +105,7 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     rate        of new subjects, or pooled: what the point was chosen by, less its luck
     luck        by how much it looked better, as the best of all that was tried (`evaluation.luck`)
     frames      the same of single frames, as it came out (None: a trial has one frame)
-    beside      the other of the two, as it came out (None: only one subject)
+    other_rate  the other of the two, uncorrected (None: only one subject)
     scan        reading the switches (the mean where it ends early); transfer: the joints (on demand, the mean)
     frame       max(scan, transfer) + classify: the two lie on lines of their own; on demand the sum of all three
     asked       the share of frames in which the joints are read: below 1 on demand
@@ -119,7 +119,7 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     rate: Rate
     luck: Share
     frames: Rate | None
-    beside: Rate | None
+    other_rate: Rate | None
     scan: Time
     transfer: Time
     classify: Time
@@ -140,7 +140,7 @@ class Tried(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True)
     fastest of its wirings; and its trainer, where that is not the paper's.
     """
 
-    way: Way
+    placement: PlacementChoice
     inputs: Inputs
     n_switches: Count
     rounds: Count | None
@@ -184,7 +184,7 @@ class Mark(Struct, frozen=True, forbid_unknown_fields=True):
 class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """All that `thenar frontier` found.
 
-    by       what points are chosen by, and each `rate` is of; a point's `beside` is of the other
+    by       what points are chosen by, and each `rate` is of; a point's `other_rate` is of the other
     n_levels  levels of the n_taxels that there were to choose from, at most; they come on top of the switches
     picked   number of the point that suits the budget or the rate asked for; None where nothing was asked
     skipped  sentences: what could not be measured here, and what was left out
@@ -222,7 +222,7 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return tuple(dict.fromkeys(each.trainer for each in self.tried))
 
     @property
-    def beside(self) -> By | None:
+    def other(self) -> By | None:
         """What the other rate of each point is of."""
         if self.subjects < 2:
             return None
@@ -286,7 +286,7 @@ def _contradictions(frontier: Frontier) -> Iterator[str]:
         yield "does not number its points 1, 2, 3 and so on"
     if frontier.picked is not None and not 1 <= frontier.picked <= len(frontier.points):
         yield f"picked point {frontier.picked}, which it does not have"
-    rates = [rate for point in frontier.points for rate in (point.rate, point.frames, point.beside)]
+    rates = [rate for point in frontier.points for rate in (point.rate, point.frames, point.other_rate)]
     rates += [each.rate for each in frontier.tried] + [mark.rate for mark in frontier.marks]
     rates += [rate for curve in frontier.curves for rate in curve.rates]
     if not all(rate is None or 0 <= rate.low <= rate.mean <= rate.high <= 1 for rate in rates):

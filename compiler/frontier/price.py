@@ -124,6 +124,6 @@ def _wired(
 ) -> tuple[Wired, ...]:
     bits, codes = frames[:, : len(names)].astype(bool), frames[:, len(names) :]
     return tuple(
-        Wired(wiring.name, wiring.clock_hz, scan_times(names, tables, wiring, bits, codes, equipment.beside))
+        Wired(wiring.name, wiring.clock_hz, scan_times(names, tables, wiring, bits, codes, equipment.overhead))
         for wiring in equipment.fitting(names)
     )

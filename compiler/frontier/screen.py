@@ -7,7 +7,7 @@ from ..placement.methods.base import METHODS
 from ..samples import Columns
 from .points import Curve
 from .price import Tabled, price
-from .search import JOINTS, NO_SWITCHES, Candidate, Shape, available_inputs, curve_ways, ways
+from .search import JOINTS, NO_SWITCHES, Candidate, Shape, available_inputs, curve_placements, tried_placements
 from .survey import Judged, Survey
 
 # How long a frame takes hardly depends on how many rounds and rows there were: tables of few tell it.
@@ -38,20 +38,25 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     """
     search, cuts, sizes = survey.search, survey.cuts, {most: len(survey.elements(most)) for most in survey.levels}
     inputs, first = available_inputs(sizes[survey.levels[-1]], survey.n_joints), search.trainers[0]
-    every = [(way, most) for most, size in sizes.items() for name in search.methods for way in ways(name, size)]
+    every = [
+        (choice, most)
+        for most, size in sizes.items()
+        for name in search.methods
+        for choice in tried_placements(name, size)
+    ]
     choices = [
-        Candidate(way, kind, first, levels=most)
+        Candidate(choice, kind, first, levels=most)
         for kind in inputs
-        for way, most in (every if kind != "joints" else ((NO_SWITCHES, None),))
+        for choice, most in (every if kind != "joints" else ((NO_SWITCHES, None),))
     ]
     baselines = [
-        Candidate(way, "switches", first, levels=survey.levels[-1])
+        Candidate(choice, "switches", first, levels=survey.levels[-1])
         for name in search.baselines
-        for way in curve_ways(name, sizes[survey.levels[-1]])
+        for choice in curve_placements(name, sizes[survey.levels[-1]])
     ]
     survey.choose("placements", choices, (cuts.everything, *cuts.screening))
     # A placement that keeps nothing is none.
-    choices = [one for one in choices if one.way == NO_SWITCHES or survey.columns(one, cuts.everything)]
+    choices = [one for one in choices if one.placement == NO_SWITCHES or survey.columns(one, cuts.everything)]
     survey.choose("baselines", baselines, cuts.screening)
     rates = _rates(survey, "", choices, baselines)
     names = dict.fromkeys([*search.methods, *search.baselines])
@@ -98,7 +103,7 @@ def _screened(
     found = []
     for choice, (priced,) in zip(choices, survey.cache.ask(f"times{stage}", calls), strict=True):
         us = priced.fastest_us(survey.transfer(choice).us)
-        if us is not None and (priced.wired or choice.way == NO_SWITCHES):
+        if us is not None and (priced.wired or choice.placement == NO_SWITCHES):
             found.append(Screened(choice, survey.columns(choice, survey.cuts.everything), rates[choice], us))
     return tuple(found)
 
@@ -107,7 +112,7 @@ def _curve(survey: Survey, name: str, rates: dict[Candidate, Judged]) -> Curve:
     """Return a method's rates by the mean number of switches that it kept in the folds, switches alone."""
     folds, points = survey.cuts.screening, {}
     for choice, judged in rates.items():
-        if (choice.way.method, choice.inputs, choice.levels) == (name, "switches", survey.levels[-1]):
+        if (choice.placement.method, choice.inputs, choice.levels) == (name, "switches", survey.levels[-1]):
             points[sum(len(survey.columns(choice, fold)) for fold in folds) / len(folds)] = judged.rate
     sizes = tuple(sorted(points))
     return Curve(name, METHODS[name].help, METHODS[name].ours, sizes, tuple(points[size] for size in sizes))

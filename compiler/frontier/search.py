@@ -9,12 +9,12 @@ from thenar.runtime.manifest import AUTO, PAPERS_TRAINER, Inputs, Options, Table
 from ..placement.elements import LEVELS
 from ..placement.methods.base import METHODS, usual
 from ..trainers.base import TRAINERS, Number, Training, changed
-from .points import FrontierError, Way
+from .points import FrontierError, PlacementChoice
 
 # Baselines are only seen beside ours: a few sizes show their curves.
 CURVE_SIZES = (4, 8, 16, 33, 66)
 # The placement of inputs without switches.
-NO_SWITCHES = Way("none", 0.0)
+NO_SWITCHES = PlacementChoice("none", 0.0)
 USUAL_BASELINES = ("rfe", "forest", "mrmr", "mutual-information", "random", "sspoc", "qr")
 ROUNDS = (1, 2, 3, 5, 8, 12, 20, 30, 50, 75, 100, 150, 200, 300)
 
@@ -45,7 +45,7 @@ class Candidate:
     and how many levels of a taxel there are to choose from (None: no taxel is read); inputs "joints" have NO_SWITCHES.
     """
 
-    way: Way
+    placement: PlacementChoice
     inputs: Inputs
     trainer: str = PAPERS_TRAINER
     keep_joints: int | None = None
@@ -59,12 +59,12 @@ class Candidate:
     @property
     def learns_from_joints(self) -> bool:
         """Whether its switches are chosen by the joints as well."""
-        return self.inputs == "both" and METHODS[self.way.method].uses_joints
+        return self.inputs == "both" and METHODS[self.placement.method].uses_joints
 
     @property
     def chosen_by(self) -> Choosing:
         """The method, whether it looks at the joints, and the levels that it chooses from."""
-        return self.way.method, self.learns_from_joints, self.levels
+        return self.placement.method, self.learns_from_joints, self.levels
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,14 +176,14 @@ class Search:
         return (*(each for each in rounds if each < self.rounds), self.rounds) if self.staged else (1,)
 
 
-def ways(method: str, n_switches: int) -> tuple[Way, ...]:
+def tried_placements(method: str, n_switches: int) -> tuple[PlacementChoice, ...]:
     """Return the placements of a method that are tried among so many switches."""
-    return tuple(Way(method, float(parameter)) for parameter in METHODS[method].ladder(n_switches))
+    return tuple(PlacementChoice(method, float(parameter)) for parameter in METHODS[method].ladder(n_switches))
 
 
-def curve_ways(method: str, n_switches: int) -> tuple[Way, ...]:
+def curve_placements(method: str, n_switches: int) -> tuple[PlacementChoice, ...]:
     """Return the placements of a baseline that its curve goes through."""
-    return tuple(Way(method, float(size)) for size in CURVE_SIZES if size <= n_switches)
+    return tuple(PlacementChoice(method, float(size)) for size in CURVE_SIZES if size <= n_switches)
 
 
 def available_inputs(n_switches: int, n_joints: int) -> tuple[Inputs, ...]:

@@ -88,7 +88,7 @@ class Cuts:
         return (self.subjects,) if by == "new subject" else self.repeats
 
     @property
-    def beside(self) -> By | None:
+    def other(self) -> By | None:
         """The other rate, if there are several subjects."""
         if not self.subjects:
             return None
@@ -212,7 +212,7 @@ class Survey:
         """Return the joints of a choice, ascending, once chosen from the training rows of `fold`."""
         if choice.keep_joints is None or not choice.joints:
             return tuple(range(self.n_joints)) if choice.joints else ()
-        order = self._joints[choice.chosen_by, choice.way.parameter, fold]
+        order = self._joints[choice.chosen_by, choice.placement.parameter, fold]
         return tuple(sorted(order[: choice.keep_joints]))
 
     def some_joints(self, choice: Candidate) -> tuple[str, ...]:
@@ -281,8 +281,8 @@ class Survey:
         """Have the switches and levels of all choices chosen from the training rows of these folds."""
         asked: dict[Choosing, dict[float, None]] = {}
         for choice in choices:
-            if choice.way != NO_SWITCHES:
-                asked.setdefault(choice.chosen_by, {})[choice.way.parameter] = None
+            if choice.placement != NO_SWITCHES:
+                asked.setdefault(choice.chosen_by, {})[choice.placement.parameter] = None
         places = [(key, fold) for key in asked for fold in folds]
         calls = [
             choose_path.call(
@@ -305,7 +305,7 @@ class Survey:
 
     def choose_joints(self, stage: str, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
         """Have the joints ranked beside the switches of those choices that keep only some, by rows of these folds."""
-        alike = {(one.chosen_by, one.way.parameter): one for one in choices if one.keep_joints is not None}
+        alike = {(one.chosen_by, one.placement.parameter): one for one in choices if one.keep_joints is not None}
         places = [(key, fold) for key in alike for fold in folds]
         calls = [
             rank_joints.call(_RANK_S, self.inputs(True, key[0][2], fold), fold.train, self.columns(alike[key], fold))
@@ -316,7 +316,9 @@ class Survey:
 
     def columns(self, choice: Candidate, fold: Fold) -> Columns:
         """Return the switches of a choice, once chosen, from the training rows of `fold`."""
-        return () if choice.way == NO_SWITCHES else self._columns[choice.chosen_by, choice.way.parameter, fold]
+        return (
+            () if choice.placement == NO_SWITCHES else self._columns[choice.chosen_by, choice.placement.parameter, fold]
+        )
 
     def choosing_s(self, choice: Candidate) -> float:
         """Return how long it took to choose the switches of a choice from all rows."""

@@ -19,10 +19,10 @@ COLUMNS = (
         "frames",
         "frames_low",
         "frames_high",
-        "beside_of",
-        "beside",
-        "beside_low",
-        "beside_high",
+        "other_rate_of",
+        "other_rate",
+        "other_rate_low",
+        "other_rate_high",
         "scan_us",
         "scan_how",
         "transfer_us",
@@ -80,7 +80,7 @@ def shorten(name: str) -> str:
 def way_of(setting: Recipe) -> str:
     """Return how switches were chosen: "id3 62", "id3 62, 3 levels"."""
     levels = "" if setting.levels is None else f", {counted(setting.levels, 'level')}"
-    return f"{setting.way.method} {setting.way.parameter:g}{levels}"
+    return f"{setting.placement.method} {setting.placement.parameter:g}{levels}"
 
 
 def training_of(setting: Recipe) -> str:
@@ -173,8 +173,8 @@ def rates_of(frontier: Frontier) -> dict[str, Callable[[Point], Rate | None]]:
     found: dict[str, Callable[[Point], Rate | None]] = {frontier.by: lambda point: point.rate}
     if any(point.frames is not None for point in frontier.points):
         found[f"{frontier.by}, frames"] = lambda point: point.frames
-    if frontier.beside is not None:
-        found[frontier.beside] = lambda point: point.beside
+    if frontier.other is not None:
+        found[frontier.other] = lambda point: point.other_rate
     return found
 
 
@@ -197,7 +197,7 @@ def _mark(mark: Mark, frontier: Frontier) -> str:
 def csv_bytes(frontier: Frontier) -> bytes:
     """Return `frontier.csv`: UTF-8, a line of COLUMNS, perhaps with TRAINER_COLUMNS, and a line for each point.
 
-    Rates are in 0..1, times in microseconds (compile_s: seconds); `frames` and `beside` are empty where there are none.
+    Rates are in 0..1, times in microseconds (compile_s: seconds); `frames` and `other_rate` are empty where there are none.
     `fronts`, `switches` and `settings` are lists in their cell, parted by semicolons; what holds a semicolon or a quote
     is quoted as CSV quotes.
     """
@@ -215,9 +215,9 @@ def csv_bytes(frontier: Frontier) -> bytes:
 def _values(point: Point) -> Iterator[object]:
     setting, latency = point.setting, point.latency
     yield from (point.number, _list(point.fronts), len(point.switches), setting.inputs)
-    yield from (setting.way.method, setting.way.parameter, setting.rounds, setting.width, setting.layout)
+    yield from (setting.placement.method, setting.placement.parameter, setting.rounds, setting.width, setting.layout)
     yield from (setting.wiring, setting.clock_hz, setting.scan, setting.decision)
-    yield from (*_rate(point.rate), point.luck, *_rate(point.frames), *_rate(point.beside))
+    yield from (*_rate(point.rate), point.luck, *_rate(point.frames), *_rate(point.other_rate))
     for time in (point.scan, point.transfer, point.classify, point.frame):
         yield from _time(time)
     yield from (latency.mean_us, latency.p99_us, latency.missed, latency.wrong)

@@ -47,7 +47,7 @@ _BOARD = "avr328p"
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class Overhead:
     """Microseconds beside the wire: of a transaction and of a byte that it reads; of a scan and of a key that it reads.
 
     what  in a sentence, what these are and where they come from
@@ -64,35 +64,35 @@ class Beside:
         return self.call_us + self.byte_us * reading.length
 
 
-WIRE_ONLY = Beside("scans are those of the wire alone")
+WIRE_ONLY = Overhead("scans are those of the wire alone")
 
 
-def beside_wire(target: str) -> Beside:
+def overhead_of(target: str) -> Overhead:
     """Return what reading takes on `target` (a name of `frontier --target`) beside the wire."""
     if target in TARGETS and TARGETS[target].clock_hz is not None:
         if "scan" in TARGETS[target].modes:
-            return firmware_beside(target)
-        return Beside(f"scans on {target} are those of the wire alone: thenar has no scanning firmware for it")
+            return firmware_overhead(target)
+        return Overhead(f"scans on {target} are those of the wire alone: thenar has no scanning firmware for it")
     if target == "pi" and not on_a_pi():
-        return Beside(
+        return Overhead(
             f"a transfer on a Raspberry Pi takes {PI_CALL_US:g} us beside the wire: doubtful, from a kernel trace of a "
             "Pi 3; run thenar frontier on the Pi itself",
             call_us=PI_CALL_US,
         )
     measured = measured_call_us()
-    return Beside(
+    return Overhead(
         f"a transfer takes {measured:.1f} us beside the wire, measured here: the system call, without what the "
         "adapter's driver adds",
         call_us=measured,
     )
 
 
-def firmware_beside(target: str) -> Beside:
+def firmware_overhead(target: str) -> Overhead:
     """Return what thenar's scanning firmware takes on an AVR at its usual clock, while no switch changes."""
     part = TARGETS[target]
     assert part.clock_hz is not None
     us = 1e6 / part.clock_hz
-    return Beside(
+    return Overhead(
         f"scans on {part.named} hold the cycles that thenar's firmware takes beside the wire while no switch changes",
         call_us=_READING * us,
         byte_us=_ANSWER_BYTE * us,
@@ -101,9 +101,9 @@ def firmware_beside(target: str) -> Beside:
     )
 
 
-def board_beside() -> Beside:
+def board_overhead() -> Overhead:
     """Return what a scanner board of thenar's firmware takes before it sends."""
-    return firmware_beside(_BOARD)
+    return firmware_overhead(_BOARD)
 
 
 def on_a_pi() -> bool:
@@ -175,7 +175,7 @@ def scan_times(
     wiring: Wiring,
     bits: NDArray[np.bool_],
     codes: NDArray[np.uint16],
-    beside: Beside = WIRE_ONLY,
+    overhead: Overhead = WIRE_ONLY,
 ) -> ScanTimes:
     """Return what scans of the build's switches `names` take, the build's order, over frames bits (n, s), codes (n, j).
 
@@ -198,19 +198,19 @@ def scan_times(
     board_us = max((*(_board_us(*board) for board in boards), *rows_us), default=0.0)
     ports = [port.elements for port in scan.ports]
     known = Decided(tables, ports, bits, codes)
-    full_us, early_us, early_ports = _bus_us(scan, harness, known, beside) if ports else (0.0, 0.0, 0.0)
+    full_us, early_us, early_ports = _bus_us(scan, harness, known, overhead) if ports else (0.0, 0.0, 0.0)
     alone_us, alone_ports, asked = early_us, early_ports, 1.0
     if tables.n_joints and len(bits):
         unknown = Decided(tables, ports, bits, codes, on_demand=True)
         asked = unknown.undecided((1 << len(ports)) - 1) / len(bits)
         if ports:
-            _, alone_us, alone_ports = _bus_us(scan, harness, unknown, beside)
+            _, alone_us, alone_ports = _bus_us(scan, harness, unknown, overhead)
     return ScanTimes(
         full_us=max(full_us, board_us),
         early_us=max(early_us, board_us),
         ports=len(scan.ports) + len(boards) + len(streams),
         chips=len({(port.bus, port.chip) for port in scan.ports}) + len(boards),
-        how="model" if boards or beside.scan_us else "wire",
+        how="model" if boards or overhead.scan_us else "wire",
         early_ports=early_ports,
         alone_us=max(alone_us, board_us),
         alone_ports=alone_ports,
@@ -222,23 +222,23 @@ def _board_us(board: ScannerWiring, channels: int) -> float:
     """Return what a board takes that is asked for so many of its taxels: their codes come in frames of their own, as
     soon as all are converted.
     """
-    own = board_beside()
+    own = board_overhead()
     keys_us = own.scan_us + own.key_us * len(board.switches) + scanner_us(board)
     if not channels:
         return keys_us
     return max(keys_us, analog_us(channels, board.baud), conversions_us(board, channels))
 
 
-def _bus_us(scan: ScanMap, harness: Harness, frames: Decided, beside: Beside) -> tuple[float, float, float]:
+def _bus_us(scan: ScanMap, harness: Harness, frames: Decided, overhead: Overhead) -> tuple[float, float, float]:
     """Return the time of a whole scan of the chips, and the mean time and number of ports of one that ends early."""
     costs = Costs(scan.ports, harness)
-    always = beside.scan_us + beside.key_us * len(scan.switches)
+    always = overhead.scan_us + overhead.key_us * len(scan.switches)
     whole, weighted, shares, read = [always], [always], list[float](), 0
     for number, port in enumerate(scan.ports):
         # A selection of a channel is a transaction as well.
         wire_ns = costs.after(read, number)
         selected = wire_ns > costs.after(read | 1 << number, number)
-        us = wire_ns / 1000 + beside.reading_us(reading_of(port, harness)) + beside.call_us * selected
+        us = wire_ns / 1000 + overhead.reading_us(reading_of(port, harness)) + overhead.call_us * selected
         # The first port is always read: nothing stops a scan before it.
         share = frames.undecided(read) / len(frames) if read and len(frames) else 1.0
         whole.append(us)

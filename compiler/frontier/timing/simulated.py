@@ -23,7 +23,7 @@ from ...firmware.targets import TARGETS, Target
 from ...firmware.tools import call, workshop
 from ...firmware.words import numbered
 from .python_times import random_tables
-from .scan_times import beside_wire, scan_times
+from .scan_times import overhead_of, scan_times
 from .wirings import Wiring, names_of
 
 _TRIALS = (
@@ -91,7 +91,7 @@ def run_scan(trial: ScanTrial) -> Outcome:
     """Return what a whole scan takes as predicted, and as simulated, in microseconds. Raises FirmwareError."""
     nothing = np.zeros((1, trial.switches), bool), np.zeros((1, 0), np.uint16)
     tables = random_tables(trial.switches, 0, 2)
-    times = scan_times(names_of(trial.switches), tables, trial.wiring, *nothing, beside_wire(trial.target))
+    times = scan_times(names_of(trial.switches), tables, trial.wiring, *nothing, overhead_of(trial.target))
     return Outcome(times.full_us, simulated_scan_us(trial))
 
 
