@@ -121,7 +121,7 @@ class _Pruning:
 
     def steps(self) -> Iterator[tuple[int, Fraction, int]]:
         """Yield each weakest link as it is removed: node, g, number of distinct inputs left."""
-        waiting = [self._key(number) for number, stands in enumerate(self.standing) if stands]
+        waiting = [self._key(number) for number, remaining in enumerate(self.standing) if remaining]
         heapify(waiting)
         while waiting:
             key = heappop(waiting)
