@@ -1,4 +1,4 @@
-"""Screening: every placement at one number of rounds on the folds of one repeat, and in the fastest of its wirings."""
+"""Screening: train every placement once, on the folds of one repeat, and price it in the fastest of its wirings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,10 +10,10 @@ from .price import Tabled, price
 from .search import JOINTS, NO_SWITCHES, Candidate, Shape, available_inputs, curve_placements, tried_placements
 from .survey import Judged, Survey
 
-# How long a frame takes hardly depends on how many rounds and rows there were: tables of few tell it.
+# The frame time hardly depends on the numbers of rounds and rows: tables of few suffice.
 _TABLED = Tabled(12, Shape(16))
 QUICK_PRICE_S = 0.3
-# What stages of trainers but the first are called besides.
+# Suffixes of the stages after the first trainer's.
 OTHER_TRAINERS, FEWER_JOINTS = ", other trainers", ", fewer joints"
 
 
@@ -33,8 +33,8 @@ class Screened:
 
 
 def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
-    """Return how well and how fast every choice is that may be built, with the first trainer; and everybody's curves,
-    baselines' included.
+    """Return the accuracy and frame time of every choice that can be built, with the first trainer; and the curves of
+    all methods, including the baselines.
     """
     search, cuts, sizes = survey.search, survey.cuts, {most: len(survey.elements(most)) for most in survey.levels}
     inputs, first = available_inputs(sizes[survey.levels[-1]], survey.n_joints), search.trainers[0]
@@ -55,7 +55,7 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
         for choice in curve_placements(name, sizes[survey.levels[-1]])
     ]
     survey.choose("placements", choices, (cuts.everything, *cuts.screening))
-    # A placement that keeps nothing is none.
+    # Drop placements that keep nothing.
     choices = [one for one in choices if one.placement == NO_SWITCHES or survey.columns(one, cuts.everything)]
     survey.choose("baselines", baselines, cuts.screening)
     rates = _rates(survey, "", choices, baselines)
@@ -65,7 +65,7 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
 
 
 def screen_fewer(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, ...]:
-    """Return how well and how fast those are that are `worth` it, with fewer joints, where these take time."""
+    """Return those `worth` it, screened with fewer joints, if joints take time."""
     cuts, sizes = survey.cuts, [size for size in JOINTS if size < survey.n_joints]
     mine = [one.choice for one in worth if one.choice.joints] if survey.equipment.records.each_us else []
     choices = [replace(choice, keep_joints=size) for choice in mine for size in sizes]
@@ -74,7 +74,7 @@ def screen_fewer(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, .
 
 
 def screen_others(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, ...]:
-    """Return how well and how fast those are that are `worth` it, with each of the other trainers."""
+    """Return those `worth` it, screened with each of the other trainers."""
     choices = [replace(one.choice, trainer=name) for name in survey.search.trainers[1:] for one in worth]
     return _screened(survey, OTHER_TRAINERS, choices, _rates(survey, OTHER_TRAINERS, choices)) if choices else ()
 
