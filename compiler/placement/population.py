@@ -1,15 +1,13 @@
-"""A standard placement: one for many subjects, those it serves worst included, and how many subjects it takes.
+"""A standard placement: one for many subjects, its accuracy for the worst-served tenth, and the subjects it needs.
 
-Placements are learnt from some subjects and recognise others, who are never learnt from. Three are held beside each
-other: as a method chooses them, and bettered for the mean over subjects or for the worst-served tenth. Which of the
-three is taken is decided among the subjects that are learnt from, on a fifth of them that is kept aside, by the mean
-and the worst tenth in equal parts.
+Placements are trained on some subjects and tested on others. Three are compared: as a method chooses them, and refined
+for the mean over subjects or for the worst-served tenth. The choice among the three is made within the training
+subjects, on a fifth of them that is held out, by the mean and the worst tenth in equal parts.
 
-What a method chooses last, and what it would choose next, it can hardly tell apart from the rows it looks at: another
-draw of rows chooses others. So these are exchanged, one by one, as long as half of the subjects then recognise the
-other half better: on the mean over subjects, or over the tenth that is served worst. Weights in place of exchanges
-(the worst-served tenth counted more, every subject by how badly it is served) gained no more than another draw of rows
-did.
+A method can hardly distinguish its last choices from the next candidates: another draw of rows ranks them differently.
+So these are exchanged, one by one, as long as the model of one half of the subjects then reaches a higher accuracy on
+the other half: on the mean over subjects, or on the worst tenth. Weights instead of exchanges (more weight for the
+worst tenth, or for every subject by its error) gained no more than another draw of rows did.
 """
 
 from dataclasses import dataclass, field, replace
@@ -35,22 +33,22 @@ LEAST_SUBJECTS = 8
 WORST_SHARE = 0.1
 _HELD_OUT = 0.2
 _SIZES = (2, 5, 10, 20, 40, 80, 160)
-# So many of the switches chosen last, and of those chosen next, may change places, in so many exchanges at most.
+# Numbers of last choices and next candidates that may be exchanged, and of exchanges, at most.
 REACH, EXCHANGES = 4, 2
-# With fewer subjects nothing is exchanged: the worst tenth is a handful, and with 10 to 40 of the 200 what exchanges
-# won within them was lost on others more often than not.
+# With fewer subjects nothing is exchanged: the worst tenth is then a handful, and with 10 to 40 of the 200 subjects,
+# gains of exchanges within them were more often than not losses on others.
 ENOUGH_SUBJECTS = 80
 _ASKED_OF_EACH = 50
 
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What a study of a population takes.
+    """Parameters of a study of a population.
 
     keep     switches to keep; method: one of `METHODS` whose parameter is a number of switches
-    rows     at most so many are learnt from to place, equally many of every subject; a classifier learns from all
-    rounds   of LogitBoost that judges a placement
-    repeats  other draws of subjects for every point of the learning curve
+    rows     most rows to place with, equally many of every subject; classifiers are trained on all rows
+    rounds   of LogitBoost that evaluates a placement
+    repeats  draws of subjects for every point of the learning curve
     """
 
     keep: int
@@ -63,7 +61,7 @@ class Asked:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Population:
-    """Rows of many subjects: `samples` of n rows, and whose each row is, subjects (n,) intp."""
+    """Rows of many subjects: `samples` of n rows, and the subject of each row, subjects (n,) intp."""
 
     samples: Samples
     subjects: Numbers
@@ -73,8 +71,8 @@ class Population:
         return self._part(np.flatnonzero(np.isin(self.subjects, subjects)))
 
     def drawn(self, rows: int, seed: int) -> "Population":
-        """Return about so many rows, about equally many of every subject, all frames of trials that are drawn with
-        `seed`; all rows where there are no more.
+        """Return about `rows` rows, about equally many of every subject, in whole trials drawn with `seed`; all rows
+        if there are no more.
         """
         there = np.unique(self.subjects)
         if rows >= len(self.subjects):
@@ -85,7 +83,7 @@ class Population:
         return self._part(np.flatnonzero(np.isin(self.samples.trials, np.concatenate(list(own)))))
 
     def _trials_of(self, subject: int, rows: int, random: np.random.Generator) -> Numbers:
-        """Return the numbers of random trials of a subject: one, or as many as have at most so many rows."""
+        """Return random trials of a subject, by number: one, or as many as have at most `rows` rows."""
         trials, frames = np.unique(self.samples.trials[self.subjects == subject], return_counts=True)
         order = random.permutation(len(trials))
         return np.asarray(trials[order[: max(int(np.searchsorted(np.cumsum(frames[order]), rows, "right")), 1)]])
@@ -95,9 +93,9 @@ class Population:
 
 
 def rates(learnt: Population, asked: Population, elements: Elements, rounds: int) -> NDArray[np.float64]:
-    """Return the share of trials of every subject of `asked` that are recognised, in the order of their numbers.
+    """Return the accuracy, by trials, of every subject of `asked`, in the order of their numbers.
 
-    LogitBoost of so many rounds learns the elements, and the joints if there are any, from `learnt`.
+    LogitBoost of `rounds` rounds is trained on the elements, and any joints, of `learnt`.
     """
     samples, others = (bits_of(population.samples, elements) for population in (learnt, asked))
     stumps, _ = boost(samples.inputs, samples.labels, samples.n_classes, rounds=rounds)
@@ -109,7 +107,7 @@ def rates(learnt: Population, asked: Population, elements: Elements, rounds: int
 
 
 def served(rates: NDArray[np.float64]) -> Served:
-    """Return how the subjects of these rates (n,) are served."""
+    """Return the mean, worst tenth and lowest of these accuracies (n,) of subjects."""
     ordered = np.sort(rates)
     worst = ordered[: max(round(WORST_SHARE * len(ordered)), 1)]
     return Served(float(rates.mean()), float(worst.mean()), float(ordered[0]))
@@ -139,9 +137,9 @@ class Refining:
         self._halves = tuple(zip(learnt, asked, strict=True))
 
     def best(self, aim: Aim) -> Elements:
-        """Return the placement as the method chose it ("plain"), or after the exchanges that serve `aim` best.
+        """Return the method's placement ("plain"), or the placement after the exchanges that improve `aim` most.
 
-        Nothing is exchanged without a gain, nor with fewer than ENOUGH_SUBJECTS.
+        No exchange is made without a gain, nor with fewer than ENOUGH_SUBJECTS.
         """
         if aim == "plain" or len(np.unique(self.population.subjects)) < ENOUGH_SUBJECTS:
             return self.kept
@@ -175,7 +173,7 @@ class Refining:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Task:
-    """Learn from some subjects of a population, recognise others."""
+    """Train on some subjects of a population, test on others."""
 
     population: Population
     learnt: Numbers
@@ -194,9 +192,9 @@ def place_for_population(
     jobs: int = -1,
     on_done: Progress | None = None,
 ) -> Placement:
-    """Choose at most `keep` switches for all subjects of a set; the placement's `study` says whom they serve how well.
+    """Choose at most `keep` switches for all subjects of a set; the placement's `study` has their accuracies.
 
-    Raises PlacementError as `place` does, and for fewer than eight subjects; MemberError where there is no such method.
+    Raises PlacementError as `place` does, and for fewer than eight subjects; MemberError for an unknown method.
     """
     fingerprint, grasp_set = grasp_set.fingerprint(), grasp_set.without_none()
     samples = samples_of(grasp_set, joints=joints)
@@ -217,9 +215,9 @@ def place_for_population(
 
 
 def standard_placement(population: Population, take: Asked, jobs: int = 1, on_done: Progress | None = None) -> Standard:
-    """Return one placement for all subjects of `population`, and the rate against the number of subjects learnt from.
+    """Return one placement for all subjects of `population`, and the accuracy against the number of training subjects.
 
-    `on_done(done, all)` is called after every piece of work. The same arguments give the same answer, whatever `jobs`.
+    `on_done(done, all)` is called after every task. The same arguments give the same result, whatever `jobs`.
     Raises PlacementError for fewer than eight subjects, and for a method that takes no number of switches.
     """
     if not METHODS.named(take.method).by_number:
@@ -227,14 +225,14 @@ def standard_placement(population: Population, take: Asked, jobs: int = 1, on_do
     people = np.unique(population.subjects)
     if len(people) < LEAST_SUBJECTS:
         raise PlacementError(
-            f"the set has {len(people)} subject(s): a standard placement is learnt from at least {LEAST_SUBJECTS}"
+            f"the set has {len(people)} subject(s): a standard placement needs at least {LEAST_SUBJECTS}"
         )
     people = np.random.default_rng(take.seed).permutation(people)
     asked, learnt = _apart(people)
     tasks = [_trial(population, learnt, take), *_curve(population, learnt, asked, take)]
     found: dict[int, tuple[Served, ...]] = {}
-    for done, (place, answer) in enumerate(in_workers(_work, tasks, jobs), 1):
-        found[place] = answer
+    for done, (place, result) in enumerate(in_workers(_work, tasks, jobs), 1):
+        found[place] = result
         if on_done is not None:
             on_done(done, len(tasks) + 1)
     points = _points(tasks, found)
@@ -248,13 +246,13 @@ def standard_placement(population: Population, take: Asked, jobs: int = 1, on_do
 
 
 def _apart(people: Numbers) -> tuple[Numbers, Numbers]:
-    """Return a fifth of the people, to be recognised, and the others, to learn from."""
+    """Return a fifth of the people, to test on, and the others, to train on."""
     held_out = max(round(_HELD_OUT * len(people)), 1)
     return people[:held_out], people[held_out:]
 
 
 def _trial(population: Population, learnt: Numbers, take: Asked) -> _Task:
-    """Return the task that the aims are compared by, within the people learnt from."""
+    """Return the task that compares the aims, within the training subjects."""
     asked, rest = _apart(learnt)
     return _Task(population.of(learnt), rest, asked, take, take.seed, 0)
 
@@ -272,7 +270,7 @@ def _curve(population: Population, learnt: Numbers, asked: Numbers, take: Asked)
 
 
 def _work(task: _Task) -> tuple[int, tuple[Served, ...]]:
-    """Return the task's place, and how the people asked are served for each aim."""
+    """Return the task's number, and the accuracies of the test subjects for each aim."""
     learnt, asked = task.population.of(task.learnt), task.population.of(task.asked)
     refining = _refining(learnt, task.take, task.seed)
     placements = [refining.best(aim) for aim in AIMS]
@@ -281,7 +279,7 @@ def _work(task: _Task) -> tuple[int, tuple[Served, ...]]:
 
 
 def _refining(population: Population, take: Asked, seed: int) -> Refining:
-    """Return the method's placement, from rows drawn evenly over the subjects, ready to be bettered."""
+    """Return the method's placement, from rows drawn evenly over the subjects, ready for refinement."""
     samples = population.drawn(take.rows, seed).samples
     elements = elements_of(samples)
     choose = METHODS.named(take.method).chooser(bits_of(samples, elements))

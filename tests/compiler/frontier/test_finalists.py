@@ -3,7 +3,7 @@ import pytest
 
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.finalists import depth_of, finalists, papers_depth, papers_tables, worthwhile
-from thenar.compiler.frontier.points import Way
+from thenar.compiler.frontier.points import PlacementChoice
 from thenar.compiler.frontier.price import Tabled
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import NO_SWITCHES, Candidate, Search, Shape
@@ -16,7 +16,7 @@ def judged(rate: float) -> Judged:
 
 
 def _screened(size: int, rate: float, frame_us: float, inputs: Inputs = "switches", method: str = "id3") -> Screened:
-    choice = Candidate(Way(method, float(size)), inputs)
+    choice = Candidate(PlacementChoice(method, float(size)), inputs)
     return Screened(choice, tuple(range(size)), judged(rate), frame_us)
 
 

@@ -82,7 +82,7 @@ def test_rows_in_which_nothing_is_held_change_no_rate(
     more = with_none(first[0]["grasp_set"])
     found = found_of(first[0] | {"grasp_set": more, "output": tmp_path / "out"})
     assert found.fingerprint == more.fingerprint()
-    assert [(one.way, one.rate) for one in found.tried] == [(one.way, one.rate) for one in first[1].tried]
+    assert [(one.placement, one.rate) for one in found.tried] == [(one.placement, one.rate) for one in first[1].tried]
 
 
 def test_points_are_numbered_from_the_fastest_frame_on(first: tuple[Request, Frontier]) -> None:
@@ -116,7 +116,7 @@ def test_subjects_are_left_out_where_there_are_several(first: tuple[Request, Fro
     assert (found.subjects, found.by, found.trials) == (2, "new subject", found.rows)
     rates = [point.rate for point in found.points] + [tried.rate for tried in found.tried]
     assert {rate.what for rate in (*rates, *(mark.rate for mark in found.marks))} == {"new subject, trials"}
-    assert {point.beside and point.beside.what for point in found.points} == {"pooled, trials"}
+    assert {point.other_rate and point.other_rate.what for point in found.points} == {"pooled, trials"}
     assert {point.rate.over for point in found.points} == {2}
 
 
@@ -127,9 +127,9 @@ def rows_recognised(grasp_set: GraspSet, point: Point, train: Rows, test: Rows) 
     codes = grasp_set.codes if joints else grasp_set.codes[:, :0]
     columns: tuple[int, ...] = ()
     if setting.inputs != "joints":
-        beside = codes if setting.way.method == "elimination" else codes[:, :0]
+        beside = codes if setting.placement.method == "elimination" else codes[:, :0]
         learning = Samples(grasp_set.switches[train], beside[train], labels[train], tuple("0123"))
-        columns = METHODS[setting.way.method].chooser(learning)(setting.way.parameter)
+        columns = METHODS[setting.placement.method].chooser(learning)(setting.placement.parameter)
     bits = grasp_set.switches[:, list(columns)]
     X = np.hstack([bits.astype(np.uint16), codes])
     assert setting.rounds is not None
@@ -147,8 +147,8 @@ def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_pat
     labels = np.unique(grasp_set.labels, return_inverse=True)[1]
     for point in found.points:
         pooled = [rows_recognised(grasp_set, point, fold.train, fold.test) for fold in weka_folds(labels, 4, 1)]
-        assert point.beside is not None
-        assert point.beside.mean == pytest.approx(sum(pooled) / len(grasp_set))
+        assert point.other_rate is not None
+        assert point.other_rate.mean == pytest.approx(sum(pooled) / len(grasp_set))
         others = [np.flatnonzero(grasp_set.subjects == subject) for subject in ("S0", "S1", "S2")]
         alone = [
             rows_recognised(grasp_set, point, np.setdiff1d(np.arange(len(grasp_set)), test), test) for test in others
@@ -257,8 +257,8 @@ def test_a_set_may_lack_switches_or_joints(
     found = found_of(asked(tmp_path, make_set(switches=switches, joints=joints)))
     assert {each.inputs for each in found.tried} == inputs
     assert found.points
-    assert (found.by, found.beside) == ("pooled", None)
-    assert all(point.beside is None for point in found.points)
+    assert (found.by, found.other) == ("pooled", None)
+    assert all(point.other_rate is None for point in found.points)
     if joints == 0:
         assert "paper, S = 62" in [mark.name for mark in found.marks]
 
@@ -284,8 +284,8 @@ def test_what_ports_cost_is_part_of_the_question(tmp_path: Path, make_set: Make)
     alone = found_of({**request, "output": tmp_path / "alone", "harness": glove})
     found_of(request)
     after = found_of({**request, "harness": glove})
-    assert [(each.way, each.n_switches, each.rate) for each in after.tried] == [
-        (each.way, each.n_switches, each.rate) for each in alone.tried
+    assert [(each.placement, each.n_switches, each.rate) for each in after.tried] == [
+        (each.placement, each.n_switches, each.rate) for each in alone.tried
     ]
     assert len(keys_in(tmp_path / "out" / "store.jsonl")) > len(keys_in(tmp_path / "alone" / "store.jsonl"))
 
@@ -345,7 +345,7 @@ def test_two_workers_of_a_cluster_find_the_same(tmp_path: Path, make_set: Make) 
 
 def _timeless(found: Frontier) -> tuple[object, ...]:
     points = [
-        (each.setting, each.switches, each.rate, each.luck, each.beside, each.frame, each.latency)
+        (each.setting, each.switches, each.rate, each.luck, each.other_rate, each.frame, each.latency)
         for each in found.points
     ]
     rest = (found.tried, found.curves, found.marks, found.combinations, found.picked)
@@ -361,7 +361,9 @@ def test_every_trainer_is_on_one_picture_and_what_compile_makes_of_a_point_is_wh
     drawn = (tmp_path / "out" / "frontier.svg").read_text()
     # Outlines: but each trainer has a line in the key, and the file another size than with one trainer.
     assert drawn != pictures(replace(found, tried=found.tried[:1]), "svg")["frontier"].decode()
-    tried = {name: {(one.way, one.inputs) for one in found.tried if one.trainer == name} for name in found.trainers}
+    tried = {
+        name: {(one.placement, one.inputs) for one in found.tried if one.trainer == name} for name in found.trainers
+    }
     assert tried["logit"] <= tried["logitboost"]
     assert tried["logit"]
     path = tmp_path / "out" / "frontier.json"
