@@ -119,7 +119,7 @@ fuzz: $(VENV)/installed  ## hostile files of every format, guided by coverage, u
 	$(BIN)/python tests/fuzz/run.py $(FUZZ)
 
 docs: $(VENV)/installed  ## the documentation as a site in site/, offline
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 check: lint types test  ## what a commit should pass
 

@@ -74,7 +74,7 @@ class Setting:
 
 
 class Trainer(ABC):
-    """What makes an additive model: scores that are a sum over inputs, F_k(x) = b_k + sum over i of T_i[x_i][k].
+    """What makes an additive model: scores that are a sum over inputs, F_k(x) = b_k + `sum over i of T_i[x_i][k]`.
 
     A member of `TRAINERS` is an instance, that a module of this folder defines as `MEMBER`.
 
