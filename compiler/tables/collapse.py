@@ -50,7 +50,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScoreTables:
-    """F_k = bias_k + sum over switches s of bits_s * switch_rows[s, k] + sum over joints a of joint_rows[a][bin_a, k].
+    """`F_k = bias_k + sum over s of bits_s * switch_rows[s, k] + sum over joints a of joint_rows[a][bin_a, k]`.
 
     Linear joints also add their lines, and pairs of joints add a row that depends on both codes.
 

@@ -74,7 +74,7 @@ class Setting:
 
 
 class Trainer(ABC):
-    """A method that fits an additive model: a sum over inputs, F_k(x) = b_k + sum over i of T_i[x_i][k].
+    """A method that fits an additive model: a sum over inputs, F_k(x) = b_k + `sum over i of T_i[x_i][k]`.
 
     Each member of `TRAINERS` is an instance, defined in a module of this folder as `MEMBER`.
 
