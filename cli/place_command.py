@@ -324,14 +324,14 @@ def _of_exact(exact: "Exactly", m: int) -> Iterator[str]:
 
 
 def _of_study(kept: str, study: "Standard") -> Iterator[str]:
-    from thenar.compiler.placement.drawing import BETTERED
+    from thenar.compiler.placement.drawing import REFINED
 
     yield (
-        f"{kept}, chosen by {study.method}, {BETTERED[study.aim]}: this did best within the subjects learnt from. "
+        f"{kept}, chosen by {study.method}, {REFINED[study.aim]}: this did best within the subjects learnt from. "
         f"Learnt again from {study.rows} rows of all {study.subjects} subjects"
     )
     yield (
-        "bettered: the switches chosen last exchanged for the next ones, where half of the subjects learnt from then "
+        "refined: the switches chosen last are exchanged for the next ones if half of the training subjects then "
         "recognise the other half better. Counting badly served subjects more often was tried on 80 simulated hands, "
         "gained no more than another draw of rows did, and is not done"
     )
@@ -339,11 +339,11 @@ def _of_study(kept: str, study: "Standard") -> Iterator[str]:
 
 def _print_served(study: "Standard") -> None:
     """Print how held-out subjects are served."""
-    from thenar.compiler.placement.drawing import BETTERED
+    from thenar.compiler.placement.drawing import REFINED
 
     columns = ("subjects", "placement", "mean, %", "worst tenth, %", "lowest, %")
     served = table(columns, title=f"Trials recognised of {study.held_out} held-out subjects (new subject)")
     for point in study.curve:
         rates = (point.served.mean, point.served.worst_tenth, point.served.lowest)
-        served.add_row(str(point.subjects), BETTERED[point.aim], *(f"{100 * rate:.1f}" for rate in rates))
+        served.add_row(str(point.subjects), REFINED[point.aim], *(f"{100 * rate:.1f}" for rate in rates))
     out().print(served)
