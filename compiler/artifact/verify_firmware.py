@@ -26,7 +26,7 @@ from ..firmware.choose import Fit, fit_for, smallest_fit
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Library
 from ..firmware.generate import LARGEST
 from ..firmware.layout import ports_of_scan
-from ..firmware.probes import Answers, Lost, Probes, extreme_frames, joined, lost_inputs, random_frames
+from ..firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, lost_inputs, random_frames
 from ..firmware.targets import TARGETS
 from ..firmware.targets import kinds as every_kind
 from ..recordings.graspset import GraspSet, Joint
@@ -234,18 +234,18 @@ class FirmwareTrial:
         shares = [softmax.probabilities(own)[n % len(own)] for n, own in enumerate(scores.tolist())]
         return np.stack([best - second, shares], axis=1)
 
-    def _misnamed(self, answers: Answers) -> int | None:
+    def _misnamed(self, answers: Predictions) -> int | None:
         if answers.names is None:
             return None
         return sum(name != grasp for name, grasp in zip(answers.names, self._build.grasps, strict=True))
 
-    def _run(self, fit: Fit, *, incremental: bool, lost: Lost | None) -> Answers:
+    def _run(self, fit: Fit, *, incremental: bool, lost: Lost | None) -> Predictions:
         layout, target = fit.choice.layout, fit.target
         files = target.sources(Library(LIBRARY_NAME, self._build.manifest, layout, target.avr))
         frames = layout.frame_bytes(self._frames.bits, self._frames.codes)
         return target.run(files, LIBRARY_NAME, layout, frames, incremental=incremental, lost=lost)
 
-    def _difference(self, frame: int, answers: Answers, *, missing: bool) -> Difference:
+    def _difference(self, frame: int, answers: Predictions, *, missing: bool) -> Difference:
         scores = self._scores_without if missing else self._scores
         described = self._build.manifest
         inputs = [*(switch.name for switch in described.switches), *(joint.name for joint in described.joints)]
@@ -275,7 +275,7 @@ class FirmwareTrial:
         return self._build.grasps[number] if number < len(self._build.grasps) else f"type {number}, which there is not"
 
 
-def _said(answers: Answers) -> NDArray[np.int64] | None:
+def _said(answers: Predictions) -> NDArray[np.int64] | None:
     """Return what a program said of margin and probability, (n, 2); None where it was not asked."""
     if answers.margins is None or answers.shares is None:
         return None

@@ -7,7 +7,7 @@ import pytest
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import Layout, arrange
-from thenar.compiler.firmware.probes import Answers, Probes
+from thenar.compiler.firmware.probes import Predictions, Probes
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.bare import Bare
 from thenar.runtime.manifest import Manifest
@@ -31,7 +31,7 @@ MOST_INSTRUCTIONS = {
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
 Probed = Callable[[IntegerTables, int], Probes]
-SameAsPython = Callable[[Answers, IntegerTables, Probes], None]
+SameAsPython = Callable[[Predictions, IntegerTables, Probes], None]
 
 
 @pytest.fixture(autouse=True)
