@@ -91,7 +91,7 @@ def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
     if platform.startswith(("cortex", "rv32")):
         tool("qemu-system-arm" if platform.startswith("cortex") else "qemu-system-riscv32")
     if not platform.startswith("avr"):
-        assert "\n18 frames, answered as by Python\n" in make(folder, "check")
+        assert "\n18 frames, predicted as by Python\n" in make(folder, "check")
     make(folder, "clean")
     assert {path.name for path in folder.iterdir()} == {*classifier(build, platform), "SHA256SUMS"}
 
