@@ -70,10 +70,10 @@ class ReportContent:
     has_page: bool = False
 
     def __post_init__(self) -> None:
-        grasps, answers = len(self.manifest.grasps), len(self.manifest.answers)
+        grasps, classes = len(self.manifest.grasps), len(self.manifest.answers)
         if self.tables.n_classes != grasps or self.tables.n_switches != len(self.manifest.switches):
             raise ReportError("the tables do not match build.json: compile the build again")
-        if self.confusion is not None and self.confusion.shape not in ((grasps, grasps), (answers, answers)):
+        if self.confusion is not None and self.confusion.shape not in ((grasps, grasps), (classes, classes)):
             raise ReportError(f"the confusion matrix of {grasps} grasp types has the shape {self.confusion.shape}")
         if self.tree is not None and len(self.tree.classes) > grasps:
             raise ReportError("the tree has more grasp types than the build: it belongs to other recordings")
