@@ -1,6 +1,6 @@
 """LogitBoost for J classes on decision stumps: the rounds (Friedman, Hastie, Tibshirani 2000; Weka 3.6's choices).
 
-Where Weka's own answer hangs on rounding, thenar goes on in a stable way instead (docs/project/weka-parity.md): sums are exact
+Where Weka's result depends on rounding, thenar is stable instead (docs/project/weka-parity.md): sums are exact
 (exactsums), a branch of next to no weight counts as empty, and no branch answers with more than z_max.
 """
 

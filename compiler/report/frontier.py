@@ -170,7 +170,7 @@ def _make_point(marker: ElementTree.Element, said: str, picked: bool) -> None:
 
 def _detail(point: Point, frontier: Frontier, hand: HandShape | None) -> Detail:
     setting = point.setting
-    what = (inputs_of(point), setting.way.method, training_of(setting), f"{setting.width} bits")
+    what = (inputs_of(point), setting.placement.method, training_of(setting), f"{setting.width} bits")
     words = ", ".join(filter(None, (*what, _wiring(point))))
     return Detail(
         number=point.number,
@@ -278,7 +278,7 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
     if frontier.tried:
         tried = tuple(
             (
-                f"{each.way.method} {each.way.parameter:g}",
+                f"{each.placement.method} {each.placement.parameter:g}",
                 each.inputs,
                 str(each.n_switches),
                 DASH if each.rounds is None else str(each.rounds),

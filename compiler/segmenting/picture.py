@@ -17,7 +17,7 @@ _SECONDS, _POINTS = 10.0, 7.0
 # What a letter takes at most, in units of the font's size.
 _LETTER = 0.75
 # Colours of types, far enough from one another to tell neighbours apart; the name says which it is.
-_COLOURS = ("switches", "joints", "both", "rival-1", "rival-2", "rival-3", "link", "miss", "hit")
+_COLOURS = ("switches", "joints", "both", "baseline-1", "baseline-2", "baseline-3", "link", "miss", "hit")
 
 
 def draw(timelines: Sequence[Timeline], kind: str) -> bytes:

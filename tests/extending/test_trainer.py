@@ -85,7 +85,7 @@ def test_a_frontier_of_the_trainer_has_one_stage_and_its_points_are_built(
 
     folder, build = tmp_path / "frontier", tmp_path / "build"
     given = ("frontier", str(recordings), "-o", str(folder), "--trainer", "naive-bayes")
-    few = ("--methods", "elimination", "--rivals", "none", "--repeats", "1", "--finalists", "2", "--jobs", "1")
+    few = ("--methods", "elimination", "--baselines", "none", "--repeats", "1", "--finalists", "2", "--jobs", "1")
     found = json.loads(installed.thenar(*given, "--joint-bins", "5", *few, "--json"))
     settings = [point["setting"] for point in found["points"]]
     assert {(each["trainer"], each["rounds"]) for each in settings} == {("naive-bayes", None)}

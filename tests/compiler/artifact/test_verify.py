@@ -87,9 +87,9 @@ def test_the_worst_frame_is_told_whether_recorded_or_not(folder: Path, grasp_set
     bits = [switch.name in worst.closed for switch in build.manifest.switches]
     stumps = ensemble_from_bytes((folder / "ensemble.bin").read_bytes())
     exact = collapse(stumps, len(bits)).scores(np.array([bits]), np.array([worst.codes], np.uint16))[0]
-    leader, rival = build.grasps.index(worst.leader), build.grasps.index(worst.rival)
+    leader, competitor = build.grasps.index(worst.leader), build.grasps.index(worst.competitor)
     deployed = build.scores(bits, np.array(worst.codes, np.uint16))
-    lost = (exact[leader] - exact[rival]) * build.tables.scale - (deployed[leader] - deployed[rival])
+    lost = (exact[leader] - exact[competitor]) * build.tables.scale - (deployed[leader] - deployed[competitor])
     assert lost == pytest.approx(worst.loss, abs=1e-9)
     assert 0 < worst.loss < worst.bound
     assert worst.bound == pytest.approx(build.manifest.proof.safe_margin, rel=1e-11, abs=1e-9)

@@ -37,9 +37,9 @@ def test_a_threshold_lies_where_it_parts_two_neighbours(values: list[float]) -> 
         assert low <= threshold < high
         middle = (Fraction(low) + Fraction(high)) / 2
         # No double between the two lies closer to the middle.
-        for rival in np.nextafter(threshold, [-np.inf, np.inf]).tolist():
-            if low <= rival < high:
-                assert abs(Fraction(rival) - middle) >= abs(Fraction(threshold) - middle)
+        for near in np.nextafter(threshold, [-np.inf, np.inf]).tolist():
+            if low <= near < high:
+                assert abs(Fraction(near) - middle) >= abs(Fraction(threshold) - middle)
 
 
 @settings(deadline=None, max_examples=40)

@@ -15,8 +15,8 @@
 #define CLASSES 3u
 #define LAST_PORT (THENAR_GLOVE_SCANNED_PORTS - 1u)
 
-/* The lead in steps that the leader (row) needs over another class (column) after a port: the most that the unread
-   switches can reduce it, and one more where the other class would win a tie. 65535: no lead is enough.
+/* Steps by which the leader (row) must be ahead of a competitor (column) after a port: the most by which the unread
+   switches can bring the competitor closer, and one more where it would win a tie. 65535: no lead is enough.
 
    columns:
    power grip, tip pinch, lateral pinch
@@ -41,10 +41,10 @@ bool thenar_glove_decided(
         const uint16_t best = (uint16_t)glove->scores[leader];
         const uint16_t *needed = hurdles[port][leader];
 
-        for (uint16_t other = 0u; decided && (other < CLASSES); other++) {
-            const uint16_t lead = (uint16_t)(best - (uint16_t)glove->scores[other]);
+        for (uint16_t competitor = 0u; decided && (competitor < CLASSES); competitor++) {
+            const uint16_t lead = (uint16_t)(best - (uint16_t)glove->scores[competitor]);
 
-            decided = lead >= READ(needed[other]);
+            decided = lead >= READ(needed[competitor]);
         }
     }
     return decided;
