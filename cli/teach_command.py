@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 def command(
     demonstrations: tuple[Path, ...], build: Path, output: Path, preshape: str | None, transitions: Path | None
 ) -> None:
-    """Find the sequence of grasps that demonstrations have in common. They are recordings (.mcap) of the inputs of BUILD,
+    """Find the sequence of grasps that demonstrations share. They are recordings (.mcap) of the inputs of BUILD,
     or sets of whole movements (.grasps), each stream of which counts as one.
 
     A grasp becomes a step if most demonstrations have it at that place. A step has its preshape, the median of each
