@@ -195,7 +195,7 @@ def codes_of_bytes(joint: Calibration, calibration: Meaning) -> tuple[int, ...]:
         return _raw(joint)
     if isinstance(calibration, GloveCalibration) and calibration.unit != joint.unit:
         raise SettingError(
-            f"the glove is calibrated in {calibration.unit!r}, but joint {joint.name!r} of the build in {joint.unit!r}: "
+            f"the glove is calibrated in {calibration.unit!r}, joint {joint.name!r} of the build in {joint.unit!r}: "
             "compile recordings in the calibration's unit"
         )
     lines = {line.name: line for line in calibration.sensors}
