@@ -97,7 +97,7 @@ class Newest(Generic[F]):
 
 
 class Rewired:
-    """Converts a set of a device's bits to a set of switches: bit by bit as given by `pairs` (bit, switch).
+    """Converts a set of a device's bits to a set of switches, as given by `pairs` (bit, switch).
 
     A call costs a lookup as long as nothing changes: a hand rests for many scans.
     """

@@ -41,13 +41,13 @@ class Standing:
     For a build that refuses frames there are K + 1 of them (`or_none`), and none is the last class.
     """
 
-    __slots__ = ("_odds", "_rivals", "_scorer", "_unread", "candidate", "lanes")
+    __slots__ = ("_odds", "_others", "_scorer", "_unread", "candidate", "lanes")
 
     def __init__(self, lanes: tuple[int, ...], scorer: Scorer, unread: Mask = 0) -> None:
         self.lanes = lanes
         self.candidate = lanes.index(max(lanes))
         self._scorer, self._unread = scorer, unread
-        self._rivals = self._nearest(self.candidate) if unread else lanes
+        self._others = self._nearest(self.candidate) if unread else lanes
         self._odds = 0.0, 0.0
 
     @property
@@ -58,23 +58,23 @@ class Standing:
     @property
     def certain(self) -> bool:
         """Whether the candidate wins whatever the unread switches are; of equal scores the lowest number wins."""
-        return self._rivals.index(max(self._rivals)) == self.candidate
+        return self._others.index(max(self._others)) == self.candidate
 
     def leads(self, lead: int) -> bool:
         """Return whether the candidate wins, by `lead` steps at least, whatever the unread inputs are."""
         best = self.lanes[self.candidate]
-        rivals = ((number, rival) for number, rival in enumerate(self._rivals) if number != self.candidate)
-        return all(rival + max(lead, number < self.candidate) <= best for number, rival in rivals)
+        others = ((number, score) for number, score in enumerate(self._others) if number != self.candidate)
+        return all(score + max(lead, number < self.candidate) <= best for number, score in others)
 
     @property
     def margin(self) -> int:
         """The candidate's lead over the second best, in steps."""
-        second, best = sorted(self._rivals)[-2:]
+        second, best = sorted(self._others)[-2:]
         return best - second
 
     def lead(self, held: int) -> int:
         """Return the candidate's lead over class `held`, in steps."""
-        return self.lanes[self.candidate] - self._rivals[held]
+        return self.lanes[self.candidate] - self._others[held]
 
     def contradicts(self, held: int, lead: int) -> bool:
         """Return whether the candidate is not `held` and may lead it by `lead` steps: with unread switches, whether any
@@ -91,8 +91,8 @@ class Standing:
             return softmax(self._nearest(number), number, scale)
         of, total = self._odds
         if of != scale:
-            self._odds = scale, (total := odds(self._rivals, scale))
-        return softmax(self._rivals, number, scale, total)
+            self._odds = scale, (total := odds(self._others, scale))
+        return softmax(self._others, number, scale, total)
 
     def or_none(self, lead: int) -> "Standing":
         """Return the same with none, the last class, `lead` steps above the best, or below it if that is negative."""

@@ -132,9 +132,9 @@ def on_shares(build: Build) -> list[float]:
     """Return, for every switch, the share of the recordings in which it was closed; nan if unknown: in builds of older
     versions, if its row is all zeros.
     """
-    told = [switch.closed_share for switch in build.manifest.switches]
-    known = [share for share in told if share is not None]
-    if len(known) == len(told):
+    stored = [switch.closed_share for switch in build.manifest.switches]
+    known = [share for share in stored if share is not None]
+    if len(known) == len(stored):
         return known
     tables = build.tables
     rows, means = tables.switch_rows.astype(np.float64), tables.switch_means.astype(np.float64)

@@ -90,8 +90,8 @@ class EarlyExit:
     def _hurdles_of(self, port: int, leader: int) -> tuple[int, ...]:
         """Return the amounts which, added to a class's score, must not exceed the leader's: (K,), 0 for the leader."""
         found = [
-            reach + max(self._lead, rival < leader)
-            for rival, reach in enumerate(self._reach(leader, self._later[port]))
+            reach + max(self._lead, other < leader)
+            for other, reach in enumerate(self._reach(leader, self._later[port]))
         ]
         found[leader] = 0
         return tuple(found)

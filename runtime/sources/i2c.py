@@ -166,8 +166,8 @@ class I2cDevice(Source):
             # On demand, no scan ends because of a record: the switches that it leaves unread matter for none.
             glove = None if early.on_demand else newest.frame
             early.start(joints.codes(now_us(), glove))
-        for group, answers in zip(self._groups, self._scan, strict=False):
-            for number, reply in zip(group, answers, strict=True):
+        for group, replies in zip(self._groups, self._scan, strict=False):
+            for number, reply in zip(group, replies, strict=True):
                 port = self._ports[number]
                 shut, silent = port.states(reply)
                 closed, lost = closed | shut, lost | silent

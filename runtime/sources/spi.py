@@ -46,14 +46,14 @@ class SpiConverter(Source):
         """Convert all channels once."""
         time.sleep(min(max(0.0, self._due - time.monotonic()), timeout_s))
         self._due = time.monotonic() + _PERIOD_S
-        answers = self.run()
-        self.silent = None in answers
+        replies = self.run()
+        self.silent = None in replies
         closed = lost = 0
         codes: list[int | None] = [None] * self._everything
-        for taxel, answer in zip(self.taxels, answers, strict=True):
-            shut, silent = taxel.states(answer)
+        for taxel, reply in zip(self.taxels, replies, strict=True):
+            shut, silent = taxel.states(reply)
             closed, lost = closed | shut, lost | silent
-            codes[taxel.place] = answer
+            codes[taxel.place] = reply
         return SwitchFrame(now_us(), closed, lost, taxels=tuple(codes))
 
     def counts(self) -> tuple[Count, ...]:

@@ -99,7 +99,7 @@ class Overview:
         for unix_us, _, grasp, *_ in self.changes:
             if not spans or spans[-1][1] != grasp:
                 spans.append((unix_us, grasp))
-        return message("overview", answers=spans, truth=self.truth, marks=self.marks)
+        return message("overview", predictions=spans, truth=self.truth, marks=self.marks)
 
     def _change(self, grasp: LiveGrasp) -> None:
         entry = grasp.candidate, grasp.grasp, grasp.health, grasp.state, grasp.segment, grasp.segment_type

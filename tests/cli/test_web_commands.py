@@ -239,7 +239,7 @@ def test_a_recording_is_shown_from_any_moment_of_it(
         assert told(live, "hand")["switches"]
         state = told(live, "replay", lambda state: state["share"] == 1)
         assert (state["playing"], state["speed"], state["truth"], state["faults"]) == (False, 1.0, None, [])
-        assert told(live, "overview")["answers"][0][1] == "unknown"
+        assert told(live, "overview")["predictions"][0][1] == "unknown"
         ask(live, do="seek", value=state["last_us"])
         assert told(live, "frame", lambda frame: frame["number"] == 19)["time_us"] == state["last_us"]
         ask(live, do="seek", value=0)
