@@ -178,7 +178,7 @@ def guarantee_sentences(content: ReportContent) -> Iterator[str]:
     if worst is not None:
         yield (
             f"In the worst case over all possible frames, recorded or not, {worst.leader} loses {worst.loss:.3f} steps "
-            f"of its lead over {worst.competitor}. By this exact analysis, including ties in whole steps, a lead of more "
+            f"of its lead over {worst.competitor}. By this exact analysis, ties included, a lead of more "
             f"than {worst.safe_margin:.3f} steps is safe: {_share(worst.covered, rows)} training rows have it."
         )
 

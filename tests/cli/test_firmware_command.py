@@ -150,7 +150,7 @@ def test_what_was_measured_stands_in_the_header_beside_its_bounds(
 def test_on_this_machine_there_is_nothing_to_count(thenar: Thenar, build: Path, flag: str) -> None:
     done = thenar("firmware", build, "--target", "host", flag)
     assert done.returncode == 2
-    assert "On this machine nothing is counted" in done.stderr
+    assert "The host has no cycle counts" in done.stderr
 
 
 def test_a_board_that_scans_is_written(thenar: Thenar, build: Path, board: Path, tmp_path: Path) -> None:
@@ -200,13 +200,13 @@ def test_a_glove_s_ranges_are_what_its_pins_read_and_boards_that_fit_are_told(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--target", "avr328p"), "Name a folder to write with -o"),
+        (("--target", "avr328p"), "name a folder to write with -o"),
         (("--target", "pdp11", "-o", "made"), "there is no target 'pdp11': choose one of host"),
         (("--target", "avr328p", "--mode", "scan", "-o", "made"), "the mode scan needs a board.toml"),
-        (("--target", "avr328p", "--mode", "scan", "--measure"), "A board that only scans holds no classifier"),
+        (("--target", "avr328p", "--mode", "scan", "--measure"), "A board that only scans has no classifier"),
         (
             ("--target", "avr328p", "--mode", "scan", "--calibration", "{board}", "-o", "made"),
-            "a board that scans reads no CyberGlove",
+            "a scanning board reads no CyberGlove",
         ),
         (
             ("--target", "avr328p", "--mode", "glove", "--glove", "{board}", "-o", "made"),
@@ -214,7 +214,7 @@ def test_a_glove_s_ranges_are_what_its_pins_read_and_boards_that_fit_are_told(
         ),
         (
             ("--target", "avr328p", "--calibration", "{board}", "--glove", "{board}", "-o", "made"),
-            "leave --calibration out, or --glove",
+            "leave out --calibration, or --glove",
         ),
         (("--target", "avr328p", "--board", "{board}", "-o", "made"), "the mode classify reads no board"),
         (

@@ -55,7 +55,7 @@ def test_a_glove_that_the_point_is_not_wired_as_is_named(
     (tmp_path / "glove.toml").write_text(harness_to_toml(propose_harness(names, "pca9555", name="mine")))
     code, complaint = compiled(lambda point: point, "--glove", str(tmp_path / "glove.toml"))
     assert code == 0
-    assert "the scan map is of the wiring that point 1 was found with, not of" in complaint
+    assert "the scan map uses the wiring that point 1 was found with, not" in complaint
     assert compiled(lambda point: point)[1].count("scan map") == 0
 
 

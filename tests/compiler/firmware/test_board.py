@@ -103,7 +103,7 @@ def test_what_is_left_out_has_its_default_and_debouncing_is_off() -> None:
         (UNO + CHIP + CHIP.replace('"a"', '"b"'), "chip[1].address: 0x20 is the address of chip[0] too"),
         (UNO + CHIP + CHIP.replace("0x20", "0x21"), "switch 'a' is already at chip[0].pins.GPA0"),
         (UNO + CHIP.replace("mcp23017", "pcf8574"), "the firmware cannot read a pcf8574: it reads mcp23017"),
-        (UNO + CHIP + "mux = { address = 0x70, channel = 0 }", "chip[0].mux: the firmware cannot select multiplexer channels"),
+        (UNO + CHIP + "mux = { address = 0x70, channel = 0 }", "chip[0].mux: the firmware cannot select multiplexer"),
         (UNO + "clock_hz = 1_000_000\nbaud = 62_500\n" + CHIP, "bus.clock_hz: must be at most a 16th"),
         (UNO + "early_exit = true\n" + PINS, "early_exit: only chips are read one after another"),
         (UNO + "baud = 921_600\n" + PINS, "baud: a UART at 16000000 Hz cannot make 921600 baud within 2.5%"),

@@ -187,7 +187,7 @@ def test_builds_that_lack_a_kind_of_input_have_layouts_too(make_tables: MakeTabl
     for target in TARGETS.values():
         found = choose(tables, target)
         assert np.array_equal(found.layout.scores(*frames), arrange(tables).scores(*frames))
-        assert ("switches a lookup" in found.why, "codes" in found.why) == (switches > 0, joints > 0)
+        assert ("switches per lookup" in found.why, "codes" in found.why) == (switches > 0, joints > 0)
 
 
 def test_tables_without_inputs_are_refused(make_tables: MakeTables) -> None:

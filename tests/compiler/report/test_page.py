@@ -67,7 +67,12 @@ def test_every_section_is_there_and_has_something_to_say(page: Page) -> None:
     ids = [attributes["id"] for _, attributes in page.elements if "id" in attributes]
     assert len(set(ids)) == len(ids)
     assert {link[1:] for link in links if link} <= {name for name in ids if name}
-    for said in ("recognises 4 grasp types", "In the worst case over all possible frames", "A whole scan is", "nested protocol"):
+    for said in (
+        "recognises 4 grasp types",
+        "In the worst case over all possible frames",
+        "A whole scan is",
+        "nested protocol",
+    ):
         assert said in page.text
     assert "No frontier was given" not in page.text
 
