@@ -82,7 +82,7 @@ def _cutter(grasp_set: GraspSet, scheme: Scheme, n_folds: int, repeats: int, see
 
 
 def groups_of(grasp_set: GraspSet, scheme: Scheme) -> NDArray[np.str_] | None:
-    """Return the group (n,) that each row is left out with, None if that is its trial; sessions are those of a subject."""
+    """Return the group (n,) that each row is left out with, None if that is its trial; sessions are per subject."""
     if scheme == "session":
         return np.char.add(np.char.add(grasp_set.subjects, "\n"), grasp_set.sessions)
     return {"subject": grasp_set.subjects, "object": grasp_set.objects}.get(scheme)

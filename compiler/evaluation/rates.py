@@ -98,7 +98,8 @@ class Rate:
         given, truth = np.atleast_2d(np.asarray(predicted)), np.asarray(labels)
         _, first, trial = np.unique(np.asarray(trials), return_index=True, return_inverse=True)
         if not truth.size or given.shape[1:] != truth.shape or trial.shape != truth.shape:
-            raise ValueError(f"predictions {given.shape} of {truth.size} rows with {trial.size} trials do not give a rate")
+            shapes = f"predictions {given.shape} of {truth.size} rows with {trial.size} trials"
+            raise ValueError(f"{shapes} do not give a rate")
         clusters: Rows = trial
         alike: Unit = "frames"
         if groups is not None and len(found := np.unique(np.asarray(groups), return_inverse=True)[1]) and found.max():
