@@ -11,9 +11,9 @@ from .words import Names, comment, switches_in_words
 
 # Free to use for a C function, and to be kept for its caller; of pairs the lower.
 _FREE, _KEPT = (22, 24, 26, 18, 20), (16, 14, 12, 10, 8, 6, 4, 2, 28)
-# What finding a row needs besides r0, r1 and Z: Y, which points at the glove; where codes are wide, two zeros and a
-# register for comparisons; where some of the input is far, X.
-_POINTER, _WIDE, _FAR = 28, (18, 20), (26,)
+# Finding a row needs r0, r1, Z and Y, which points at the glove; where codes are wide, also a zero in r19:r18 and r20
+# for comparisons.
+_POINTER, _ZERO, _COMPARED = 28, 18, 20
 _IMMEDIATE = 16  # registers from here on can be loaded with a constant
 _LPM_REACH = 65536
 # rcall reaches 4 KiB either way; all that update() does about a look-up must stay within that.
@@ -21,7 +21,7 @@ _NEAR_BYTES = 3600
 _LOOKUP_BYTES, _JOINT_BYTES, _SOURCE_BYTES = 100, 54, 26  # without comparisons
 _SLOPE_BYTES = 110  # but for its products, which no near call reaches across
 FLAGS = 2  # bytes of a glove from where Y points to its input
-_REACH = 63  # of ldd
+_REACH = 63  # of ldd, and of adiw
 
 
 Row = dict[str, object]  # of the template's lists
@@ -54,7 +54,7 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
         "stride": stride,
         "frame_size": layout.frame_size,
         "kept": kept_registers(layout),
-        "borrowed": borrowed_registers(layout),
+        "last": last_size(layout),
         "seen": seen_size(layout),
         "sources": FLAGS + layout.frame_size + _n_found(layout),
         "halves": layout.entry_shift == 8,
@@ -70,7 +70,7 @@ def finds_first(layout: Layout) -> bool:
     """Return whether classify() finds all rows before it adds any: where classes are added up in parts, or where their
     sums leave no registers to find rows with.
     """
-    return len(layout.parts.firsts) > 1 or bool(_pairs(layout) & spare_registers(layout))
+    return len(layout.parts.firsts) > 1 or bool(_pairs(layout) & _spare(layout))
 
 
 def compared_bytes(layout: Layout, lookup: Lookup) -> list[int]:
@@ -145,48 +145,41 @@ def _moved(bit: int, width: int, to: int) -> tuple[str, ...]:
     return min(found, key=len)
 
 
-def far(place: int, *, wide: bool = False) -> bool:
-    """Return whether an input at that place in the frame is beyond the reach of Y."""
-    return FLAGS + place + wide > _REACH
+def far(place: int, *, wide: bool = False) -> int:
+    """Return whether the glove's byte at that place from its input on is within the reach of Y (0), within reach of a
+    short move of Y (1), or beyond (2).
+    """
+    at = FLAGS + place + wide
+    return (at > _REACH) + (at > 2 * _REACH)
+
+
+def _at(place: int, transfer: str, registers: Sequence[int]) -> list[str]:
+    """Return the instructions that load registers from that place on, or store them there (`transfer`). Y points FLAGS
+    bytes before the input; it is moved, and moved back, for what is beyond its reach.
+    """
+    at = FLAGS + place
+    base = (0, _REACH, at)[far(place, wide=len(registers) > 1)]
+    before, after = [f"adiw  r28, {base}"], [f"sbiw  r28, {base}"]
+    if base > _REACH:
+        before, after = ([f"subi  r28, lo8({each})", f"sbci  r29, hi8({each})"] for each in (-base, base))
+    moved = [transfer.format(register=each, place=at - base + more) for more, each in enumerate(registers)]
+    return [*before, *moved, *after] if base else moved
 
 
 def taken(place: int, register: int, *, wide: bool = False) -> list[str]:
-    """Return the instructions that load an input from that place in the frame, a wide one into two registers. Y points
-    FLAGS bytes before the frame; what is beyond its reach goes by X.
-    """
-    at = FLAGS + place
-    registers = range(register, register + 1 + wide)
-    if not far(place, wide=wide):
-        return [f"ldd   r{each}, Y+{at + more}" for more, each in enumerate(registers)]
-    moved = ["movw  r26, r28", f"subi  r26, lo8(-{at})", f"sbci  r27, hi8(-{at})"]
-    return moved + [f"ld    r{each}, X+" for each in registers]
+    """Return the instructions that load the input at that place in the frame, a wide one into two registers."""
+    return _at(place, "ldd   r{register}, Y+{place}", range(register, register + 1 + wide))
 
 
-def _loaded(layout: Layout, places: Sequence[int]) -> list[list[str]]:
-    """Return for each byte of input the instructions that load it into r0 while sums are in their registers."""
-    return [_lending(layout, taken(place, 0)) for place in places]
-
-
-def _lending(layout: Layout, lines: list[str]) -> list[str]:
-    """Return the instructions, and around them what saves X where they need it and it is a sum."""
-    if _FAR[0] not in _borrowed(layout) or not any("r26" in line for line in lines):
-        return lines
-    return ["push  r26", "push  r27", *lines, "pop   r27", "pop   r26"]
-
-
-def found_is_far(layout: Layout, number: int) -> bool:
-    """Return whether the byte that says what update() has found for a slope, or then for a look-up, is beyond Y."""
-    return far(layout.frame_size + number)
+def found_place(layout: Layout, number: int) -> int:
+    """Return where the byte is that says what update() has found for a slope, or then for a look-up."""
+    return layout.frame_size + number
 
 
 def _exchange(layout: Layout, number: int) -> Row:
     """Return the instructions that load what was found before into r31, and those that store r30 in its place."""
-    if not found_is_far(layout, number):
-        at = FLAGS + layout.frame_size + number
-        return {"before_in_r31": [f"ldd   r31, Y+{at}"], "store_r30": [f"std   Y+{at}, r30"]}
-    *moved, _ = taken(layout.frame_size + number, 31)
-    lines = (_lending(layout, [*moved, each]) for each in ("ld    r31, X", "st    X, r30"))
-    return dict(zip(("before_in_r31", "store_r30"), lines, strict=True))
+    place = found_place(layout, number)
+    return {"before_in_r31": taken(place, 31), "store_r30": _at(place, "std   Y+{place}, r{register}", [30])}
 
 
 def group_lines(fields: Sequence[Field]) -> list[str]:
@@ -207,17 +200,16 @@ def group_lines(fields: Sequence[Field]) -> list[str]:
     return lines
 
 
-def spare_registers(layout: Layout) -> set[int]:
+def _spare(layout: Layout) -> set[int]:
     """Return the registers that are needed to find rows; of pairs the lower."""
-    beyond = max(layout.frame_size - 1, layout.frame_size + _n_found(layout) - 1)
-    return {_POINTER, *(_WIDE if layout.code_bits == 16 else ()), *(_FAR if far(beyond) else ())}
+    return {_POINTER, *((_ZERO, _COMPARED) if layout.code_bits == 16 else ())}
 
 
 def _registers(layout: Layout) -> list[int]:
     """Return the registers of the sums of a pass; of pairs the lower. Those that finding rows needs are the last to be
     taken.
     """
-    spare = spare_registers(layout)
+    spare = _spare(layout)
     pairs = sorted((*_FREE, *_KEPT), key=lambda low: (low == _POINTER, low in spare))
     found = pairs if layout.sum_bits == 16 else [low + half for low in pairs for half in (0, 1)]
     return sorted(found[: layout.parts.width])
@@ -228,14 +220,15 @@ def _pairs(layout: Layout) -> set[int]:
     return {register // 2 * 2 for register in _registers(layout)}
 
 
-def _borrowed(layout: Layout) -> list[int]:
-    """Return the pairs besides Y that update() must save whenever it finds a row."""
-    return sorted(_pairs(layout) & spare_registers(layout) - {_POINTER})
+def borrows(layout: Layout, lookup: Lookup) -> bool:
+    """Return whether update() must save a sum while it finds a row: it compares wide codes with thresholds."""
+    compares = layout.code_bits == 16 and any(joint.compared for joint in lookup.joints)
+    return compares and _COMPARED in _registers(layout)
 
 
-def borrowed_registers(layout: Layout) -> list[int]:
-    """Return the registers with sums that are saved while update() finds a row."""
-    return [register for low in _borrowed(layout) for register in (low, low + 1)]
+def last_size(layout: Layout) -> int:
+    """Return the bytes of the sums of update() that stay in memory while Y points at the glove."""
+    return sum(each // 2 * 2 == _POINTER for each in _registers(layout)) * layout.sum_bits // 8
 
 
 def kept_registers(layout: Layout) -> list[int]:
@@ -286,6 +279,11 @@ def _code_bytes(layout: Layout, joint: int) -> list[int]:
     return [*range(first, first + each)]
 
 
+def _loaded(places: Sequence[int]) -> list[list[str]]:
+    """Return for each byte of input the instructions that load it into r0."""
+    return [taken(place, 0) for place in places]
+
+
 def _code(layout: Layout, joint: int) -> list[str]:
     """Return the instructions that load a joint's code, into r30 or r31:r30."""
     return taken(_code_bytes(layout, joint)[0], 30, wide=layout.code_bits == 16)
@@ -300,7 +298,7 @@ def _slope(names: Names, layout: Layout, at: int, first: int) -> Row:
         "at": at,
         "what": comment(names.joints[slope.joint].name),
         "taken": _code(layout, slope.joint),
-        "compared_bytes": _loaded(layout, _code_bytes(layout, slope.joint)),
+        "compared_bytes": _loaded(_code_bytes(layout, slope.joint)),
         **_exchange(layout, at),
         "low": slope.low,
         "span": slope.high - slope.low,
@@ -341,7 +339,7 @@ def _step(names: Names, layout: Layout, lookup: Lookup, part: int) -> Row:
         "index": lookup.index,
         "what": ", ".join([*groups, *(comment(names.joints[joint.number].name) for joint in lookup.joints)]),
         "rows": (part * layout.n_rows + lookup.first_row) * layout.parts.width * layout.entry_bits // 8,
-        "compared_bytes": _loaded(layout, compared_bytes(layout, lookup)),
+        "compared_bytes": _loaded(compared_bytes(layout, lookup)),
         **_exchange(layout, len(layout.tables.slopes) + lookup.index),
         "one_group": not lookup.joints,
         "compared": [
@@ -358,7 +356,7 @@ def _step(names: Names, layout: Layout, lookup: Lookup, part: int) -> Row:
             for joint, how in zip(trimmed, _adding(len(trimmed), bool(compared), grouped), strict=True)
         ],
         "group": group,
-        "group_lent": _lending(layout, group),
+        "borrows": borrows(layout, lookup),
         "register": 30 if trimmed or grouped else 0,
     }
 

@@ -19,16 +19,15 @@ from thenar.firmware_templates.rendering import render
 
 from .assembly import (
     assembly_values,
-    borrowed_registers,
     calls_are_near,
     compared_bytes,
     far,
     finds_first,
-    found_is_far,
+    found_place,
     found_size,
     glove_size,
     kept_registers,
-    spare_registers,
+    last_size,
 )
 from .costs import NAME_BYTES, Cost
 from .layout import Field, JointLayout, Layout, Lookup
@@ -39,7 +38,7 @@ from .words import numbered
 _ONE = (
     "adc add and andi bst clr cp cpc clt cpi eor inc ldi lsl lsr mov movw neg or ori ror sbc sbci set sub subi swap tst"
 )
-_TWO = "icall ld ldd lds mul muls pop push sbiw st std sts"
+_TWO = "adiw icall ld ldd lds mul muls pop push sbiw st std sts"
 _CYCLES = dict.fromkeys(_ONE.split(), 1) | dict.fromkeys(_TWO.split(), 2) | {"lpm": 3}
 _JUMPS = {"rjmp": 2, "jmp": 3}
 _CALLS = {"rcall": 3, "call": 4, "ret": 4}
@@ -223,9 +222,8 @@ _LARGE = 5  # numbers from here on are multiplied by `mul`
 _SET_SWITCH, _GRASP, _INIT, _PAGE = 80, 40, 70, 256
 _LOSING, _LOSING_JOINTS = 400, 300
 _POINTER = 2  # bytes of variables: what is done while an input is missing, and the glove, where rows are found first
-# Return addresses of update() and of what it calls about a change; then either registers that finding a row borrows, or
-# a row's number and the return address of what adds the row.
-_CALLS_DEEP = 2
+# Return addresses of update(), of what it calls about a change, and of what adds a row; a row's number is on top.
+_CALLS_DEEP = 3
 
 
 Frame = tuple[NDArray[np.bool_], NDArray[np.uint16]]
@@ -305,10 +303,6 @@ class AvrCosts:
         self._near = calls_are_near(layout)
         kind = layout.entry_bits, layout.sum_bits, layout.entry_shift, layout.code_bits, layout.adding
         self._of_all = (layout.tables.n_classes, layout.tables.relative, layout.tables.slopes, *kind)
-        if spare_registers(layout) != spare_registers(replace(layout, lookups=layout.lookups[:1])):
-            # With so many look-ups that X is needed as well, each takes more than it takes alone.
-            self._counts = self._count(*layout.lookups)
-            return
         ordered = sorted(layout.lookups, key=lambda lookup: not lookup.joints)
         self._counts, rest = self._count(*ordered[:1]), ordered[1:]
         kinds = {bool(lookup.joints): lookup for lookup in layout.lookups}
@@ -324,7 +318,7 @@ class AvrCosts:
             (
                 _of_group(self._layout, lookup),
                 len(compared_bytes(self._layout, lookup)),
-                found_is_far(self._layout, len(self._layout.tables.slopes) + lookup.index),
+                far(found_place(self._layout, len(self._layout.tables.slopes) + lookup.index)),
                 tuple([_of_joint(self._layout, joint) for joint in lookup.joints]),
             )
             for lookup in lookups
@@ -357,9 +351,8 @@ class AvrCosts:
     @property
     def ram(self) -> int:
         """Bytes of a glove, of variables and of the deepest stack, return address included."""
-        deepest = max(len(borrowed_registers(self._layout)), 1 + self._counter)
-        stack = len(kept_registers(self._layout)) + _CALLS_DEEP * self._counter + deepest
-        variables = _POINTER * (1 + finds_first(self._layout)) + found_size(self._layout)
+        stack = len(kept_registers(self._layout)) + _CALLS_DEEP * self._counter + 1
+        variables = _POINTER * (1 + finds_first(self._layout)) + found_size(self._layout) + last_size(self._layout)
         return glove_size(self._layout) + variables + stack
 
     @property
