@@ -6,21 +6,18 @@ from itertools import pairwise, product
 from typing import cast
 
 from . import FirmwareError
-from .layout import Field, JointLayout, Layout, Lookup
+from .layout import Field, JointLayout, Layout, Lookup, looked_up
 from .words import Names, comment, switches_in_words
 
 # Free to use for a C function, and to be kept for its caller; of pairs the lower.
 _FREE, _KEPT = (22, 24, 26, 18, 20), (16, 14, 12, 10, 8, 6, 4, 2, 28)
-# Finding a row needs r0, r1, Z and Y, which points at the glove; where codes are wide, also a zero in r19:r18 and r20
-# for comparisons.
+# Finding a row needs r0, r1, Z and Y, which points at the glove; of a wide code also zero in r19:r18, or r20, which
+# compares.
 _POINTER, _ZERO, _COMPARED = 28, 18, 20
 _IMMEDIATE = 16  # registers from here on can be loaded with a constant
 _LPM_REACH = 65536
-# rcall reaches 4 KiB either way; all that update() does about a look-up must stay within that.
-_NEAR_BYTES = 3600
-_LOOKUP_BYTES, _JOINT_BYTES, _SOURCE_BYTES = 100, 54, 26  # without comparisons
-_SLOPE_BYTES = 110  # but for its products, which no near call reaches across
 FLAGS = 2  # bytes of a glove from where Y points to its input
+MOST_DISTANCE = 255  # that a byte holds
 _REACH = 63  # of ldd, and of adiw
 
 
@@ -37,7 +34,7 @@ def check_size(layout: Layout) -> None:
 
 
 def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> dict[str, object]:
-    """Return what the template of the assembly asks for; `near` is what `calls_are_near` says of the whole layout."""
+    """Return what the template of the assembly asks for; `near`: calls are `rcall`, not `call`."""
     parts = layout.parts
     stride = parts.width * layout.entry_bits // 8
     passes = [_pass(names, layout, number) for number in range(len(parts.firsts))]
@@ -45,6 +42,7 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
     return {
         "byte_sums": layout.sum_bits == 8,
         "wide": layout.code_bits == 16,
+        "zeros": _ZERO in _spare(layout),
         "unrolled": layout.adding == "unrolled",
         "finds_first": finds_first(layout),
         "call": "rcall" if near else "call",
@@ -104,17 +102,6 @@ def glove_size(layout: Layout) -> int:
     """Return the bytes of a glove on an AVR: scores, what they begin with, FLAGS, the input, and what is private."""
     lost = len(layout.ports) + -(-layout.tables.n_joints // 8) + 2
     return 4 * layout.tables.n_classes + FLAGS + layout.frame_size + seen_size(layout) + lost
-
-
-def calls_are_near(layout: Layout) -> bool:
-    """Return whether all calls are `rcall`; else they are `call`, a word and a cycle more."""
-    joints = sum(_JOINT_BYTES + 4 * len(joint.thresholds) * joint.compared for joint in layout.joints)
-    wide = sum(4 * len(joint.thresholds) * joint.compared for joint in layout.joints) * (layout.code_bits == 16)
-    groups = [layout.fields[lookup.group] for lookup in layout.lookups if lookup.group is not None]
-    put_together = 2 * sum(len(group_lines(fields)) for fields in groups)
-    each = put_together + _LOOKUP_BYTES * len(layout.lookups) + _SLOPE_BYTES * len(layout.tables.slopes)
-    each += _SOURCE_BYTES * (seen_size(layout) - _n_found(layout)) + joints + wide
-    return each * len(layout.parts.firsts) < _NEAR_BYTES
 
 
 _MOST_MOVES, _BYTE = 4, range(8)
@@ -202,7 +189,9 @@ def group_lines(fields: Sequence[Field]) -> list[str]:
 
 def _spare(layout: Layout) -> set[int]:
     """Return the registers that are needed to find rows; of pairs the lower."""
-    return {_POINTER, *((_ZERO, _COMPARED) if layout.code_bits == 16 else ())}
+    if layout.code_bits == 8 or not looked_up(layout.tables):
+        return {_POINTER}
+    return {_POINTER, _COMPARED if layout.bins == "search" else _ZERO}
 
 
 def _registers(layout: Layout) -> list[int]:
@@ -302,6 +291,7 @@ def _slope(names: Names, layout: Layout, at: int, first: int) -> Row:
         **_exchange(layout, at),
         "low": slope.low,
         "span": slope.high - slope.low,
+        "long": slope.high - slope.low > MOST_DISTANCE,
         "upper": slope.high < (1 << layout.code_bits) - 1,
         "doubled": max(slope.gain, 0),
         "halved": max(-slope.gain, 0),

@@ -2,7 +2,7 @@
 instruction along the longest path.
 
 All frames take equally long but for two things: each class that is better than all before it costs a cycle, and so
-does each code of 16 bits that is beyond the ends of a slope.
+does each code of 16 bits that is below a slope, or beyond one that is longer than a byte.
 """
 
 import re
@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from thenar.firmware_templates.rendering import render
 
 from .assembly import (
+    MOST_DISTANCE,
     assembly_values,
-    calls_are_near,
     compared_bytes,
     far,
     finds_first,
@@ -117,6 +117,11 @@ class Assembly:
         """Return the bytes of code, of one section or of all."""
         pairs = zip(self._code, self._sections, strict=True)
         return sum(each.size for each, its in pairs if section in ("", its))
+
+    def span(self, first: str, last: str) -> int:
+        """Return the bytes of code from a label to another, or to the end where that is not there."""
+        end = self._labels.get(last, [len(self._code)])[0]
+        return sum(each.size for each in self._code[self._labels[first][0] : end])
 
     def cycles(self, label: str) -> Ways:
         """Return the cycles from a label to the return from there, which is counted."""
@@ -224,6 +229,8 @@ _LOSING, _LOSING_JOINTS = 400, 300
 _POINTER = 2  # bytes of variables: what is done while an input is missing, and the glove, where rows are found first
 # Return addresses of update(), of what it calls about a change, and of what adds a row; a row's number is on top.
 _CALLS_DEEP = 3
+_RCALL_REACH = 4094  # bytes, forwards and backwards
+_ELPM_BYTES = 16  # where a part has ELPM, classify() looks where its tables end
 
 
 Frame = tuple[NDArray[np.bool_], NDArray[np.uint16]]
@@ -232,8 +239,8 @@ _DRAWN, _CLIMBED, _ROUNDS, _BETWEEN = 4096, 8, 20, 33
 
 
 class Counts(NamedTuple):
-    """The fewest cycles of classify, the most of it and of update, bytes of all code and of what is not needed to
-    classify.
+    """The fewest cycles of classify, the most of it and of update; bytes of all code, of what is not needed to
+    classify, and of what calls in update() must reach across.
     """
 
     least: int
@@ -241,6 +248,7 @@ class Counts(NamedTuple):
     update: int
     size: int
     uncalled: int
+    across: int
 
     def plus(self, more: "Counts", times: int = 1) -> "Counts":
         """Return the sum of these and of `times` more."""
@@ -288,42 +296,57 @@ def _counted(part: _Part, near: bool, elpm: bool) -> Counts:
     found = Assembly(render("classifier/thenar_NAME_avr.S.j2", **common, assembly=values), elpm=elpm)
     _, update = found.cycles("thenar_x_update")
     uncalled = found.size(".text.thenar_x_update") + found.size(".text.thenar_x_start_without")
-    return Counts(*found.cycles("thenar_x_classify"), update, found.size(), uncalled)
+    across = found.span("thenar_x_update", "thenar_x_update_near")
+    return Counts(*found.cycles("thenar_x_classify"), update, found.size(), uncalled, across)
 
 
-class AvrCosts:
-    """The costs of a layout on an AVR of so many bytes of flash, of which depends how wide its program counter is.
+def _total(layout: Layout, near: bool, elpm: bool) -> Counts:
+    """Return what there is to count in the assembly of a layout.
 
     Look-ups follow one another. So what each adds is counted once for all layouts: in the assembly of it alone, less
     what is left of that without it, which is what it takes alone less than twice.
     """
+    compares = layout.code_bits == 16 and layout.bins == "search"
+    kind = layout.entry_bits, layout.sum_bits, layout.entry_shift, layout.code_bits, compares, layout.adding
+    of_all = (layout.tables.n_classes, layout.tables.relative, layout.tables.slopes, *kind)
 
-    def __init__(self, layout: Layout, flash: int) -> None:
-        self._layout, self._counter = layout, 3 if flash > 128 << 10 else 2
-        self._near = calls_are_near(layout)
-        kind = layout.entry_bits, layout.sum_bits, layout.entry_shift, layout.code_bits, layout.adding
-        self._of_all = (layout.tables.n_classes, layout.tables.relative, layout.tables.slopes, *kind)
-        ordered = sorted(layout.lookups, key=lambda lookup: not lookup.joints)
-        self._counts, rest = self._count(*ordered[:1]), ordered[1:]
-        kinds = {bool(lookup.joints): lookup for lookup in layout.lookups}
-        around = {kind: self._around(lookup) for kind, lookup in kinds.items()}
-        for lookup in rest:
-            self._counts = self._counts.plus(self._count(lookup)).plus(around[bool(lookup.joints)], -1)
-
-    def _around(self, lookup: Lookup) -> Counts:
-        return self._count(lookup).plus(self._count(lookup)).plus(self._count(lookup, lookup), -1)
-
-    def _count(self, *lookups: Lookup) -> Counts:
+    def count(*lookups: Lookup) -> Counts:
         shapes = tuple(
             (
-                _of_group(self._layout, lookup),
-                len(compared_bytes(self._layout, lookup)),
-                far(found_place(self._layout, len(self._layout.tables.slopes) + lookup.index)),
-                tuple([_of_joint(self._layout, joint) for joint in lookup.joints]),
+                _of_group(layout, lookup),
+                len(compared_bytes(layout, lookup)),
+                far(found_place(layout, len(layout.tables.slopes) + lookup.index)),
+                tuple([_of_joint(layout, joint) for joint in lookup.joints]),
             )
             for lookup in lookups
         )
-        return _counted(_Part((shapes, self._of_all), self._layout, lookups), self._near, self._counter == 3)
+        return _counted(_Part((shapes, of_all), layout, lookups), near, elpm)
+
+    def around(lookup: Lookup) -> Counts:
+        return count(lookup).plus(count(lookup)).plus(count(lookup, lookup), -1)
+
+    ordered = sorted(layout.lookups, key=lambda lookup: not lookup.joints)
+    kinds = {bool(lookup.joints): lookup for lookup in layout.lookups}
+    between = {kind: around(lookup) for kind, lookup in kinds.items()}
+    counts = count(*ordered[:1])
+    for lookup in ordered[1:]:
+        counts = counts.plus(count(lookup)).plus(between[bool(lookup.joints)], -1)
+    return counts
+
+
+def calls_are_near(layout: Layout) -> bool:
+    """Return whether all calls are `rcall`; else they are `call`, a word and a cycle more."""
+    counts = _total(layout, near=True, elpm=False)
+    classify = 0 if layout.adding == "unrolled" else counts.size - counts.uncalled + _ELPM_BYTES
+    return max(counts.across, classify) <= _RCALL_REACH
+
+
+class AvrCosts:
+    """The costs of a layout on an AVR of so many bytes of flash, of which depends how wide its program counter is."""
+
+    def __init__(self, layout: Layout, flash: int) -> None:
+        self._layout, self._counter = layout, 3 if flash > 128 << 10 else 2
+        self._counts = _total(layout, calls_are_near(layout), self._counter == 3)
 
     @property
     def cost(self) -> Cost:
@@ -364,7 +387,8 @@ class AvrCosts:
 
 def rises(layout: Layout, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.int64]:
     """Return how many classes of each frame, bits (n, s) and codes (n, j), are better than all before them, (n,), and
-    how many codes of 16 bits are beyond their slopes: the cycles that classify takes beyond the fixed ones.
+    how many codes of 16 bits are cut off at an end of their slope where that takes longer: the cycles that classify
+    takes beyond the fixed ones.
     """
     scores = layout.scores(bits, codes)
     if len(layout.parts.firsts) == 1:
@@ -372,8 +396,8 @@ def rises(layout: Layout, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) ->
     best = np.maximum.accumulate(scores, axis=1)
     cycles: NDArray[np.int64] = np.count_nonzero(scores[:, 1:] > best[:, :-1], axis=1)
     for slope in layout.tables.slopes if layout.code_bits == 16 else ():
-        beyond = (codes[:, slope.joint] < slope.low) | (codes[:, slope.joint] >= slope.high)
-        cycles = cycles + beyond
+        code = codes[:, slope.joint]
+        cycles = cycles + ((code < slope.low) | ((code >= slope.high) & (slope.high - slope.low > MOST_DISTANCE)))
     return cycles
 
 
