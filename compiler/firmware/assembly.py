@@ -45,6 +45,7 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
         "zeros": _ZERO in _spare(layout),
         "unrolled": layout.adding == "unrolled",
         "finds_first": finds_first(layout),
+        "compares": compares_input(layout),
         "call": "rcall" if near else "call",
         "jump": "rjmp" if near else "jmp",
         "passes": passes,
@@ -71,14 +72,25 @@ def finds_first(layout: Layout) -> bool:
     return len(layout.parts.firsts) > 1 or bool(_pairs(layout) & _spare(layout))
 
 
+def compares_input(layout: Layout) -> bool:
+    """Return whether update() compares the input before it finds rows, which takes more flash and, where few codes
+    change, less time; otherwise it compares the rows.
+    """
+    return layout.adding == "unrolled"
+
+
 def compared_bytes(layout: Layout, lookup: Lookup) -> list[int]:
     """Return the places in the frame of the bytes of input that update() compares, to know whether a look-up's row may
     be another: none of a group of switches alone, whose row is made of few bits.
     """
-    if not lookup.joints:
+    if not lookup.joints or not compares_input(layout):
         return []
     ports = [] if lookup.group is None else [field.port for field in layout.fields[lookup.group]]
     return [*dict.fromkeys(ports), *(place for joint in lookup.joints for place in _code_bytes(layout, joint.number))]
+
+
+def _compared_of_slope(layout: Layout, joint: int) -> list[int]:
+    return _code_bytes(layout, joint) if compares_input(layout) else []
 
 
 def found_size(layout: Layout) -> int:
@@ -91,7 +103,8 @@ def seen_size(layout: Layout) -> int:
     input that these were found from.
     """
     codes = sum(len(compared_bytes(layout, lookup)) for lookup in layout.lookups)
-    return max(_n_found(layout) + codes + len(layout.tables.slopes) * layout.code_bits // 8, 1)
+    codes += sum(len(_compared_of_slope(layout, slope.joint)) for slope in layout.tables.slopes)
+    return max(_n_found(layout) + codes, 1)
 
 
 def _n_found(layout: Layout) -> int:
@@ -287,7 +300,7 @@ def _slope(names: Names, layout: Layout, at: int, first: int) -> Row:
         "at": at,
         "what": comment(names.joints[slope.joint].name),
         "taken": _code(layout, slope.joint),
-        "compared_bytes": _loaded(_code_bytes(layout, slope.joint)),
+        "compared_bytes": _loaded(_compared_of_slope(layout, slope.joint)),
         **_exchange(layout, at),
         "low": slope.low,
         "span": slope.high - slope.low,

@@ -228,6 +228,7 @@ _SET_SWITCH, _GRASP, _INIT, _PAGE = 80, 40, 70, 256
 _LOSING, _LOSING_JOINTS = 400, 300
 _POINTER = 2  # bytes of variables: what is done while an input is missing, and the glove, where rows are found first
 # Return addresses of update(), of what it calls about a change, and of what adds a row; a row's number is on top.
+# One more where a group's change takes the last sum from memory to add, and puts it back.
 _CALLS_DEEP = 3
 _RCALL_REACH = 4094  # bytes, forwards and backwards
 _ELPM_BYTES = 16  # where a part has ELPM, classify() looks where its tables end
@@ -325,6 +326,8 @@ def _total(layout: Layout, near: bool, elpm: bool) -> Counts:
     def around(lookup: Lookup) -> Counts:
         return count(lookup).plus(count(lookup)).plus(count(lookup, lookup), -1)
 
+    if layout.tables.slopes:
+        return count(*layout.lookups)  # which take longer to write than many look-ups
     ordered = sorted(layout.lookups, key=lambda lookup: not lookup.joints)
     kinds = {bool(lookup.joints): lookup for lookup in layout.lookups}
     between = {kind: around(lookup) for kind, lookup in kinds.items()}
@@ -374,9 +377,11 @@ class AvrCosts:
     @property
     def ram(self) -> int:
         """Bytes of a glove, of variables and of the deepest stack, return address included."""
-        stack = len(kept_registers(self._layout)) + _CALLS_DEEP * self._counter + 1
-        variables = _POINTER * (1 + finds_first(self._layout)) + found_size(self._layout) + last_size(self._layout)
-        return glove_size(self._layout) + variables + stack
+        layout = self._layout
+        taking = last_size(layout) > 0 and not layout.biased and any(not lookup.joints for lookup in layout.lookups)
+        stack = len(kept_registers(layout)) + (_CALLS_DEEP + taking) * self._counter + 1
+        variables = _POINTER * (1 + finds_first(layout)) + found_size(layout) + last_size(layout)
+        return glove_size(layout) + variables + stack
 
     @property
     def losing(self) -> int:
