@@ -73,10 +73,12 @@ def finds_first(layout: Layout) -> bool:
 
 
 def compares_input(layout: Layout) -> bool:
-    """Return whether update() compares the input before it finds rows, which takes more flash and, where few codes
-    change, less time; otherwise it compares the rows.
+    """Return whether update() compares the input before it finds rows; if not, it finds all rows and compares those.
+
+    That takes more time if few codes change, but less flash. Wide codes, which change with every bit of noise, are only
+    compared where flash is spent on speed.
     """
-    return layout.adding == "unrolled"
+    return layout.adding == "unrolled" or layout.code_bits == 8
 
 
 def compared_bytes(layout: Layout, lookup: Lookup) -> list[int]:

@@ -171,13 +171,13 @@ thenar_glove_update:
 
 changes_0:
     movw  r30, r24
+loads_0:
     ldd   r22, Z+0
     ldd   r23, Z+1
     ldd   r24, Z+2
     ldd   r25, Z+3
     ldd   r26, Z+4
     ldd   r27, Z+5
-groups_0:
 
     /* switches 0 to 5 */
     ldd   r30, Y+2
@@ -233,13 +233,7 @@ thenar_glove_prepare:
 
 begin_0:
     to_state START + 0 - STATE
-    ldd   r22, Z+0
-    ldd   r23, Z+1
-    ldd   r24, Z+2
-    ldd   r25, Z+3
-    ldd   r26, Z+4
-    ldd   r27, Z+5
-    jmp   groups_0
+    jmp   loads_0
 
 all_0:
     rcall change_0_1
@@ -303,18 +297,7 @@ change_0_1:
     ret
 
 add_0:
-    lpm   r0, Z+
-    add   r22, r0
-    lpm   r0, Z+
-    adc   r23, r0
-    lpm   r0, Z+
-    add   r24, r0
-    lpm   r0, Z+
-    adc   r25, r0
-    lpm   r0, Z+
-    add   r26, r0
-    lpm   r0, Z+
-    adc   r27, r0
+    add_row
     ret
 
 subtract_0:
@@ -331,6 +314,7 @@ subtract_0:
     lpm   r0, Z+
     sbc   r27, r0
     ret
+thenar_glove_update_near:
     .size thenar_glove_update, . - thenar_glove_update
 
     .section .text.thenar_glove_start_without, "ax", @progbits
