@@ -1,4 +1,4 @@
-"""The classifier in AVR assembly: which registers hold the sums, and where each look-up finds its row."""
+"""The classifier in AVR assembly: which registers hold the sums, and how each lookup finds its row."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -9,15 +9,15 @@ from . import FirmwareError
 from .layout import Field, JointLayout, Layout, Lookup, looked_up
 from .words import Names, comment, switches_in_words
 
-# Free to use for a C function, and to be kept for its caller; of pairs the lower.
+# Call-clobbered and call-saved register pairs, each named by its lower register.
 _FREE, _KEPT = (22, 24, 26, 18, 20), (16, 14, 12, 10, 8, 6, 4, 2, 28)
-# Finding a row needs r0, r1, Z and Y, which points at the glove; of a wide code also zero in r19:r18, or r20, which
-# compares.
+# Finding a row needs r0, r1, Z, and Y, which points at the glove. With 16-bit codes it also needs r19:r18 as zero, or
+# r20 for comparisons.
 _POINTER, _ZERO, _COMPARED = 28, 18, 20
 _IMMEDIATE = 16  # registers from here on can be loaded with a constant
 _LPM_REACH = 65536
-FLAGS = 2  # bytes of a glove from where Y points to its input
-MOST_DISTANCE = 255  # that a byte holds
+FLAGS = 2  # bytes between the address in Y and the glove's input
+MOST_DISTANCE = 255  # the largest distance that fits in a byte
 _REACH = 63  # of ldd, and of adiw
 
 
@@ -34,7 +34,7 @@ def check_size(layout: Layout) -> None:
 
 
 def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> dict[str, object]:
-    """Return what the template of the assembly asks for; `near`: calls are `rcall`, not `call`."""
+    """Return the values for the assembly template; if `near`, calls are relative."""
     parts = layout.parts
     stride = parts.width * layout.entry_bits // 8
     passes = [_pass(names, layout, number) for number in range(len(parts.firsts))]
@@ -57,7 +57,7 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
         "seen": seen_size(layout),
         "sources": FLAGS + layout.frame_size + _n_found(layout),
         "halves": layout.entry_shift == 8,
-        "clean": layout.biased and not layout.entry_shift,  # r1 is zero between look-ups
+        "clean": layout.biased and not layout.entry_shift,  # r1 is zero between lookups
         "tables": [
             *([(f"thenar_{name}_rows", layout.n_rows * len(parts.firsts) * stride)] if layout.n_rows else []),
             *([(f"thenar_{name}_bins", bins)] if bins else []),
@@ -66,24 +66,24 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
 
 
 def finds_first(layout: Layout) -> bool:
-    """Return whether classify() finds all rows before it adds any: where classes are added up in parts, or where their
-    sums leave no registers to find rows with.
+    """Return whether classify() finds all rows before it adds any: the classes need several passes, or their sums leave
+    no registers for finding rows.
     """
     return len(layout.parts.firsts) > 1 or bool(_pairs(layout) & _spare(layout))
 
 
 def compares_input(layout: Layout) -> bool:
-    """Return whether update() compares the input before it finds rows; if not, it finds all rows and compares those.
+    """Return whether update() compares the input before it finds rows. Otherwise it finds all rows and compares those,
+    which needs less flash but more time if few codes change.
 
-    That takes more time if few codes change, but less flash. Wide codes, which change with every bit of noise, are only
-    compared where flash is spent on speed.
+    Sensor noise changes most 16-bit codes in every frame, so they are only compared if rows are added in line.
     """
     return layout.adding == "unrolled" or layout.code_bits == 8
 
 
 def compared_bytes(layout: Layout, lookup: Lookup) -> list[int]:
-    """Return the places in the frame of the bytes of input that update() compares, to know whether a look-up's row may
-    be another: none of a group of switches alone, whose row is made of few bits.
+    """Return the offsets in the frame of the input bytes that update() compares to decide whether a lookup's row may
+    have changed. A lookup of switches alone has none: its row number is cheap to compute.
     """
     if not lookup.joints or not compares_input(layout):
         return []
@@ -96,13 +96,13 @@ def _compared_of_slope(layout: Layout, joint: int) -> list[int]:
 
 
 def found_size(layout: Layout) -> int:
-    """Return the bytes that hold what classify() has found, where it finds first."""
+    """Return the size of the row numbers that classify() stores if it finds all rows first."""
     return max(_n_found(layout), 1) if finds_first(layout) else 0
 
 
 def seen_size(layout: Layout) -> int:
-    """Return the bytes that say what is in the sums of update(): the distances of slopes, the rows of look-ups, and the
-    input that these were found from.
+    """Return the size of the state of update(): the distances of slopes, the row numbers of lookups, and the compared
+    input bytes.
     """
     codes = sum(len(compared_bytes(layout, lookup)) for lookup in layout.lookups)
     codes += sum(len(_compared_of_slope(layout, slope.joint)) for slope in layout.tables.slopes)
@@ -114,7 +114,7 @@ def _n_found(layout: Layout) -> int:
 
 
 def glove_size(layout: Layout) -> int:
-    """Return the bytes of a glove on an AVR: scores, what they begin with, FLAGS, the input, and what is private."""
+    """Return the size of a glove on an AVR: scores, initial scores, FLAGS, input and private state."""
     lost = len(layout.ports) + -(-layout.tables.n_joints // 8) + 2
     return 4 * layout.tables.n_classes + FLAGS + layout.frame_size + seen_size(layout) + lost
 
@@ -124,8 +124,8 @@ _MOST_MOVES, _BYTE = 4, range(8)
 
 @lru_cache(maxsize=512)
 def _moved(bit: int, width: int, to: int) -> tuple[str, ...]:
-    """Return the fewest instructions that bring `width` bits of a register from `bit` to `to` and clear all others;
-    `{}` is the register.
+    """Return the shortest instruction sequence that moves `width` bits of a register from `bit` to `to` and clears the
+    others; `{}` is the register.
     """
 
     def after(moves: tuple[str, ...], place: int) -> int | None:
@@ -148,16 +148,16 @@ def _moved(bit: int, width: int, to: int) -> tuple[str, ...]:
 
 
 def far(place: int, *, wide: bool = False) -> int:
-    """Return whether the glove's byte at that place from its input on is within the reach of Y (0), within reach of a
-    short move of Y (1), or beyond (2).
+    """Return how Y reaches an offset from the glove's input: directly (0), after one `adiw` (1), or after a 16-bit
+    addition (2).
     """
     at = FLAGS + place + wide
     return (at > _REACH) + (at > 2 * _REACH)
 
 
 def _at(place: int, transfer: str, registers: Sequence[int]) -> list[str]:
-    """Return the instructions that load registers from that place on, or store them there (`transfer`). Y points FLAGS
-    bytes before the input; it is moved, and moved back, for what is beyond its reach.
+    """Return the instructions that load or store (`transfer`) registers at an offset from the input. Y points FLAGS
+    bytes before the input; it is moved and restored if the offset is out of reach.
     """
     at = FLAGS + place
     base = (0, _REACH, at)[far(place, wide=len(registers) > 1)]
@@ -169,24 +169,24 @@ def _at(place: int, transfer: str, registers: Sequence[int]) -> list[str]:
 
 
 def taken(place: int, register: int, *, wide: bool = False) -> list[str]:
-    """Return the instructions that load the input at that place in the frame, a wide one into two registers."""
+    """Return the instructions that load the input at an offset in the frame, two bytes if `wide`."""
     return _at(place, "ldd   r{register}, Y+{place}", range(register, register + 1 + wide))
 
 
 def found_place(layout: Layout, number: int) -> int:
-    """Return where the byte is that says what update() has found for a slope, or then for a look-up."""
+    """Return the offset of the distance of a slope, or of the row number of a lookup (numbered after the slopes)."""
     return layout.frame_size + number
 
 
 def _exchange(layout: Layout, number: int) -> Row:
-    """Return the instructions that load what was found before into r31, and those that store r30 in its place."""
+    """Return the instructions that load the previous row number or distance into r31, and that store r30 over it."""
     place = found_place(layout, number)
     return {"before_in_r31": taken(place, 31), "store_r30": _at(place, "std   Y+{place}, r{register}", [30])}
 
 
 def group_lines(fields: Sequence[Field]) -> list[str]:
-    """Return the instructions that make the byte of a group of its fields' ports in r30; r31 is theirs to use, r0 and
-    r1 are not.
+    """Return the instructions that assemble a group's byte in r30 from its fields. They may change r31, but not r0 or
+    r1.
     """
     lines: list[str] = []
     for field in fields:
@@ -203,15 +203,15 @@ def group_lines(fields: Sequence[Field]) -> list[str]:
 
 
 def _spare(layout: Layout) -> set[int]:
-    """Return the registers that are needed to find rows; of pairs the lower."""
+    """Return the register pairs that are needed to find rows, each by its lower register."""
     if layout.code_bits == 8 or not looked_up(layout.tables):
         return {_POINTER}
     return {_POINTER, _COMPARED if layout.bins == "search" else _ZERO}
 
 
 def _registers(layout: Layout) -> list[int]:
-    """Return the registers of the sums of a pass; of pairs the lower. Those that finding rows needs are the last to be
-    taken.
+    """Return the registers of the sums of a pass; of a pair the lower. Registers that finding rows needs are taken
+    last.
     """
     spare = _spare(layout)
     pairs = sorted((*_FREE, *_KEPT), key=lambda low: (low == _POINTER, low in spare))
@@ -220,32 +220,33 @@ def _registers(layout: Layout) -> list[int]:
 
 
 def _pairs(layout: Layout) -> set[int]:
-    """Return the pairs of registers that hold sums; the lower of each."""
+    """Return the register pairs that hold sums, each by its lower register."""
     return {register // 2 * 2 for register in _registers(layout)}
 
 
 def borrows(layout: Layout, lookup: Lookup) -> bool:
-    """Return whether update() must save a sum while it finds a row: it compares wide codes with thresholds."""
+    """Return whether update() must save r20, a sum, while it compares 16-bit codes with thresholds."""
     compares = layout.code_bits == 16 and any(joint.compared for joint in lookup.joints)
     return compares and _COMPARED in _registers(layout)
 
 
 def last_size(layout: Layout) -> int:
-    """Return the bytes of the sums of update() that stay in memory while Y points at the glove."""
+    """Return the size of the sums that update() keeps in memory while Y points at the glove."""
     return sum(each // 2 * 2 == _POINTER for each in _registers(layout)) * layout.sum_bits // 8
 
 
 def kept_registers(layout: Layout) -> list[int]:
-    """Return the registers that are saved: because they hold sums, and because Y points at the glove."""
+    """Return the call-saved registers that are used: those with sums, and Y."""
     halves = (0, 1) if layout.sum_bits == 16 else (0,)
     sums = {low + half for low in _registers(layout) for half in halves if low // 2 * 2 in _KEPT}
     return sorted(sums | {_POINTER, _POINTER + 1})
 
 
 def _pass(names: Names, layout: Layout, number: int) -> Row:
-    """Return a pass over all look-ups for some classes: their sums, each in a register or in a pair from `low` on,
-    their place among the scores in bytes, and how many of them, the first ones, are in the pass before as well. While
-    Y points at the glove, the sums in `spilled`, which are the last, stay in memory.
+    """Return a pass over all lookups for some classes.
+
+    Each sum is in a register, or in a pair from `low` on; those in `spilled`, the last, stay in memory while Y points
+    at the glove. `scores` is the byte offset of the first score; the first `again` classes are also in the pass before.
     """
     parts = layout.parts
     first = parts.firsts[number]
@@ -256,7 +257,7 @@ def _pass(names: Names, layout: Layout, number: int) -> Row:
     slopes = [_slope(names, layout, at, first) for at in range(len(layout.tables.slopes))]
     before = 0
     for each in (*steps, *slopes):
-        each["before"] = before  # where the bytes of input that it was found from begin
+        each["before"] = before  # offset of its compared input bytes
         before += len(cast("list[Row]", each["compared_bytes"]))
     sums = [
         {"low": low, "high": low + high, "start": start, "grasp": grasp, "immediate": low >= _IMMEDIATE}
@@ -277,25 +278,25 @@ def _pass(names: Names, layout: Layout, number: int) -> Row:
 
 
 def _code_bytes(layout: Layout, joint: int) -> list[int]:
-    """Return the places in the frame of the bytes of a joint's code."""
+    """Return the offsets in the frame of the bytes of a joint's code."""
     each = layout.code_bits // 8
     first = len(layout.ports) + layout.padding + joint * each
     return [*range(first, first + each)]
 
 
 def _loaded(places: Sequence[int]) -> list[list[str]]:
-    """Return for each byte of input the instructions that load it into r0."""
+    """Return the instructions that load each input byte into r0."""
     return [taken(place, 0) for place in places]
 
 
 def _code(layout: Layout, joint: int) -> list[str]:
-    """Return the instructions that load a joint's code, into r30 or r31:r30."""
+    """Return the instructions that load a joint's code into r30 or r31:r30."""
     return taken(_code_bytes(layout, joint)[0], 30, wide=layout.code_bits == 16)
 
 
 def _slope(names: Names, layout: Layout, at: int, first: int) -> Row:
-    """Return a slope: how its code is loaded, held within its range and scaled, and what it multiplies: entries, each
-    with the sums that it is added to, or subtracted from.
+    """Return a slope: how its code is loaded, clamped and scaled, and the entries that it multiplies, each with the
+    sums that the product is added to or subtracted from.
     """
     slope, registers = layout.tables.slopes[at], _registers(layout)
     return {
@@ -319,8 +320,8 @@ def _slope(names: Names, layout: Layout, at: int, first: int) -> Row:
 
 
 def products(row: Sequence[int]) -> list[tuple[int, list[tuple[int, bool]]]]:
-    """Return what a slope's row multiplies: each entry that is not zero, but for those that are equal to another or its
-    negative, and the classes that it is of, with whether it is theirs or its negative is.
+    """Return the distinct absolute values among the nonzero entries of a slope's row. With each come its classes, and
+    whether the entry of a class equals the one returned or its negative.
     """
     found: dict[int, list[int]] = {}
     for k, entry in enumerate(row):
@@ -330,8 +331,8 @@ def products(row: Sequence[int]) -> list[tuple[int, list[tuple[int, bool]]]]:
 
 
 def _step(names: Names, layout: Layout, lookup: Lookup, part: int) -> Row:
-    """Return a look-up in the pass for the classes of a part: what it is of, how the number of its row is made of the
-    input, which register has it then, how each byte of that input is loaded into r0, and where its rows begin.
+    """Return a lookup in the pass of a part: its inputs, how its row number is computed and in which register, how each
+    input byte is loaded into r0, and the offset of its rows.
     """
     compared = [joint for joint in reversed(lookup.joints) if joint.compared]
     trimmed = [joint for joint in lookup.joints if not joint.compared]
@@ -379,8 +380,8 @@ def _bins(layout: Layout, joint: JointLayout) -> Row:
 
 
 def _adding(count: int, before: bool, after: bool) -> list[str]:
-    """Return what is done with each of `count` numbers in r30, that are added up in r0 and in the end in r30; whether
-    there is one in r0 before, and whether one comes after.
+    """Return the instruction that adds each of `count` numbers in r30 to a sum in r0; the last leaves the sum in r30.
+    `before`: r0 already holds a number; `after`: another number follows.
     """
     last = [] if after else ["add   r30, r0" if count > 1 or before else ""]
     rest = ["add   r0, r30"] * (count - len(last) if count else 0)
