@@ -1,8 +1,8 @@
 """Cycles, flash and RAM of the classifier on an AVR, counted in its assembly as it is rendered, instruction by
 instruction along the longest path.
 
-All frames take equally long but for two things: each class that is better than all before it costs a cycle, and so
-does each code of 16 bits that is below a slope, or beyond one that is longer than a byte.
+All frames take the same time with two exceptions: each class whose score exceeds all earlier ones costs a cycle, and
+so does each 16-bit code below a slope, or beyond a slope that is longer than a byte.
 """
 
 import re
@@ -72,7 +72,7 @@ class Line(NamedTuple):
 
 
 class Assembly:
-    """The instructions of rendered assembly: macros of its own put in, preprocessed for a part that has ELPM or not."""
+    """The instructions of rendered assembly, macros expanded, preprocessed for a part with or without ELPM."""
 
     def __init__(self, text: str, *, elpm: bool) -> None:
         self._counter = 3 if elpm else 2
@@ -152,7 +152,7 @@ class Assembly:
         return self._labels[target][0] if target in self._labels else -1
 
     def _stops(self, at: int) -> bool:
-        """Return whether an instruction leaves this assembly for good: no answer takes that way."""
+        """Return whether an instruction leaves this assembly for good, on a path that no prediction takes."""
         return self._code[at].name in _JUMPS and self._to[at] < 0
 
     def _path(self, start: int, end: int) -> Ways:
@@ -258,7 +258,7 @@ class Counts(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """Look-ups of a layout, equal to all that take the same code there."""
+    """Lookups of a layout; two are equal if they need the same code."""
 
     key: tuple[object, ...]
     layout: Layout = field(compare=False)
@@ -266,7 +266,7 @@ class _Part:
 
 
 def _of_joint(layout: Layout, joint: JointLayout) -> tuple[int, ...]:
-    """Return what the code that finds a row has of a joint: its steps, and what it is multiplied by, or its clamps."""
+    """Return a joint's part in the code that finds a row: its steps, and its factor or clamps."""
     place, wide = len(layout.ports) + layout.padding + joint.number * layout.code_bits // 8, layout.code_bits == 16
     beyond = far(place, wide=wide)
     if joint.compared:
@@ -277,7 +277,7 @@ def _of_joint(layout: Layout, joint: JointLayout) -> tuple[int, ...]:
 
 
 def _of_group(layout: Layout, lookup: Lookup) -> tuple[Field, ...]:
-    """Return what the code that puts a group together has of it, wherever its ports are."""
+    """Return a group's part in the code that assembles its index, independent of its ports."""
     return () if lookup.group is None else _anywhere(layout.fields[lookup.group])
 
 
@@ -288,7 +288,7 @@ def _anywhere(fields: tuple[Field, ...]) -> tuple[Field, ...]:
 
 @lru_cache(maxsize=4096)
 def _counted(part: _Part, near: bool, elpm: bool) -> Counts:
-    """Return what there is to count in the assembly of a layout of these look-ups alone."""
+    """Return the counts of the assembly of a layout with only these lookups."""
     layout = replace(part.layout, lookups=part.lookups)
     values = assembly_values("x", numbered(layout.tables), layout, near=near)
     common = {"name": "x", "opening": "", "biased": layout.biased, "width": layout.parts.width}
@@ -302,9 +302,9 @@ def _counted(part: _Part, near: bool, elpm: bool) -> Counts:
 
 
 def _total(layout: Layout, near: bool, elpm: bool) -> Counts:
-    """Return what there is to count in the assembly of a layout.
+    """Return the counts of the assembly of a layout.
 
-    Look-ups follow one another. So what each adds is counted once for all layouts: in the assembly of it alone, less
+    Lookups follow one another, so the contribution of each is counted once for all layouts: its assembly alone, less
     what is left of that without it, which is what it takes alone less than twice.
     """
     compares = layout.code_bits == 16 and layout.bins == "search"
@@ -327,7 +327,7 @@ def _total(layout: Layout, near: bool, elpm: bool) -> Counts:
         return count(lookup).plus(count(lookup)).plus(count(lookup, lookup), -1)
 
     if layout.tables.slopes:
-        return count(*layout.lookups)  # which take longer to write than many look-ups
+        return count(*layout.lookups)  # which take longer to render than many lookups
     ordered = sorted(layout.lookups, key=lambda lookup: not lookup.joints)
     kinds = {bool(lookup.joints): lookup for lookup in layout.lookups}
     between = {kind: around(lookup) for kind, lookup in kinds.items()}
@@ -345,7 +345,7 @@ def calls_are_near(layout: Layout) -> bool:
 
 
 class AvrCosts:
-    """The costs of a layout on an AVR of so many bytes of flash, of which depends how wide its program counter is."""
+    """The costs of a layout on an AVR; its flash, in bytes, determines the width of its program counter."""
 
     def __init__(self, layout: Layout, flash: int) -> None:
         self._layout, self._counter = layout, 3 if flash > 128 << 10 else 2
@@ -434,7 +434,7 @@ def _codes(layout: Layout, number: int) -> NDArray[np.uint16]:
 
 
 def _climb(layout: Layout, frame: Frame, choices: list[NDArray[np.uint16]]) -> Frame:
-    """Return what the frame becomes by taking, again and again, the best of those that differ in one input."""
+    """Climb from a frame: repeatedly take the best of the frames that differ in one input."""
     for _ in range(_ROUNDS):
         bits, codes = _neighbours(frame, choices)
         cycles = rises(layout, bits, codes)
