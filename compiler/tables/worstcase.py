@@ -82,11 +82,11 @@ class Rounding:
 
 
 class _Pairs:
-    """The most that every ordered pair of classes can lose: the sum over inputs of the greatest difference of errors.
+    """The maximal loss of every ordered pair of classes: the sum over inputs of the largest difference of errors.
 
-    Errors have a hundred bits and more, pairs are a million where there are a thousand classes. So errors are cut into
-    parts of so many bits that sums of differences fit machine words. The first parts alone bound every loss to within a
-    unit an input on either side; the few pairs that may then have the greatest are worked out with all parts.
+    Errors have a hundred bits and more, and a thousand classes have a million pairs. So errors are cut into parts small
+    enough for sums of differences to fit machine words. The first parts alone bound every loss to within one unit per
+    input on either side; the few pairs that may have the maximum are then computed with all parts.
     """
 
     def __init__(self, errors: list[Exact]) -> None:
