@@ -97,7 +97,7 @@ def test_nobody_there_is_a_device_error_that_says_what_to_look_at(tmp_path: Path
             (f"ws://127.0.0.1:{port}/", "is the sender there"),
             (f"unix:{tmp_path}/none", "is the sender there"),
             (f"unix:{tmp_path}/{'x' * 200}", "too long"),
-            (taken.port, "no other program may have the port"),
+            (taken.port, "close other programs that have the port"),
         ):
             with pytest.raises(DeviceError, match=said):
                 LineReader(where).open()

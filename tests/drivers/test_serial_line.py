@@ -90,7 +90,7 @@ def test_a_url_of_any_other_kind_is_refused_and_touches_no_file(tmp_path: Path, 
     victim = tmp_path / "victim"
     victim.write_bytes(b"kept")
     for url in (f"{scheme}://{os.devnull}?file={victim}", f"{scheme}://{victim}", f"{scheme}://?file={victim}"):
-        with pytest.raises(SettingError, match="is no port that is opened: a port is a device such as"):
+        with pytest.raises(SettingError, match="is not a supported port: a port is a device such as"):
             SerialLine(url, 115_200)
     assert victim.read_bytes() == b"kept"
 
