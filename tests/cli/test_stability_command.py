@@ -103,7 +103,7 @@ def test_a_case_that_raises_is_a_line_and_hides_no_other(here: Thenar) -> None:
 def test_json_holds_every_number_and_the_verdicts(here: Thenar) -> None:
     done = here("exceeding", "sound", "--json")
     report = json.loads(done.stdout)
-    assert (done.returncode, report["holds"], report["full"], report["beside"]) == (1, False, False, None)
+    assert (done.returncode, report["holds"], report["full"], report["weka"]) == (1, False, False, None)
     assert [(case["name"], case["holds"]) for case in report["cases"]] == [("sound", True), ("exceeding", False)]
     assert report["cases"][1]["checks"][0]["finding"]["error"] == 1.5
 

@@ -126,7 +126,7 @@ def test_a_line_where_nothing_comes_or_nothing_can_is_said(thenar: Thenar, tmp_p
     for port, said in (
         ("spy://x", "is not a supported port"),
         ("/dev/none", "there is no such port"),
-        (f"unix:{tmp_path}/none", "is the sender there"),
+        (f"unix:{tmp_path}/none", "is the sender running"),
     ):
         done = thenar("doctor", "--line", port)
         assert done.returncode == 2

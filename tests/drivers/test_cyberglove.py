@@ -199,7 +199,7 @@ def test_a_box_that_never_is_ready_is_read_with_a_note(line: PtyLine) -> None:
         emulated.state.plugged = False
         glove = CyberGlove(str(line.link))
         (note,) = glove.open().notes
-        assert "?G says 1, not 3" in note
+        assert "?G returns 1, not 3" in note
         assert read(glove).fault == "unplugged"
         emulated.state.plugged = True
         assert read(glove, lambda record: record.fault is None)
