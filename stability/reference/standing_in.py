@@ -75,7 +75,7 @@ def _step(kind: Kind, shares: Sequence[Sequence[Sequence[mpf]]], rows: Rows) -> 
     if len(lacks) > n:
         beyond = [(lacks[n][k] - mpmath.fsum(lack[k] for lack in gains)) / (1 + n) for k in classes]
         gains = [[lack[k] + beyond[k] for k in classes] for lack in gains]
-    # The error of a gain is that of its own lack plus a (1 + n)-th of all; n + 4 roundings add and divide them.
+    # The error of a gain is that of its lack plus a (1 + n)-th of all; n + 4 roundings add and divide them.
     most = [2 * (max(of[k] for of in doubts) + (n + 4) * _U * max(abs(of[k]) for of in lacks)) for k in classes]
     moves = iter(gains)
     all_gains = [next(moves) if counts else [mpf(0)] * len(sums) for counts in says]

@@ -130,7 +130,10 @@ def test_weka_that_is_missing_is_named(text: str) -> None:
 
 def test_the_round_in_which_weka_parts_from_itself_is_named_in_words_and_picture() -> None:
     read = Reader(page(msgspec.structs.replace(REPORT, weka=COMPARISON), FIGURES))
-    assert "JVM: at most 1e-16 until they diverge in round 3, then up to 1; after the last round 2 rows of 8 change" in read.words
+    assert (
+        "JVM: at most 1e-16 until they diverge in round 3, then up to 1; after the last round 2 rows of 8 change"
+        in read.words
+    )
     assert "the processor's exp(), the default: at most 1e-16 until they diverge in round 3, then up to 1" in read.words
     assert "Java's portable exp(): at most 1e-13, in all rounds" in read.words
     assert "in 10 other orders: the same bits" in read.words
