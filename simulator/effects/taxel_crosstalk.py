@@ -4,8 +4,8 @@ conduct, the less voltage is left for each.
 The matrix is read against virtual ground, with one amplifier per column, so that there are no sneak paths; the loss at
 the row's switch is then exact (D'Alessio 1999, Sensors and Actuators A 72: 71, and Hidalgo-Lopez et al. 2018, J.
 Sensors 9735741, name it the main cause of crosstalk): G / (1 + R sum of G over the row). Published: 70 ohms typical of
-the multiplexer CD74HC4067 at 4.5 V (its data sheet). Read off the force curve of the FSR 402's data sheet: 10 kilohms at
-1 N, to some tens of percent. A piezoresistive fabric is of the same order (ours).
+the multiplexer CD74HC4067 at 4.5 V (its data sheet). Read off the force curve of the FSR 402's data sheet: 10 kilohms
+at 1 N, to some tens of percent. A piezoresistive fabric is of the same order (ours).
 """
 
 from typing import Annotated

@@ -80,7 +80,7 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
         ),
         (
             "[[scanner]]\nport = 'socket://a:1?x'\nswitches = []",
-            "port: 'socket://a:1?x' has the option 'x', which is not",
+            "port: 'socket://a:1?x' has the option 'x', which it does not support",
         ),
         ("[[bus]]\ndevice = 'spy://a'", "line 2: bus[0].device: 'spy://a' is not the path of a device, such as"),
         ("[[bus]]\ndevice = 'a\\u001bb'".replace("'", '"'), "bus[0].device: 'a\\x1bb' is not the path of a device"),

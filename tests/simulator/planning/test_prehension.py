@@ -103,7 +103,7 @@ BAD = [
     ("away = [0, 0, -1]", "away = [0, 0, 0]", "types.Tip.away: is a direction"),
     ("up = [0, 0, 1]", "up = [0, 0, 0]", "types.Tip.up: is a direction"),
     ("grip_n = 10", "grip_n = 10\ndown = [0, 0, 0]", "types.Tip.down: is a direction"),
-    ("up = [0, 0, 1]", "up = [0, -2, 0]", "line 11: types.Tip.up: points along `axis`"),
+    ("up = [0, 0, 1]", "up = [0, -2, 0]", "line 11: types.Tip.up: is parallel to `axis`"),
     ("up = [0, 0, 1]", "up = [0, 0, inf]", "types.Tip.up[2]: must be a finite number"),
     ("up = [0, 0, 1]", "up = [0, 1]", "types.Tip.up: "),
     ("up = [0, 0, 1]\n", "", "line 1: types.Tip: the key up is missing"),
