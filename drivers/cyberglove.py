@@ -4,7 +4,7 @@
         while (timed := glove.read(1.0)) is not None:
             time_us, record = timed
 
-Where the sources of the protocol disagree, each variant is accepted or selectable: docs/reference/cyberglove.md.
+Where the sources of the protocol disagree, each variant is accepted or selectable: docs/reference/devices.md.
 """
 
 import logging

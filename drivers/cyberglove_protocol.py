@@ -1,7 +1,7 @@
 """The CyberGlove's serial protocol: sensors, commands and replies, periods, records.
 
 It follows the vendor's manual as public drivers quote it (ViSTA, FreeVR, Shadow's serial_glove, VESS, asr, toon);
-docs/reference/cyberglove.md lists their disagreements.
+docs/reference/devices.md lists their disagreements.
 
 **Sensors.** The box has 24 slots. Two are never sent: the abduction of the index, which no glove measures, and the
 last.
@@ -64,7 +64,7 @@ _ERRORS = {
     b"g": "no glove is plugged in",
     b"s": "sampling too fast",
 }
-# Bytes in the reply to ?X, by X; below, bytes after X as a setting. docs/reference/cyberglove.md explains each letter.
+# Bytes in the reply to ?X, by X; below, bytes after X as a setting. docs/reference/devices.md explains each letter.
 ANSWERED: Mapping[str, int] = (
     dict.fromkeys("BDFGJLNQRSUWY", 1) | dict.fromkeys("KMP", 3) | dict.fromkeys("TV", 4) | {"A": 6}
 )

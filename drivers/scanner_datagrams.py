@@ -1,4 +1,4 @@
-"""A scanner board over Wi-Fi: one frame a UDP datagram, at udp://HOST:PORT. docs/reference/scanner-board.md has the
+"""A scanner board over Wi-Fi: one frame a UDP datagram, at udp://HOST:PORT. docs/reference/devices.md has the
 layout.
 
 A network drops, duplicates and reorders datagrams. So each carries a number of 32 bits, and one is accepted only if it

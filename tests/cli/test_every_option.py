@@ -35,14 +35,14 @@ LINES: dict[str, tuple[str, str]] = {
     "segment": ("movements.grasps", "-b build -o new.csv"),
     "frontier": (
         "set.grasps",
-        "-o new --methods elimination --rivals none --rounds 2 --repeats 1 --finalists 1 --jobs 1",
+        "-o new --methods elimination --baselines none --rounds 2 --repeats 1 --finalists 1 --jobs 1",
     ),
     "compile": ("set.grasps", "-o new --rounds 2 --folds 0 --no-report"),
     "verify": ("build set.grasps", ""),
     "firmware": ("build", "--target host -o new"),
     "spec": ("build", "-o new"),
     "run": ("build", "--replay set.grasps"),
-    "monitor": ("unix:missing/socket", "--web 127.0.0.1:0"),
+    "monitor": ("missing.mcap", "--web 127.0.0.1:0"),
     "teach": ("movements.grasps", "-b build -o new.json"),
     "calibrate": ("missing/port", "-o new.toml"),
     "record": ("", "--glove glove.toml --subject A --objects objects.toml --taxonomy own -o new.grasps"),
@@ -134,7 +134,7 @@ def _tried(line: list[str], place: Path, capfd: pytest.CaptureFixture[str]) -> t
     printed, said = capfd.readouterr()
     after = _holds(place)
     assert "Traceback" not in printed + said
-    assert "mistake in thenar" not in said, said
+    assert "bug in thenar" not in said, said
     assert {name: after.get(name) for name in before} == before, "a file that was there has changed"
     new = sorted(after.keys() - before.keys(), key=len)
     if code == 2:
@@ -194,6 +194,6 @@ def test_names_beyond_ascii_are_said_in_any_locale(command: str, place: Path) ->
         [sys.executable, "-m", "thenar.cli", command, *words], capture_output=True, env=environment, check=False
     )
     assert b"Traceback" not in done.stderr
-    assert b"mistake in thenar" not in done.stderr, done.stderr
+    assert b"bug in thenar" not in done.stderr, done.stderr
     assert done.returncode in (0, 1, 2)
     assert (done.stdout + done.stderr).isascii()

@@ -19,7 +19,7 @@ Thenar = Callable[..., subprocess.CompletedProcess[str]]
 # A trainer of which nothing is left to choose.
 SETTLED = ("--trainer", "logitboost", "--shrinkage", 1, "--max-bins", 65536)
 QUICK = (
-    *("--target", "host", "--methods", "elimination,id3", "--rivals", "mrmr"),
+    *("--target", "host", "--methods", "elimination,id3", "--baselines", "mrmr"),
     *("--rounds", 6, "--finalists", 2, "--repeats", 1, "--jobs", 1, *SETTLED),
 )
 pytestmark = pytest.mark.slow
@@ -60,7 +60,7 @@ def test_a_record_is_the_vendors_formula_unless_the_wire_alone_is_asked_for(
 ) -> None:
     joints = tuple(replace(joint, name=name) for joint, name in zip(small_set.joints, SENSORS_18, strict=False))
     replace(small_set, joints=joints).save(tmp_path / "set.grasps")
-    few = ("--methods", "id3", "--rivals", "none", "--rounds", 2, "--finalists", 1, "--repeats", 1, "--jobs", 1)
+    few = ("--methods", "id3", "--baselines", "none", "--rounds", 2, "--finalists", 1, "--repeats", 1, "--jobs", 1)
     wire_us = round(5 * 10e6 / 115_200)
     for options, how, us in (((), "formula", 500 + wire_us), (("--record-time", "wire"), "wire", wire_us)):
         done = thenar("frontier", tmp_path / "set.grasps", "-o", tmp_path / "frontier", *few, *SETTLED, *options)
@@ -129,7 +129,7 @@ def test_options_that_the_point_settles_cannot_be_given_as_well(
         "compile", set_file, "-o", tmp_path / "b", "--from", found_folder / "frontier.json", "--point", 1, "--rounds", 5
     )
     assert done.returncode == 2
-    assert "--rounds is settled by the point" in done.stderr
+    assert "--rounds is set by the point" in done.stderr
 
 
 def test_a_frontier_of_other_recordings_is_refused(
@@ -157,5 +157,5 @@ def test_a_budget_that_nothing_meets_ends_with_a_code(
     shutil.copytree(found_folder, again)
     done = thenar("frontier", set_file, "-o", again, *QUICK, "--budget-us", 0.001)
     assert done.returncode == 1
-    assert "no point suits" in done.stderr
+    assert "no point qualifies" in done.stderr
     assert (again / "frontier.json").exists()
