@@ -72,18 +72,18 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
         ("[cyberglove]\nport = ''", "line 2: cyberglove.port: must be text of length >= 1"),
         (
             "[cyberglove]\nport = 'spy:///dev/null?file=a'",
-            "line 2: cyberglove.port: 'spy:///dev/null?file=a' is no port that is opened: a port is a device such as",
+            "line 2: cyberglove.port: 'spy:///dev/null?file=a' is not a supported port: a port is a device such as",
         ),
         (
             "[[scanner]]\nswitches = []\nport = 'loop://'",
-            "line 3: scanner[0].port: 'loop://' is no port that is opened",
+            "line 3: scanner[0].port: 'loop://' is not a supported port",
         ),
         (
             "[[scanner]]\nport = 'socket://a:1?x'\nswitches = []",
-            "port: 'socket://a:1?x' has the option 'x', which is not",
+            "port: 'socket://a:1?x' has the option 'x', which it does not support",
         ),
-        ("[[bus]]\ndevice = 'spy://a'", "line 2: bus[0].device: 'spy://a' is no path of a device, such as"),
-        ("[[bus]]\ndevice = 'a\\u001bb'".replace("'", '"'), "bus[0].device: 'a\\x1bb' is no path of a device"),
+        ("[[bus]]\ndevice = 'spy://a'", "line 2: bus[0].device: 'spy://a' is not the path of a device, such as"),
+        ("[[bus]]\ndevice = 'a\\u001bb'".replace("'", '"'), "bus[0].device: 'a\\x1bb' is not the path of a device"),
         ("[cyberglove]\nport = 'x'\nbaud = 'fast'", "line 3: cyberglove.baud: 'fast' is not among its values (did"),
         ("[cyberglove]\nport = 'x'\nbaud = 0", "line 3: cyberglove.baud: must be at least 1, not 0"),
         ("[cyberglove]\nport = 'x'\nsensors = 20", "line 3: cyberglove.sensors: 20 is not among its values"),
@@ -131,9 +131,9 @@ def test_what_is_wrong_with_a_line_or_bus_is_told_with_its_place(load: Load, tex
         ("kind = 'mcp23018'", "line 4: bus[0].chip[0].kind: there is no chip 'mcp23018' (did you mean 'mcp23017'"),
         (
             "kind = 'mcp23017'\naddress = 0x28",
-            "line 5: bus[0].chip[0].address: a mcp23017 answers at 0x20 to 0x27, not",
+            "line 5: bus[0].chip[0].address: a mcp23017 is at 0x20 to 0x27, not",
         ),
-        ("kind = 'mcp23017'\naddress = -1", "line 5: bus[0].chip[0].address: a mcp23017 answers at 0x20 to 0x27, not"),
+        ("kind = 'mcp23017'\naddress = -1", "line 5: bus[0].chip[0].address: a mcp23017 is at 0x20 to 0x27, not"),
         (
             "pins = { GPA8 = 's' }",
             "bus[0].chip[0].pins.GPA8: a mcp23017 has no pin 'GPA8' (did you mean 'GPA6' or 'GPA5' or 'GPA4'?)",
