@@ -150,7 +150,7 @@ def test_a_table_is_imported_without_a_columns_toml(glove: Path, capsys: pytest.
         "a semicolon",
         "decimal sign: a comma",
         "Versuch │ trial",
-        "columns.toml: what was",
+        "columns.toml: the detected columns",
     ):
         assert words in said.out
     assert "numbered as trials in natural order: 'T1' is 1, 'T2' is 2, 'T10' is 3" in said.out
@@ -197,9 +197,7 @@ def test_without_a_terminal_nothing_is_imported_and_the_next_command_is_said(
     said = capsys.readouterr()
     assert "Versuch │ trial" in said.out
     again = "thenar import 'my glove.csv' -o set.grasps --columns columns-2.toml\n"
-    assert (
-        said.err == f"thenar: nobody confirmed the columns on a terminal: review columns-2.toml, then run: {again}"
-    )
+    assert said.err == f"thenar: nobody confirmed the columns on a terminal: review columns-2.toml, then run: {again}"
     assert (glove / "columns.toml").read_text() == "# mine\n"
     assert not (glove / "set.grasps").exists()
     assert run(shlex.split(again)[1:]) == 0
