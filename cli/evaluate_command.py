@@ -91,7 +91,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the first repeat.")
 @jobs_option()
 @click.option(
-    "--rivals",
+    "--baselines",
     type=method_list,
     default="cmim,mutual-information",
     show_default=True,

@@ -86,7 +86,7 @@ def _address(_: click.Context, __: click.Parameter, text: str | None) -> str | N
     type=method_list,
     help="Placement methods to build from.  [default: elimination and ID3, by cost with --glove]",
 )
-@click.option("--rivals", type=method_list, help="Methods to compare them with, or none.  [default: most rivals]")
+@click.option("--baselines", type=method_list, help="Methods to compare them with, or none.  [default: most]")
 @trainer_option(AUTO)
 @click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="Most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1, 1000), default=3, show_default=True, help="Repeats of the folds.")
@@ -119,7 +119,7 @@ def command(
     budget_us: float | None,
     rate: float | None,
     methods: tuple[str, ...] | None,
-    rivals: tuple[str, ...] | None,
+    baselines: tuple[str, ...] | None,
     **asked: Any,
 ) -> int:
     """Show the trade-off between accuracy and time: which switches, joints, rounds, tables, wirings and decisions pay.
@@ -147,7 +147,7 @@ def command(
     training = asked_settings(context, asked)
     search = Search(
         methods=methods or usual(ours=True, wired=harness is not None or bool(grasp_set.taxel_columns)),
-        rivals=usual(ours=False) if rivals is None else rivals,
+        baselines=usual(ours=False) if baselines is None else baselines,
         rounds=rounds,
         trainer=training.pop("trainer"),
         settings={name: value for name, value in training.items() if name != "rounds"},

@@ -148,7 +148,7 @@ class WithMethods(click.Command):
 
 def _remarks(method: "Method") -> str:
     """Return further remarks for the user, in brackets."""
-    remarks = [] if method.ours else ["rival"]
+    remarks = [] if method.ours else ["baseline"]
     remarks += [f"pip install {method.install}"] if method.install else []
     return f" ({'; '.join(remarks)})" if remarks else ""
 

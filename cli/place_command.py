@@ -57,7 +57,7 @@ class _Asked:
     prune: int
     keep: int | None
     exact: bool
-    crowd: bool
+    population: bool
     joints: bool
     levels: int | None
     keep_joints: int | None
@@ -79,7 +79,7 @@ class _Asked:
         """The requested method, or the usual one."""
         from thenar.compiler.placement.methods.base import BEST, METHODS, PAPERS
 
-        return METHODS.named(self.method or (BEST if self.crowd else PAPERS))
+        return METHODS.named(self.method or (BEST if self.population else PAPERS))
 
     def check(self) -> None:
         """Raise UsageError if options conflict."""
@@ -90,16 +90,23 @@ class _Asked:
         for wrong, reason in (
             (wants_json() and self.show_tree, "--tree is for people and --json for machines: give one of them"),
             (self.show_tree and not tree, "--tree prints the tree of the paper's ID3 only: leave it out"),
-            (self.draw is not None and not (tree or self.crowd), "--draw draws ID3's tree, or a --crowd"),
-            (self.exact and self.crowd, "--exact judges one placement and --crowd looks for one: take one of them"),
+            (self.draw is not None and not (tree or self.population), "--draw draws ID3's tree, or a --population"),
             (
-                self.crowd and not method.by_number,
-                "--crowd takes a method that keeps M switches",
+                self.exact and self.population,
+                "--exact judges one placement and --population looks for one: take one of them",
             ),
-            (self.crowd and (self.levels or self.keep_joints), "--crowd takes neither --levels nor --keep-joints"),
             (
-                self.crowd and (self.limited or self.robust),
-                "--crowd looks for the placement of many subjects: it takes no limits and no --robust",
+                self.exact and self.population,
+                "--exact judges one placement, --population looks for one: take one of them",
+            ),
+            (
+                self.population and not method.by_number,
+                "--population takes a method that keeps M switches",
+            ),
+            (self.population and (self.levels or self.keep_joints), "--population takes no --levels or --keep-joints"),
+            (
+                self.population and (self.limited or self.robust),
+                "--population looks for the placement of many subjects: it takes no limits and no --robust",
             ),
             (self.layout is not None and self.apart_mm is None, "--layout gives positions for --apart-mm: add that"),
             (self.joints and tree, "--joints is for methods other than the paper's ID3"),
@@ -107,7 +114,7 @@ class _Asked:
             if wrong:
                 raise click.UsageError(reason)
         method.check_given(self.keep, self.prune)
-        if self.glove is not None and (self.crowd or not (method.uses_ports or self.budget_us is not None)):
+        if self.glove is not None and (self.population or not (method.uses_ports or self.budget_us is not None)):
             from thenar.compiler.placement.methods.base import METHODS
 
             heeding = ", ".join(name for name, each in METHODS.items() if each.uses_ports)
@@ -160,13 +167,13 @@ class _Asked:
     def found(self) -> "Placement":
         """Return the placement."""
         from thenar.compiler.placement.placement import place
-        from thenar.compiler.placement.population import place_for_crowd
+        from thenar.compiler.placement.population import place_for_population
         from thenar.compiler.recordings.graspset import GraspSet
 
         grasp_set, method = GraspSet.load(self.grasps), self.chosen_by
         with progress(f"choosing switches by {method.name}") as report:
-            if self.crowd:
-                return place_for_crowd(
+            if self.population:
+                return place_for_population(
                     grasp_set,
                     self.keep or 1,
                     method=method.name,
@@ -191,7 +198,7 @@ class _Asked:
 
 @click.command("place", cls=WithMethods)
 @click.argument("grasps", type=existing_file)
-@method_option(default="id3; elimination with --crowd")
+@method_option(default="id3; elimination with --population")
 @keep_option
 @levels_option
 @keep_joints_option
@@ -205,10 +212,12 @@ class _Asked:
     help="A glove.toml: the costs of its ports, for methods that weigh them.  [default: MCP23017]",
 )
 @click.option("--exact", is_flag=True, help="Also print the gap between the placement and the best of the same size.")
-@click.option("--crowd", is_flag=True, help="Choose one standard placement for many subjects.")
-@jobs_option("Worker processes of --crowd.")
+@click.option("--population", is_flag=True, help="Choose one standard placement for many subjects.")
+@jobs_option("Worker processes of --population.")
 @click.option("--tree", "show_tree", is_flag=True, help="Also print ID3's tree.")
-@click.option("--draw", type=picture_file, help="Also draw ID3's tree, or a crowd's accuracy: an .svg or .png file.")
+@click.option(
+    "--draw", type=picture_file, help="Also draw ID3's tree, or a population's accuracy: an .svg or .png file."
+)
 @click.option("-o", "--output", type=OutputFile(".json"), help="Also store the placement as JSON.")
 @overwrite_flag
 @json_flag
@@ -226,7 +235,7 @@ def command(**options: Any) -> None:
         thenar place set.grasps --method elimination --keep 16 --exact
         thenar place set.grasps --method id3-cost --keep 16 --glove glove.toml
         thenar place set.grasps --method elimination --keep 16 --keep-these thumb_distal_5 --apart-mm 8
-        thenar place crowd.grasps --crowd --keep 16 --draw subjects.svg
+        thenar place crowd.grasps --population --keep 16 --draw subjects.svg
     """
     asked = _Asked(**options)
     asked.check()
@@ -321,14 +330,14 @@ def _of_exact(exact: "Exactly", m: int) -> Iterator[str]:
 
 
 def _of_study(kept: str, study: "Standard") -> Iterator[str]:
-    from thenar.compiler.placement.drawing import BETTERED
+    from thenar.compiler.placement.drawing import REFINED
 
     yield (
-        f"{kept}, chosen by {study.method}, {BETTERED[study.aim]}: this did best within the training subjects. "
+        f"{kept}, chosen by {study.method}, {REFINED[study.aim]}: this did best within the training subjects. "
         f"Trained again on {study.rows} rows of all {study.subjects} subjects"
     )
     yield (
-        "bettered: the switches chosen last are exchanged for the next ones if half of the training subjects then "
+        "refined: the switches chosen last are exchanged for the next ones if half of the training subjects then "
         "predict the other half better. Counting badly served subjects more often was tried on 80 simulated hands; "
         "it gained no more than redrawing the rows, and is not done"
     )
@@ -336,11 +345,11 @@ def _of_study(kept: str, study: "Standard") -> Iterator[str]:
 
 def _print_served(study: "Standard") -> None:
     """Print the accuracy on held-out subjects."""
-    from thenar.compiler.placement.drawing import BETTERED
+    from thenar.compiler.placement.drawing import REFINED
 
     columns = ("subjects", "placement", "mean, %", "worst tenth, %", "lowest, %")
     served = table(columns, title=f"Accuracy on trials of {study.held_out} held-out subjects (new subject)")
     for point in study.curve:
         rates = (point.served.mean, point.served.worst_tenth, point.served.lowest)
-        served.add_row(str(point.subjects), BETTERED[point.aim], *(f"{100 * rate:.1f}" for rate in rates))
+        served.add_row(str(point.subjects), REFINED[point.aim], *(f"{100 * rate:.1f}" for rate in rates))
     out().print(served)

@@ -102,7 +102,9 @@ def test_a_set_of_another_glove_is_refused_by_its_first_strange_switch(
 ) -> None:
     for options in ([], ["--place"], ["--per-grasp"]):
         assert run(["draw", str(set_file), *options, "-o", str(tmp_path / "no.svg")]) == 2
-        assert "where switch 's0' lies is not known: --layout takes a drawing of your glove" in capsys.readouterr().err
+        assert (
+            "the position of switch 's0' is unknown: give --layout a drawing of your glove" in capsys.readouterr().err
+        )
     assert not (tmp_path / "no.svg").exists()
 
 

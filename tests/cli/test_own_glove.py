@@ -118,7 +118,7 @@ def test_without_a_layout_nothing_is_drawn_and_with_one_everything_is(
 ) -> None:
     refused = thenar("draw", grasps, "-o", tmp_path / "no.svg")
     assert refused.returncode == 2
-    assert "where switch 'pad_thumb_1' lies is not known: --layout takes a drawing" in refused.stderr
+    assert "the position of switch 'pad_thumb_1' is unknown: give --layout a drawing" in refused.stderr
     build = tmp_path / "build"
     refused = thenar("compile", grasps, "-o", build, *QUICK, "--hand-length", 180)
     assert refused.returncode == 2
@@ -139,7 +139,7 @@ def test_without_a_layout_nothing_is_drawn_and_with_one_everything_is(
 def test_a_frontier_leaves_the_unknown_time_of_joints_out_and_says_so_or_takes_what_it_is_told(
     thenar: Thenar, grasps: Path, tmp_path: Path
 ) -> None:
-    few = ("--methods", "id3", "--rivals", "none", "--rounds", 5, "--repeats", 1, "--finalists", 1, "--jobs", 1)
+    few = ("--methods", "id3", "--baselines", "none", "--rounds", 5, "--repeats", 1, "--finalists", 1, "--jobs", 1)
     settled = ("--trainer", "logitboost", "--shrinkage", 1, "--max-bins", 65536)  # nothing is left to choose
     found: dict[str, list[Any]] = {}
     for name, more in (("left out", ()), ("given", ("--joint-us", 5000))):
@@ -147,7 +147,7 @@ def test_a_frontier_leaves_the_unknown_time_of_joints_out_and_says_so_or_takes_w
             (tmp_path / name).mkdir()
             copy(tmp_path / "left out" / "store.jsonl", tmp_path / name)
         said = worked(thenar("frontier", grasps, "-o", tmp_path / name, *few, *settled, "--target", "avr328p", *more))
-        assert ("what reading the joints (flex_thumb, flex_index) takes is not known" in said) == (name == "left out")
+        assert ("the time of reading the joints (flex_thumb, flex_index) is unknown" in said) == (name == "left out")
         points = json.loads((tmp_path / name / "frontier.json").read_text())["points"]
         found[name] = [point for point in points if point["setting"]["inputs"] != "switches"]
         assert found[name]

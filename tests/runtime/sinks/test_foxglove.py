@@ -1,6 +1,6 @@
 """What Foxglove reads, by its own WebSocket protocol, foxglove.sdk.v1, spoken by a client that is not Foxglove's.
 
-https://github.com/foxglove/ws-protocol, docs/how-to/spec.md: the server advertises channels as JSON, a client subscribes with
+https://github.com/foxglove/ws-protocol, docs/spec.md: the server advertises channels as JSON, a client subscribes with
 ids of its own, and messages are binary: 0x01, the subscription as uint32, nanoseconds as uint64, the payload.
 """
 
