@@ -177,7 +177,7 @@ def test_shipped_scenes_are_listed_with_what_they_are(capsys: Captured) -> None:
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["quick"], "say one of --output, --explain, --ablate, --list"),
+        (["quick"], "choose one mode: --output, --explain, --ablate, --list"),
         (["quick", "--explain", "--ablate"], "choose one mode:"),
         (["--explain"], "name a scene"),
         (["quick", "--list"], "leave out quick"),
