@@ -45,10 +45,10 @@ def test_a_placement_obeys_and_its_bound_is_of_those_that_do(thenar: Thenar, set
 def test_what_contradicts_or_is_not_known_is_refused(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
     where = ("--layout", layout(tmp_path))
     for asked, reason in (
-        (("--keep-these", "s4,s3", "--apart-mm", 6, *where), "s4,s3 are 3.0 mm apart, --apart-mm asks for 6"),
+        (("--keep-these", "s4,s3", "--apart-mm", 6, *where), "s4,s3 are 3.0 mm apart, --apart-mm requires 6"),
         (("--keep-these", "s4", "--never", "s4"), "--keep-these and --never both name s4"),
         (("--never", "s9"), "no input 's9'"),
-        (("--apart-mm", 6), "where s0, s1, s2, s3, s4 and 1 more lie is not known"),
+        (("--apart-mm", 6), "the position of s0, s1, s2, s3, s4 and 1 more is unknown"),
         (("--budget-us", 0), "--never and --budget-us leave nothing"),
         (("--at-most", 3, "pads"), "'pads' is not"),
         (("--population", "--keep", 2, "--robust"), "--population looks for the placement of many subjects"),
