@@ -2,7 +2,7 @@
 
 import io
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import chdir, contextmanager
 from importlib import import_module
 from importlib.util import find_spec
@@ -39,6 +39,12 @@ PALETTE: Mapping[str, tuple[str, str]] = MappingProxyType(
 def on_paper(name: str) -> str:
     """Return a colour of PALETTE for files."""
     return PALETTE[name][0]
+
+
+def colour_variables(names: Collection[str] = PALETTE) -> str:
+    """Return colours of PALETTE as variables of a style sheet, for light screens and paper, and for dark screens."""
+    light, dark = ("".join(f" --{name}: {PALETTE[name][side]};" for name in names) for side in (0, 1))
+    return f":root {{{light} }}\n@media screen and (prefers-color-scheme: dark) {{ :root {{{dark} }} }}\n"
 
 
 class PictureError(ThenarError, ValueError):
