@@ -126,8 +126,8 @@ def test_an_answer_that_was_not_offered_takes_no_pose(line: PtyLine, tmp_path: P
     with EmulatedCyberGlove(line) as glove, calibrating(line, tmp_path / "a.toml") as process:
         code, _, said = converse(process, Wearer(glove, 18, {0: "back", 3: "k"}))
     assert code == 0, said
-    assert "'back' is no answer here" in said
-    assert "'k' is no answer here" in said
+    assert "'back' is not one of the keys: type one that the question names" in said
+    assert "'k' is not one of the keys: type one that the question names" in said
     assert [said.count(f"Pose {number} of 7") for number in range(1, 8)] == [1] * 7
 
 
@@ -193,7 +193,7 @@ def test_an_unplugged_glove_is_not_calibrated(line: PtyLine, tmp_path: Path) -> 
         glove.state.plugged = False
         code, _, said = converse(process, lambda _: None)
     assert code == 2
-    assert "?G says 1, not 3" in said
+    assert "?G returns 1, not 3" in said
     assert "the glove is not plugged into its box" in said.splitlines()[-1]
 
 

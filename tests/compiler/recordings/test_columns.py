@@ -61,10 +61,10 @@ def test_every_key_is_read(tmp_path: Path) -> None:
     [
         ("", "line 1: the key label is missing"),
         ("label = 3", "line 1: label: must be text or a list, not 3"),
-        ('label = "a"\nlables = 1', "line 2: lables: there is no such key here"),
+        ('label = "a"\nlables = 1', "line 2: lables: this key is unknown"),
         (
             'label = "a"\n[[joints]]\ncolumns = ["b"]\ngird = 1',
-            r"line 4: joints\[0\].gird: there is no such key here",
+            r"line 4: joints\[0\].gird: this key is unknown",
         ),
         ('label = "a"\nmissing = "skip"', "line 2: missing: 'skip' is not among its values"),
         ('label = "a"\ndelimiter = ""', "`delimiter` must be one character"),
@@ -73,8 +73,8 @@ def test_every_key_is_read(tmp_path: Path) -> None:
         ('label = "a"\nencoding = "base64"', "`encoding` must be one that Python knows, not 'base64'"),
         ('label = "a"\nencoding = "idna"', "`encoding` must be one that Python knows"),
         ('label = "a"\nencoding = "a\\u0000b"', "`encoding` must be one that Python knows"),
-        ('label = "a"\ntime_unit = "s"', "`time_unit` is that of `time`, which names no column"),
-        ('label = "a"\ntrial = "b"\nframes = "restart"', "`frames` = 'restart' takes no `trial`"),
+        ('label = "a"\ntime_unit = "s"', "`time_unit` is given without `time`"),
+        ('label = "a"\ntrial = "b"\nframes = "restart"', "`frames` = 'restart' excludes `trial`"),
         ('label = "a"\nreduce = "mean"', "reduce: 'mean' is not among its values"),
         ("label = []", "`label` must name a column"),
         ('label = "a"\n[[taxels]]\ncolumns = ["b"]\nthreshold = inf', "`threshold` must be a finite number, 'otsu' or"),

@@ -94,7 +94,7 @@ def test_arrays_of_an_npz_are_columns(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arrays", "reason"),
     [
-        ({"a": np.zeros(2), "b": np.zeros(3)}, "its arrays have 2, 3 rows"),
+        ({"a": np.zeros(2), "b": np.zeros(3)}, "its arrays have unequal lengths, 2, 3"),
         ({"a": np.zeros((2, 2, 2))}, "array a.npy: it has 3 dimensions"),
         ({"a": np.zeros(2, complex)}, "array a.npy: it holds '<c16', neither numbers nor text"),
         ({"a": np.array([{}, {}])}, r"cannot be read as npz: array a\.npy: it holds '\|O', neither"),
@@ -135,7 +135,7 @@ HUGE = ONE.replace(b"(1,), }             ", b"(999999999999,), }  ")
         (ONE, "File is not a zip file"),
         (_zip({"a.npy": ONE})[:-30], "File is not a zip file"),
         (_zip({"readme.txt": b"no array at all"}), "it does not begin as a .npy file does"),
-        (_zip({"a.npy": ONE[:-1]}), r"array a\.npy: it is of other length than its shape \(1,\) takes"),
+        (_zip({"a.npy": ONE[:-1]}), r"array a\.npy: its length does not match its shape \(1,\)"),
         (_zip({"a.npy": ONE.replace(b")", b"(")}), "its head is not what numpy writes"),
         (_zip({"a.npy": HUGE}), "it has more than 1000000 rows"),
         (_zip({"a.npy": ONE}, zipfile.ZIP_BZIP2), r"a\.npy is not compressed as numpy\.savez does"),
