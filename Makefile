@@ -16,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 PACKAGES := cli compiler drivers firmware_templates runtime simulator stability
 
-.PHONY: help demo test test-slow test-all pythons mutants lint format types bench soak fuzz docs check clean
+.PHONY: help demo test test-slow test-all pythons mutants lint format types bench soak fuzz docs dist check clean
 
 help:           ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -37,7 +37,7 @@ else
 	$(BIN)/thenar draw $(OUT)/set.grasps --place -o $(OUT)/kept.svg --overwrite
 endif
 	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json --overwrite $(if $(TABLE),--repeats 1 --tables compositions)
-	$(BIN)/thenar frontier $(OUT)/set.grasps -o $(OUT)/frontier --methods elimination,id3 --rivals none --rounds 50 --repeats 1 --finalists 4 --budget-us 5000
+	$(BIN)/thenar frontier $(OUT)/set.grasps -o $(OUT)/frontier --methods elimination,id3 --baselines none --rounds 50 --repeats 1 --finalists 4 --budget-us 5000
 	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build --from $(OUT)/frontier/frontier.json
 	$(BIN)/thenar verify $(OUT)/build $(OUT)/set.grasps
 	$(BIN)/thenar run $(OUT)/build --replay $(OUT)/set.grasps > $(OUT)/grasps.jsonl
@@ -70,9 +70,14 @@ pythons: $(VENV)/installed  ## .venv-3.x with thenar for every other Python of t
 	.venv-3.$*/bin/python -m pip install --quiet --editable ".[compiler]"
 	touch $@
 
-lint: $(VENV)/installed  ## ruff: rules and formatting
+lint: $(VENV)/installed  ## ruff: rules and formatting; codespell: spelling, and the words of words.txt
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/codespell *.md *.toml Makefile docs examples benchmarks $(PACKAGES)
+
+dist: $(VENV)/installed  ## the sdist and the wheel, in dist/, with their metadata checked
+	$(BIN)/python -m build
+	$(BIN)/twine check --strict dist/*
 
 format: $(VENV)/installed  ## let ruff mend what it can
 	$(BIN)/ruff check --fix .
@@ -114,9 +119,9 @@ fuzz: $(VENV)/installed  ## hostile files of every format, guided by coverage, u
 	$(BIN)/python tests/fuzz/run.py $(FUZZ)
 
 docs: $(VENV)/installed  ## the documentation as a site in site/, offline
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 check: lint types test  ## what a commit should pass
 
 clean:          ## remove everything that the targets make
-	rm -rf $(VENV) .venv-3.* $(OUT) .mutants build site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .fuzz
+	rm -rf $(VENV) .venv-3.* $(OUT) .mutants build dist site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .fuzz

@@ -100,12 +100,12 @@ def _trained(trainer: str, settings: tuple[tuple[str, Any], ...], fold: Fold, jo
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A row of the table: `rival` where it has a place among those that are compared."""
+    """A row of the table; `compared` if it competes for the front."""
 
     name: str
     rates: tuple[float, ...]
     cost: Cost
-    rival: bool = field(default=True)
+    compared: bool = field(default=True)
 
     def beats(self, other: "Line") -> bool:
         """Whether it is nowhere worse than the other, and somewhere better."""
@@ -151,7 +151,7 @@ def theirs(cuts: Mapping[str, list[Fold]]) -> Iterator[Line]:
             except FirmwareError as also:
                 CONSOLE.print(f"{also}"[:200], markup=False)
             else:
-                yield Line(f"{peer.name} ({LARGER.part})", found, cost, rival=False)
+                yield Line(f"{peer.name} ({LARGER.part})", found, cost, compared=False)
 
 
 def table(title: str, lines: Sequence[Line], shown: Callable[[Line], bool]) -> Table:
@@ -161,13 +161,13 @@ def table(title: str, lines: Sequence[Line], shown: Callable[[Line], bool]) -> T
         made.add_column(column, justify="right" if column else "left")
     for line in lines:
         if shown(line):
-            mark = "*" if line.rival and _on_front(line, lines) else ""
+            mark = "*" if line.compared and _on_front(line, lines) else ""
             made.add_row(line.name, *(f"{rate:.2f}" for rate in line.rates), *line.cost.cells, mark)
     return made
 
 
 def _on_front(line: Line, lines: Sequence[Line]) -> bool:
-    return not any(other.beats(line) for other in lines if other.rival)
+    return not any(other.beats(line) for other in lines if other.compared)
 
 
 def print_changes(cuts: Mapping[str, list[Fold]], what: Ours) -> None:
@@ -199,7 +199,7 @@ def main() -> None:
     lines.sort(key=lambda line: (line.cost.part != AVR.part, line.cost.most))
     title = f"{SWITCHES} switches in {PORTS} bytes + {JOINTS} joints, 14 grasp types, {AVR.part}, -Os, filling included"
     CONSOLE.print(table(title, lines, lambda line: True))
-    CONSOLE.print(table("The front", lines, lambda line: line.rival and _on_front(line, lines)))
+    CONSOLE.print(table("The front", lines, lambda line: line.compared and _on_front(line, lines)))
     for what in OURS:
         print_changes(cuts, what)
 

@@ -45,7 +45,7 @@ CURVE_MODELS = (
     "extra trees",
     "RBF SVM",
 )
-# What a rival may be ahead by.
+# What a baseline may be ahead by.
 WITHIN = 0.5
 
 
@@ -165,39 +165,49 @@ def shown(name: str, of: Of, made: Sequence[Line]) -> Table:
     table = Table(title=f"{name}, {of}: {made[0].rate.total:,} trials")
     for heading in ("", "additive", "settings"):
         table.add_column(heading)
-    for heading in ("accuracy, %", "95 %", "as integers, %", "behind the best rival, points", "p", "CPU, s"):
+    for heading in ("accuracy, %", "95 %", "as integers, %", "behind the best baseline, points", "p", "CPU, s"):
         table.add_column(heading, justify="right")
-    rival = next((line for line in made if not line.model.ours), None)
+    baseline = next((line for line in made if not line.model.ours), None)
     for line in made:
         name, yes, how = line.model.name, "yes" if line.model.additive else "", line.model.how
         of_integers = "" if line.integers is None else f"{100 * line.integers.mean:.2f}"
         within = f"{100 * line.rate.low:.1f} to {100 * line.rate.high:.1f}"
-        gap, p = ("", "") if rival is None or line is rival else _against(line, rival)
+        gap, p = ("", "") if baseline is None or line is baseline else _against(line, baseline)
         numbers = (f"{100 * line.rate.mean:.2f}", within, of_integers, gap, p, f"{line.cpu_s:.1f}")
         table.add_row(name, yes, how, *numbers, style="bold" if line.model.ours else "")
     return table
 
 
-def _against(line: Line, rival: Line) -> tuple[str, str]:
-    return f"{100 * (rival.rate.mean - line.rate.mean):+.2f}", f"{p_value(line.hits, rival.hits):.2g}"
+def _against(line: Line, baseline: Line) -> tuple[str, str]:
+    return f"{100 * (baseline.rate.mean - line.rate.mean):+.2f}", f"{p_value(line.hits, baseline.hits):.2g}"
 
 
 def summary(every: dict[tuple[str, Of], list[Line]], name: str) -> Table:
-    """Return how far the best rival is ahead of model `name` on each set, and the best additive one behind it."""
-    table = Table(title=f"{name}: within {WITHIN} points of the best rival, ahead of every additive one?")
-    for heading in ("set", "", f"{name}, %", "best rival, %", "", "behind", "best additive rival, %", "", "ahead"):
+    """Return how far the best baseline is ahead of model `name` on each set, and the best additive one behind it."""
+    table = Table(title=f"{name}: within {WITHIN} points of the best baseline, ahead of every additive one?")
+    for heading in (
+        "set",
+        "",
+        f"{name}, %",
+        "best baseline, %",
+        "",
+        "behind",
+        "best additive baseline, %",
+        "",
+        "ahead",
+    ):
         table.add_column(heading, justify="right" if heading.endswith(("%", "behind", "ahead")) else "left")
     for (which, of), made in every.items():
         mine = next((line for line in made if line.model.name == name), None)
-        rivals = [line for line in made if not line.model.ours]
-        additive = [line for line in rivals if line.model.additive]
+        baselines = [line for line in made if not line.model.ours]
+        additive = [line for line in baselines if line.model.additive]
         if mine is None or not additive:
             continue
         cells = [which, of, f"{100 * mine.rate.mean:.2f}"]
-        for rival, sign in ((rivals[0], 1), (additive[0], -1)):
-            gap = 100 * sign * (rival.rate.mean - mine.rate.mean)
+        for baseline, sign in ((baselines[0], 1), (additive[0], -1)):
+            gap = 100 * sign * (baseline.rate.mean - mine.rate.mean)
             met = gap <= WITHIN if sign > 0 else gap >= 0
-            cells += [f"{100 * rival.rate.mean:.2f}", rival.model.name, f"{gap:+.2f} {'yes' if met else 'NO'}"]
+            cells += [f"{100 * baseline.rate.mean:.2f}", baseline.model.name, f"{gap:+.2f} {'yes' if met else 'NO'}"]
         table.add_row(*cells)
     return table
 

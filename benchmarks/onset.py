@@ -30,7 +30,7 @@ from thenar.runtime.manifest import Of, Options
 
 Reading = Literal["switches", "levels", "codes", "nothing"]
 READINGS: tuple[Reading, ...] = ("switches", "levels", "codes")
-COLOURS = {"switches": "ink", "levels": "switches", "codes": "rival-2", "nothing": "joints"}
+COLOURS = {"switches": "ink", "levels": "switches", "codes": "baseline-2", "nothing": "joints"}
 NEWTONS = tuple(step / 10 for step in range(1, 11))
 
 

@@ -1,4 +1,4 @@
-"""Fewer switches for the same recognition: thenar's placements and their rivals beside the paper's pruned ID3.
+"""Fewer switches for the same recognition: thenar's placements and baselines compared with the paper's pruned ID3.
 
     python benchmarks/placement.py [SET.grasps ...] [--folds N] [--jobs N]
 

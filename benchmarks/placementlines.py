@@ -166,15 +166,15 @@ def bounded(task: tuple[Data, int]) -> tuple[int, int, Subset]:
 
 
 def measured(alone: Data, with_joints: Data, paper: dict[bool, Point], jobs: int) -> list[Line]:
-    """Return every method's line, switches alone first. Joints are no matter to rivals."""
+    """Return every method's line, switches alone first. Joints are no matter to baselines."""
     ours = [name for name, method in METHODS.items() if method.ours]
-    rivals = [name for name, method in METHODS.items() if not method.ours and method.installed]
+    baselines = [name for name, method in METHODS.items() if not method.ours and method.installed]
     wanted = {joints: point.rate - WITHIN for joints, point in paper.items()}
     # What takes longest begins first.
     tasks: list[tuple[Data, str, float | None]] = [
         (data, name, wanted[data.joints]) for data in (with_joints, alone) for name in reversed(ours)
     ]
-    tasks += [(alone, name, None) for name in rivals]
+    tasks += [(alone, name, None) for name in baselines]
     lines = track(in_workers(measure, tasks, jobs), "methods", total=len(tasks), console=CONSOLE, transient=True)
-    order = [*ours, *rivals]
+    order = [*ours, *baselines]
     return sorted(lines, key=lambda line: (line.joints, order.index(line.method)))

@@ -1,6 +1,6 @@
-"""The command `thenar`: thin, and light until a sub-command is called.
+"""The command `thenar`; it imports nothing heavy until a sub-command runs.
 
-Exit codes: 0 done, 1 a check that did not hold (`verify`, `stability`), 2 a mistake that the user can mend, 130 Ctrl-C,
+Exit codes: 0 done, 1 a check failed (`verify`, `stability`), 2 a mistake that the user can fix, 130 Ctrl-C,
 143 SIGTERM, 129 SIGHUP.
 """
 
@@ -11,20 +11,20 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
-# What a shell adds to the number of the signal that ended a command.
+# A shell reports a command ended by a signal as this plus the signal's number.
 _SIGNALLED = 128
 
 
 class Ended(KeyboardInterrupt):
-    """A signal asks this process to end. It unwinds as a Ctrl-C does: workers end, nothing is left behind."""
+    """A signal asked this process to end. It unwinds like Ctrl-C: workers end and no partial file remains."""
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Run `thenar` with `arguments` and return its exit code; what the user did wrong is one sentence on stderr."""
+    """Run `thenar` with `arguments` and return its exit code; report a user's mistake in one sentence on stderr."""
     came = [signal.SIGINT]
     try:
         with _ended_like_ctrl_c(came):
-            # In here, so that a Ctrl-C while the libraries load is one like any other.
+            # Imported here, so that Ctrl-C during the imports is handled like any other.
             from .group import run_group
             from .lines import escape_the_unencodable
 
@@ -37,7 +37,7 @@ def run(arguments: Sequence[str]) -> int:
 
 @contextmanager
 def _ended_like_ctrl_c(came: list[signal.Signals]) -> Iterator[None]:
-    """Let SIGTERM and SIGHUP raise `Ended` in here, and note them; a second one ends the process at once."""
+    """Make SIGTERM and SIGHUP raise `Ended` in this context and record them; a second one ends the process at once."""
 
     def end(number: int, _frame: FrameType | None) -> None:
         signal.signal(number, signal.SIG_DFL)
@@ -45,7 +45,7 @@ def _ended_like_ctrl_c(came: list[signal.Signals]) -> Iterator[None]:
         raise Ended
 
     is_main = threading.current_thread() is threading.main_thread()
-    # What is ignored (nohup) stays so.
+    # A signal that is ignored (nohup) stays ignored.
     heard = [n for n in (signal.SIGTERM, signal.SIGHUP) if is_main and signal.getsignal(n) is signal.SIG_DFL]
     for number in heard:
         signal.signal(number, end)
@@ -57,5 +57,5 @@ def _ended_like_ctrl_c(came: list[signal.Signals]) -> Iterator[None]:
 
 
 def main() -> None:
-    """Entry point of the command `thenar`."""
+    """Run the command `thenar`: the entry point."""
     sys.exit(run(sys.argv[1:]))

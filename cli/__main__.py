@@ -1,4 +1,4 @@
-"""`python -m thenar.cli` is `thenar`."""
+"""Let `python -m thenar.cli` run `thenar`."""
 
 from . import main
 

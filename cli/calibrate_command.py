@@ -1,4 +1,4 @@
-"""`thenar calibrate`: two points of each of a CyberGlove's sensors, pose by pose; rest and press of each taxel."""
+"""`thenar calibrate`: calibrate a CyberGlove's sensors pose by pose, or taxels from rest and presses."""
 
 import os
 import select
@@ -28,14 +28,14 @@ _REFRESH_S = 0.1
 
 _WAIT_US = 50_000
 _PATIENCE_S = 5.0
-# Somebody who presses for an hour is not calibrating.
+# Nobody presses for an hour during a calibration.
 _MOST_FRAMES = 1_000_000
 
 Codes = tuple[int | None, ...]
 
 
 def _rate(_context: click.Context, _option: click.Parameter, text: str) -> int | None:
-    """Return the baud rate, None for auto."""
+    """Return the baud rate, or None for auto."""
     if text == "auto":
         return None
     if not text.isdecimal() or not 0 < int(text) < 10**8:
@@ -44,7 +44,7 @@ def _rate(_context: click.Context, _option: click.Parameter, text: str) -> int |
 
 
 def _device(context: click.Context, argument: click.Parameter, text: str) -> str:
-    """Return the port, or the path of a glove.toml, which --taxels takes in any case."""
+    """Return the port, or the path of a glove.toml, which --taxels always expects."""
     if context.params.get("taxels") or text.endswith(".toml"):
         return str(existing_file.convert(text, argument, context))
     return serial_port(context, argument, text)
@@ -55,11 +55,11 @@ def _device(context: click.Context, argument: click.Parameter, text: str) -> str
 @click.option("-o", "--output", type=OutputFile(".toml"), required=True, help="The .toml file to write.")
 @overwrite_flag
 @click.option("--subject", help="Name of the subject.  [default: the file's name]")
-@click.option("--baud", callback=_rate, default="115200", show_default=True, help="Baud rate, or auto to find it.")
+@click.option("--baud", callback=_rate, default="115200", show_default=True, help="Baud rate, or auto to detect it.")
 @click.option("--sensors", type=click.Choice(["18", "22"]), help="Expected sensor count.  [default: as reported]")
 @click.option("--taxels", is_flag=True, is_eager=True, help="Calibrate the taxels of a glove.toml, not a CyberGlove.")
-@click.option("--newtons", type=Number(0.001, 1000), help="Force of the presses, where it is known; with --taxels.")
-@click.option("--hold", type=Number(0.05, 60), default=1.0, show_default=True, help="Seconds to hold a pose.")
+@click.option("--newtons", type=Number(0.001, 1000), help="Force of the presses, if known; with --taxels.")
+@click.option("--hold", type=Number(0.05, 60), default=1.0, show_default=True, help="Time to hold each pose, seconds.")
 @web_options
 def command(
     port: str,
@@ -73,12 +73,12 @@ def command(
     web: str | None,
     web_token: bool,
 ) -> None:
-    """Calibrate the CyberGlove at PORT (/dev/ttyUSB0, socket://HOST:PORT, ...) for the hand that wears it; with
-    --taxels, the taxels of a glove.toml; of a glove.toml without it, the joints of its [[stream]].
+    """Calibrate the CyberGlove at PORT (/dev/ttyUSB0, socket://HOST:PORT, ...) for its wearer. Given a glove.toml,
+    calibrate the joints of its [[stream]], or its taxels with --taxels.
 
-    One is asked for a flat hand, a fist and five more poses, sees what the sensors say, and takes each pose with Enter.
-    Of taxels, rest and press are learnt: one presses nothing, then every taxel once. The file is written at the end:
-    until then, Ctrl-C leaves an older one as it is.
+    The command asks for a flat hand, a fist and five more poses, shows the sensor values, and takes each pose when you
+    press Enter. For taxels, leave all untouched first, then press each one once. The file is written at the end; until
+    then, Ctrl-C keeps the old one.
 
     \b
     Example:
@@ -95,7 +95,7 @@ def command(
     if reason := fault(wearer):
         raise click.UsageError(f"subject {shortened(repr(wearer))} {reason}: give another with --subject")
     if taxels and web is not None:
-        raise click.UsageError("--web shows poses of joints: leave it out with --taxels")
+        raise click.UsageError("--web shows poses of joints, not taxels: leave out --web or --taxels")
     if taxels:
         _calibrate_taxels(Path(port), output, wearer, newtons, hold)
         return
@@ -108,11 +108,11 @@ def command(
         glove = CyberGlove(port, baud=baud, sensors=int(sensors) if sensors else None)
 
     def written(guide: "PoseGuide") -> str:
-        """Write what the poses make; return what there is to say of it."""
+        """Write the calibration of the poses and return the line to print."""
         calibrated = guide.calibration(wearer)
         found = {sensor.name for sensor in calibrated.sensors}
         if not found:
-            raise click.ClickException(f"no sensor moved, so there is nothing to calibrate by: {output} is not written")
+            raise click.ClickException(f"no sensor moved, so nothing can be calibrated: {output} is not written")
         if left_out := [name for name in guide.names if name not in found]:
             err().print(f"Not calibrated, because they did not move: {', '.join(left_out)}", soft_wrap=True)
         write_atomically(output, calibrated.to_toml().encode("utf-8"))
@@ -141,19 +141,19 @@ def _calibrate_taxels(glove: Path, output: Path, wearer: str, newtons: float | N
     from thenar.runtime.taxels import TaxelSettings
 
     keep_apart(glove, output)
-    harness = replace(load_harness(glove), taxel_settings=TaxelSettings())  # it may name the file that is to be written
+    harness = replace(load_harness(glove), taxel_settings=TaxelSettings())  # it may name the file to be written
     if not harness.taxel_names:
-        raise click.UsageError(f"{glove.name} names no taxels: it takes `taxels` of a [[scanner]], or a converter")
+        raise click.UsageError(f"{glove.name} names no taxels: add `taxels` to a [[scanner]], or add a converter")
     with Sources(harness, (), whole_scan(harness, (), every_taxel=True)) as sources:
         calibrated = TaxelGuide(harness, sources, hold).calibration(wearer, newtons)
     if not calibrated.taxels:
-        raise click.ClickException(f"no taxel moved, so there is nothing to calibrate by: {output} is not written")
+        raise click.ClickException(f"no taxel moved, so nothing can be calibrated: {output} is not written")
     write_atomically(output, calibrated.to_toml().encode("utf-8"))
     echo(f"{output}: {len(calibrated.taxels)} taxels of {calibrated.subject}; name it under [taxels] of {glove.name}")
 
 
 class Guide:
-    """Leads through the poses on stderr, with the sensors' bytes live where that is a terminal; answers are typed."""
+    """Leads through the poses on stderr, showing the sensor bytes live on a terminal; the user types the replies."""
 
     def __init__(self, glove: "CyberGlove | StreamedJoints", info: "GloveInfo | StreamedJoints", hold_s: float) -> None:
         from thenar.runtime.posing import PoseGuide
@@ -166,9 +166,9 @@ class Guide:
             self._say(note)
 
     def lead(self) -> "PoseGuide":
-        """Return the guide once all poses are taken, each asked for until it is.
+        """Return the guide once all poses are taken; each is asked for until it succeeds.
 
-        Raises click.Abort if the user quits, DeviceError if the glove is gone or unplugged.
+        Raises click.Abort if the user quits, DeviceError if the glove is disconnected or unplugged.
         """
         from thenar.runtime.frames import now_us
         from thenar.runtime.posing import PoseKey, PoseStage
@@ -181,38 +181,38 @@ class Guide:
             if posing.stage is PoseStage.DOUBTED:
                 for problem in posing.problems:
                     self._say(f"  {problem}")
-                question, other, meant = "Enter to hold it again (k: keep it all the same, q: quit)", "k", PoseKey.KEEP
+                question, other, meant = "Enter to hold it again (k: keep it anyway, q: quit)", "k", PoseKey.KEEP
             else:
                 pose, number = posing.pose, f"{len(posing.taken) + 1} of {len(posing.poses)}"
                 self._say(f"\nPose {number}, {pose.name}: {pose.instruction}")
                 question, other, meant = (
-                    "Enter when you hold it (b: back to the pose before, q: quit)",
+                    "Enter when you hold it (b: back to the previous pose, q: quit)",
                     "b",
                     PoseKey.BACK,
                 )
-            answer = self._asked(question, other)
-            posing.press(now_us(), PoseKey.ACCEPT if answer == "" else meant)
+            reply = self._asked(question, other)
+            posing.press(now_us(), PoseKey.ACCEPT if reply == "" else meant)
         return posing
 
     def _asked(self, question: str, other: str) -> str:
-        """Return "" or the `other` answer, asking again whoever types anything else."""
-        while (answer := self._answered(question)) not in ("", other):
-            if answer == "q":
+        """Return "" or `other`, asking again after any other reply."""
+        while (reply := self._reply(question)) not in ("", other):
+            if reply == "q":
                 raise click.Abort
-            self._say(f"'{answer}' is no answer here")
-        return answer
+            self._say(f"'{reply}' is not one of the keys: type one that the question names")
+        return reply
 
-    def _answered(self, question: str) -> str:
+    def _reply(self, question: str) -> str:
         self._say(question)
         with Live(console=self._console, transient=True, auto_refresh=False) as live:
             drawn = 0.0
-            while (answer := self._typed.take()) is None:
+            while (reply := self._typed.take()) is None:
                 self._take()
                 raw = self._posing.raw
                 if raw is not None and self._console.is_terminal and monotonic() - drawn > _REFRESH_S:
                     live.update(self._table(raw), refresh=True)
                     drawn = monotonic()
-        return answer
+        return reply
 
     def _take(self) -> None:
         from thenar.runtime.frames import now_us
@@ -232,7 +232,7 @@ class Guide:
 
 
 def raw_of(glove: "CyberGlove | StreamedJoints") -> bytes | None:
-    """Return the next bytes of the sensors, None where none came in time. Raises DeviceError."""
+    """Return the next sensor bytes, or None if none arrive in time. Raises DeviceError."""
     timed = glove.read(_WAIT_S)
     if timed is None or isinstance(timed, bytes):
         return timed
@@ -244,7 +244,7 @@ def raw_of(glove: "CyberGlove | StreamedJoints") -> bytes | None:
 
 
 class StreamedJoints:
-    """The joints of the stream of a glove.toml, as the guide reads a glove: their names, and the bytes of a row.
+    """The joints of the stream of a glove.toml, read as the guide reads a glove: sensor names and the bytes of a row.
 
     Raises UsageError if the harness has no such stream.
     """
@@ -279,7 +279,7 @@ class StreamedJoints:
             self._sources.raise_settings()
             if monotonic() > end:
                 state = self._sources.health()[0]
-                raise DeviceError(f"{state.name}: {state.error or 'no joint comes'}; nothing is calibrated")
+                raise DeviceError(f"{state.name}: {state.error or 'no joint arrives'}; nothing is calibrated")
         return self
 
     def read(self, timeout_s: float) -> bytes | None:
@@ -296,7 +296,7 @@ class StreamedJoints:
 
 
 class TaxelGuide:
-    """Asks on stderr for a glove at rest and for a press of every taxel, and shows their counts meanwhile."""
+    """Asks on stderr for a glove at rest, then for a press of every taxel, and shows the counts live."""
 
     def __init__(self, harness: "Harness", sources: "Sources", hold_s: float) -> None:
         self.names = harness.taxel_names
@@ -305,7 +305,7 @@ class TaxelGuide:
         self._typed = TypedLines(sys.stdin.fileno())
 
     def calibration(self, subject: str, newtons: float | None) -> "TaxelCalibration":
-        """Return what was learnt. Raises DeviceError where a device sends no taxels, click.Abort if the user quits."""
+        """Return the calibration. Raises DeviceError if no device sends taxels, click.Abort if the user quits."""
         from thenar.runtime.taxels import TaxelCalibration, learnt_lines
 
         self._meet()
@@ -341,7 +341,7 @@ class TaxelGuide:
         return [frame.taxels for frame in arrived if isinstance(frame, SwitchFrame) and frame.taxels is not None]
 
     def _held(self) -> list[Codes]:
-        """Return what comes for as long as a pose is held."""
+        """Return the frames that arrive while a pose is held."""
         codes: list[Codes] = []
         end = monotonic() + self._hold_s
         while monotonic() < end or not codes:
@@ -349,18 +349,18 @@ class TaxelGuide:
         return codes
 
     def _until_enter(self, question: str, rested: list[Codes]) -> list[Codes]:
-        """Return what comes until Enter is pressed."""
+        """Return the frames that arrive until the user presses Enter."""
         self._say(question)
         codes: list[Codes] = []
         drawn = 0.0
         with Live(console=self._console, transient=True, auto_refresh=False) as live:
-            while (answer := self._typed.take()) is None:
+            while (reply := self._typed.take()) is None:
                 codes += self._frames()
                 del codes[:-_MOST_FRAMES]
                 if codes and self._console.is_terminal and monotonic() - drawn > _REFRESH_S:
                     live.update(self._table(codes[-1], rested), refresh=True)
                     drawn = monotonic()
-        if answer == "q":
+        if reply == "q":
             raise click.Abort
         return codes
 
@@ -376,18 +376,18 @@ class TaxelGuide:
 
 
 class TypedLines:
-    """Whole lines from a descriptor, without waiting for them."""
+    """Whole lines from a file descriptor, read without blocking."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
         self._rest = b""
 
     def take(self) -> str | None:
-        """Return the next line, stripped, or None if none is complete yet. Raises click.ClickException at the end."""
+        """Return the next line, stripped, or None if none is complete. Raises click.ClickException at the end."""
         if b"\n" not in self._rest and select.select([self._descriptor], [], [], 0.0)[0]:
             typed = os.read(self._descriptor, 4096)
             if not typed:
-                raise click.ClickException("the input ended before all was answered: nothing is written")
+                raise click.ClickException("the input ended before the last question: nothing is written")
             self._rest += typed
         line, end, rest = self._rest.partition(b"\n")
         if not end:

@@ -1,4 +1,4 @@
-"""A guided collection under way: devices, terminal and recording around the Guide."""
+"""A guided collection while it runs: devices, terminal and recording around the Guide."""
 
 import sys
 from collections.abc import Sequence
@@ -35,18 +35,18 @@ if TYPE_CHECKING:
     from .guided_web import PageAt
 
 _WAIT_US = 50_000
-# What is just being plugged in gets this long.
+# Time for a device that is just being plugged in.
 _PATIENCE_US = 3_000_000
 
 
 class Devices(Protocol):
-    """What a collection takes from `Sources`."""
+    """The part of `Sources` that a collection uses."""
 
     def take(self, at_most_us: int) -> Taken:
-        """Return what has come in, after waiting for something."""
+        """Wait for new readings and return them."""
 
     def devices(self) -> tuple[DeviceState, ...]:
-        """Return how the devices fare."""
+        """Return the state of each device."""
 
     def raise_settings(self) -> None:
         """Raise the SettingError of a device that can never work."""
@@ -62,16 +62,16 @@ def collect(
     countdown_s: float,
     page: "PageAt | None" = None,
 ) -> int:
-    """Lead through those of the `trials` that the journal lacks; return how many are accepted, all in all.
+    """Lead through the `trials` that the journal lacks and return the total number of accepted trials.
 
-    Keys come from stdin, unless there is a `page` and stdin is no terminal. Raises SettingError or DeviceError if a
+    Keys come from stdin, or from the `page` alone if stdin is not a terminal. Raises SettingError or DeviceError if a
     device cannot serve, SinkError if the page cannot be served, click.ClickException if the recording cannot go on.
     """
     typed = page is None or (sys.stdin is not None and sys.stdin.isatty())
     if sys.stdin is None and typed:
-        raise click.UsageError("stdin is closed: the keys that lead through a collection come from there")
+        raise click.UsageError("stdin is closed, but a collection is led by keys typed there: run it in a terminal")
     if typed and any(stream.port == "-" for stream in harness.streams):
-        raise click.UsageError("the keys that lead through a collection come from stdin: let rows come by udp:")
+        raise click.UsageError("the keys that lead a collection come from stdin: send rows by udp: instead")
     switches, sensors = harness.switches, harness.sensor_names
     check_names("column", (*switches, *harness.taxel_names, *sensors))
     scan = whole_scan(harness, switches, every_taxel=True)
@@ -95,7 +95,7 @@ def collect(
         with ExitStack() as entered:
             taxonomy, faces = Taxonomy(collection.taxonomy, collection.types), list[Face]()
             if page is not None:
-                # Before the recording is begun: an address that cannot be served leaves no file.
+                # Before the recording begins: an address that cannot be served leaves no file.
                 faces.append(entered.enter_context(page.serve(session, taxonomy, recording)))
             tail = None if journal is None else journal.tail
             recorder = entered.enter_context(Recorder(recording, session, tail=tail))
@@ -104,15 +104,15 @@ def collect(
             guide = Guide(trials, recorder, round(countdown_s * 1e6), accepted)
             lead(guide, sources, recorder, faces, stop)
     if recorder.failure is not None:
-        raise click.ClickException(f"{recorder.failure}; make room, and the same command goes on")
+        raise click.ClickException(f"{recorder.failure}; free some space, and the same command goes on")
     return guide.done
 
 
 def _meet(sources: Sources, switches: int, stop: Event) -> None:
     """Wait until every device is there and something is read, or `stop` is set.
 
-    Raises DeviceError or SettingError about a device that is not there, DeviceError where all are silent: a port may
-    well be opened without anybody at its other end.
+    Raises DeviceError or SettingError for a missing device, DeviceError if all are silent: a port may open even when
+    nothing is connected to its other end.
     """
     end = now_us() + _PATIENCE_US
     read = False
@@ -131,22 +131,22 @@ def _meet(sources: Sources, switches: int, stop: Event) -> None:
 
 
 def _is_read(frame: SwitchFrame, switches: int) -> bool:
-    """Return whether the frame holds a switch, of so many, or a taxel that could be read."""
+    """Return whether the frame holds a known switch, out of `switches`, or a readable taxel."""
     return bool((1 << switches) - 1 & ~frame.lost) or any(code is not None for code in frame.taxels or ())
 
 
 class Face(Protocol):
-    """Where a collection is looked at and keys are pressed: the terminal, or a page."""
+    """Where a collection is shown and keys are pressed: the terminal, or a page."""
 
     def press(self, now_us: int, guide: Guide) -> None:
-        """Press what somebody has pressed there since the last call."""
+        """Pass the keys pressed since the last call to the guide."""
 
     def show(self, now_us: int, guide: Guide, devices: Sequence[DeviceState]) -> None:
-        """Show where `guide` stands."""
+        """Show the guide's state."""
 
 
 class Terminal:
-    """Keys from stdin, and the view on stderr; a context manager."""
+    """Keys from stdin and the view on stderr; a context manager."""
 
     def __init__(self, taxonomy: Taxonomy) -> None:
         self._view = GuideView(err(), taxonomy)
@@ -155,7 +155,7 @@ class Terminal:
         self._entered = ExitStack()
 
     def press(self, now_us: int, guide: Guide) -> None:
-        """Press what was typed."""
+        """Pass the typed keys to the guide."""
         for key in self._keys.pressed():
             guide.press(now_us, key)
 
@@ -169,7 +169,7 @@ class Terminal:
 
 
 def lead(guide: Guide, devices: Devices, recorder: Recorder, faces: Sequence[Face], stop: Event) -> None:
-    """Lead through the guide's trials until they are done, the user leaves, `stop` is set, or the recording fails."""
+    """Lead through the guide's trials until all are done, the user leaves, `stop` is set, or the recording fails."""
     while guide.stage is not Stage.OVER and recorder.failure is None and not stop.is_set():
         arrived = devices.take(_WAIT_US).arrived
         devices.raise_settings()
@@ -177,7 +177,7 @@ def lead(guide: Guide, devices: Devices, recorder: Recorder, faces: Sequence[Fac
         for face in faces:
             face.press(now_us(), guide)
             face.show(now_us(), guide, devices.devices())
-    # Whatever ended it, a page shows that it has.
+    # However it ended, the page shows that it has.
     guide.press(now_us(), Key.QUIT)
     for face in faces:
         face.show(now_us(), guide, devices.devices())
@@ -193,4 +193,4 @@ def _check_same_glove(journal: Journal, session: Session) -> None:
         ("calibration of taxels", begun.taxel_calibration, session.taxel_calibration),
     ):
         if before != now:
-            raise SettingError(f"{journal.path} was begun with other {what}: name another --output for this glove")
+            raise SettingError(f"{journal.path} was begun with another {what}: name another --output for this glove")

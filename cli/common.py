@@ -1,4 +1,4 @@
-"""What the sub-commands share: paths, the `--json` flag, consoles, and a progress bar for work longer than a second."""
+"""Shared by the sub-commands: paths, the `--json` flag, consoles, and a progress bar for work longer than a second."""
 
 import math
 import os
@@ -36,10 +36,10 @@ _JSON, _OVERWRITE = "thenar.json", "thenar.overwrite"
 
 
 class OutputFile(click.Path):
-    """A file to write, in a folder that is there: the one rule for all commands, checked before any work.
+    """A file to write, in an existing folder: the one rule for all commands, checked before any work.
 
-    Its name has one of `endings`, which says the format. A file that is there is replaced with `overwrite_flag` only,
-    unless the command `goes_on` in it.
+    Its name ends in one of `endings`, which selects the format. An existing file is replaced only with
+    `overwrite_flag`, unless the command `goes_on` in it.
     """
 
     def __init__(self, *endings: str, goes_on: bool = False) -> None:
@@ -47,29 +47,29 @@ class OutputFile(click.Path):
         self.endings, self.goes_on = endings, goes_on
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """Return the path. Raises BadParameter where the rule forbids it."""
+        """Return the path. Raises BadParameter if the rule forbids it."""
         from thenar.runtime.files import is_special
 
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
         if not path.name:
-            self.fail("A file to write needs a name.", param, ctx)
+            self.fail("The output file needs a name.", param, ctx)
         if not path.name.lower().endswith(self.endings):
-            self.fail(f"{path.name}: a file to write here ends in {_either(self.endings)}.", param, ctx)
+            self.fail(f"{path.name}: the name of the output file must end in {_either(self.endings)}.", param, ctx)
         if not path.parent.is_dir():
-            self.fail(f"There is no folder '{path.parent}' to write '{path.name}' into: make it first.", param, ctx)
+            self.fail(f"There is no folder '{path.parent}' to write '{path.name}' into: create it first.", param, ctx)
         if not os.access(path.parent, os.W_OK):
-            self.fail(f"Nothing may be written into folder '{path.parent}'.", param, ctx)
+            self.fail(f"Folder '{path.parent}' is not writable: name another, or change its permissions.", param, ctx)
         if is_special(path):
             self.fail(f"'{path}' is a device or a pipe: name a file.", param, ctx)
         if path.exists() and not (self.goes_on or overwrites(ctx)):
-            self.fail(f"{path} is there already: add --overwrite to replace it, or name another file.", param, ctx)
+            self.fail(f"{path} already exists: add --overwrite to replace it, or name another file.", param, ctx)
         return path
 
 
 class OutputFolder(click.Path):
-    """A folder to write, which is made if need be; whether thenar may replace what is in it, its writer knows.
+    """A folder to write, created if needed; its writer decides whether thenar may replace its content.
 
-    One that is to be `fresh` holds nothing, unless `overwrite_flag` is given.
+    A `fresh` folder must be empty, unless `overwrite_flag` is given.
     """
 
     def __init__(self, *, fresh: bool = False) -> None:
@@ -77,37 +77,37 @@ class OutputFolder(click.Path):
         self._fresh = fresh
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """Return the path. Raises BadParameter where no folder can be made."""
+        """Return the path. Raises BadParameter if no folder can be created there."""
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
         if not str(value):
-            self.fail("A folder to write needs a name.", param, ctx)
+            self.fail("The output folder needs a name.", param, ctx)
         above = next(parent for parent in (path, *path.absolute().parents) if parent.exists())
         if not above.is_dir():
-            self.fail(f"'{above}' is no folder: nothing can be written below it.", param, ctx)
+            self.fail(f"'{above}' is not a folder, so nothing can be written below it: name another.", param, ctx)
         if not os.access(above, os.W_OK):
-            self.fail(f"Nothing may be written into folder '{above}'.", param, ctx)
+            self.fail(f"Folder '{above}' is not writable: name another, or change its permissions.", param, ctx)
         if self._fresh and above == path and any(path.iterdir()) and not overwrites(ctx):
             self.fail(f"{path} is not empty: add --overwrite to replace files in it, or name another.", param, ctx)
         return path
 
 
 class Number(click.FloatRange):
-    """A finite number, which may be held to a range."""
+    """A finite number, optionally within a range."""
 
     def _describe_range(self) -> str:
-        # click's own makes "x<=None" of no range at all.
+        # click's own describes an unlimited range as "x<=None".
         return super()._describe_range() if (self.min, self.max) != (None, None) else ""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the number. Raises BadParameter for nan and inf, and for what is out of the range."""
+        """Return the number. Raises BadParameter for nan, inf, and numbers outside the range."""
         number = float(super().convert(value, param, ctx))
         if not math.isfinite(number):
-            self.fail(f"{value} is no finite number.", param, ctx)
+            self.fail(f"{value} is not a finite number.", param, ctx)
         return number
 
 
 def overwrites(context: click.Context | None) -> bool:
-    """Return whether files that are there may be replaced."""
+    """Return whether existing files may be replaced."""
     return context is not None and bool(context.meta.get(_OVERWRITE))
 
 
@@ -117,9 +117,9 @@ def _either(names: Sequence[str]) -> str:
 
 
 class OneOf(click.Choice[str]):
-    """One of the names of a kind, which are read when they are first needed and not when a command is defined.
+    """One name of a kind; the names are read when first needed, not when a command is defined.
 
-    `otherwise` is a sentence that is added where none of them was named.
+    `otherwise` is a sentence added to the error for an unknown name.
     """
 
     def __init__(self, kind: str, names: Callable[[], Iterable[str]], otherwise: str = "") -> None:
@@ -131,7 +131,7 @@ class OneOf(click.Choice[str]):
         return tuple(self._names())
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the name. Raises BadParameter, with the names most like it, if there is none such."""
+        """Return the name. Raises BadParameter, with the most similar names, if it is unknown."""
         from thenar.runtime.names import nearest
 
         if value not in self.choices:
@@ -141,13 +141,13 @@ class OneOf(click.Choice[str]):
         return value
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
-        """Return the names where they fit a line of help, and the kind elsewhere."""
+        """Return the names if they fit a line of help, else the kind."""
         names = "|".join(self.choices)
         return f"[{names}]" if len(names) <= _LONGEST_METAVAR else self.kind.upper()
 
 
 class ListOf(click.ParamType[tuple[str, ...]]):
-    """Several of the names of a kind, with commas between them; where `none` is allowed, that names none."""
+    """Several names of a kind, separated by commas; where `none` is allowed, it means the empty list."""
 
     def __init__(self, kind: str, names: Callable[[], Iterable[str]], *, none: bool = False) -> None:
         self.name, self._one, self._none = f"{kind}s", OneOf(kind, names), none
@@ -158,10 +158,10 @@ class ListOf(click.ParamType[tuple[str, ...]]):
             return value
         if self._none and value == "none":
             return ()
-        return tuple(self._one.convert(part, param, ctx) for part in parted(value))
+        return tuple(self._one.convert(part, param, ctx) for part in comma_separated(value))
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
-        """Return how the list is written."""
+        """Return the placeholder that shows how to write the list."""
         return f"{self._one.kind.upper()},..."
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -183,19 +183,19 @@ json_flag = click.option(
     help="Print one JSON document for machines instead.",
 )
 
-# Eager: whether a file may be replaced is known before the file is looked at.
+# Eager: the file's own check must know whether it may be replaced.
 overwrite_flag = click.option(
     "--overwrite",
     is_flag=True,
     is_eager=True,
     expose_value=False,
     callback=lambda context, _option, wanted: context.meta.update({_OVERWRITE: wanted}),
-    help="Replace files that are there already.",
+    help="Replace existing files.",
 )
 
 
 def jobs_option(what: str = "Worker processes. The result does not depend on it.") -> Callable[[Command], Command]:
-    """Return the option --jobs, which is -1 for all cores."""
+    """Return the option --jobs; its value is -1 for all cores."""
     return click.option(
         "--jobs",
         type=click.IntRange(min=1),
@@ -204,13 +204,13 @@ def jobs_option(what: str = "Worker processes. The result does not depend on it.
     )
 
 
-def parted(text: str) -> tuple[str, ...]:
-    """Return what stands between the commas of `text`, each once, in the order given."""
+def comma_separated(text: str) -> tuple[str, ...]:
+    """Return the comma-separated parts of `text`, each once, in the order given."""
     return tuple(dict.fromkeys(part.strip() for part in text.split(",")))
 
 
 def serial_port(context: click.Context, parameter: click.Parameter, text: str) -> str:
-    """Return `text` if it is a port, by the rule that holds for those in files."""
+    """Return `text` if it is a valid port, by the same rule as for ports in files."""
     from thenar.drivers.ports import port_fault
 
     if fault := port_fault(text):
@@ -219,28 +219,28 @@ def serial_port(context: click.Context, parameter: click.Parameter, text: str) -
 
 
 def keep_apart(*paths: Path | None) -> None:
-    """Raise UsageError if two of the `paths` of one command are the same file: writing one would destroy the other."""
+    """Raise UsageError if two of the `paths` of a command are the same file: writing one would destroy the other."""
     seen = set()
     for path in filter(None, paths):
         if path.resolve() in seen:
             raise click.UsageError(
-                f"{path} is named twice: what is written there would replace what is read or written"
+                f"{path} is named twice, and writing it would destroy the other: name two different files"
             )
         seen.add(path.resolve())
 
 
 def check_devices(harness: "Harness", path: Path) -> None:
-    """Raise UsageError if the `harness` in `path` names no device: whatever is done with it would come to nothing."""
+    """Raise UsageError if the `harness` in `path` names no device: there would be nothing to read."""
     if not (harness.cyberglove or harness.scanners or harness.buses or harness.spi or harness.streams):
-        takes = "it takes a [cyberglove], a [[scanner]], a [[bus]], an [[spi]] or a [[stream]]"
+        takes = "add a [cyberglove], a [[scanner]], a [[bus]], an [[spi]] or a [[stream]]"
         raise click.UsageError(f"{path.name} names no device: {takes}")
 
 
 class _Console(Console):
-    """A console that escapes whatever a name might order a terminal to do; styles are rich's own."""
+    """A console that escapes control characters in names; styles are rich's."""
 
     def render_str(self, text: str, **options: Any) -> Text:
-        # Escaped before it is measured, so that columns are as wide as what is in them.
+        # Escaped before it is measured, so that column widths fit.
         return super().render_str(shown(text), **options)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
@@ -249,7 +249,7 @@ class _Console(Console):
 
 
 def out() -> Console:
-    """Return the console for results. Lines are 200 wide where they do not go to a terminal."""
+    """Return the console for results; its lines are 200 characters wide outside a terminal."""
     console = _console()
     return console if console.is_terminal else _console(width=200)
 
@@ -265,7 +265,7 @@ def warning(sentence: str) -> None:
 
 
 def _console(stderr: bool = False, width: int | None = None) -> Console:
-    # The names of the user's columns and files may hold brackets and colons, which are no markup.
+    # Names of the user's columns and files may hold brackets and colons: they are not markup.
     return _Console(stderr=stderr, width=width, highlight=False, markup=False, emoji=False)
 
 
@@ -282,7 +282,7 @@ def print_json(result: Any) -> None:
 def show(
     found: Found, people: Callable[Concatenate[Found, Rest], None], *rest: Rest.args, **named: Rest.kwargs
 ) -> None:
-    """Print `found` as JSON where --json asks for that, otherwise by `people`."""
+    """Print `found` as JSON if --json is given, otherwise by `people`."""
     if wants_json():
         print_json(found)
     else:
@@ -301,7 +301,7 @@ def _json(found: Any) -> bytes:
 
 
 class _Whole(Table):
-    """A table that cuts nothing: one that is too wide becomes several, each with the first column."""
+    """A table that truncates nothing: one that is too wide is split into several, each with the first column."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """Yield the lines of each part."""
@@ -323,14 +323,14 @@ class _Whole(Table):
         return part
 
     def _width(self, column: Column, console: Console, options: ConsoleOptions) -> int:
-        """Return the width that a column needs with one line: words wrap, but not into a column of single ones."""
+        """Return the width that a column needs with one line: words wrap, but not to one word per line."""
         needed = Measurement.get(console, options.update_width(_UNBOUNDED), self._part([column]))
         most = needed.maximum if column.no_wrap else max(needed.minimum, min(needed.maximum, _READABLE))
         return most - 1
 
 
 def table(columns: Iterable[str], numbers: Container[str] = (), title: TextType | None = None) -> Table:
-    """Return a table of these columns, of which `numbers` are on the right."""
+    """Return a table of these columns, with `numbers` aligned right."""
     made = _Whole(title=title)
     for column in columns:
         is_number = column in numbers
@@ -340,7 +340,7 @@ def table(columns: Iterable[str], numbers: Container[str] = (), title: TextType 
 
 @contextmanager
 def progress(what: str) -> Iterator[Callable[[int, int], None]]:
-    """Yield report(done, total), which draws a bar on stderr when that is a terminal and nothing otherwise."""
+    """Yield report(done, total), which draws a bar on stderr if that is a terminal and does nothing otherwise."""
     console = err()
     columns = (
         TextColumn("{task.description}", markup=False),
@@ -355,6 +355,6 @@ def progress(what: str) -> Iterator[Callable[[int, int], None]]:
 
 
 def of_device(name: str, state: str) -> str:
-    """Return `state` as a sentence about the device `name`, whose port is not named twice."""
+    """Return `state` as a sentence about the device `name`, naming its port only once."""
     kind, _, port = name.partition(" at ")
     return f"{kind if port and port in state else name}: {state}"

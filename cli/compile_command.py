@@ -52,9 +52,9 @@ if TYPE_CHECKING:
     from thenar.runtime.scanning.timing import ScanTime
 
 _BOARD = "board"
-# What a point of a frontier says.
+# Options that a point of a frontier sets.
 _SETTLED = ("preset", "prune", "inputs", "table_bits", "method", "keep", "width", "trainer")
-# Chosen by measurement: docs/reference/commands.md shows what each brings. None sets both --keep and --prune.
+# Chosen by measurement: docs/reference/commands.md shows the effect of each. None sets both --keep and --prune.
 PRESETS: dict[str, dict[str, str]] = {
     "smallest": {"method": "elimination", "keep": "8", "max-bins": "8", "table-bits": "8"},
     "fastest": {"method": "elimination", "keep": "16", "inputs": "switches", "table-bits": "8"},
@@ -65,7 +65,7 @@ _GROUPS = {
     "Limits": ("keep_these", "never", "apart_mm", "at_most", "budget_us"),
     "Training": ("trainer", "robust", "refuse"),
     "Integer tables": ("table_bits", "width"),
-    "The rates in build.json": ("folds", "seed", "by", "jobs"),
+    "The accuracies in build.json": ("folds", "seed", "by", "jobs"),
     "A point of a frontier": ("from_frontier", "point"),
     "Wiring": ("glove", "propose", "chip"),
     "Files": ("report", "hand_length", "layout", "overwrite", "json"),
@@ -87,20 +87,20 @@ def _converters() -> list[str]:
 
 
 class _ChipOption(click.Option):
-    """Its help, which is only made when it is asked for, names the chips."""
+    """Its help names the chips, and is only made when requested."""
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         measuring = _converters()
         chips = [kind for kind in _chips() if kind != _BOARD and kind not in measuring]
         self.help = (
-            f"Port expander to propose: {', '.join(chips)}; or {_BOARD}, a scanner board; or what measures taxels: "
+            f"Port expander to propose: {', '.join(chips)}; {_BOARD}, a scanner board; or a converter for taxels: "
             f"{', '.join(measuring)}.  [default: {chips[0]}, and ads7828 for taxels]"
         )
         return super().get_help_record(ctx)
 
 
 def _preset(context: click.Context, _: click.Parameter, name: str | None) -> None:
-    """Let the preset's values be the defaults: explicit options win."""
+    """Make the preset's values the defaults: explicit options override them."""
     given = PRESETS.get(name or "", {})
     context.default_map = {option.replace("-", "_"): value for option, value in given.items()}
 
@@ -108,7 +108,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
 @click.command("compile", cls=Grouped, groups=_GROUPS)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option(
-    "-o", "--output", type=OutputFolder(), required=True, help="Folder of the build. A build there is replaced."
+    "-o", "--output", type=OutputFolder(), required=True, help="Build folder to write; an existing build is replaced."
 )
 @click.option(
     "--preset",
@@ -116,7 +116,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
     is_eager=True,
     expose_value=False,
     callback=_preset,
-    help="Set several options at once; what you give yourself wins. "
+    help="Set several options at once; explicit options override them. "
     + "; ".join(
         f"{name}: {' '.join(f'--{option} {value}' for option, value in given.items())}"
         for name, given in PRESETS.items()
@@ -133,7 +133,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
     type=click.Choice(["both", "switches", "joints"]),
     default="both",
     show_default=True,
-    help="Which inputs the build reads.",
+    help="Inputs that the build reads.",
 )
 @trainer_option(AUTO)
 @click.option(
@@ -142,20 +142,20 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
     default=0.01,
     show_default=True,
     metavar="SHARE",
-    help="Share of grasps that may be refused as nothing held, where no row of the set shows that; 0: refuse none.",
+    help="Share of grasps that may be refused as nothing held, if no row of the set has nothing held; 0: refuse none.",
 )
 @click.option(
     "--folds",
     type=click.IntRange(0),
     default=4,
     show_default=True,
-    help="Folds of the pooled rate; 0: measure no rate.",
+    help="Folds of the pooled accuracy; 0: measure no accuracy.",
 )
 @click.option("--seed", type=seed_range, default=1, show_default=True, help="Seed of the folds.")
 @click.option(
     "--by",
     type=click.Choice(("trial", "subject", "object", "session")),
-    help="What the folds of the first rate leave out.  [default: subject where there are several, otherwise trial]",
+    help="What the folds of the first accuracy leave out.  [default: subject if there are several, otherwise trial]",
 )
 @jobs_option()
 @click.option(
@@ -164,14 +164,14 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
     callback=lambda _context, _parameter, bits: int(bits),
     default="16",
     show_default=True,
-    help="Bits of a table entry. With 8, steps are coarser and firmware is smaller.",
+    help="Bits per table entry. With 8, steps are coarser and the firmware is smaller.",
 )
 @click.option(
-    "--width", type=click.IntRange(4, 16), default=16, show_default=True, help="Bits that hold every sum of scores."
+    "--width", type=click.IntRange(4, 16), default=16, show_default=True, help="Bits that every sum of scores fits."
 )
 @click.option("--from", "from_frontier", type=existing_file, help="A frontier.json: build one of its points.")
-@click.option("--point", type=click.IntRange(1), help="Number of the point.  [default: the one that was picked]")
-@click.option("--report/--no-report", default=True, show_default=True, help="Write report.html and spec/ as well.")
+@click.option("--point", type=click.IntRange(1), help="Number of the point.  [default: the picked one]")
+@click.option("--report/--no-report", default=True, show_default=True, help="Also write report.html and spec/.")
 @click.option("--hand-length", type=Number(100, 300), metavar="MM", help="Wearer's hand length.  [default: 190]")
 @layout_option
 @click.option("--glove", type=existing_file, help="A glove.toml: add the scan map of its wiring to the build.")
@@ -200,12 +200,12 @@ def command(
     chip: str | None,
     **asked: Any,
 ) -> None:
-    """Choose the switches of SET.grasps, train on them, and write the build: integer tables with their proof.
+    """Choose the switches of SET.grasps, train on them, and write the build: integer tables and their verification.
 
-    The folder holds build.json, tables.bin and ensemble.bin, the classifier in C in firmware/, with --glove scan.json,
-    and in hand.json where its switches lie. report.html shows all of it in a browser; spec/ describes the reduced glove
-    to cut, solder and run; try.html recognises in a browser what is closed and bent there. The same recordings,
-    options, wiring and layout give the same bytes.
+    The folder holds build.json, tables.bin and ensemble.bin, the classifier in C in firmware/, the switch positions in
+    hand.json, and with --glove scan.json. report.html shows all of it in a browser; spec/ describes the reduced glove
+    to cut, solder and run; in try.html you close switches and bend joints in a browser and see the prediction. The same
+    recordings, options, wiring and layout give the same bytes.
 
     \b
     Example:
@@ -227,7 +227,7 @@ def command(
     _check_proposal(propose, chip, glove)
     _check_point(context, from_frontier, point)
     if hand_length is not None and not report:
-        raise click.UsageError("--hand-length is of the hand in spec/, which --no-report leaves out: give one of them.")
+        raise click.UsageError("--hand-length sizes the hand in spec/, which --no-report omits: give one of them.")
     keep_apart(recordings, layout, glove, propose, from_frontier)
     options = asked_settings(context, asked) | _placed(context, asked)
     given = None if glove is None else load_harness(glove)
@@ -241,7 +241,7 @@ def command(
     if chosen is not None:
         options |= chosen.options
         documents = documents and replace(documents, frontier=chosen.frontier, point=chosen.point.number)
-    with progress("compiling, then the paper's tables" if report and asked["folds"] else "compiling") as told:
+    with progress("compiling, then the paper's tables" if report and asked["folds"] else "compiling") as report_done:
         made = compile_build(
             grasp_set,
             output,
@@ -250,18 +250,18 @@ def command(
             hand=hand,
             documents=documents,
             jobs=jobs,
-            progress=told,
+            progress=report_done,
             **options,
         )
     warn_of_budget(asked["budget_us"], grasp_set.joint_names, None if given is None else given.cyberglove)
     if made.only_answer is not None:
         warning(
-            f"the build recognises every row as {made.only_answer}: no input tells grasp types apart by "
-            "itself, and the model looks at one at a time"
+            f"the build predicts {made.only_answer} for every row: no single input distinguishes grasp types, and the "
+            "model looks at one input at a time"
         )
     if chosen is not None and given is not None and made.harness != given:
         warning(
-            f"the scan map is of the wiring that point {chosen.point.number} was found with, not of {glove}: to run on "
+            f"the scan map uses the wiring that point {chosen.point.number} was found with, not {glove}: to run on "
             "that glove, build a point that is read as wired, or compile without --from"
         )
     if propose is not None:
@@ -270,7 +270,7 @@ def command(
 
 
 def _placed(context: click.Context, asked: dict[str, Any]) -> dict[str, Any]:
-    """Return what was `asked` as options of a build. A preset's --keep is for the preset's own --method."""
+    """Return the requested build options. A preset's --keep applies only to the preset's own --method."""
     from thenar.compiler.placement.methods.base import METHODS, PAPERS
 
     method = asked.pop("method") or PAPERS
@@ -280,27 +280,27 @@ def _placed(context: click.Context, asked: dict[str, Any]) -> dict[str, Any]:
 
 
 def _check_proposal(propose: Path | None, chip: str | None, glove: Path | None) -> None:
-    """Raise UsageError for what does not go with --propose: before the training, not after it."""
+    """Raise UsageError for options that conflict with --propose: before the training, not after it."""
     if propose is None:
         if chip is not None:
-            raise click.UsageError("--chip says how to --propose a harness: name the file to write.")
+            raise click.UsageError("--chip sets the chips of a proposed harness: add --propose with a file to write.")
         return
     if glove is not None:
-        raise click.UsageError("--glove reads a wiring, --propose writes a new one: give one of them.")
+        raise click.UsageError("--glove reads a wiring and --propose writes a new one: give one of them.")
 
 
 def _check_point(context: click.Context, from_frontier: Path | None, point: int | None) -> None:
-    """Raise UsageError for what does not go with --from."""
+    """Raise UsageError for options that conflict with --from."""
     from thenar.compiler.trainers.base import TRAINERS
 
     if from_frontier is None:
         if point is not None:
-            raise click.UsageError("--point is one of a frontier: name its file with --from.")
+            raise click.UsageError("--point picks a point of a frontier: name its file with --from.")
         return
     for name in (*_SETTLED, *(setting.name for trainer in TRAINERS.values() for setting in trainer.settings)):
         if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             option = next(param.opts[-1] for param in context.command.get_params(context) if param.name == name)
-            raise click.UsageError(f"{option} is settled by the point that --from names: leave it out.")
+            raise click.UsageError(f"{option} is set by the point that --from names: leave it out.")
 
 
 def _propose(manifest: "Manifest", path: Path, chip: str) -> None:
@@ -330,18 +330,18 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
     )
     _print_training(manifest)
     for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
-        console.print(f"recognised, {rate}")
+        console.print(f"accuracy, {rate}")
     for sentence in manifest.nothing_held:
         console.print(sentence, soft_wrap=True)
     if manifest.source.independent:
         console.print(INDEPENDENT)
     console.print(
-        f"integers: {proof.scale:.1f} steps a unit, no sum beyond {proof.bound} of 32767, no score off by more than "
+        f"integers: {proof.scale:.1f} steps a unit, no sum above {proof.bound} of 32767, no score off by more than "
         f"{proof.error:g} steps; {proof.covered} of {manifest.source.rows} rows are safe, {proof.changed} change class"
     )
     console.print(made.firmware, soft_wrap=True)
     if manifest.faults is not None and manifest.faults.lost is not None:
-        console.print(f"worst of single inputs lost, rows trained on: {manifest.faults.sentences[0]}", soft_wrap=True)
+        console.print(f"worst loss of a single input, on training rows: {manifest.faults.sentences[0]}", soft_wrap=True)
     if made.harness is not None and made.scan is not None:
         _print_scan(made.scan, made.harness)
     if propose is not None:
@@ -353,7 +353,7 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
 
 
 def _kept(manifest: "Manifest", made: "BuildReport") -> str:
-    """Return how many switches, levels and joints are kept: "3 of 8 switches and 18 joints"."""
+    """Return the numbers of kept switches, levels and joints: "3 of 8 switches and 18 joints"."""
     taxels, total = len(made.grasp_set.taxel_columns), manifest.source.switches
     levels = [switch.source for switch in manifest.switches if switch.threshold is not None]
     found = []
@@ -390,13 +390,13 @@ def _print_training(manifest: "Manifest") -> None:
         )
     if manifest.zero_gain_nodes:
         console.print(
-            f"at {manifest.zero_gain_nodes} of the placement's decisions no switch gains anything alone: "
+            f"at {manifest.zero_gain_nodes} of the placement's decisions no switch alone gains anything: "
             "the lowest-numbered one that varies was taken"
         )
 
 
 def _print_scan(scan: "ScanMap", harness: "Harness") -> None:
-    """Print the map chip by chip in the order in which chips are read first, with what the wire is bound to take."""
+    """Print the map chip by chip, in reading order, with the time on the wire."""
     from thenar.runtime.scanning.timing import scan_us, scanner_us, taxels_us
 
     time = scan_us(scan, harness)

@@ -1,4 +1,4 @@
-"""`thenar doctor`: is every device of a harness there, and as fast as its wire?"""
+"""`thenar doctor`: check that every device of a harness is there, and as fast as its wire allows."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,13 +32,13 @@ if TYPE_CHECKING:
 
 @click.command("doctor")
 @click.argument("glove", metavar="[glove.toml]", type=existing_file, required=False)
-@click.option("--line", metavar="PORT", help="Listen to rows from PORT in place of it, and propose a glove.toml.")
+@click.option("--line", metavar="PORT", help="Listen to rows from PORT instead, and propose a glove.toml.")
 @click.option("--baud", type=click.IntRange(1), default=115_200, show_default=True, help="Baud rate, with --line.")
-@click.option("--seconds", type=Number(0.5, 600), default=5.0, show_default=True, help="For how long, with --line.")
-@click.option("--names", metavar="NAME,...", help="Names of the columns, where the sender does not name them.")
-@click.option("--propose", metavar="FILE.toml", type=OutputFile(".toml"), help="Write the proposal here, with --line.")
+@click.option("--seconds", type=Number(0.5, 600), default=5.0, show_default=True, help="How long to listen to --line.")
+@click.option("--names", metavar="NAME,...", help="Column names, if the sender does not name them.")
+@click.option("--propose", metavar="FILE.toml", type=OutputFile(".toml"), help="Write the proposal here; with --line.")
 @overwrite_flag
-@click.option("--build", metavar="BUILD", type=existing_folder, help="Look only at what this build reads of the glove.")
+@click.option("--build", metavar="BUILD", type=existing_folder, help="Check only the devices that this build reads.")
 @click.option("--write", is_flag=True, help="Write the CyberGlove's measured record time into glove.toml.")
 @json_flag
 def command(
@@ -51,16 +51,16 @@ def command(
     build: Path | None,
     write: bool,
 ) -> None:
-    """Open every device of glove.toml and say what is there, how fast it is and how fast its wire would let it be.
+    """Open every device of glove.toml and report whether it is there, its speed, and the speed that its wire allows.
 
-    Of a CyberGlove it measures a record of all sensors, and one of those that the build reads, or of half of them,
-    against the vendor's formula. With --write, `thenar frontier --glove glove.toml` goes by what was measured.
+    For a CyberGlove, measure a record of all sensors, and one of the sensors that the build reads (or half of all), and
+    compare both with the vendor's formula. With --write, `thenar frontier --glove glove.toml` uses the measured time.
 
-    With --line, what a board or a program sends as lines of numbers (CSV, JSON, name:value) is shown column by column:
-    press every switch and pad, and bend every finger, while it listens. PORT is a serial port, tcp://HOST:PORT,
+    With --line, listen to a board or program that sends lines of numbers (CSV, JSON, name:value), and show each column:
+    meanwhile press every switch and pad, and bend every finger. PORT is a serial port, tcp://HOST:PORT,
     udp://HOST:PORT, unix:PATH, ws://HOST:PORT/PATH, - (stdin), lsl:NAME or ros:/TOPIC.
 
-    Exit code 1 if something is missing; with --build, also if the build cannot work with the glove's calibration.
+    Exit code 1 if something is missing; with --build, also if the glove's calibration does not fit the build.
 
     \b
     Example:
@@ -68,15 +68,15 @@ def command(
         thenar doctor --line /dev/ttyUSB0 --propose glove.toml
     """
     if (glove is None) == (line is None):
-        raise click.UsageError("name a glove.toml, or the --line to listen to")
+        raise click.UsageError("nothing to check: name a glove.toml, or a port to listen to with --line")
     if line is not None:
         if build is not None or write:
-            raise click.UsageError("--build and --write look at a glove.toml: leave --line out")
+            raise click.UsageError("--build and --write need a glove.toml: leave out --line and name one")
         _listen(line, baud, seconds, [] if names is None else names.split(","), propose)
         return
     assert glove is not None
     if propose is not None or names is not None:
-        raise click.UsageError("--names and --propose are of what --line hears: name the line")
+        raise click.UsageError("--names and --propose describe the rows of a --line: name the port with --line")
     from thenar.runtime.build import Build
     from thenar.runtime.harness.loading import load_harness
     from thenar.runtime.live.checkup import check_up
@@ -101,7 +101,7 @@ def command(
 
 
 def _listen(port: str, baud: int, seconds: float, columns: "Sequence[str]", propose: Path | None) -> None:
-    """Show what comes from a port, and print the glove.toml that reads it, or write it into a file."""
+    """Show what a port sends, and print the glove.toml that reads it, or write it to a file."""
     from thenar.runtime.files import write_atomically
     from thenar.runtime.harness.checks import faults
     from thenar.runtime.harness.wiring import Harness
@@ -126,10 +126,10 @@ def _listen(port: str, baud: int, seconds: float, columns: "Sequence[str]", prop
 
     show(found, show_heard)
     for _, reason in faults(harness):
-        err().print(f"to be mended before it can be used: {reason}", highlight=False)
+        err().print(f"fix this before using it: {reason}", highlight=False)
     if propose is not None:
         write_atomically(propose, text.encode())
-        err().print(f"{propose}: read it through, then `thenar doctor {propose}`", highlight=False)
+        err().print(f"{propose}: review it, then run `thenar doctor {propose}`", highlight=False)
 
 
 def _write(glove: Path, found: "Sequence[Finding]") -> None:
@@ -138,13 +138,13 @@ def _write(glove: Path, found: "Sequence[Finding]") -> None:
 
     measured = next((one.measured_us for one in found if one.part == RECORD), None)
     if measured is None:
-        raise click.ClickException(f"no record of a CyberGlove was measured: {glove} is as it was")
+        raise click.ClickException(f"no CyberGlove record was measured: {glove} is unchanged")
     write_record_us(glove, round(measured))
     err().print(f"{glove}: record_us = {measured:.0f}", highlight=False)
 
 
 def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[Finding]":
-    """Yield what is wrong with the joints: a calibration that does not fit would end `thenar run` and `record`."""
+    """Yield what is wrong with the joints: a calibration that does not fit would stop `thenar run` and `record`."""
     from thenar.drivers.errors import ThenarError
     from thenar.runtime.calibration import load_calibration
     from thenar.runtime.live.checkup import Finding

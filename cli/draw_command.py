@@ -1,4 +1,4 @@
-"""`thenar draw`: the glove as a picture, palm up."""
+"""`thenar draw`: draw the glove, palm up."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 
 _LARGEST = 4_000_000  # bytes; a placement of the largest set has fewer
-_WANTED = "take a build's folder, the file of `thenar place -o`, or a text of one name a line"
+_WANTED = "name a build folder, a file of `thenar place -o`, or a text file with one name per line"
 
 
 def _titled_paths(_context: click.Context, _option: click.Parameter, given: tuple[str, ...]) -> list[tuple[str, Path]]:
-    """Return title and path of each [NAME=]PATH; without a NAME, the title is the file's."""
+    """Return title and path of each [NAME=]PATH; without a NAME, the title is the file's name."""
     return [_titled_path(text) for text in given]
 
 
@@ -44,18 +44,18 @@ def _titled_path(text: str) -> tuple[str, Path]:
 @click.option("-o", "--output", type=picture_file, required=True, help="The picture to write: an .svg or .png file.")
 @overwrite_flag
 @layout_option
-@click.option("--numbers", is_flag=True, help="Of all switches: write each one's number in the set, from 0, into it.")
-@click.option("--per-grasp", is_flag=True, help="Of GRASPS: a hand for each grasp type, on one scale.")
-@click.option("--place", "choose", is_flag=True, help="Of GRASPS: the switches that `thenar place` would keep.")
+@click.option("--numbers", is_flag=True, help="Label each switch with its number in the set, from 0.")
+@click.option("--per-grasp", is_flag=True, help="Draw one hand per grasp type of GRASPS, all on one scale.")
+@click.option("--place", "choose", is_flag=True, help="Draw the switches that `thenar place` would keep for GRASPS.")
 @click.option(
-    "--prune", type=click.IntRange(min=0), default=0, metavar="S", help="With --place: as `thenar place` does."
+    "--prune", type=click.IntRange(min=0), default=0, metavar="S", help="With --place: pruning as in `thenar place`."
 )
 @click.option(
     "--kept",
     multiple=True,
     callback=_titled_paths,
     metavar="[NAME=]PATH",
-    help="What a placement, a build or a list of names keeps; several of them are drawn side by side.",
+    help="Draw what a placement, a build or a list of names keeps; several are drawn side by side.",
 )
 def command(
     grasps: Path | None,
@@ -67,11 +67,11 @@ def command(
     prune: int,
     kept: list[tuple[str, Path]],
 ) -> None:
-    """Draw a glove, every switch a circle: your own with --layout, else that of the shipped scenes, palm up.
+    """Draw a glove palm up, each switch as a circle: your own with --layout, else the glove of the shipped scenes.
 
-    Without GRASPS: all its switches, or with --kept those that placements keep, with their order. Of GRASPS, a .grasps
-    file with the glove's switches: how often each closed; or with --place those worth keeping, for each subject and for
-    all rows pooled. In an .svg each circle says on hovering what it is.
+    Without GRASPS: all its switches, or with --kept those that placements keep, numbered in order. With GRASPS, a
+    .grasps file with the glove's switches: how often each closed, or with --place the switches worth keeping, for each
+    subject and for all rows pooled. In an .svg file, hovering over a circle names the switch.
 
     \b
     Example:
@@ -98,15 +98,15 @@ def _check_options(
     grasps: Path | None, numbers: bool, per_grasp: bool, choose: bool, prune: int, some_kept: bool
 ) -> None:
     if grasps is None and (per_grasp or choose):
-        raise click.UsageError("--per-grasp and --place need GRASPS: a .grasps file")
+        raise click.UsageError("--per-grasp and --place need recordings: name a .grasps file as GRASPS")
     if grasps is not None and (some_kept or numbers):
         raise click.UsageError("--kept and --numbers draw the glove itself: leave GRASPS out")
     if numbers and some_kept:
-        raise click.UsageError("--kept writes the order of the kept switches into them: leave --numbers out")
+        raise click.UsageError("--kept already numbers the kept switches: leave out --numbers")
     if per_grasp and choose:
-        raise click.UsageError("--per-grasp draws contacts and --place what is kept: take one of them")
+        raise click.UsageError("--per-grasp draws contacts and --place draws kept switches: give one of them")
     if prune and not choose:
-        raise click.UsageError("--prune belongs to --place")
+        raise click.UsageError("--prune needs --place")
 
 
 def _without_grasps(hand: "HandShape", numbers: bool, kept: list[tuple[str, Path]]) -> "Picture":
@@ -118,17 +118,17 @@ def _without_grasps(hand: "HandShape", numbers: bool, kept: list[tuple[str, Path
 
 
 def _placements(hand: "HandShape", grasp_set: "GraspSet", prune: int) -> "Picture":
-    """Return a hand for each subject and one for all rows pooled, or one hand if there is but one subject."""
+    """Return a hand for each subject and one for all rows pooled, or one hand if there is only one subject."""
     from thenar.compiler.placement.placement import place_by_subject
     from thenar.simulator.handmaps.draw import kept
 
-    hand.numbers_of(grasp_set.element_names)  # a foreign set is refused before a tree is grown
+    hand.numbers_of(grasp_set.element_names)  # rejects a foreign set before any tree is grown
     with progress("growing a tree of each hand") as report:
         return kept(hand, [(title, list(found.names)) for title, found in place_by_subject(grasp_set, prune, report)])
 
 
 class KeptError(ThenarError, ValueError):
-    """A file does not say which switches are kept."""
+    """A file does not list the kept switches."""
 
 
 class _Chosen(msgspec.Struct, frozen=True):
@@ -136,7 +136,7 @@ class _Chosen(msgspec.Struct, frozen=True):
 
 
 class _Placement(msgspec.Struct, frozen=True):
-    """What of a placement, or of a build's description, is asked for here."""
+    """The part of a placement, or of a build's description, that is used here."""
 
     switches: tuple[_Chosen, ...]
 
@@ -144,8 +144,8 @@ class _Placement(msgspec.Struct, frozen=True):
 def kept_names(path: Path) -> tuple[str, ...]:
     """Return the names of the kept switches, in the order in which they were chosen.
 
-    path is a build's folder, a JSON file (what `thenar place -o` writes, or an array of names), or a text of one name a
-    line. Raises KeptError if it is none of these or names no switch, BuildError if it is a damaged build.
+    path is a build's folder, a JSON file (written by `thenar place -o`, or an array of names), or a text file with one
+    name per line. Raises KeptError if it is none of these or names no switch, BuildError if it is a damaged build.
     """
     from thenar.runtime.build import load_manifest
     from thenar.runtime.names import fault
@@ -166,14 +166,14 @@ def _of_file(path: Path) -> tuple[str, ...]:
     try:
         text = read_file(path, _LARGEST, KeptError).decode()
     except UnicodeDecodeError:
-        raise KeptError(f"{path} is no text: {_WANTED}") from None
+        raise KeptError(f"{path} is not a text file: {_WANTED}") from None
     if text.lstrip()[:1] not in ("{", "["):
         return tuple(filter(None, map(str.strip, text.splitlines())))
     try:
         check_json(text.encode())
         found = msgspec.json.decode(text, type=_Placement | tuple[str, ...])
     except ValueError as reason:
-        raise KeptError(f"{path} is no list of switches ({shortened(str(reason))}): {_WANTED}") from None
+        raise KeptError(f"{path} is not a list of switches ({shortened(str(reason))}): {_WANTED}") from None
     return tuple(chosen.name for chosen in found.switches) if isinstance(found, _Placement) else found
 
 

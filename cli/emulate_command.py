@@ -1,4 +1,4 @@
-"""`thenar emulate`: a glove that is not there, on real ports, playing a scene or a recording."""
+"""`thenar emulate`: emulate a glove on real ports, playing a scene or a recording."""
 
 import ctypes
 import os
@@ -41,13 +41,13 @@ if TYPE_CHECKING:
 
 _ADAPTERS = ("any", "bcm2835", "designware", "i2c-gpio", "smbus-only")
 _GRACE_S = 5.0
-# Ctrl-C comes to the command too: it is given so long to end before it is told to.
+# The command receives Ctrl-C too: it gets this long to end before it is asked to.
 _BY_ITSELF_S = 1.0
 _FRAME_US = 10_000
 _HARNESS, _CALIBRATION, _TAXELS = "glove.toml", "calibration.toml", "taxels.toml"
 _BITS = 10
 _LONGEST_PATH = 4095  # of Linux
-# What a shell adds to the number of the signal that ended a command.
+# A shell reports a command ended by a signal as this plus the signal's number.
 _KILLED = 128
 _PROCESSES = Path("/proc")
 _SET_CHILD_SUBREAPER = 36
@@ -55,7 +55,7 @@ _LOOK_S = 0.02
 
 
 class Played(msgspec.Struct, frozen=True):
-    """A line of --log: the frame with this number is shown from this time of the monotonic clock on."""
+    """A line of --log: the frame with this number is shown from this monotonic time on."""
 
     time_us: int
     row: int
@@ -80,11 +80,11 @@ class Played(msgspec.Struct, frozen=True):
 @click.option(
     "--rest-ms",
     type=Number(1, 60_000),
-    help="Rest between grasps for so long, with an open hand.  [default: the scene's rest, or none]",
+    help="Time to rest between grasps, with an open hand.  [default: the scene's rest, or none]",
 )
-@click.option("--repeat", is_flag=True, help="Play again and again, until Ctrl-C or the command ends.")
+@click.option("--repeat", is_flag=True, help="Repeat until Ctrl-C, or until the command ends.")
 @click.option(
-    "--adapter", type=click.Choice(_ADAPTERS), default="any", show_default=True, help="What the I2C bus can batch."
+    "--adapter", type=click.Choice(_ADAPTERS), default="any", show_default=True, help="What the I2C adapter can batch."
 )
 @click.option("--log", metavar="FILE.jsonl", type=OutputFile(".jsonl"), help="Log the time of each frame to this file.")
 @overwrite_flag
@@ -103,10 +103,10 @@ def command(
     """Emulate the devices of a harness and play on them: a SCENE (a shipped one or a .toml file), a .grasps set, or the
     .mcap recording of a live run.
 
-    A CyberGlove and scanner boards appear as serial ports in DIR, paced like the wire, with the wire effects that the
-    scene lists; streams as lines by the way that their port names, on loopback; expanders and converters on
-    /dev/i2c-N and /dev/spidevB.C, through umockdev. With a COMMAND, that runs beside the emulated glove and sees it:
-    {glove} in it stands for the glove.toml that names the emulated ports. It is ended when the playing is over.
+    A CyberGlove and scanner boards appear as serial ports in DIR, paced like the wire, with the scene's wire effects;
+    streams send lines on loopback, over the transport that their port names; expanders and converters appear on
+    /dev/i2c-N and /dev/spidevB.C, through umockdev. A COMMAND runs next to the emulated glove and sees it: {glove} in
+    its arguments is replaced by the glove.toml that names the emulated ports. It is ended when the playback is over.
 
     \b
     Example:
@@ -125,15 +125,15 @@ def command(
     keep_apart(glove, Path(source), calibration, *ours, log)
     _check_folder(folder)
     if client and shutil.which(client[0]) is None:
-        raise click.UsageError(f"{client[0]} cannot be run: there is no such command")
+        raise click.UsageError(f"{client[0]} cannot be run: no such command is installed")
     performance, cable = _performance(source, subject, period_ms, rest_ms, cyberglove=worn is not None)
     if missing := [name for name in harness.switches if name not in performance.switch_names]:
-        warning(f"{source} has no switch {list_names(missing)}: open all the time")
+        warning(f"{source} has no switch {list_names(missing)}: always open")
     if missing := [name for name in harness.taxel_names if name not in performance.taxel_names]:
-        warning(f"{source} has no taxel {list_names(missing)}: 0 counts all the time")
+        warning(f"{source} has no taxel {list_names(missing)}: always 0 counts")
     streamed = [name for stream in harness.streams for name in stream.joints]
     if missing := [name for name in streamed if name not in performance.joint_names]:
-        warning(f"{source} has no joint {list_names(missing)}: 0 all the time")
+        warning(f"{source} has no joint {list_names(missing)}: always 0")
     with ExitStack() as stack:
         stop = stack.enter_context(ended_by_signals())
         folder.mkdir(parents=True, exist_ok=True)
@@ -160,21 +160,21 @@ def command(
 
 
 def _check_folder(folder: Path) -> None:
-    """Raise UsageError if `folder` holds files by the names of ours, and others: then they may be the user's; or if no
-    glove.toml could name a port in it.
+    """Raise UsageError if `folder` holds files with the names of ours and others too, which may then be the user's; or
+    if no glove.toml could name a port in it.
     """
     if reason := fault(str(folder.resolve()), _LONGEST_PATH):
-        raise click.UsageError(f"the path of {folder} {reason}, and glove.toml has to say it: name another --dir")
+        raise click.UsageError(f"the path of {folder} {reason}, so glove.toml cannot name it: name another --dir")
     there = {path.name for path in folder.iterdir() if not path.is_symlink()} if folder.is_dir() else set()
     ours = there & {_HARNESS, _CALIBRATION, _TAXELS}
     if ours and there - ours and not overwrites(click.get_current_context()):
-        raise click.UsageError(f"{folder / min(ours)} is there already: add --overwrite, or name another --dir")
+        raise click.UsageError(f"{folder / min(ours)} already exists: add --overwrite, or name another --dir")
 
 
 def _performance(
     source: str, subject: str | None, period_ms: float | None, rest_ms: float | None, *, cyberglove: bool
 ) -> tuple["Performance", "CableOf"]:
-    """Return what to play, and what happens on serial line n."""
+    """Return what to play, and the effects on serial line n."""
     from thenar.simulator.playing import performance
 
     given_us, rest_us = (None if given is None else round(given * 1000) for given in (period_ms, rest_ms))
@@ -183,10 +183,14 @@ def _performance(
         if not path.exists():
             raise click.BadParameter(f"there is no file {path}", param_hint="SOURCE")
         if subject is not None:
-            raise click.UsageError("--subject picks one of a scene's subjects: a recording has its own")
+            raise click.UsageError(
+                "--subject picks a subject of a scene, and a recording has only its own: leave it out"
+            )
         if path.suffix == ".mcap":
             if rest_ms is not None:
-                raise click.UsageError("--rest-ms is for scenes and sets of grasps: a recording has its own rests")
+                raise click.UsageError(
+                    "--rest-ms is for scenes and sets of grasps, and a recording has its rests: leave it out"
+                )
             return performance.of_recording(path, given_us or _FRAME_US, warning), lambda _line: None
         from thenar.compiler.recordings.graspset import GraspSet
 
@@ -222,16 +226,16 @@ def _write_harness(bench: "Bench", performance: "Performance", folder: Path) -> 
 
 
 def _tell_how(bench: "Bench", emulated: Path) -> None:
-    """Say on stderr how to meet the emulated glove."""
+    """Explain on stderr how to connect to the emulated glove."""
     echo(f"emulated glove: {emulated}; run it with: thenar run BUILD --glove {emulated}", err=True)
     if bench.environment:
         settings = " ".join(f"{name}={value}" for name, value in bench.environment.items())
-        echo(f"for its I2C buses, put before that command: {settings}", err=True)
+        echo(f"for its I2C buses, prefix that command with: {settings}", err=True)
 
 
 @contextmanager
 def _noting(log: Path | None) -> Iterator["Log"]:
-    """Yield what notes every frame in `log`, a line each, as soon as it is shown."""
+    """Yield a function that logs every frame to `log`, one line each, as soon as it is shown."""
     if log is None:
         yield lambda row, grasp, time_us: None
         return
@@ -245,7 +249,7 @@ def _noting(log: Path | None) -> Iterator["Log"]:
 
 @contextmanager
 def _beside(client: tuple[str, ...], emulated: Path, bench: "Bench", stop: Event) -> Iterator[subprocess.Popen[bytes]]:
-    """Run the command, and what it starts, for no longer than this context; `stop` is set when the command ends."""
+    """Run the command, and what it starts, within this context only; `stop` is set when the command ends."""
     arguments = [argument.replace("{glove}", str(emulated)) for argument in client]
     try:
         family = Family(arguments, {**os.environ, **bench.environment})
@@ -269,9 +273,9 @@ def _play(bench: "Bench", performance: "Performance", note: "Log", stop: Event, 
 
 
 class Family:
-    """A command that runs with `environment`, in our process group: it has the terminal and may ask for keys.
+    """A command that runs with `environment`, in our process group: it shares the terminal and may read keys.
 
-    On Linux this process adopts what the command leaves behind, and so finds it; elsewhere it knows the command alone.
+    On Linux this process adopts the command's orphans and so finds them; elsewhere it knows only the command itself.
     Raises OSError if the command cannot be run.
     """
 
@@ -281,10 +285,10 @@ class Family:
         self.command = subprocess.Popen(arguments, env=environment)
 
     def end(self, patience_s: float, grace_s: float) -> None:
-        """End all of it; whatever happens here, none outlives this.
+        """End the command and all its children; none outlives this call.
 
-        patience_s  the command is given to end by itself
-        grace_s     it is given after a SIGINT, and as much what it leaves behind, after a SIGTERM
+        patience_s  time for the command to end by itself
+        grace_s     time for it after a SIGINT, and for its children after a SIGTERM
         """
         try:
             with suppress(subprocess.TimeoutExpired):
@@ -306,7 +310,7 @@ class Family:
             time.sleep(_LOOK_S)
 
     def _signal(self, number: signal.Signals) -> bool:
-        """Send the signal to all that run; return whether there are any."""
+        """Send the signal to all running processes; return whether there are any."""
         alive = self._alive()
         for process in alive:
             with suppress(ProcessLookupError, PermissionError):
@@ -335,7 +339,7 @@ def _adopt_orphans() -> None:
 
 
 def _children() -> dict[int, set[int]]:
-    """Return the children of each process, where there is a /proc."""
+    """Return the children of each process, where /proc exists."""
     found: dict[int, set[int]] = {}
     for folder in _PROCESSES.glob("[0-9]*"):
         if fields := _fields(int(folder.name)):
@@ -349,7 +353,7 @@ def _runs(process: int) -> bool:
 
 
 def _fields(process: int) -> list[str]:
-    """Return state, parent and so on; nothing of a process that is gone."""
+    """Return state, parent and so on; nothing if the process has ended."""
     try:
         return (_PROCESSES / str(process) / "stat").read_text(errors="replace").rpartition(")")[2].split()
     except OSError:

@@ -1,4 +1,4 @@
-"""The signals that end what runs until somebody ends it."""
+"""The signals that end a command that runs until it is stopped."""
 
 import signal
 from collections.abc import Iterator
@@ -13,13 +13,13 @@ _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 def ended_by_signals() -> Iterator[Event]:
     """Yield an event that SIGINT, SIGTERM and SIGHUP set; a second SIGINT interrupts as usual.
 
-    A signal that whoever started us wants ignored (`nohup`) stays so.
+    A signal that the parent process ignores (`nohup`) stays ignored.
     """
     stop = Event()
 
     def end(number: int, _frame: FrameType | None) -> None:
         signal.signal(number, before[signal.Signals(number)])
-        # In a thread, for this one may be amid `stop`'s own lock.
+        # In a thread, because this handler may interrupt code that holds the lock of `stop`.
         Thread(target=stop.set, name="thenar end", daemon=True).start()
 
     heard = [number for number in _ENDING if signal.getsignal(number) is not signal.SIG_IGN]

@@ -1,4 +1,4 @@
-"""`thenar evaluate`: the paper's tables for the user's own recordings."""
+"""`thenar evaluate`: the paper's tables for the user's recordings."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,13 +11,13 @@ from .common import (
     ListOf,
     OutputFile,
     OutputFolder,
+    comma_separated,
     existing_file,
     jobs_option,
     json_flag,
     keep_apart,
     out,
     overwrite_flag,
-    parted,
     progress,
     show,
     table,
@@ -39,8 +39,8 @@ TABLES = (*_USUAL, "joints")
 
 
 def _numbers(_: click.Context, __: click.Parameter, value: str) -> tuple[int, ...]:
-    """Return the whole numbers in `value`, parted by commas: each once, in the order given."""
-    parts = parted(value)
+    """Return the comma-separated whole numbers in `value`, each once, in the order given."""
+    parts = comma_separated(value)
     if not all(part.isascii() and part.isdigit() for part in parts):
         raise click.BadParameter(f"{value!r} is not a list of whole numbers such as 0,13,62")
     return tuple(dict.fromkeys(map(int, parts)))
@@ -52,7 +52,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
 
 @click.command(cls=Training)
 @click.argument("grasps", type=existing_file)
-@click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Only this subject; may be given again.")
+@click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Use only this subject; repeatable.")
 @click.option("--folds", type=click.IntRange(min=2), default=4, show_default=True, help="Folds of cross-validation.")
 @click.option(
     "--by",
@@ -60,14 +60,14 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     type=click.Choice(("trial", "subject", "object", "session", "block")),
     default="trial",
     show_default=True,
-    help="What a fold tests: trials at random or by their number (block), or a subject, object or session left out.",
+    help="What a fold tests: trials at random or by number (block), or a left-out subject, object or session.",
 )
 @click.option(
     "--repeats",
     type=click.IntRange(1, 1000),
     default=3,
     show_default=True,
-    help="Repeats of random folds, other seeds each.",
+    help="Repeats of random folds, each with another seed.",
 )
 @trainer_option("logitboost")
 @click.option("--prune", type=click.IntRange(min=0), default=0, show_default=True, help="S: smallest node ID3 splits.")
@@ -77,7 +77,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     metavar="S,S,...",
     default="0,13,62",
     show_default=True,
-    help="Each S of pooled pruning.",
+    help="Values of S for pooled pruning.",
 )
 @click.option(
     "--protocol",
@@ -91,18 +91,18 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the first repeat.")
 @jobs_option()
 @click.option(
-    "--rivals",
+    "--baselines",
     type=method_list,
     default="cmim,mutual-information",
     show_default=True,
-    help="Methods to compare ID3 with, by commas.",
+    help="Methods to compare ID3 with, separated by commas.",
 )
 @click.option(
     "--tables",
     type=ListOf("table", lambda: TABLES, none=True),
     default=",".join(_USUAL),
     show_default=True,
-    help="Which tables, or none; joints: the best 1, 2, ... of them.",
+    help="Tables to print, or none; joints: the best 1, 2, ... of them.",
 )
 @levels_option
 @keep_joints_option
@@ -117,12 +117,12 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     "--learning-curve",
     "learning",
     is_flag=True,
-    help="Learning curves: accuracy after 2, 4, 8, ... repetitions, and what to expect of more.",
+    help="Learning curves: accuracy after 2, 4, 8, ... repetitions, with an extrapolation.",
 )
 @click.option(
     "--streams",
     is_flag=True,
-    help="Instead: how well whole movements of each subject, left out in turn, are cut into grasps.",
+    help="Evaluate segmentation of whole movements instead, leaving out one subject at a time.",
 )
 @click.option("--confusion", is_flag=True, help="Print the confusion matrix of every composition and subject.")
 @click.option(
@@ -130,9 +130,9 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     "folder",
     type=OutputFolder(fresh=True),
     metavar="FOLDER",
-    help="Draw the confusion matrices there, and the learning curves.",
+    help="Draw the confusion matrices and learning curves into this folder.",
 )
-@click.option("-o", "--output", type=OutputFile(".json"), metavar="FILE", help="Write the whole result there, as JSON.")
+@click.option("-o", "--output", type=OutputFile(".json"), metavar="FILE", help="Write the whole result as JSON.")
 @overwrite_flag
 @json_flag
 @click.pass_context
@@ -149,19 +149,19 @@ def command(
 ) -> None:
     """Cross-validate GRASPS and print the paper's tables: accuracies in percent, with 95 % intervals.
 
-    Every rate comes under two protocols: `paper` chooses the placement from all rows, as the paper did (optimistic);
-    `nested` chooses it inside each training fold. What ID3 is worth shows beside random and information-greedy
-    placements of as many switches.
+    Every accuracy is given under two protocols: `paper` chooses the placement from all rows, as the paper did
+    (optimistic); `nested` chooses it inside each training fold. Random and information-greedy placements with equally
+    many switches are the baselines for ID3.
 
-    A fold never has frames of one trial on both sides. Accuracies are of trials, each recognised as most of its frames
-    are; where trials have several frames, the accuracy of single frames is added.
+    Frames of one trial are never on both sides of a fold. Accuracies count trials, each classified by majority vote of
+    its frames; if trials have several frames, the accuracy of single frames is added.
 
-    Trainers are compared with each other and with scikit-learn's simplest, at settings that each chooses from its
+    Trainers are compared with each other and with scikit-learn's simplest, each with hyperparameters chosen on its
     training rows.
 
-    With --streams, GRASPS holds whole movements: placement, tables and the costs of segments are learnt without the
-    subject whose streams are decoded, live and afterwards, beside the dwell rule, a sequential test and a plain hidden
-    Markov model.
+    With --streams, GRASPS holds whole movements: placement, tables and segment costs are learnt without the subject
+    whose streams are decoded, live and afterwards. The dwell rule, a sequential test and a plain hidden Markov model
+    are decoded for comparison.
 
     \b
     Example:
@@ -184,7 +184,7 @@ def command(
     asked["tables"] = tuple(name for name in TABLES if name in asked["tables"])
     options = msgspec.convert(asked | named | {"settings": training}, Options)
     if (confusion or (folder is not None and not options.learning)) and "compositions" not in options.tables:
-        raise click.UsageError("--confusion and --plot show the compositions: name them among --tables")
+        raise click.UsageError("--confusion and --plot show the compositions: name one of them in --tables")
     with progress("evaluating") as report:
         study = evaluate(GraspSet.load(grasps), options, jobs, report)
     if folder is not None:
@@ -243,12 +243,12 @@ def _print_streams(study: "StreamStudy") -> None:
     console.print(
         f"{counted(study.movements, 'movement')} of {counted(len(study.subjects), 'subject')}, {study.seconds:,.0f} s; "
         "each subject left out in turn; shares in %, means over subjects with 95 % intervals (Student). Nothing held "
-        "counts as background. False: segments that are announced while nothing is held, a hundred movements."
+        "counts as background. False: segments announced while nothing is held, per hundred movements."
     )
 
 
 def _print(study: "Study", *, confusion: bool) -> None:
-    """Print all tables, laid out as in the paper, and the confusion matrices if asked for."""
+    """Print all tables, laid out as in the paper, and the confusion matrices if requested."""
     from thenar.compiler.evaluation.populations import PROTOCOLS
 
     console = out()
@@ -283,7 +283,7 @@ def _print_learning(learning: "Learning") -> None:
     console.print()
     console.print(Text(learning.title, "bold"))
     console.print(grid)
-    console.print(learning.note or "Expected: a power law through the points, so an extrapolation.")
+    console.print(learning.note or "Expected: a power law fitted to the points, so an extrapolation.")
 
 
 def _print_confusions(study: "Study") -> None:
@@ -314,7 +314,7 @@ def _rates(rated: "RateTable") -> "Grid":
 
 
 def _matrix(grasps: tuple[str, ...], cell: "Cell") -> "Grid":
-    columns = ("true \\ found", *grasps)
+    columns = ("true \\ predicted", *grasps)
     grid = table(columns, columns)
     for grasp, counts in zip(grasps, cell.confusion or (), strict=True):
         grid.add_row(Text(grasp), *(str(count) if count else "." for count in counts))

@@ -1,4 +1,4 @@
-"""`thenar export`: a .grasps file into a table for other programs."""
+"""`thenar export`: convert a .grasps file into a table for other programs."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from .lines import echo
 
 
 class Exported(Struct, frozen=True):
-    """What was written: the table, the columns.toml that reads it back if asked for, and the number of grasps."""
+    """The written table, the columns.toml that reads it back if requested, and the number of grasps."""
 
     output: str
     columns: str | None
@@ -24,17 +24,17 @@ class Exported(Struct, frozen=True):
     "--output",
     type=OutputFile(".csv", ".csv.gz", ".tsv", ".tsv.gz", ".arff", ".parquet"),
     required=True,
-    help="The .csv, .tsv (each with or without .gz), .arff or .parquet file to write.",
+    help="The table to write: .csv or .tsv (also with .gz), .arff or .parquet.",
 )
 @overwrite_flag
-@click.option("--codes", is_flag=True, help="Write the joints' integer codes instead of values in their units.")
-@click.option("--meta", is_flag=True, help="ARFF: write subject, object, session and trial too, as --columns does.")
+@click.option("--codes", is_flag=True, help="Write the joints' integer codes, not values in their units.")
+@click.option("--meta", is_flag=True, help="ARFF: also write subject, object, session and trial, as --columns does.")
 @click.option("--columns", type=OutputFile(".toml"), help="Also write the columns.toml that imports the table again.")
 @json_flag
 def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path | None) -> None:
     """Export GRASPS, a .grasps file, as CSV, as Parquet, or as ARFF for Weka.
 
-    With --columns the table imports again as the same set: no table says by itself what its codes mean, or that its
+    With --columns, the table imports again as the same set: a table alone does not say what its codes mean, or that its
     grasps were simulated.
 
     \b

@@ -1,4 +1,4 @@
-"""`thenar firmware`: a build as C99 for a microcontroller."""
+"""`thenar firmware`: write a build as C99 for a microcontroller."""
 
 import shlex
 from collections.abc import Iterable
@@ -40,11 +40,11 @@ def _modes() -> Iterable[str]:
     return dict.fromkeys(mode for target in TARGETS.values() for mode in target.modes)
 
 
-_ANY = " `generic` is for any other part that has a C99 compiler."
+_ANY = " Use `generic` for any other part with a C99 compiler."
 
 
 class _Command(click.Command):
-    """The command; its help ends with what each target is."""
+    """The command; its help ends with a description of each target."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         from thenar.compiler.firmware.targets import TARGETS
@@ -56,7 +56,7 @@ class _Command(click.Command):
 @click.command("firmware", cls=_Command)
 @click.argument("build", metavar="BUILD", type=existing_folder)
 @click.option(
-    "--target", type=OneOf("target", _targets, _ANY), required=True, help="What the firmware is for: see below."
+    "--target", type=OneOf("target", _targets, _ANY), required=True, help="Target of the firmware: see below."
 )
 @click.option("-o", "--output", metavar="DIR", type=OutputFolder(), help="Folder to write the firmware into.")
 @click.option(
@@ -64,14 +64,14 @@ class _Command(click.Command):
     type=OneOf("mode", _modes),
     default="classify",
     show_default=True,
-    help="A library that classifies frames; a board that scans switches; or one that also recognises.",
+    help="A library that classifies frames; a board that scans switches; or a glove that scans and classifies.",
 )
-@click.option("--board", metavar="board.toml", type=existing_file, help="How the microcontroller is wired.")
+@click.option("--board", metavar="board.toml", type=existing_file, help="Wiring of the microcontroller.")
 @click.option(
     "--calibration",
     metavar="HAND.toml",
     type=existing_file,
-    help="The hand that it is for: its CyberGlove's bytes, from `thenar calibrate`.",
+    help="The wearer's calibration of the CyberGlove's bytes, from `thenar calibrate`.",
 )
 @click.option(
     "--glove",
@@ -83,20 +83,20 @@ class _Command(click.Command):
     "--name",
     default="glove",
     show_default=True,
-    help="What files and functions are called, thenar_NAME: a to z, digits and _, at most 32.",
+    help="Name of files and functions, thenar_NAME: a to z, digits and _, at most 32.",
 )
 @click.option(
     "--flash-limit",
     type=click.IntRange(1),
     metavar="BYTES",
-    help="Flash that the classifier may take.  [default: half of the part's, three quarters where half is too little; "
+    help="Flash available to the classifier.  [default: half of the part's, three quarters if half is too little; "
     "on an AVR at most 48 KiB]",
 )
-@click.option("--frontier", is_flag=True, help="Show the layouts there are: cycles against flash against width.")
+@click.option("--frontier", is_flag=True, help="List the possible layouts: cycles against flash against width.")
 @click.option(
     "--measure",
     is_flag=True,
-    help="Compile, run the worst frame in a simulator, and note in the header what it took.",
+    help="Compile, run the worst frame in a simulator, and record the cycles in the header.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace firmware that thenar wrote there; other files stay.")
 @json_flag
@@ -114,11 +114,11 @@ def command(
     measure: bool,
     overwrite: bool,
 ) -> int:
-    """Write C99 that recognises as BUILD does, bit for bit, with a Makefile, or as a package: for Arduino, PlatformIO,
-    ESP-IDF, Zephyr, pico-sdk and CMake.
+    """Write C99 that predicts exactly as BUILD does, bit for bit, with a Makefile, or as a package for Arduino,
+    PlatformIO, ESP-IDF, Zephyr, pico-sdk and CMake.
 
-    The layout of the tables is chosen by a cost model: the fastest that fits. Exits with 1 if --measure finds more
-    than the model allows for. The same build and options give the same bytes.
+    A cost model chooses the layout of the tables: the fastest that fits. Exits with 1 if --measure exceeds the model's
+    bounds. The same build and options give the same bytes.
 
     \b
     Example:
@@ -173,25 +173,25 @@ def command(
 
 
 def _check_calibrated(mode: "Mode", calibration: Path | None, glove: Path | None) -> None:
-    """Raise UsageError where a mode takes no calibration, or it is given twice."""
+    """Raise UsageError if a mode takes no calibration, or if two are given."""
     if calibration is not None and mode == "scan":
         raise click.UsageError(
-            "--calibration is for the modes classify and glove: a board that scans reads no CyberGlove."
+            "--calibration is for the modes classify and glove: a scanning board reads no CyberGlove, so leave it out."
         )
     if glove is not None and mode != "classify":
-        raise click.UsageError("--glove is for --mode classify: how a board of the other modes is wired says --board.")
+        raise click.UsageError("--glove is for --mode classify: describe a board's wiring with --board.")
     if glove is not None and calibration is not None:
-        raise click.UsageError("glove.toml names its calibration: leave --calibration out, or --glove.")
+        raise click.UsageError("glove.toml names its calibration: leave out --calibration, or --glove.")
 
 
 def _check(target: "Target", mode: "Mode", *, writes: bool, counts: bool) -> None:
-    """Raise UsageError where options do not go together; `counts` is --measure or --frontier."""
+    """Raise UsageError for options that conflict; `counts` is --measure or --frontier."""
     if mode == "scan" and counts:
-        raise click.UsageError("A board that only scans holds no classifier to --measure or to see the --frontier of.")
+        raise click.UsageError("A board that only scans has no classifier: leave out --measure and --frontier.")
     if not target.own_layout and not target.any_part and counts:
-        raise click.UsageError("On this machine nothing is counted: --measure and --frontier are for microcontrollers.")
+        raise click.UsageError("The host has no cycle counts: --measure and --frontier are for microcontrollers.")
     if not writes and not counts:
-        raise click.UsageError("Name a folder to write with -o, or look first, with --frontier or --measure.")
+        raise click.UsageError("Nothing to do: name a folder to write with -o, or add --frontier or --measure.")
 
 
 def _print(fit: "Fit", measured: "Measured | None", *, frontier: bool, updates: bool) -> None:
@@ -209,14 +209,14 @@ def _print(fit: "Fit", measured: "Measured | None", *, frontier: bool, updates: 
 
 def _expected(fit: "Fit", updates: bool) -> str:
     cost = fit.choice.cost
-    less = "" if updates else f" ({cost.flash_classify} where only classify() is called)"
+    less = "" if updates else f" ({cost.flash_classify} if only classify() is called)"
     times = f"{cost.cycles} {fit.target.unit} a frame ({cost.update_cycles} by update())"
     return f"{fit.target.bound} {times}, {cost.flash} bytes of flash{less}, {cost.ram} of RAM"
 
 
 def _layouts(fit: "Fit") -> list[dict[str, Any]]:
-    """Return the frontier that a layout was chosen from, fastest first: `time` of a frame, bytes, and how many switches
-    share a `lookup` at most, and how many joints.
+    """Return the frontier that the layout was chosen from, fastest first: `time` of a frame, bytes, and how many
+    switches, and joints, share a `lookup` at most.
     """
     return [
         {
@@ -235,8 +235,8 @@ def _layouts(fit: "Fit") -> list[dict[str, Any]]:
 
 
 def _frontier_table(fit: "Fit") -> Table:
-    """Return the frontier as a table, the chosen layout marked."""
-    numbers = ("bits", "switches a look-up", "joints", fit.target.unit, "flash", "RAM")
+    """Return the frontier as a table, with the chosen layout marked."""
+    numbers = ("bits", "switches per lookup", "joints", fit.target.unit, "flash", "RAM")
     columns = ("", *numbers[:3], "codes", "rows added", *numbers[3:])
     layouts = table(columns, numbers, f"Layouts for {fit.target.part}, {fit.target.bound}")
     for row in _layouts(fit):
@@ -247,7 +247,7 @@ def _frontier_table(fit: "Fit") -> Table:
 
 
 def _document(fit: "Fit", measured: "Measured | None", files: list[str]) -> dict[str, object]:
-    """Return all that --json tells; on this machine nothing is counted, and there is no cost."""
+    """Return the document of --json; the host target has no cycle counts and so no cost."""
     counted, cost = fit.target.own_layout, fit.choice.cost
     costs = {
         "time": cost.cycles,

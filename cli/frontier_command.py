@@ -1,4 +1,4 @@
-"""`thenar frontier`: what accuracy costs in time."""
+"""`thenar frontier`: the trade-off between accuracy and time."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -47,20 +47,20 @@ def _timed() -> tuple[str, ...]:
 
 def _address(_: click.Context, __: click.Parameter, text: str | None) -> str | None:
     if text is not None and not all(text.partition("://")):
-        raise click.BadParameter(f"{shortened(repr(text))} is no address such as tcp://10.0.0.5:8786")
+        raise click.BadParameter(f"{shortened(repr(text))} is not an address such as tcp://10.0.0.5:8786")
     return text
 
 
 @click.command("frontier", cls=Training)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=OutputFolder(), required=True, help="Folder for tables, pictures and the store.")
-@click.option("--glove", type=existing_file, help="A glove.toml: try its wiring as well, and choose by its ports.")
+@click.option("--glove", type=existing_file, help="A glove.toml: try its wiring too, and choose by its ports.")
 @click.option("--target", type=OneOf("target", _timed), default="host", show_default=True, help="Deployment target.")
 @click.option(
     "--budget-us",
     type=Number(min=0, min_open=True),
-    help="Pick the most accurate point within this frame time. A CyberGlove takes 260 us, and 337 us for "
-    "each sensor that is read, 6,323 us for 18: a small budget excludes its joints.",
+    help="Pick the most accurate point within this frame time. A CyberGlove takes 260 us plus 337 us for "
+    "each sensor read, 6,323 us for 18: a small budget excludes its joints.",
 )
 @click.option(
     "--rate", type=Number(0, 1, min_open=True), help="Pick the fastest point of at least this accuracy, 0 to 1."
@@ -69,26 +69,26 @@ def _address(_: click.Context, __: click.Parameter, text: str | None) -> str | N
 @click.option(
     "--joint-us",
     type=Number(0, 60_000_000, min_open=True),
-    help="What reading all joints takes.  [default: a CyberGlove's record; of other joints unknown, left out]",
+    help="Time to read all joints.  [default: a CyberGlove's record; unknown and omitted for other joints]",
 )
 @click.option(
     "--record-time",
     type=click.Choice(("formula", "wire")),
     default="formula",
     show_default=True,
-    help="A CyberGlove's record, where the glove.toml does not have it measured: the vendor's formula, or its bytes on "
-    "the line alone.",
+    help="Record time of a CyberGlove that the glove.toml has no measurement for: the vendor's formula, or only its "
+    "bytes on the line.",
 )
-@click.option("--filter", "filtered", is_flag=True, help="The box's digital filter is on, which the formula counts.")
+@click.option("--filter", "filtered", is_flag=True, help="The box's digital filter is on; the formula includes it.")
 @click.option("--stream", type=existing_file, help="Measure decision latency on this set of whole movements.")
 @click.option(
     "--methods",
     type=method_list,
     help="Placement methods to build from.  [default: elimination and ID3, by cost with --glove]",
 )
-@click.option("--rivals", type=method_list, help="Methods to compare them with, or none.  [default: most rivals]")
+@click.option("--baselines", type=method_list, help="Methods to compare them with, or none.  [default: most]")
 @trainer_option(AUTO)
-@click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="The most rounds to try.")
+@click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="Most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1, 1000), default=3, show_default=True, help="Repeats of the folds.")
 @click.option(
     "--finalists", type=click.IntRange(1), default=12, show_default=True, help="Placements to refine and price."
@@ -97,7 +97,7 @@ def _address(_: click.Context, __: click.Parameter, text: str | None) -> str | N
 @click.option(
     "--by",
     type=click.Choice(("subject", "trial")),
-    help="Choose points by subjects who are left out, or by trials of everybody.  [default: subject, if several]",
+    help="Choose points by left-out subjects, or by trials of all subjects.  [default: subject, if several]",
 )
 @jobs_option()
 @click.option(
@@ -119,14 +119,14 @@ def command(
     budget_us: float | None,
     rate: float | None,
     methods: tuple[str, ...] | None,
-    rivals: tuple[str, ...] | None,
+    baselines: tuple[str, ...] | None,
     **asked: Any,
 ) -> int:
-    """Show what accuracy costs in time: which switches, joints, rounds, tables, wirings and decisions are worth it.
+    """Show the trade-off between accuracy and time: which switches, joints, rounds, tables, wirings and decisions pay.
 
-    Every placement is screened by a nested cross-validation; those near the front are looked at closely, priced for
-    the target, simulated there, and put on one picture. OUTPUT gets frontier.json, frontier.csv, three pictures and
-    store.jsonl, from which an interrupted run goes on.
+    Every placement is screened by a nested cross-validation. Those near the front are refined, priced for the target,
+    simulated there, and put on one picture. OUTPUT gets frontier.json, frontier.csv, three pictures and store.jsonl,
+    from which an interrupted run continues.
 
     \b
     Example:
@@ -147,7 +147,7 @@ def command(
     training = asked_settings(context, asked)
     search = Search(
         methods=methods or usual(ours=True, wired=harness is not None or bool(grasp_set.taxel_columns)),
-        rivals=usual(ours=False) if rivals is None else rivals,
+        baselines=usual(ours=False) if baselines is None else baselines,
         rounds=rounds,
         trainer=training.pop("trainer"),
         settings={name: value for name, value in training.items() if name != "rounds"},
@@ -167,7 +167,7 @@ def command(
         )
     show(found, _print, output)
     if wanted.words and found.picked is None:
-        err().print(f"no point suits: {wanted.words} is beyond this frontier")
+        err().print(f"no point qualifies: {wanted.words} is beyond this frontier; relax it, or leave it out")
         return 1
     return 0
 
@@ -183,7 +183,7 @@ def _print(found: "Frontier", output: Path) -> None:
 
 
 def print_frontier(frontier: "Frontier") -> None:
-    """Print the points, the picked one bold; then checks, what was left out, and what the picture says."""
+    """Print the points, the picked one bold; then the checks, the omissions, and the caption of the picture."""
     from thenar.compiler.frontier.words import LUCK, folds_of, summary
 
     console = out()
@@ -238,6 +238,6 @@ def _cells(point: "Point", rated: Sequence[str]) -> tuple[Text, ...]:
 
 def _check(check: "Check") -> str:
     return (
-        f"{check.what}, {check.how}: {check.n} times held against its model, "
-        f"off by {check.mean_error:.1%} in the mean, {check.worst_error:.1%} at worst"
+        f"{check.what}, {check.how}: {check.n} times compared with the model, "
+        f"mean error {check.mean_error:.1%}, worst {check.worst_error:.1%}"
     )

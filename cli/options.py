@@ -10,7 +10,7 @@ from click.shell_completion import CompletionItem
 
 from thenar.runtime.manifest import AUTO
 
-from .common import Command, ListOf, Number, OneOf, existing_file, parted, warning
+from .common import Command, ListOf, Number, OneOf, comma_separated, existing_file, warning
 
 if TYPE_CHECKING:
     from thenar.compiler.hand import HandShape
@@ -80,7 +80,7 @@ prune_option = click.option(
 
 
 def _names(_: click.Context, __: click.Parameter, text: str | None) -> tuple[str, ...]:
-    return () if text is None else parted(text)
+    return () if text is None else comma_separated(text)
 
 
 def limit_options(command: Command) -> Command:
@@ -148,7 +148,7 @@ class WithMethods(click.Command):
 
 def _remarks(method: "Method") -> str:
     """Return what a user has to know besides, in brackets."""
-    remarks = [] if method.ours else ["rival"]
+    remarks = [] if method.ours else ["baseline"]
     remarks += [f"pip install {method.install}"] if method.install else []
     return f" ({'; '.join(remarks)})" if remarks else ""
 

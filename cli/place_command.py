@@ -57,7 +57,7 @@ class _Asked:
     prune: int
     keep: int | None
     exact: bool
-    crowd: bool
+    population: bool
     joints: bool
     levels: int | None
     keep_joints: int | None
@@ -79,7 +79,7 @@ class _Asked:
         """The method asked for, or the usual one."""
         from thenar.compiler.placement.methods.base import BEST, METHODS, PAPERS
 
-        return METHODS.named(self.method or (BEST if self.crowd else PAPERS))
+        return METHODS.named(self.method or (BEST if self.population else PAPERS))
 
     def check(self) -> None:
         """Raise UsageError if the options do not go together."""
@@ -90,16 +90,19 @@ class _Asked:
         for wrong, reason in (
             (wants_json() and self.show_tree, "--tree is for people and --json for machines: take one of them"),
             (self.show_tree and not tree, "--tree prints the tree of the paper's ID3 alone"),
-            (self.draw is not None and not (tree or self.crowd), "--draw draws ID3's tree, or a --crowd"),
-            (self.exact and self.crowd, "--exact judges one placement and --crowd looks for one: take one of them"),
+            (self.draw is not None and not (tree or self.population), "--draw draws ID3's tree, or a --population"),
             (
-                self.crowd and not method.by_number,
-                "--crowd takes a method that keeps M switches",
+                self.exact and self.population,
+                "--exact judges one placement, --population looks for one: take one of them",
             ),
-            (self.crowd and (self.levels or self.keep_joints), "--crowd takes neither --levels nor --keep-joints"),
             (
-                self.crowd and (self.limited or self.robust),
-                "--crowd looks for the placement of many subjects: it takes no limits and no --robust",
+                self.population and not method.by_number,
+                "--population takes a method that keeps M switches",
+            ),
+            (self.population and (self.levels or self.keep_joints), "--population takes no --levels or --keep-joints"),
+            (
+                self.population and (self.limited or self.robust),
+                "--population looks for the placement of many subjects: it takes no limits and no --robust",
             ),
             (self.layout is not None and self.apart_mm is None, "--layout says where switches lie, for --apart-mm"),
             (self.joints and tree, "--joints is for other methods than the paper's ID3"),
@@ -107,7 +110,7 @@ class _Asked:
             if wrong:
                 raise click.UsageError(reason)
         method.check_given(self.keep, self.prune)
-        if self.glove is not None and (self.crowd or not (method.uses_ports or self.budget_us is not None)):
+        if self.glove is not None and (self.population or not (method.uses_ports or self.budget_us is not None)):
             from thenar.compiler.placement.methods.base import METHODS
 
             heeding = ", ".join(name for name, each in METHODS.items() if each.uses_ports)
@@ -160,13 +163,13 @@ class _Asked:
     def found(self) -> "Placement":
         """Return the placement."""
         from thenar.compiler.placement.placement import place
-        from thenar.compiler.placement.population import place_for_crowd
+        from thenar.compiler.placement.population import place_for_population
         from thenar.compiler.recordings.graspset import GraspSet
 
         grasp_set, method = GraspSet.load(self.grasps), self.chosen_by
         with progress(f"choosing switches by {method.name}") as report:
-            if self.crowd:
-                return place_for_crowd(
+            if self.population:
+                return place_for_population(
                     grasp_set,
                     self.keep or 1,
                     method=method.name,
@@ -191,7 +194,7 @@ class _Asked:
 
 @click.command("place", cls=WithMethods)
 @click.argument("grasps", type=existing_file)
-@method_option(default="id3; elimination with --crowd")
+@method_option(default="id3; elimination with --population")
 @keep_option
 @levels_option
 @keep_joints_option
@@ -205,10 +208,10 @@ class _Asked:
     help="A glove.toml: the costs of its ports, for methods that weigh them.  [default: MCP23017]",
 )
 @click.option("--exact", is_flag=True, help="Also print how far the placement is from the best of the same size.")
-@click.option("--crowd", is_flag=True, help="Choose one standard placement for many subjects.")
-@jobs_option("Worker processes of --crowd.")
+@click.option("--population", is_flag=True, help="Choose one placement for a population of subjects.")
+@jobs_option("Worker processes of --population.")
 @click.option("--tree", "show_tree", is_flag=True, help="Also print ID3's tree.")
-@click.option("--draw", type=picture_file, help="Also draw ID3's tree, or a crowd's accuracy: an .svg or .png file.")
+@click.option("--draw", type=picture_file, help="Also draw ID3's tree, or a population's accuracy: .svg or .png.")
 @click.option("-o", "--output", type=OutputFile(".json"), help="Also store the placement: a .json file to write.")
 @overwrite_flag
 @json_flag
@@ -226,7 +229,7 @@ def command(**options: Any) -> None:
         thenar place set.grasps --method elimination --keep 16 --exact
         thenar place set.grasps --method id3-cost --keep 16 --glove glove.toml
         thenar place set.grasps --method elimination --keep 16 --keep-these thumb_distal_5 --apart-mm 8
-        thenar place crowd.grasps --crowd --keep 16 --draw subjects.svg
+        thenar place crowd.grasps --population --keep 16 --draw subjects.svg
     """
     asked = _Asked(**options)
     asked.check()

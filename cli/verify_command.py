@@ -142,7 +142,7 @@ def _print_faults(found: "FaultCheck") -> None:
 def _print_worst(console: "Console", worst: "WorstCase") -> None:
     frame = f"{len(worst.closed)} switches closed, codes {' '.join(map(str, worst.codes)) or 'none'}"
     console.print(
-        f"worst frame there is: {worst.leader} loses {worst.loss:.3f} steps of its lead over {worst.rival}, "
+        f"worst frame there is: {worst.leader} loses {worst.loss:.3f} steps of its lead over {worst.competitor}, "
         f"allowed {worst.bound:.3f} ({frame})"
     )
     console.print(

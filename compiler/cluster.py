@@ -1,6 +1,6 @@
-"""Independent pieces of work on the workers of a Dask cluster: same answers as here, each as soon as it is there.
+"""Independent tasks on the workers of a Dask cluster: same results as locally, each as soon as it is available.
 
-A piece of work is pickled for its worker, large arrays apart.
+A task is pickled for its worker; large arrays are sent separately.
 """
 
 import asyncio
@@ -26,23 +26,23 @@ if TYPE_CHECKING:
     from distributed import Client, Future, Security
 
 
-# Arrays from this size on go to the workers once, not with every piece of work that holds them.
+# Arrays of at least this size are sent to the workers once, not with every task that holds them.
 SHARED_BYTES = 1 << 16
 
 
 class UnreadableError(ThenarError):
-    """A worker cannot read what it is to do."""
+    """A worker cannot unpickle its task."""
 
 
 class SharedArrays:
-    """Large arrays, each sent to all workers when a task first holds it, and dropped there when it is gone here."""
+    """Large arrays, each sent to all workers with the first task that holds it, and freed there when freed here."""
 
     def __init__(self, client: "Client") -> None:
         self._client = client
         self._sent: dict[int, tuple[ref[NDArray[Any]], Future[Any]]] = {}
 
     def packed(self, piece: object) -> "list[bytes | Future[Any]]":
-        """Return the arguments of `answered` for a piece of work."""
+        """Return the arguments of `run_packed` for a task."""
         file = BytesIO()
         packer = _Packer(file, pickle.HIGHEST_PROTOCOL)
         packer.dump(piece)
@@ -71,7 +71,7 @@ class _Packer(pickle.Pickler):
 
 
 class _Unpacker(pickle.Unpickler):
-    """Undoes what _Packer did, given the arrays."""
+    """Reverses _Packer, given the arrays."""
 
     def __init__(self, data: bytes, arrays: Sequence[NDArray[Any]]) -> None:
         super().__init__(BytesIO(data))
@@ -79,17 +79,17 @@ class _Unpacker(pickle.Unpickler):
 
     def persistent_load(self, number: int) -> NDArray[Any]:
         array = self._arrays[number]
-        array.flags.writeable = False  # other pieces of work have it too
+        array.flags.writeable = False  # other tasks share it
         return array
 
 
-def answered(data: bytes, *arrays: NDArray[Any]) -> Any:
-    """Do a piece of work, in a worker."""
+def run_packed(data: bytes, *arrays: NDArray[Any]) -> Any:
+    """Run a task in a worker."""
     try:
         work, task = _Unpacker(data, arrays).load()
     except Exception as reason:
         raise UnreadableError(
-            f"a worker with thenar {installed()} and Python {sys.version.split()[0]} cannot read its work ({reason})"
+            f"a worker with thenar {installed()} and Python {sys.version.split()[0]} cannot read its task ({reason})"
         ) from reason
     _take_one_thread(len(sys.modules))
     return work(task)
@@ -97,7 +97,7 @@ def answered(data: bytes, *arrays: NDArray[Any]) -> Any:
 
 @lru_cache(maxsize=1)
 def _take_one_thread(_modules: int) -> None:
-    """Give BLAS and OpenMP one thread; again when modules, and with them libraries, have been loaded since."""
+    """Limit BLAS and OpenMP to one thread; again after modules, and with them libraries, have been loaded."""
     from threadpoolctl import threadpool_limits
 
     threadpool_limits(limits=1)
@@ -109,36 +109,36 @@ def installed() -> str:
 
 
 Task = TypeVar("Task")
-Answer = TypeVar("Answer")
+Result = TypeVar("Result")
 
 CONNECT_S = 5.0
 WORKERS_S = 10.0
-# So long without an answer, and it is asked whether anybody is left to give one.
+# Time without a result after which the workers are checked.
 PATIENCE_S = 10.0
-# Pieces that are handed out ahead, so that no worker waits for this process: for each of its threads, and at least.
+# Tasks that are submitted ahead, so that no worker waits for this process: for each of its threads, and at least.
 AHEAD_EACH, AHEAD = 4, 64
 
 
 class ClusterError(ThenarError, BrokenExecutor):
-    """A cluster is not there, lost its workers, or cannot run this program's work."""
+    """A cluster is missing, lost its workers, or cannot run this program's tasks."""
 
 
-def on_cluster(work: Callable[[Task], Answer], tasks: Iterable[Task], address: str) -> Iterator[Answer]:
-    """Yield the answers in the order in which they come.
+def on_cluster(work: Callable[[Task], Result], tasks: Iterable[Task], address: str) -> Iterator[Result]:
+    """Yield the results in the order of completion.
 
-    work     and tasks go through pickle, `work` by the name of its module: thenar is to be installed on the cluster, of
-             this version. An array of SHARED_BYTES or more that several tasks hold is sent to each worker once.
+    work     and tasks are pickled, `work` by the name of its module: this version of thenar must be installed on the
+             cluster. An array of SHARED_BYTES or more that several tasks hold is sent to each worker once.
     address  of the scheduler, such as tcp://10.0.0.5:8786
 
-    A worker that dies loses nothing: the others do its work. Work runs in threads of the workers (`dask worker
-    --nthreads 1` keeps them out of each other's way), and there BLAS takes one thread, as long as the worker lives.
+    If a worker dies, the others redo its tasks. Work runs in threads of the workers (`dask worker --nthreads 1` keeps
+    them from competing), with one BLAS thread as long as the worker lives.
 
-    Raises ClusterError if there is no such cluster, if it has no workers (any more), if a piece of work killed several,
-    or if they cannot read it; and whatever the work raises.
+    Raises ClusterError if there is no such cluster, if it has no workers (any more), if a task killed several workers,
+    or if they cannot read it; and any exception of `work`.
     """
     with _connected(address) as client:
         _check_workers(client, address)
-        yield from _answers(client, address, work, tasks)
+        yield from _results(client, address, work, tasks)
 
 
 @contextmanager
@@ -147,17 +147,17 @@ def _connected(address: str) -> "Iterator[Client]":
         from distributed import Client
     except ImportError:
         raise ClusterError(
-            "work on a cluster takes Dask, which is not installed: pip install 'thenar[cluster]'"
+            "work on a cluster requires Dask, which is not installed: pip install 'thenar[cluster]'"
         ) from None
     try:
         security = _security(address)
-        # A loop of its own: the caller's thread may run one.
+        # A separate event loop: the caller's thread may run one.
         with ThreadPoolExecutor(1) as thread:
             thread.submit(asyncio.run, _greet(address, security)).result()
         client = Client(address, timeout=CONNECT_S, set_as_default=False, security=security)
     except (OSError, ValueError, TypeError, RuntimeError) as reason:
         raise ClusterError(
-            f"no Dask scheduler answers at {address!r}: start one there (dask scheduler), or mend the address, "
+            f"no Dask scheduler replies at {address!r}: start one there (dask scheduler), or fix the address, "
             "which is like tcp://10.0.0.5:8786"
         ) from reason
     try:
@@ -167,7 +167,7 @@ def _connected(address: str) -> "Iterator[Client]":
 
 
 def _security(address: str) -> "Security":
-    """Return what the user's configuration of Dask says of TLS."""
+    """Return the TLS settings of the user's Dask configuration."""
     import dask
     from distributed import Security
     from distributed.utils import import_term
@@ -177,10 +177,10 @@ def _security(address: str) -> "Security":
 
 
 async def _greet(address: str, security: "Security") -> None:
-    """Connect to the scheduler and go.
+    """Connect to the scheduler and disconnect.
 
-    A Client of an address that is none stays half made, and its end, whenever it is collected, can take the lock under
-    which the next one starts: none is made where nobody answers. (For no address Dask would start a cluster here.)
+    A Client that cannot connect stays half initialised. When it is collected it can take the lock under which the next
+    one starts, so none is made until a scheduler replies. (Without an address Dask would start a local cluster.)
     """
     from distributed.comm.core import connect
 
@@ -189,7 +189,7 @@ async def _greet(address: str, security: "Security") -> None:
 
 
 def _check_workers(client: "Client", address: str) -> None:
-    """Raise ClusterError unless there are workers, and each has thenar of this version."""
+    """Raise ClusterError unless there are workers, each with this version of thenar."""
     _wait_for_workers(client, address)
     ours = installed()
     for worker, theirs in client.run(installed, on_error="return").items():
@@ -206,7 +206,7 @@ def _wait_for_workers(client: "Client", address: str) -> None:
         raise ClusterError(f"the scheduler at {address} has no workers: start some (dask worker {address})") from None
 
 
-def _answers(client: "Client", address: str, work: Callable[[Task], Answer], tasks: Iterable[Task]) -> Iterator[Answer]:
+def _results(client: "Client", address: str, work: Callable[[Task], Result], tasks: Iterable[Task]) -> Iterator[Result]:
     arrays = SharedArrays(client)
     finished: SimpleQueue[Future[Any]] = SimpleQueue()
     begun: set[Future[Any]] = set()
@@ -216,19 +216,19 @@ def _answers(client: "Client", address: str, work: Callable[[Task], Answer], tas
         for task in islice(waiting, number):
             try:
                 arguments = arrays.packed((work, task))
-            except TimeoutError as reason:  # no worker takes an array
+            except TimeoutError as reason:  # no worker accepts an array
                 raise _lost(address) from reason
-            future = client.submit(answered, *arguments, pure=False)
+            future = client.submit(run_packed, *arguments, pure=False)
             begun.add(future)
             future.add_done_callback(finished.put)
 
     begin(max(AHEAD, AHEAD_EACH * sum(client.ncores().values())))
     while begun:
         future = _next(finished, client, address)
-        answer = _result(future, client, address)
+        result = _result(future, client, address)
         begun.discard(future)
         begin(1)
-        yield answer
+        yield result
 
 
 def _next(finished: "SimpleQueue[Future[Any]]", client: "Client", address: str) -> "Future[Any]":
@@ -247,13 +247,12 @@ def _check_alive(client: "Client", address: str) -> None:
 
 def _lost(address: str) -> ClusterError:
     return ClusterError(
-        f"the scheduler at {address}, or what it was given, is lost: look at how it or its workers ended, and do the "
-        "same again"
+        f"the scheduler at {address}, or its tasks, are lost: check how it or its workers ended, and run this again"
     )
 
 
 def _result(future: "Future[Any]", client: "Client", address: str) -> Any:
-    """Return the answer of a `future` that has ended one way or another, or raise what the work raised."""
+    """Return the result of a finished `future`, or raise the exception of its work."""
     from distributed import CancelledError, KilledWorker
 
     patience = PATIENCE_S
@@ -262,16 +261,16 @@ def _result(future: "Future[Any]", client: "Client", address: str) -> Any:
             return future.result(timeout=patience)
         except KilledWorker as reason:
             raise ClusterError(
-                f"one piece of work ended {reason.allowed_failures + 1} workers of the cluster at {address}, perhaps "
-                "for want of memory: give each worker more"
+                f"one task ended {reason.allowed_failures + 1} workers of the cluster at {address}, perhaps for lack "
+                "of memory: give each worker more"
             ) from reason
         except UnreadableError as reason:
-            raise ClusterError(f"{reason}: the cluster at {address} needs what is installed here") from reason
+            raise ClusterError(f"{reason}: the cluster at {address} needs the packages installed here") from reason
         except CancelledError as reason:
             raise _lost(address) from reason
         except TimeoutError:
             if future.status == "error":
-                raise  # the work's own
-        # The worker that had the answer may be gone: another finds it again.
+                raise  # from the work itself
+        # The worker with the result may be gone: another repeats the task.
         _check_alive(client, address)
         patience *= 2

@@ -2,7 +2,7 @@
 
 numpy and the C library pick an exp by processor, and their last bits differ. These are made of single IEEE operations
 (add, multiply, divide, round, scale by a power of two) in one fixed order, which every machine rounds alike. Errors
-stay below 1 ulp for exp, and 2 ulp for log, sine and cosine (tests hold them against mpmath).
+stay below 1 ulp for exp, and 2 ulp for log, sine and cosine (tests compare them with mpmath).
 """
 
 import math
@@ -18,13 +18,13 @@ _INVERSE_LN2 = 1.4426950408889634
 _LN2_HIGH = 0.6931471803691238
 _LN2_LOW = 1.9082149292705877e-10
 _EXP_UNDERFLOW = -746.0
-# Elements on which many operations follow each other: 256 KiB of doubles stay in a processor's cache.
+# Elements that are processed in one block: 256 KiB of doubles fit a processor's cache.
 _CACHED = 1 << 15
 _EXP_TERMS = tuple(1.0 / math.factorial(n) for n in range(13, 1, -1))
 _LOG_TERMS = tuple(2.0 / n for n in range(23, 1, -2))
 _SQRT_HALF = 0.7071067811865476
 _TWO_OVER_PI = 0.6366197723675814
-# pi/2 in three parts, of 33 bits each: products with a small whole number are exact.
+# pi/2 in three parts, of 33 bits each: products with a small integer are exact.
 _HALF_PI_HIGH = 1.5707963267341256
 _HALF_PI_MIDDLE = 6.077100506303966e-11
 _HALF_PI_LOW = 2.0222662487959506e-21
@@ -80,7 +80,7 @@ def log(x: Floats) -> Floats:
 
 
 def _log_of_one_and(x: Floats) -> Floats:
-    """Return ln(1 + x) for x >= 0, any shape: what 1 + x rounds away is found exactly, and adds its share of it."""
+    """Return ln(1 + x) for x >= 0, any shape, corrected by the exact rounding error of 1 + x."""
     whole = 1.0 + x
     return log(whole) + (x - (whole - 1.0)) / whole
 
@@ -94,7 +94,7 @@ def add_up(rows: Floats) -> Floats:
 
 
 def add_exactly(total: Floats, carry: Floats, term: Floats) -> tuple[Floats, Floats]:
-    """Add `term` to a sum held in two parts, any shape, and return both: what `total` rounds away goes to `carry`.
+    """Add `term` to a sum held in two parts, any shape, and return both: `carry` collects `total`'s rounding errors.
 
     The rounding error of an addition is itself a double, which six operations find (Knuth, TAOCP 2, 4.2.2, theorem B).
     So total + carry is within one rounding of the true sum, and n^2 * 2^-106 of the magnitudes: 10,000 terms drift no
@@ -115,8 +115,8 @@ def softmax(scores: Floats) -> Floats:
 def softmax_and_loss(scores: Floats, labels: NDArray[np.intp], weights: Floats | None) -> tuple[Floats, float]:
     """Return P (K, n) and the weighted mean of -ln P(label) for scores (K, n), labels and weights (n,); None: all 1.
 
-    Its sums are correctly rounded (fsum), and it is taken from the scores, not from P: the loss of a class that is next
-    to certain is ln(1 + what the others have of its share), which keeps its bits however small it is.
+    Its sums are correctly rounded (fsum), and it is computed from the scores, not from P: the loss of an almost certain
+    class is ln(1 + the others' odds), which keeps its bits however small it is.
     """
     shares, losses = np.empty(scores.shape), np.empty(labels.size)
     step = max(64, _CACHED // len(scores))
@@ -125,7 +125,7 @@ def softmax_and_loss(scores: Floats, labels: NDArray[np.intp], weights: Floats |
         shares[:, rows], losses[rows] = _softmax_and_losses(scores[:, rows], labels[rows])
     if weights is None:
         return shares, math.fsum(losses.tolist()) / labels.size
-    # The heaviest to about 1, by a power of two, which is exact: light rows of small losses would lose bits otherwise.
+    # Scale the largest weight to about 1 by a power of two, which is exact: small losses of light rows keep their bits.
     near_one = np.ldexp(weights, -int(np.frexp(weights.max())[1]))
     return shares, math.fsum((losses * near_one).tolist()) / math.fsum(near_one.tolist())
 

@@ -1,7 +1,7 @@
-"""A hand laid flat on paper, with its switches: what pictures, reports and specs know of a glove.
+"""A hand laid flat, with its switches, for pictures, reports and specs.
 
-The places come from whoever knows the glove (simulator/handmaps, or a layout of one's own), so that nothing here
-depends on how hands are simulated.
+The positions come from a hand map (simulator/handmaps) or from a user's layout, so nothing here depends on how hands
+are simulated.
 """
 
 from collections.abc import Sequence
@@ -17,23 +17,23 @@ Floats = NDArray[np.float64]
 
 
 class MapError(ThenarError, ValueError):
-    """A switch or a set cannot be drawn on the hand."""
+    """A switch or a set that cannot be drawn on the hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandShape:
-    """A glove laid flat; all places in mm for a hand of `length_mm`.
+    """A glove laid flat; all positions in mm for a hand of `length_mm`.
 
-    The shipped one is a right hand, palm up, thumb right, its digits' sides unfolded. A layout of one's own has no
-    length (None), as it is its own measure; its outline may be empty, and so are strips, creases and labels.
+    The shipped one is a right hand, palm up, thumb right, with the digits' sides unfolded. A user's layout is drawn to
+    scale and has no length (None); its outline, strips, creases and labels may be empty.
 
-    names, places (s, 2)  the switches, and where their middles lie; radius_mm of the circle that stands for one
+    names, places (s, 2)  the switches and their centres; radius_mm of the circle that represents one
     parts (s,)            index of each switch's part in part_names: the digits from the thumb on, then the palm
     sides (s,)            -1 on the unfolded left side of its digit, 1 on the right one, 0 elsewhere
-    outline (k, 2)        the hand from cuff to cuff; digits: that of each digit; creases: open lines
+    outline (k, 2)        the hand from cuff to cuff; digits: outline of each digit; creases: open lines
     strips                outlines of the unfolded sides, left and right of the thumb, then of the index, ...
     labels (digits, 2)    where a digit's name is written, above its tip
-    part_number           what to buy for a switch, and body_mm, how broad it is: "" and 0 where that is open
+    part_number           of a switch to buy, and body_mm, its width; "" and 0 if open
     """
 
     glove: str
@@ -54,14 +54,14 @@ class HandShape:
 
     @property
     def view(self) -> str:
-        """What one sees, in words."""
+        """Description of the view."""
         if self.length_mm is None:
-            return f"the glove as {self.glove} has it"
+            return f"the glove as drawn in {self.glove}"
         return "a right hand, palm up, thumb right, the sides of its digits unfolded"
 
     @property
     def wrist(self) -> tuple[float, float]:
-        """Where the wires end: in the middle of the glove's cuff; of a layout of one's own, in the middle below it."""
+        """Where the wires end: in the middle of the glove's cuff; for a user's layout, in the middle below it."""
         if self.length_mm is not None:
             x, y = (self.outline[0] + self.outline[-1]) / 2
             return float(x), float(y)
@@ -70,15 +70,15 @@ class HandShape:
         return float((left + right) / 2), float(bottom)
 
     def fitted(self, names: Sequence[str], length_mm: float | None = None) -> "HandShape | None":
-        """Return the hand, of that length, if it has all the switches called `names`; None if not, or without names."""
+        """Return the hand at that length if it has all the switches `names`; None if not, or without names."""
         if not names or not self.knows(names):
             return None
         return self if length_mm is None else self.scaled(length_mm)
 
     def scaled(self, length_mm: float) -> "HandShape":
-        """Return the same hand, of another length: its proportions stay, and so does the size of a switch."""
+        """Return the same hand at another length, with its proportions; the size of a switch stays."""
         if self.length_mm is None:
-            raise MapError(f"{self.glove} is drawn at its own size: only the glove that thenar draws is made longer")
+            raise MapError(f"{self.glove} is drawn to scale: only the glove that thenar draws can be resized")
         factor = length_mm / self.length_mm
         return replace(
             self,
@@ -93,7 +93,7 @@ class HandShape:
 
     @property
     def by_name(self) -> dict[str, tuple[float, float]]:
-        """Where each switch lies, mm, by its name."""
+        """Position of each switch, mm, by its name."""
         return {name: (x, y) for name, (x, y) in zip(self.names, self.places.tolist(), strict=True)}
 
     def knows(self, names: Sequence[str]) -> bool:
@@ -104,14 +104,14 @@ class HandShape:
         return name if name in self.names else name.rpartition(">")[0]
 
     def numbers_of(self, names: Sequence[str]) -> NDArray[np.intp]:
-        """Return the numbers of the switches called `names`; of a level, its taxel's. Raises MapError naming the first
-        strange one.
+        """Return the numbers of the switches called `names`; for a level, its taxel's. Raises MapError that names the
+        first unknown one.
         """
         number = {name: number for number, name in enumerate(self.names)}
         places = list(map(self._place_of, names))
         strange = next((name for name, place in zip(names, places, strict=True) if place not in number), None)
         if strange is not None:
             if self.length_mm is not None and number.keys().isdisjoint(places):
-                raise MapError(f"where switch {strange!r} lies is not known: --layout takes a drawing of your glove")
+                raise MapError(f"the position of switch {strange!r} is unknown: give --layout a drawing of your glove")
             raise MapError(f"{strange!r} is no switch of the glove {self.glove}{nearest(strange, self.names)}")
         return np.array([number[place] for place in places], dtype=np.intp)

@@ -1,8 +1,8 @@
-"""A hand of one's own: where the switches of a home-made glove lie, from a TOML file or a drawing.
+"""A user's layout: positions of the switches of a home-made glove, from a TOML file or a drawing.
 
-The drawing is an SVG file, such as Inkscape writes: every shape with a name is a switch, the one called "outline" is
-the edge of the glove. Its names are Inkscape's labels, else ids that are not Inkscape's own (circle12). Units, viewBox
-and transforms count; nothing of the file goes into what thenar writes but names and numbers.
+The drawing is an SVG file, such as Inkscape writes: every named shape is a switch, the one called "outline" is the edge
+of the glove. Names are Inkscape's labels, or else ids that Inkscape did not generate (circle12). Units, viewBox and
+transforms are applied; only names and numbers of the file reach thenar's output.
 """
 
 import io
@@ -49,9 +49,9 @@ class Places(Struct, frozen=True, forbid_unknown_fields=True):
     """The content of `layout.toml`, in mm: x to the right, y up.
 
     places       the middle of each switch, by the name of its column
-    parts        the parts of the glove, such as fingers, and the switches on each; what is on none is on "glove"
+    parts        the parts of the glove, such as fingers, and the switches on each; the others are on "glove"
     outline      points on the edge of the glove
-    part_number  what to buy for a switch, and body_mm, how broad it is; "" and 0 where that is open
+    part_number  of a switch to buy, and body_mm, its width; "" and 0 if open
     """
 
     places: dict[str, Place]
@@ -116,7 +116,7 @@ def _hand(layout: Places, name: str) -> HandShape:
 
 
 def _radius_mm(places: np.ndarray, body_mm: float) -> float:
-    """Return the radius at which no two switches overlap; of one that is broader than that, its own at most."""
+    """Return the radius at which no two switches overlap, at most half of body_mm if that is given."""
     gaps = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
     np.fill_diagonal(gaps, np.inf)
     most = min(body_mm / 2 or _LARGEST_DOT_MM, 0.45 * float(gaps.min(initial=np.inf)))
@@ -166,7 +166,7 @@ def _mm(x: float, y: float, height: float) -> Place:
 
 
 def _plain(path: Path) -> bytes:
-    """Return the drawing with its named shapes alone and the groups that they are in: no text, style, use, script."""
+    """Return the drawing reduced to its named shapes and their groups: no text, style, use or script."""
     from xml.etree.ElementTree import ParseError, tostring
 
     from defusedxml.common import DefusedXmlException
@@ -175,20 +175,20 @@ def _plain(path: Path) -> bytes:
     try:
         root = fromstring(read_file(path, _LARGEST, MapError))
     except DefusedXmlException:
-        raise MapError(f"{path.name} declares entities of its own: save it as plain SVG") from None
+        raise MapError(f"{path.name} declares XML entities: save it as plain SVG") from None
     except (ParseError, LookupError, ValueError) as reason:
         raise MapError(f"{path.name} is no SVG: {shortened(str(reason))}") from None
     if _kind(root) != "svg":
         raise MapError(f"{path.name} is no SVG: it begins with <{shortened(_kind(root))}>")
     if not _ABSOLUTE.fullmatch(root.get("width", "")) or not _ABSOLUTE.fullmatch(root.get("height", "")):
-        raise MapError(f"{path.name} does not say how large it is: give the page a width and a height in mm")
+        raise MapError(f"{path.name} does not give its size: set a width and a height of the page in mm")
     if _prune(root, "", 0) > _MOST:
-        raise MapError(f"{path.name} has more than {_MOST} named shapes, which is more than a glove has")
+        raise MapError(f"{path.name} has more than {_MOST} named shapes, too many for a glove: unname the others")
     return tostring(root)
 
 
 def _prune(group: "Element", part: str, depth: int) -> int:
-    """Leave named shapes and groups in `group`, each shape with its name and part; return how many shapes there are."""
+    """Keep only named shapes and groups in `group`, each shape with its name and part; return the number of shapes."""
     count = 0
     for child in list(group):
         kind, label = _kind(child), child.attrib.pop(_LABEL, "")

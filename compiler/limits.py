@@ -1,16 +1,16 @@
-"""Limits that are checked before the work: the size of a build, and the memory of a training."""
+"""Limits that are checked before the work starts: the size of a build, and the memory of a training."""
 
 import os
 
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.tables import MAX_BYTES, MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES, payload_bytes
 
-# Of the arrays (types, rows) that a round of boosting holds, and of a training's columns with two values and with more.
+# Numbers of (types, rows) arrays in a round of boosting, and of a training's columns with two values and with more.
 _BYTES_A_TYPE_AND_ROW, _BYTES_A_SWITCH_AND_ROW, _BYTES_A_JOINT_AND_ROW = 120, 10, 60
 
 
 def check_types(types: int, raises: type[ThenarError]) -> None:
-    """Raise `raises` where the recordings hold more grasp types than a build."""
+    """Raise `raises` if the recordings hold more grasp types than a build can."""
     if types > MAX_CLASSES:
         raise raises(
             f"the recordings hold {types} grasp types, a build has at most {MAX_CLASSES}: join types, or leave some out"
@@ -18,7 +18,7 @@ def check_types(types: int, raises: type[ThenarError]) -> None:
 
 
 def check_inputs(types: int, switches: int, joints: int, raises: type[ThenarError]) -> None:
-    """Raise `raises` where no build has room for these numbers of switches and joints."""
+    """Raise `raises` if no build has room for these numbers of switches and joints."""
     if switches > MAX_SWITCHES:
         raise raises(f"{switches} switches, a build has at most {MAX_SWITCHES}: keep fewer")
     if joints > MAX_JOINTS:
@@ -32,7 +32,7 @@ def check_inputs(types: int, switches: int, joints: int, raises: type[ThenarErro
 
 
 def check_memory(rows: int, types: int, raises: type[ThenarError], switches: int = 0, joints: int = 0) -> None:
-    """Raise `raises` where training on `rows` rows needs more memory than this machine has."""
+    """Raise `raises` if training on `rows` rows needs more memory than this machine has."""
     a_row = _BYTES_A_TYPE_AND_ROW * types + _BYTES_A_SWITCH_AND_ROW * switches + _BYTES_A_JOINT_AND_ROW * joints
     needed, there = rows * a_row, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if needed > there:

@@ -1,4 +1,4 @@
-"""What pictures share: one palette, names that are no formulas, equal bytes, and a matplotlib that may be missing."""
+"""Common parts of pictures: one palette, names that are not parsed as formulas, equal bytes, optional matplotlib."""
 
 import io
 import warnings
@@ -16,14 +16,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg")
-# What each colour is for, on light and on dark screens; files are light. Switches, joints and both are Okabe and Ito's,
-# which the colour-blind distinguish too; the baselines' colours are no inputs'.
+# The use of each colour, on light and on dark screens; files are light. Switches, joints and both have Okabe and Ito's
+# colours, which the colour-blind can distinguish; baselines have other colours than inputs.
 PALETTE: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         **{"paper": ("#ffffff", "#12161b"), "ink": ("#1b1f24", "#e7ebf0"), "soft": ("#57606a", "#a3adb8")},
         **{"line": ("#d0d7de", "#343c46"), "pale": ("#f5f7f9", "#1b2129"), "link": ("#0550ae", "#79b8ff")},
         **{"switches": ("#0072b2", "#6cb0ff"), "joints": ("#009e73", "#4cc38a"), "both": ("#d55e00", "#ff9d5c")},
-        **{"rival-1": ("#a86f00", "#e0b04c"), "rival-2": ("#a3457c", "#ec9bc6"), "rival-3": ("#6b6b6b", "#a9a9a9")},
+        **{
+            "baseline-1": ("#a86f00", "#e0b04c"),
+            "baseline-2": ("#a3457c", "#ec9bc6"),
+            "baseline-3": ("#6b6b6b", "#a9a9a9"),
+        },
         **{"picked": ("#d1242f", "#ff6b74"), "hit": ("#1f5fa8", "#4b93dd"), "miss": ("#c2410c", "#e8743b")},
         **{"leaf": ("#cfe6d4", "#23482f"), "decision": ("#d3e0f2", "#24405f")},
         **{"skin": ("#f9f1e9", "#2a2622"), "side": ("#eee3d8", "#221f1c"), "outline": ("#57493e", "#b8a594")},
@@ -33,7 +37,7 @@ PALETTE: Mapping[str, tuple[str, str]] = MappingProxyType(
 
 
 def on_paper(name: str) -> str:
-    """Return a colour of PALETTE as files have it."""
+    """Return a colour of PALETTE for files."""
     return PALETTE[name][0]
 
 
@@ -43,9 +47,9 @@ class PictureError(ThenarError, ValueError):
 
 @contextmanager
 def painting(font_size: float, *, letters: bool = False) -> Iterator[None]:
-    """Set matplotlib up for what is made and rendered inside. Raises PictureError if it is not installed.
+    """Set matplotlib up for drawing and rendering in this context. Raises PictureError if it is not installed.
 
-    With `letters`, text in SVG is text, in the font that the reader has, and not outlines.
+    With `letters`, text in SVG stays text, in a font of the reader, instead of outlines.
     """
     mpl = _matplotlib()
     with mpl.rc_context(), warnings.catch_warnings():
@@ -61,7 +65,7 @@ def painting(font_size: float, *, letters: bool = False) -> Iterator[None]:
         )
         if letters:
             mpl.rcParams.update({"svg.fonttype": "none", "font.sans-serif": ["DejaVu Sans", "Verdana", "sans-serif"]})
-        # A letter that the font lacks is drawn as a box; the rest of the picture is still worth having.
+        # A letter that the font lacks is drawn as a box, which does not spoil the picture.
         warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
         yield
 
@@ -69,12 +73,12 @@ def painting(font_size: float, *, letters: bool = False) -> Iterator[None]:
 def _matplotlib() -> ModuleType:
     """Import matplotlib without a matplotlibrc of the current folder or the user's: it could run LaTeX.
 
-    Whoever has imported it before, such as a notebook, has read theirs already; pictures are drawn by its defaults.
+    If it is already imported, as in a notebook, it has read theirs; pictures use its defaults.
     """
     found = find_spec("matplotlib")
     if found is None or found.origin is None:
         raise PictureError("drawing needs matplotlib: pip install 'thenar[compiler]'")
-    # It reads the file of that name in the current folder first, while it is imported: here that is its own.
+    # On import it reads the file of that name in the current folder first: point that at its bundled one.
     with chdir(Path(found.origin).with_name("mpl-data")):
         return import_module("matplotlib")
 

@@ -1,13 +1,13 @@
-"""Folders are published whole: written next to their place, made durable, then exchanged with what is there.
+"""Publish folders as a whole: write next to the target, make durable, then exchange with the existing folder.
 
 Writing takes place in a box, the folder `.NAME.XXXXXXXX.part` next to the published folder. It holds at most
 
     part  the folder that is being written
     new   the complete folder; after the exchange, the folder that was replaced
-    old   the folder that was replaced, where the file system cannot exchange two names
+    old   the folder that was replaced, if the file system cannot exchange two names
     gone  a folder that is being deleted
 
-Its writer holds a lock on it. What a killed writer leaves can be locked, and the next publication clears it.
+Its writer holds a lock on it. A box of a killed writer is not locked, and the next publication deletes it.
 """
 
 import ctypes
@@ -26,8 +26,8 @@ from pathlib import Path
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.files import sync_folder
 
-# Returns the entries of a folder that are the user's, as `entries` has them: they are kept. Raises where the folder may
-# not be replaced. It also judges a folder that was replaced, elsewhere and under another name.
+# Returns the user's entries in a folder, in the format of `entries`: they are kept. Raises if the folder may not be
+# replaced. It is also called for a replaced folder, at another path and name.
 Theirs = Callable[[Path], Collection[str]]
 
 _PART, _NEW, _OLD, _GONE = "part", "new", "old", "gone"
@@ -37,7 +37,7 @@ _APPEARED = frozenset({errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR})
 
 
 def entries(folder: Path) -> list[str]:
-    """Return the paths below `folder` of everything in it, in order; of folders only those that are empty."""
+    """Return the paths below `folder` of all files and empty folders in it, in order."""
     found: list[str] = []
     for inner in sorted(folder.iterdir()):
         below = entries(inner) if inner.is_dir() and not inner.is_symlink() else []
@@ -46,22 +46,22 @@ def entries(folder: Path) -> list[str]:
 
 
 def check_folder(folder: Path, theirs: Theirs, raises: type[ThenarError]) -> tuple[Path, Collection[str]]:
-    """Return `folder`, resolved, and the user's entries in it; delete what killed publications left there.
+    """Return `folder`, resolved, and the user's entries in it; delete the boxes of killed publications.
 
-    Raises `raises` where no folder can be exchanged, and what `theirs` raises.
+    Raises `raises` if no folder can be exchanged there, and whatever `theirs` raises.
     """
     target = folder.resolve()
     if not target.parent.is_dir():
         raise raises(f"{target.parent} is no folder: make it first, then write {folder}")
     if not os.access(target.parent, os.W_OK | os.X_OK):
-        raise raises(f"{target.parent} may not be written to: name a folder elsewhere")
+        raise raises(f"{target.parent} is not writable: name a folder elsewhere")
     sweep(target, theirs)
     if not target.exists():
         return target, ()
     if not target.is_dir():
         raise raises(f"{folder} is a file: name a folder")
     if target.is_mount() or _is_current(target):
-        raise raises(f"{folder} cannot be exchanged, as a mounted or the current folder: name a folder in it")
+        raise raises(f"{folder} is a mount point or the current folder and cannot be replaced: name a folder in it")
     return target, theirs(target)
 
 
@@ -74,10 +74,10 @@ def _is_current(target: Path) -> bool:
 def publish_folder(files: Mapping[str, bytes], folder: Path, theirs: Theirs, raises: type[ThenarError]) -> Path:
     """Write `files`, path below the folder -> content, as `folder`; return it, resolved.
 
-    The user's entries are in the new folder too, as the same files (a copy where there are no hard links). At every
-    instant there is the old folder or the new one, whole. Where the file system cannot exchange two names there is a
-    moment between two renames with neither: the next publication brings back the old one.
-    Raises as `check_folder`; `raises` where a user's file is in the way, or the folder was changed meanwhile; OSError.
+    The user's entries are in the new folder too, as the same files (copies if there are no hard links). At every
+    instant either the old or the new folder is there, whole. If the file system cannot exchange two names, neither is
+    there for a moment between two renames: the next publication brings back the old one.
+    Raises as `check_folder`; `raises` if a user's file is in the way, or the folder was changed meanwhile; OSError.
     """
     target, kept = check_folder(folder, theirs, raises)
     for path in kept:
@@ -92,19 +92,19 @@ def publish_folder(files: Mapping[str, bytes], folder: Path, theirs: Theirs, rai
             replaced = _put(box, target)
         except OSError as reason:
             if reason.errno in _APPEARED:
-                raise raises(f"{folder} was made by somebody else meanwhile: do the same again") from reason
-            # The user has never heard of the box.
+                raise raises(f"another program made {folder} meanwhile: run this again") from reason
+            # Report the path that the user knows, not the box.
             raise OSError(reason.errno, reason.strerror, str(folder)) from reason
         if replaced is not None and not _disposable(replaced, target, theirs):
             _put_back(replaced, box, target)
             theirs(target)
-            raise raises(f"{folder} was changed while it was replaced: do the same again")
+            raise raises(f"{folder} was changed while it was replaced: run this again")
         sync_folder(target.parent)
     return target
 
 
 def sweep(target: Path, theirs: Theirs) -> None:
-    """Delete the boxes that killed publications of `target` left next to it; those of living ones stay."""
+    """Delete the boxes that killed publications of `target` left next to it; boxes in use stay."""
     name = re.compile(rf"\.{re.escape(target.name)}\.[0-9a-f]{{8}}\.part")
     for box in sorted(path for path in target.parent.iterdir() if name.fullmatch(path.name)):
         with suppress(OSError):
@@ -129,15 +129,15 @@ def _box(target: Path, theirs: Theirs) -> Iterator[Path]:
 
 
 def _new_box(target: Path) -> tuple[Path, int | None]:
-    """Return a new box and what locks it; None where folders cannot be locked: nobody can clear it there either."""
+    """Return a new box and its lock; None if folders cannot be locked, in which case no sweep can delete it either."""
     while True:
-        # Not named after the process: in a container the next one may have the same number.
+        # Not named after the process id: in a container the next process may have the same one.
         box = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
         box.mkdir()
         try:
             lock = _locked(box)
         except (BlockingIOError, FileNotFoundError):
-            continue  # a sweep was faster, and deletes it
+            continue  # a concurrent sweep deletes it
         except OSError:
             return box, None
         if box.exists():
@@ -157,14 +157,14 @@ def _locked(box: Path) -> int:
 
 
 def _settle(box: Path, target: Path, theirs: Theirs) -> None:
-    """Delete from the box what is in the published folder or was made for it, and the box if no more was in it."""
+    """Delete the box's copies of published files and those written for it, and the box itself if it is then empty."""
     with suppress(OSError):
-        (box / _OLD).rename(target)  # fails where there is a folder again
+        (box / _OLD).rename(target)  # fails if the folder exists again
     shutil.rmtree(box / _PART, ignore_errors=True)
     shutil.rmtree(box / _GONE, ignore_errors=True)
     for name in (_NEW, _OLD):
         if (box / name).exists() and _disposable(box / name, target, theirs):
-            # From here on the rule need not hold: half of a folder may look like the user's.
+            # From here on the rule may fail: half a folder may look like the user's.
             (box / name).rename(box / _GONE)
             shutil.rmtree(box / _GONE, ignore_errors=True)
     with suppress(OSError):
@@ -172,7 +172,7 @@ def _settle(box: Path, target: Path, theirs: Theirs) -> None:
 
 
 def _disposable(folder: Path, target: Path, theirs: Theirs) -> bool:
-    """Return whether nothing in the folder is the user's except entries that `target` has too."""
+    """Return whether the folder's user entries, if any, are all in `target` too."""
     try:
         kept = theirs(folder)
     except (ThenarError, OSError):
@@ -237,7 +237,7 @@ def _sync(folder: Path) -> None:
 
 
 def _put(box: Path, target: Path) -> Path | None:
-    """Put the new folder in its place; return where the one is that was there, or None."""
+    """Move the new folder to its target; return the path of the replaced one, or None."""
     new, old = box / _NEW, box / _OLD
     if not target.exists():
         new.rename(target)
@@ -258,7 +258,7 @@ def _put_back(replaced: Path, box: Path, target: Path) -> None:
 
 
 def exchanged(one: Path, other: Path) -> bool:
-    """Exchange two names at one instant and return True; return False where that cannot be done. Raises OSError."""
+    """Exchange two names atomically and return True; return False if that is not supported. Raises OSError."""
     renameat2 = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
     if renameat2 is None:
         return False

@@ -1,4 +1,4 @@
-"""What is learnt from: the rows of a training set, as plain arrays."""
+"""Training samples: the rows of a training set, as plain arrays."""
 
 from dataclasses import dataclass, field, replace
 
@@ -16,12 +16,12 @@ Columns = tuple[int, ...]
 
 # Copies of each row with an input lost: 8 took twice the time of 4, for half a point less at the worst single loss.
 MASKED = 4
-# Of a movement that is learnt from: a frame every 30 to 50 ms of one that lasts a second or two.
+# Most frames of a movement to train on: one every 30 to 50 ms of a movement that lasts a second or two.
 FRAMES = 32
 
 
 class SamplesError(ThenarError, ValueError):
-    """Rows that nothing can be learnt from."""
+    """Rows that cannot be trained on."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,27 +31,27 @@ class Samples:
     Parameters
     ----------
     switches : ndarray of bool, shape (n, s)
-        True where a switch is closed.
+        True for a closed switch.
     codes : ndarray of uint16, shape (n, j)
-        The joints' codes. With j = 0 the switches alone are to recognise the grasp.
+        The joints' codes. With j = 0 only the switches are used.
     labels : ndarray of intp, shape (n,)
-        Class numbers, that index `grasps`.
+        Class numbers, which index `grasps`.
     grasps : tuple of str
-        The grasp types, and last of all NONE with `has_none`. A fold keeps all of them, whether they occur in it or
+        The grasp types, and with `has_none` NONE as the last. A fold keeps all of them, whether they occur in it or
         not.
     trials, subjects : ndarray of intp, shape (n,), optional
-        The number of each row's trial and subject: what is chosen by inner folds must not part them. None given: each
-        row is a trial of its own, of one subject.
+        The number of each row's trial and subject: inner folds must not split them. By default each row is a separate
+        trial, of one subject.
     taxels : ndarray of uint16, shape (n, t), optional
-        Codes of which a placement makes bits first, by thresholds that it learns: placement/elements.py.
+        Codes from which a placement learns bits, by thresholds: placement/elements.py.
     movements : ndarray of intp, shape (n,), optional
-        The number of each row's movement, which no fold parts: a trial, and the rows of nothing held before and after
-        it. None given: each trial is one.
+        The number of each row's movement, which no fold splits: a trial, and the rows of nothing held before and after
+        it. By default each trial is one.
     has_none : bool
-        Whether the last class is that nothing is held.
+        Whether the last class means that nothing is held.
     silent : ndarray of bool, shape (n,), optional
-        Rows that say which type is held and not whether any is, as those of static grasps do: of a subject's session of
-        which no row shows nothing held, where others have such rows. None given: there are none.
+        Rows that show which type is held but not whether any is, as in recordings of static grasps: sessions of a
+        subject that have no row with nothing held, if other sessions have some. By default there are none.
 
     Raises
     ------
@@ -96,14 +96,14 @@ class Samples:
             found = ", ".join(f"{name} {part.shape}" for name, part in parts.items())
             raise SamplesError(f"{found} must be {', '.join(shapes.values())} of the same n rows")
         if not rows.pop():
-            raise SamplesError("nothing can be learnt from a set without rows")
+            raise SamplesError("there are no rows to train on: take a set with rows")
         if self.labels.min() < 0 or self.labels.max() >= self.n_classes:
             raise SamplesError(f"labels must be class numbers 0 to {self.n_classes - 1}")
         check_types(self.n_classes, SamplesError)
 
     @classmethod
     def of(cls, grasp_set: GraspSet, inputs: Inputs = "both") -> "Samples":
-        """Return all rows of a set, with those of its inputs that `inputs` allows, and the grasp types that occur."""
+        """Return all rows of a set, with the inputs that `inputs` selects, and the grasp types that occur."""
         found, labels = np.unique(grasp_set.labels, return_inverse=True)
         none, session = grasp_set.is_none, groups(grasp_set.subjects, grasp_set.sessions)
         return cls(
@@ -121,17 +121,17 @@ class Samples:
 
     @property
     def n_switches(self) -> int:
-        """The number of switches there are to choose from."""
+        """The number of switches to choose from."""
         return int(self.switches.shape[1])
 
     @property
     def n_classes(self) -> int:
-        """The number of classes: grasp types, and NONE where it is one."""
+        """The number of classes: the grasp types, and NONE if it is one."""
         return len(self.grasps)
 
     @property
     def n_types(self) -> int:
-        """The number of grasp types, and the class of rows in which nothing is held."""
+        """The number of grasp types, which is also the class number of rows in which nothing is held."""
         return self.n_classes - self.has_none
 
     @property
@@ -141,8 +141,8 @@ class Samples:
 
     @property
     def given_held(self) -> NDArray[np.bool_] | None:
-        """The rows (n,) that are learnt from as if it were known that something is held; None: no row is, as where no
-        row at all shows nothing held.
+        """A mask (n,) of rows that are trained on given that something is held; None if there are none, as when no row
+        at all shows nothing held.
         """
         return self.silent if self.is_none.any() and self.silent.any() else None
 
@@ -153,8 +153,8 @@ class Samples:
         return replace(self.rows(~self.is_none), grasps=self.grasps[:-1], has_none=False)
 
     def balanced(self) -> NDArray[np.intp]:
-        """Return the numbers of rows of which no more show nothing than a grasp, and of a movement no more than FRAMES:
-        of more, as many, evenly spaced. Frames of a movement resemble their neighbours.
+        """Return the numbers of the rows to train on: no more with nothing held than with a grasp, and at most FRAMES
+        of a movement, evenly spaced. Frames of a movement resemble their neighbours.
         """
         none, held = np.flatnonzero(self.is_none), np.flatnonzero(~self.is_none)
         if len(none) > len(held):
@@ -193,10 +193,10 @@ class Samples:
         return replace(self, codes=self.codes[:, list(joints)])
 
     def masked(self) -> "Samples":
-        """Return these rows, and MASKED copies of each with one of the inputs lost: what another row has stands there.
+        """Return these rows, and MASKED copies of each with one input lost, replaced by the value in another row.
 
-        On average over other rows, an input adds its mean row, which is what stands in for a lost one. Each input is
-        lost in as many copies.
+        On average over other rows, an input adds its mean row, which is the runtime's substitute for a lost one. Each
+        input is lost in equally many copies.
         """
         (n, s), j, parts = self.switches.shape, self.codes.shape[1], [self]
         for copy in range(MASKED if s + j else 0):
@@ -212,18 +212,18 @@ class Samples:
 
     @property
     def inputs(self) -> NDArray[np.uint16]:
-        """The inputs as one matrix (n, s + j): the switches' bits, then the joints' codes. There may be no taxels."""
+        """The inputs as one matrix (n, s + j): the switches' bits, then the joints' codes. There must be no taxels."""
         if self.taxels.shape[1]:
-            raise SamplesError("taxels are no inputs: make bits of them by thresholds first")
+            raise SamplesError("taxels are no inputs: turn them into bits by thresholds first")
         return np.hstack([self.switches, self.codes], dtype=np.uint16)
 
     def kept(self, columns: Columns) -> NDArray[np.uint16]:
-        """Return what is trained on, (n, kept + j): the switches `columns` in their order, then the joints' codes."""
+        """Return the training matrix (n, kept + j): the switches `columns` in their order, then the joints' codes."""
         return self.keeping(columns).inputs
 
 
 def decided(predicted: NDArray[np.intp], trial: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the label (r, T) that most frames of each trial are given, the lowest of several.
+    """Return the label (r, T) of most frames of each trial; of equally many, the lowest.
 
     predicted  (r, n) labels        trial  (n,) numbers of trials, 0 to T - 1, each with a frame
     """

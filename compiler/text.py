@@ -1,4 +1,4 @@
-"""Numbers in words, as reports, pictures, tables and sentences write them; and texts in cells that are no formulas."""
+"""Formatting of numbers in reports, pictures, tables and sentences; and of text cells that are no formulas."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -40,7 +40,7 @@ def microseconds(us: float) -> str:
 
 
 def duration(us: float) -> str:
-    """Return a time to three digits, in the unit that suits it: "440 us", "2.05 ms", "1.5 s"."""
+    """Return a time to three digits, in a suitable unit: "440 us", "2.05 ms", "1.5 s"."""
     for unit, size in (("s", 1e6), ("ms", 1e3)):
         if us >= 0.9995 * size:
             return f"{us / size:.3g} {unit}"
@@ -48,7 +48,7 @@ def duration(us: float) -> str:
 
 
 def counted(number: int, one: str, many: str = "") -> str:
-    """Return "1 node" or "2 nodes"; `many` is the plural where it is not `one` with an s."""
+    """Return "1 node" or "2 nodes"; `many` is the plural if it is not `one` with an s."""
     return f"{number:,} {one if number == 1 else many or one + 's'}"
 
 
@@ -61,26 +61,26 @@ INDEPENDENT = "each row counts as a trial: whoever recorded them states that the
 
 
 def inputs_read(switches: int, taxels: int, joints: int) -> str:
-    """Return "switches 160, joints 18", and how many taxels where there are any."""
+    """Return "switches 160, joints 18", and the number of taxels if there are any."""
     return f"switches {switches}, {f'taxels {taxels}, ' if taxels else ''}joints {joints}"
 
 
 def none_words(rows: int) -> str:
-    """Return what follows a number of rows in so many of which nothing is held."""
+    """Return the clause that follows a number of rows, in `rows` of which nothing is held."""
     return f", in {rows} of which nothing is held" if rows else ""
 
 
 def sentence(words: str) -> str:
-    """Return words from within a sentence as a sentence."""
+    """Return words from within a sentence as a whole sentence."""
     return f"{words[:1].upper()}{words[1:].removesuffix('.')}."
 
 
-# What a spreadsheet computes, behind whatever apostrophes are there: so each text has one cell, and each cell one text.
+# Text that a spreadsheet would compute, after any number of apostrophes: so text and cell map one to one.
 _FORMULA = re.compile(r"'*[=+\-@\t\r]")
 
 
 def cell(text: str) -> str:
-    """Return `text` with an apostrophe before it where a spreadsheet would take it for a formula."""
+    """Return `text`, with an apostrophe in front if a spreadsheet would take it for a formula."""
     return f"'{text}" if _FORMULA.match(text) else text
 
 
@@ -90,5 +90,5 @@ def cells(row: Iterable[object]) -> list[object]:
 
 
 def text_of(cell: str) -> str:
-    """Return the text whose `cell` it is."""
+    """Return the text of a `cell`."""
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell

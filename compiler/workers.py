@@ -1,5 +1,5 @@
-"""Work in other processes: independent pieces on all cores, each answer handed over as soon as it is there; and one
-piece aside, for whoever must not wait for it.
+"""Work in other processes: independent tasks on all cores, with each result as soon as it is available; and a single
+background task.
 """
 
 import os
@@ -17,22 +17,22 @@ from typing import Any, Generic, TypeVar
 from .cluster import on_cluster
 
 Task = TypeVar("Task")
-Answer = TypeVar("Answer")
+Result = TypeVar("Result")
 
-# More processes than four a core are asked for by a slip only, and would take the machine with them.
+# More processes than four per core are certainly a mistake, and would slow the machine to a halt.
 MOST_JOBS = 4 * (os.cpu_count() or 1)
 
 _SAFE_PATH = "PYTHONSAFEPATH"
 # Rows times rounds of boosting: about a second's work.
 _LITTLE = 200_000
-# Where a process cannot be waited for by a stranger, it is looked for so often.
+# Polling interval on systems where a process cannot wait for a process that is not its child.
 _LOOK_S = 0.5
 
 
 def in_workers(
-    work: Callable[[Task], Answer], tasks: Iterable[Task], jobs: int, cluster: str | None = None
-) -> Iterator[Answer]:
-    """Yield the answers in the order in which they come.
+    work: Callable[[Task], Result], tasks: Iterable[Task], jobs: int, cluster: str | None = None
+) -> Iterator[Result]:
+    """Yield the results in the order of completion.
 
     jobs     worker processes, as joblib counts them: -1 for all cores, 1 for this process alone; no more than
              MOST_JOBS. A worker runs one thread.
@@ -40,8 +40,8 @@ def in_workers(
 
     Workers end when this process does, however it ends.
 
-    Raises BrokenExecutor if a worker is killed or cannot start, ClusterError (which is one) if the cluster cannot do
-    the work, and whatever the work raises.
+    Raises BrokenExecutor if a worker is killed or cannot start, ClusterError (a subclass) if the cluster cannot do
+    the work, and any exception of the work.
     """
     if cluster is not None:
         yield from on_cluster(work, tasks, cluster)
@@ -57,23 +57,23 @@ def in_workers(
         try:
             with _cancelled_work_forgotten(), ExitStack() as ended:
                 with _interrupts_held():
-                    answers = workers(delayed(work)(task) for task in tasks)
-                    ended.callback(_end_early, answers)
-                # `yield from answers` would close them without a filter when this generator is closed.
-                yield from (answer for answer in answers)
+                    results = workers(delayed(work)(task) for task in tasks)
+                    ended.callback(_end_early, results)
+                # `yield from results` would close them without a filter when this generator is closed.
+                yield from (result for result in results)
         except (BrokenExecutor, BrokenPipeError) as reason:
             raise BrokenExecutor(
-                "a worker process ended before its work was done, perhaps for want of memory: --jobs 1 takes none"
+                "a worker process ended before its work was done, perhaps for lack of memory: --jobs 1 needs none"
             ) from reason
 
 
 def little(work: int, jobs: int) -> int:
-    """Return `jobs`, or 1 where so little work (rows times rounds of boosting) is done before processes are up."""
+    """Return `jobs`, or 1 if the work (rows times rounds of boosting) is shorter than starting processes."""
     return 1 if work < _LITTLE else jobs
 
 
 def workers_of(jobs: int) -> int:
-    """Return how many processes work when `jobs` are asked for."""
+    """Return the number of processes for `jobs`."""
     if jobs == 1:
         return 1
     from joblib import effective_n_jobs
@@ -83,12 +83,12 @@ def workers_of(jobs: int) -> int:
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Let a Ctrl-C wait, and what ends a command like one. Processes started meanwhile never get these signals, so none
-    complains of them: this one ends them.
+    """Defer Ctrl-C and other signals that end a command. Processes started meanwhile never get these signals, so they
+    print no traceback: this process ends them.
     """
     from multiprocessing import resource_tracker
 
-    # loky asks for this helper process of Python's, and its start would lift the block.
+    # loky needs this helper process of Python, whose start would unblock the signals.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
     try:
@@ -99,10 +99,10 @@ def _interrupts_held() -> Iterator[None]:
 
 @contextmanager
 def _cancelled_work_forgotten() -> Iterator[None]:
-    """Keep loky's own thread quiet as it ends the workers early.
+    """Silence loky's thread when the workers end early.
 
-    It cancels what waits, and may then look for a piece of it that it was just about to hand out: a KeyError, which
-    harms nobody and would be printed.
+    It cancels waiting tasks, and may then look for one that it was about to hand out: a harmless KeyError, which would
+    be printed.
     """
     before = threading.excepthook
 
@@ -118,19 +118,19 @@ def _cancelled_work_forgotten() -> Iterator[None]:
         threading.excepthook = before
 
 
-def _end_early(answers: Generator[object, None, None]) -> None:
-    """End the work that is left, if any, and its workers, without joblib's warning of what is lost."""
+def _end_early(results: Generator[object, None, None]) -> None:
+    """Cancel the remaining work, if any, and end its workers, without joblib's warning about lost tasks."""
     with warnings.catch_warnings():
         lost = r"\d+ tasks (have been successfully executed|which were still being processed)"
         warnings.filterwarnings("ignore", lost, UserWarning)
-        answers.close()
+        results.close()
 
 
 @contextmanager
 def _safe_paths() -> Iterator[None]:
-    """Keep the current folder off the paths of the Pythons that are started: its modules are none of ours.
+    """Keep the current folder off the import paths of started Pythons: its modules are not ours.
 
-    loky and multiprocessing start them with -m and -c, and pass on no option of this one.
+    loky and multiprocessing start them with -m and -c, and pass on no option of this process.
     """
     before = os.environ.get(_SAFE_PATH)
     os.environ[_SAFE_PATH] = "1"
@@ -144,7 +144,7 @@ def _safe_paths() -> Iterator[None]:
 
 
 def _end_with_parent(parent: int) -> None:
-    """Let this worker end as soon as process `parent`, which has started it, has ended.
+    """Let this worker end as soon as process `parent`, which started it, has ended.
 
     A thread waits for that. Linux could send a signal instead, but does so when the thread that started the worker
     ends, and loky starts some in threads that end before the work does.
@@ -157,7 +157,7 @@ def _end_after(parent: int) -> None:
         if sys.platform == "linux":
             ended = select.poll()
             ended.register(os.pidfd_open(parent), select.POLLIN)
-            # By now the number may be another process's.
+            # By now the number may belong to another process.
             if os.getppid() == parent:
                 ended.poll()
     except OSError:  # no such process, or a kernel before 5.3
@@ -167,64 +167,64 @@ def _end_after(parent: int) -> None:
     os._exit(1)
 
 
-class Aside(Generic[Answer]):
-    """One piece of work at a time in a process of its own, which yields to everything else on the machine.
+class Aside(Generic[Result]):
+    """A background process for one task at a time, which yields to everything else on the machine.
 
-    It ends when this process does, however that ends.
+    It ends when this process does, however this process ends.
     """
 
     def __init__(self) -> None:
         self._process: Any = None
-        self._answers: Any = None
+        self._results: Any = None
 
     @property
     def busy(self) -> bool:
-        """Whether a piece of work is under way, or its answer has not been fetched."""
+        """Whether a task is running, or its result has not been fetched."""
         return self._process is not None
 
-    def start(self, work: Callable[[Task], Answer], task: Task) -> None:
-        """Begin; must not be busy. `work` and `task` are pickled, and what `work` raises is told by its name."""
+    def start(self, work: Callable[[Task], Result], task: Task) -> None:
+        """Begin; must not be busy. `work` and `task` are pickled; an exception of `work` is reported by its name."""
         from multiprocessing import get_context
 
         assert not self.busy
         context = get_context("spawn")
-        self._answers, there = context.Pipe(duplex=False)
-        # Its signals are held from before it is: a Ctrl-C is for this process.
+        self._results, there = context.Pipe(duplex=False)
+        # Block its signals before it exists: a Ctrl-C is for this process.
         with _safe_paths(), _interrupts_held():
             self._process = context.Process(target=_aside, args=(os.getpid(), there, work, task), daemon=True)
             self._process.start()
         there.close()
 
-    def fetch(self) -> Answer | None:
-        """Return the answer, if it is there. Raises BrokenExecutor if the work has failed, with a sentence."""
-        if self._process is None or not self._answers.poll():
+    def fetch(self) -> Result | None:
+        """Return the result, or None if it is not available yet. Raises BrokenExecutor if the work has failed."""
+        if self._process is None or not self._results.poll():
             return None
         try:
-            failure, answer = self._answers.recv()
+            failure, result = self._results.recv()
         except EOFError:
-            failure, answer = "its process ended, perhaps for want of memory", None
+            failure, result = "its process ended, perhaps for lack of memory", None
         self.close()
         if failure:
             raise BrokenExecutor(failure)
-        found: Answer = answer
+        found: Result = result
         return found
 
     def close(self) -> None:
-        """End what is under way."""
+        """End the running task."""
         if self._process is not None:
             self._process.kill()
             self._process.join()
             self._process.close()
-            self._answers.close()
+            self._results.close()
             self._process = None
 
 
-def _aside(parent: int, there: Any, work: Callable[[Task], Answer], task: Task) -> None:
+def _aside(parent: int, there: Any, work: Callable[[Task], Result], task: Task) -> None:
     _end_with_parent(parent)
     with suppress(OSError):
         os.nice(10)
     try:
-        answer = "", work(task)
+        result = "", work(task)
     except Exception as fault:
-        answer = f"{type(fault).__name__}: {fault}", None  # type: ignore[assignment]
-    there.send(answer)
+        result = f"{type(fault).__name__}: {fault}", None  # type: ignore[assignment]
+    there.send(result)

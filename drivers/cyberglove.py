@@ -4,7 +4,7 @@
         while (timed := glove.read(1.0)) is not None:
             time_us, record = timed
 
-Everything that the sources of the protocol disagree on is accepted either way, or can be chosen: docs/reference/cyberglove.md.
+Where the protocol's sources disagree, every variant is accepted or selectable: docs/reference/devices.md.
 """
 
 import logging

@@ -1,7 +1,7 @@
 """The CyberGlove's serial protocol: its sensors, its commands and answers, how fast it sends, its records.
 
 It is the vendor's manual as public drivers quote it (ViSTA, FreeVR, Shadow's serial_glove, VESS, asr, toon);
-docs/reference/cyberglove.md says where they disagree.
+docs/reference/devices.md says where they disagree.
 
 **Sensors.** The box has 24 slots, of which two are never sent: the abduction of the index, which no glove measures, and
 the last.
@@ -64,7 +64,7 @@ _ERRORS = {
     b"g": "no glove is plugged in",
     b"s": "sampling too fast",
 }
-# Bytes in the answer to ?X, by X; after X as a setting. docs/reference/cyberglove.md says what each letter means.
+# Bytes in the answer to ?X, by X; after X as a setting. docs/reference/devices.md says what each letter means.
 ANSWERED: Mapping[str, int] = (
     dict.fromkeys("BDFGJLNQRSUWY", 1) | dict.fromkeys("KMP", 3) | dict.fromkeys("TV", 4) | {"A": 6}
 )

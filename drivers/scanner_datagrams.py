@@ -1,4 +1,4 @@
-"""A scanner board in a Wi-Fi: one frame a datagram of UDP, at udp://HOST:PORT; docs/reference/scanner-board.md draws every byte.
+"""A scanner board on Wi-Fi: one frame per UDP datagram, at udp://HOST:PORT; see docs/reference/devices.md.
 
 A network drops datagrams, doubles them, and delivers some after later ones. So each carries a number of 32 bits, and
 one is taken only if it is newer than all before it (RFC 1982): what is late was overtaken by something newer, and says

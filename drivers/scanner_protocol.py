@@ -1,4 +1,4 @@
-"""The protocol of the switch-scanner board: frames, and what they carry; docs/reference/scanner-board.md draws every byte.
+"""The protocol of the switch-scanner board: frames, and what they carry; docs/reference/devices.md draws every byte.
 
 A frame is type | sequence | payload | CRC-16, stuffed by COBS, ended by 00. COBS (Cheshire and Baker 1999) costs one
 byte a frame and leaves no zero inside it, so every 00 is an end, after any loss. The CRC is CRC-16/CCITT-FALSE

@@ -65,7 +65,7 @@ class Origin(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """Every option of `thenar compile`, with its default; of those from `tolerance` on, defaults are left out.
 
-    Parameters
+    Attributes
     ----------
     prune : int
         The paper's S: ID3 splits no fewer rows.

@@ -1,4 +1,4 @@
-"""docs/reference/harness.md: its examples are loaded, its keys and defaults are the structs', its times are the arithmetic's."""
+"""docs/reference/harness.md: its examples load, its keys and defaults are the structs', its times are computed."""
 
 import re
 from collections.abc import Iterator

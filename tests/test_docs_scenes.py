@@ -1,4 +1,4 @@
-"""docs/how-to/simulate.md against the structs that decode a scene: every key, every default and every limit is what it says."""
+"""docs/reference/scenes.md against the structs that decode a scene: every key, default and limit."""
 
 import json
 import re
@@ -17,7 +17,7 @@ from thenar.simulator.scenes.scene import SURVEYS, Glove, Population, Recording,
 
 NAMES = tuple(EFFECTS)
 
-PAGE = (Path(__file__).parents[1] / "docs" / "how-to" / "simulate.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[1] / "docs" / "reference" / "scenes.md").read_text(encoding="utf-8")
 
 Documented = dict[str, dict[str, str]]  # key -> column -> cell
 

@@ -1,7 +1,6 @@
 """What is installed: every package, under one name, and a runtime that needs the base dependencies only."""
 
 import importlib.metadata as metadata
-import os
 import re
 import shutil
 import subprocess
@@ -53,21 +52,39 @@ def base_distributions() -> set[str]:
 
 
 @pytest.fixture(scope="module")
-def board(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the Python of a virtual environment with the wheel and its base dependencies and nothing else."""
-    folder = tmp_path_factory.mktemp("board")
+def distributions(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the sdist and of the wheel that is built from it, as `make dist` builds them."""
+    folder = tmp_path_factory.mktemp("distributions")
     source = folder / "source"
     for name in (*ROOMS, "src"):
         leave_out = shutil.ignore_patterns("__pycache__", "*.egg-info")
         shutil.copytree(ROOT / name, source / name, symlinks=True, ignore=leave_out)
     for name in ("pyproject.toml", "README.md", "LICENSE", "MANIFEST.in"):
         shutil.copy(ROOT / name, source / name)
-    pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation"]
-    subprocess.run(
-        [*pip, "--wheel-dir", folder / "wheel", source],
-        check=True,
-        env={**os.environ, "PIP_NO_INDEX": "1", "PIP_NO_CACHE_DIR": "1"},
-    )
+    # No isolation: that would fetch setuptools.
+    build = [sys.executable, "-m", "build", "--no-isolation", "--outdir", folder / "dist", source]
+    done = subprocess.run(build, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder / "dist"
+
+
+@pytest.mark.slow
+def test_the_metadata_of_both_distributions_passes_a_strict_check(distributions: Path) -> None:
+    files = sorted(distributions.iterdir())
+    assert [file.name.removeprefix(f"thenar-{PROJECT['project']['version']}") for file in files] == [
+        "-py3-none-any.whl",
+        ".tar.gz",
+    ]
+    check = [sys.executable, "-m", "twine", "check", "--strict", *files]
+    done = subprocess.run(check, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count("PASSED") == 2
+
+
+@pytest.fixture(scope="module")
+def board(distributions: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the Python of a virtual environment with the wheel and its base dependencies and nothing else."""
+    folder = tmp_path_factory.mktemp("board")
     venv.create(folder / "env", with_pip=False, symlinks=True)
     site = Path(sysconfig.get_path("purelib", "venv", {"base": str(folder / "env"), "platbase": str(folder / "env")}))
     for name in base_distributions():
@@ -75,7 +92,7 @@ def board(tmp_path_factory: pytest.TempPathFactory) -> Path:
             top = file.parts[0]
             if top != ".." and not (site / top).exists():
                 (site / top).symlink_to(Path(str(metadata.distribution(name).locate_file(top))))
-    (wheel,) = (folder / "wheel").glob("*.whl")
+    (wheel,) = distributions.glob("*.whl")
     with zipfile.ZipFile(wheel) as content:
         content.extractall(site)
     return folder / "env" / "bin" / "python"

@@ -1,1 +1,1 @@
-"""The additive multinomial logit: score tables fitted at once, by a convex problem."""
+"""The additive multinomial logit: all score tables fitted at once by convex optimisation."""

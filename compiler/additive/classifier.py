@@ -13,35 +13,35 @@ from .logit import BINS, PENALTY, SMOOTHNESS, TOLERANCE, fit_logit
 class AdditiveLogitClassifier(AdditiveClassifier):
     """Multinomial logistic regression on a table of scores for each input.
 
-    Inputs are bits, integer codes or floating-point numbers, X (n, d). One that takes two values adds a row of scores
-    at the upper one, any other a row for the bin that it lies in. NaN is a missing value: it has a row of its own where
-    the training set has any, and else adds the mean. What is minimised is convex, so that there is one answer. It is
-    what the trainer `logit` fits, and `compile` makes a build of a fitted one.
+    Inputs are bits, integer codes or floating-point numbers, X (n, d). An input of two values adds a row of scores at
+    the upper one; any other adds the row of its bin. NaN is a missing value: it has a separate row where the training
+    set has any, and adds the mean otherwise. The objective is convex, so the solution is unique. The trainer `logit`
+    fits the same model, and `compile` makes a build of a fitted classifier.
 
     Parameters
     ----------
     penalty : float, default=0.5
-        Pull of scores towards zero: half of it times the sum of their squares is added to the loss; of bins a
-        sixteenth of that, of the bias a thousandth.
+        Pull of scores towards zero: half of it times the sum of their squares is added to the loss. Bins have a
+        sixteenth of this pull, the bias a thousandth.
     smoothness : float, default=2.0
         Pull of neighbouring bins towards each other: half of it times the sum of squares of their differences is added.
     max_bins : int, optional, default=16
-        No input has more bins than this (2 or more); they hold rows as evenly as can be. None: one for each value.
+        The most bins per input (2 or more); they hold rows as evenly as possible. None: one for each value.
     linear : bool, default=False
-        An input of more than two values adds scores in proportion to it instead, between the least and the largest of
-        the training set; `smoothness` then pulls what a standard deviation of it adds.
+        Inputs of more than two values add scores in proportion to them instead, between their minimum and maximum in
+        the training set; `smoothness` then pulls the contribution of one standard deviation.
     tolerance : float, default=1e-7
-        No derivative of the loss is larger than this at the answer, in the weight of all rows; at least 1e-12.
+        No derivative of the loss is larger than this at the solution, relative to the total weight; at least 1e-12.
     classes : sequence, optional
-        Labels that exist even where y lacks some of them (a fold without a rare class). None: those in y.
+        All labels, if y may lack some of them (a fold without a rare class). None: those in y.
 
     Attributes
     ----------
     classes_ : ndarray, shape (K,)
         The labels, in the order of the columns of scores and probabilities.
     tables_ : ColumnTables
-        The rows of scores: `bias` (K,), for each column its `edges` and `rows`, the last one for a missing value, and
-        `lines` of some columns.
+        The rows of scores: `bias` (K,); for each column its `edges` and `rows`, the last row for a missing value; and
+        the `lines` of some columns.
 
     Examples
     --------

@@ -1,17 +1,17 @@
-"""The additive multinomial logit: all score tables fitted at once, as the one minimum of a convex function.
+"""The additive multinomial logit: all score tables fitted at once, as the unique minimum of a convex function.
 
-A column that takes two values is a row of scores, added at the upper one; any other is a row for each of its bins, and
-one for missing values, where there are any. Over the rows W (r, K), the first of which is the bias, this is minimised:
+A column of two values is one row of scores, added at the upper value; any other has a row for each of its bins, and one
+for missing values, if there are any. Over the rows W (r, K), the first of which is the bias, this is minimised:
 
     sum over frames i of u_i (log sum_k exp F_ik - F_iy)  +  1/2 sum over rows j of pull_j |W_j|^2
         + 1/2 smoothness * (sum of |W_j+1 - W_j|^2 over neighbouring bins j and j + 1 of a column),      F = D W
 
 with u the frames' weights and D (n, r) the bits that say which rows count in a frame. As every row has a pull there is
-one minimum, and it is finite, also where classes can be parted perfectly, or a class has no frames. Newton's method
-finds it: H V = -gradient is solved by conjugate gradients to a share of the gradient (Nocedal and Wright, Numerical
-Optimization, 2nd ed., algorithm 7.1). What goes into a product with D is rounded to a grid first, on which all sums are
-exact: so neither the order of frames nor the machine has a part in the answer. Columns as lines have multiples of a
-mark for bits.
+one minimum, and it is finite, even if classes are perfectly separable or a class has no frames. Newton's method finds
+it: H V = -gradient is solved by conjugate gradients to a share of the gradient (Nocedal and Wright, Numerical
+Optimization, 2nd ed., algorithm 7.1). Factors of products with D are rounded to a grid first, on which all sums are
+exact, so the result depends neither on the order of frames nor on the machine. Columns as lines have multiples of a
+mark in place of bits.
 """
 
 import math
@@ -36,17 +36,17 @@ if TYPE_CHECKING:
 
 BINS = 16
 PENALTY, SMOOTHNESS = 0.5, 2.0
-# Of the penalty: what pulls each bin, whose neighbours hold it already, and the bias, which must only stay finite.
+# As shares of the penalty: the pull on each bin, which its neighbours hold already, and on the bias, to keep it finite.
 BIN_SHARE, BIAS_SHARE = 2.0**-4, 2.0**-10
-# No derivative of the loss is larger at the answer than this, in the weight of all frames together.
+# No derivative of the loss is larger than this at the solution, relative to the total weight of the frames.
 TOLERANCE, FINEST = 1e-7, 1e-12
-# Of Newton's steps, of conjugate gradients in a step, and of halvings of a step: far more than was ever seen.
+# Limits of Newton steps, of conjugate gradients per step, and of halvings of a step: far more than were ever needed.
 _MOST_STEPS, _MOST_DIRECTIONS, _MOST_HALVINGS = 500, 2000, 40
-_ENOUGH = 1e-4  # of the slope that Armijo's rule wants to see
-_ROUNDING = 2.0**-50  # of the loss, for each entry of the rows: a rise by less may be one of rounding
-_MARKS = 512.0  # of a unit, in which a line measures its column: one or two units from end to end
-_NO_CHANCE = 800.0  # below all scores, where e to it is exactly 0
-_UNSOLVED = 0.3  # of the gradient, that a step leaves
+_ENOUGH = 1e-4  # of the slope, for Armijo's rule
+_ROUNDING = 2.0**-50  # of the loss, per entry of the rows: a smaller increase may be a rounding error
+_MARKS = 512.0  # marks per unit of a line, whose column spans one or two units
+_NO_CHANCE = 800.0  # below all scores: exp is exactly 0 there
+_UNSOLVED = 0.3  # of the gradient that a step may leave
 
 
 class Rise(NamedTuple):
@@ -63,8 +63,8 @@ class ColumnTables:
 
     bias   (K,)
     edges  for each column, ascending (B - 1,): the bin of x is the number of edges below it
-    rows   for each column (B + 1, K), the last one what a missing value adds
-    lines  for some columns what they add besides, in proportion to x
+    rows   for each column (B + 1, K), the last one for a missing value
+    lines  for some columns, an additional contribution in proportion to x
     """
 
     bias: Floats
@@ -84,7 +84,7 @@ class ColumnTables:
         return scores
 
     def columns(self, order: Sequence[int]) -> "ColumnTables":
-        """Return these of the columns in another order."""
+        """Return the tables of the columns in another order."""
         edges, rows = (tuple(part[column] for column in order) for part in (self.edges, self.rows))
         return ColumnTables(
             self.bias, edges, rows, {at: self.lines[c] for at, c in enumerate(order) if c in self.lines}
@@ -123,25 +123,25 @@ def fit_logit(
 ) -> ColumnTables:
     """Fit X (n, d) numbers (NaN: missing), labels (n,) in 0..n_classes-1, weights (n,) >= 0.
 
-    `penalty` pulls rows towards zero, `smoothness` those of neighbouring bins towards each other; columns have at most
-    `max_bins` bins (2 or more; None: one for each value), that hold frames as evenly as can be. With `linear` a column
-    of more than two values adds scores in proportion to them, between the least and the largest, and `smoothness` pulls
-    what a standard deviation of it adds. How many of the first `counted` columns, bits, are set adds scores as well,
-    with the weak pull of a bin: so what they all say alike is learnt at once. Of frames in `held` (n,) it is known that
-    they are not of the last class, which learns nothing of them. No derivative of the loss is larger at the answer than
-    `tolerance` times the sum of weights. Raises BoostingError.
+    `penalty` pulls rows towards zero, `smoothness` pulls those of neighbouring bins towards each other. Columns have at
+    most `max_bins` bins (2 or more; None: one for each value) that hold frames as evenly as possible. With `linear` a
+    column of more than two values adds scores in proportion to them, between minimum and maximum, and `smoothness`
+    pulls the contribution of one standard deviation. The number of set bits among the first `counted` columns adds
+    scores as well, with the weak pull of a bin, so that their common effect is learned at once. Frames in `held` (n,)
+    are known not to be of the last class, which learns nothing from them. No derivative of the loss is larger at the
+    solution than `tolerance` times the sum of weights. Raises BoostingError.
     """
     if not (0 < penalty < math.inf and 0 <= smoothness < math.inf):
         raise BoostingError(f"penalty={penalty} must be above 0, and smoothness={smoothness} at least 0, both finite")
     if max_bins is not None and max_bins < 2:
-        raise BoostingError(f"max_bins={max_bins} must be at least 2: one bin tells nothing")
+        raise BoostingError(f"max_bins={max_bins} must be at least 2: a single bin carries no information")
     if not FINEST <= tolerance < 1:
         raise BoostingError(f"tolerance={tolerance} must be at least {FINEST:g} and below 1")
     check_rows(X, labels, n_classes, weights)
     check_memory(len(X), n_classes, BoostingError, *X.shape[1:])
     scale = 1.0
     if weights is not None:
-        # By a power of two, which changes no answer: now sums of huge weights stay finite, and of tiny ones exact.
+        # Scale by a power of two, which changes no result: sums of huge weights stay finite, of tiny ones exact.
         scale = float(np.ldexp(1.0, -np.frexp(weights.max())[1]))
         weights = on_one_grid(weights * scale, len(X))
     heavy = np.ones(len(X)) if weights is None else weights
@@ -153,7 +153,8 @@ def fit_logit(
 
 
 def count_of(columns: Sequence["Column"], weights: Floats) -> list["Column"]:
-    """Return a column of how many of `columns`, bits, are set, in a list; none where that says no more than one does.
+    """Return a list with a column that counts the set bits of `columns`; an empty list if the count adds no
+    information.
 
     `weights` (n,) are those of frames.
     """
@@ -165,7 +166,7 @@ def count_of(columns: Sequence["Column"], weights: Floats) -> list["Column"]:
 
 
 def spread_out(columns: Sequence["Column"], rows: Floats, count: Sequence["Column"]) -> Floats:
-    """Return rows of `columns` that say what these and those of their count, the last, do together."""
+    """Return rows of `columns` that include the contribution of their count, the last column."""
     if not count or count[0].line is None:
         return rows
     ruler, rows, each = count[0].line, rows[:-1].copy(), rows[-1] / count[0].line.unit
@@ -176,7 +177,7 @@ def spread_out(columns: Sequence["Column"], rows: Floats, count: Sequence["Colum
 
 
 def tables_of(columns: Sequence["Column"], rows: Floats, held: Floats) -> ColumnTables:
-    """Return rows (r, K), those of a minimum, as tables; `held` (n,) are the frames' weights."""
+    """Return the rows (r, K) of a minimum as tables; `held` (n,) are the frames' weights."""
     bias, *parts = np.split(rows, np.cumsum([1, *(column.n_rows for column in columns[:-1])])) if columns else [rows]
     bias, tables, lines = bias[0], [], {}
     for number, (column, own) in enumerate(zip(columns, parts, strict=True)):
@@ -189,7 +190,7 @@ def tables_of(columns: Sequence["Column"], rows: Floats, held: Floats) -> Column
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Ruler:
-    """A column in units from low, rounded to marks: centre + steps (n,); 0 steps where it is missing."""
+    """A column measured in units from low, rounded to marks: centre + steps (n,); 0 steps where it is missing."""
 
     low: float
     high: float
@@ -201,12 +202,12 @@ class _Ruler:
 
     @classmethod
     def of(cls, x: Floats, weights: Floats) -> "_Ruler":
-        """Return the ruler of numbers (n,) of which two at least differ, NaN for missing."""
+        """Return the ruler for numbers (n,), at least two of which differ, NaN for missing."""
         there = ~np.isnan(x)
         low, high = float(np.min(x[there])), float(np.max(x[there]))
         if not math.isfinite(high - low):
             raise BoostingError(f"a column from {low} to {high} is too wide for a line: scale it")
-        # A power of two: whole numbers of a range below 1024 lie on marks.
+        # A power of two, so that integers within a range below 1024 lie on marks.
         unit = math.ldexp(1.0, math.frexp(high - low)[1] - 1)
         places = _marked(np.where(there, (x - low) / unit, 0.0))
         heavy = weights * there
@@ -223,11 +224,10 @@ def _marked(units: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Column:
-    """A column of frames: its edges, the bin (n,) of each, the last for missing, and the first bin that has a row.
+    """A column of frames: its edges, the bin (n,) of each frame, the last for missing, and the first bin with a row.
 
-    A line has one row instead of its only bin. Of two columns together, bins are the numbers of `cells`, row by row,
-    each of which has a row, and `smoothness` pulls neighbours in both directions. A `free` line is pulled by no
-    smoothness.
+    A line has one row instead of its only bin. For two columns together, bins number the `cells` row by row, each with
+    a row, and `smoothness` pulls neighbours in both directions. `smoothness` does not pull a `free` line.
     """
 
     edges: Floats
@@ -240,12 +240,12 @@ class Column:
 
     @property
     def counts(self) -> bool:
-        """Whether it is a bit that is set in some frames, and in some not."""
+        """Whether it is a bit that is set in some frames but not in all."""
         return self.first == 1 and len(self.edges) == 1
 
     @property
     def n_rows(self) -> int:
-        """How many rows it has."""
+        """The number of its rows."""
         return math.prod(self.cells) if self.cells else int(self.bins.max()) + 1 - self.first
 
     def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
@@ -264,7 +264,7 @@ class Column:
         return pulls
 
     def table(self, rows: Floats, weights: Floats) -> Floats:
-        """Return what each bin adds, and a missing value: where none was seen, the mean of the frames."""
+        """Return the contribution of each bin and of a missing value: if none was seen, the mean over the frames."""
         table = np.vstack([np.zeros((self.first, rows.shape[1])), rows])
         if self.line is not None:
             table[0] = 0.0
@@ -279,12 +279,12 @@ class Column:
 def columns_of(
     X: NDArray[np.generic], max_bins: int | None, weights: Floats | None, straight: Floats | None
 ) -> list[Column]:
-    """Return the columns; those of more than two values as lines, if weights (n,) are given for it as `straight`."""
+    """Return the columns; those of more than two values as lines, if their weights (n,) are given as `straight`."""
     columns = []
     for number, edges in enumerate(column_edges(X, max_bins, weights)):
         x = np.asarray(X[:, number], np.float64)
         bins = _bins(x, edges)
-        # One bin alone says what the bias does, and one of two what the other does not.
+        # A single bin is redundant with the bias, and one of two bins with the other.
         if bins.max() < 2:
             columns.append(Column(edges, bins, 1))
         elif straight is None or not len(edges):
@@ -295,7 +295,7 @@ def columns_of(
 
 
 def column_edges(X: NDArray[np.generic], max_bins: int | None, weights: Floats | None = None) -> list[Floats]:
-    """Return the edges of each column's bins, none of a column without splits."""
+    """Return the edges of each column's bins; none for a column without splits."""
     binned, found = bin_columns(X, max_bins, weights), []
     for number in range(X.shape[1]):
         group, position = binned.home.get(number, (None, 0))
@@ -305,14 +305,14 @@ def column_edges(X: NDArray[np.generic], max_bins: int | None, weights: Floats |
 
 
 def _bins(x: Floats, edges: Floats) -> NDArray[np.intp]:
-    """Return the bin (n,) of each number: how many edges are below it, and one more than there are for NaN."""
+    """Return the bin (n,) of each number, the number of edges below it; NaN gets the bin after the last."""
     bins: NDArray[np.intp] = np.searchsorted(edges, x) + np.isnan(x)
     return bins
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Point:
-    """Rows W (r, K), the probabilities (n, K) there, the loss and its gradient (r, K)."""
+    """Rows W (r, K), with their probabilities (n, K), loss and gradient (r, K)."""
 
     rows: Floats
     probability: Floats
@@ -321,7 +321,7 @@ class _Point:
 
 
 class Fit:
-    """The loss of rows W (r, K), and its minimum. Sums over frames are exact, as are those that decide.
+    """The loss of rows W (r, K), and its minimum. Sums over frames, and all that decide a branch, are exact.
 
     The rows are the bias, then those of each column.
     """
@@ -356,7 +356,7 @@ class Fit:
         self._design = sparse(np.concatenate(values), np.concatenate(frames), np.concatenate(rows), (n, start))
         self._by_row = self._design.T.tocsr()
         self._squares = self._by_row * self._by_row
-        # How much the values of a frame, and those of a row, add up to, in the units of which they are multiples.
+        # Bounds on the sums over a frame's values and over a row's values, in units of which they are multiples.
         marks = _MARKS if any(column.line for column in columns) else 1.0
         self._across, self._down = (float(abs(each).sum(axis=1).max()) * marks for each in (self._design, self._by_row))
         self._pull = np.concatenate(pull)[:, np.newaxis]
@@ -369,9 +369,9 @@ class Fit:
             self._stiffness[first:last] += between * np.add.outer(*neighbours).reshape(-1, 1)
 
     def minimum(self, tolerance: float, near: Floats | None = None) -> Floats:
-        """Return the rows at which no derivative is beyond `tolerance` times the weight of all frames.
+        """Return the rows at which no derivative exceeds `tolerance` times the total weight of the frames.
 
-        near  what the first of the rows are near to
+        near  starting values for the first of the rows
         """
         rows = np.zeros((len(self._pull), self._member.shape[1]))
         if near is not None:
@@ -384,11 +384,11 @@ class Fit:
                 return point.rows
             point = self._along(point, self._direction(point, max(_UNSOLVED * steep, 0.5 * wanted)))
         raise BoostingError(
-            f"no minimum was found in {_MOST_STEPS} steps: the penalty is too small for weights as unlike as these"
+            f"no minimum was found in {_MOST_STEPS} steps: the penalty is too small for such unequal weights"
         )
 
     def _at(self, rows: Floats) -> _Point:
-        # A point is one of the grid itself, so that its loss is that of its rows to the last digits.
+        # Put the point on the grid, so that its loss is that of its rows to the last digits.
         rows = on_one_grid(rows, self._across)
         scores = self._design @ rows
         if self._known is not None:
@@ -399,7 +399,7 @@ class Fit:
         return _Point(rows, probability, mean * self._total + 0.5 * dot(rows, held), gradient)
 
     def _held(self, rows: Floats) -> Floats:
-        """Return what the penalties add to the gradient, (r, K)."""
+        """Return the gradient of the penalties, (r, K)."""
         held, stepped = self._pull * rows, self._joint * (rows[1:] - rows[:-1])
         held[1:] += stepped
         held[:-1] -= stepped
@@ -413,19 +413,19 @@ class Fit:
         return held
 
     def residuals(self, rows: Floats) -> tuple[Floats, Floats]:
-        """Return by how much the probabilities at these rows are too high, (n, K), and their spread."""
+        """Return the excess of the probabilities at these rows over the labels, (n, K), and their variance."""
         p = self._at(rows).probability
         return p - self._member, p * (1.0 - p)
 
     def _over_frames(self, values: Floats) -> Floats:
-        """Return the sums (r, K) of `values` (n, K), which are lost, times the weights, over the frames of each row."""
+        """Return the weighted sums (r, K) of `values` (n, K), which are overwritten, over the frames of each row."""
         if self._weights is not None:
             values *= self._weights[:, np.newaxis]
         summed: Floats = self._by_row @ on_one_grid(values, self._down)
         return summed
 
     def _bent(self, rows: Floats, probability: Floats) -> Floats:
-        """Return the Hessian's product (r, K) with rows (r, K), at these probabilities."""
+        """Return the product (r, K) of the Hessian at these probabilities with rows (r, K)."""
         moved = self._design @ on_one_grid(rows, self._across)
         moved *= probability
         moved = on_one_grid(moved, moved.shape[1])
@@ -433,7 +433,7 @@ class Fit:
         return self._over_frames(moved) + self._held(rows)
 
     def _direction(self, point: _Point, unsolved: float) -> Floats:
-        """Return V with H V = -gradient but for `unsolved`, by conjugate gradients, preconditioned by H's diagonal."""
+        """Return V with H V = -gradient up to `unsolved`, by conjugate gradients preconditioned with H's diagonal."""
         p = point.probability
         spread = p * (1.0 - p) if self._weights is None else p * (1.0 - p) * self._weights[:, np.newaxis]
         diagonal = self._squares @ on_one_grid(spread, self._down * _MARKS) + self._stiffness
@@ -453,7 +453,7 @@ class Fit:
         return found
 
     def _along(self, point: _Point, direction: Floats) -> _Point:
-        """Return a point along the direction that is lower by enough: the whole step, or a half, a quarter of it ..."""
+        """Return a point along the direction with sufficient decrease: the whole step, a half, a quarter ..."""
         slope, length = dot(direction, point.gradient), 1.0
         noise = _ROUNDING * direction.size * point.loss
         for _ in range(_MOST_HALVINGS):
@@ -465,8 +465,8 @@ class Fit:
 
 
 def sparse(values: Floats, frames: NDArray[np.intp], rows: NDArray[np.intp], shape: tuple[int, int]) -> "csr_array":
-    """Return a matrix of these values, at these frames and rows."""
-    # Help of commands lists the trainers, and none of it takes scipy's half a second.
+    """Return a sparse matrix with these values at these frames and rows."""
+    # Imported late: the help of commands lists the trainers and should not load scipy, which takes half a second.
     from scipy.sparse import csr_array
 
     return csr_array((values, (frames, rows)), shape=shape)

@@ -1,11 +1,11 @@
-"""The additive logit with pairs of joints: what the tables of single inputs leave over, two joints may say together.
+"""The additive logit with pairs of joints, which model interactions that tables of single inputs cannot.
 
-First the logit is fitted without pairs. Of each pair of joints, cut into few bins, it is then known how much its cells
-could take from the loss: the residuals of a class in a cell add up to G, their spread to H, and G^2 / H, summed up, is
-twice what one Newton step there gains, each cell alone (as FAST ranks pairs for interpretml's EBM, Lou, Caruana, Gehrke
-and Hooker 2013, which looks at splits into four). The best pair is taken, then the best of joints that are left: so no
-joint is in two, and what a pair of joints adds is known of no other input. Then all tables are fitted at once, with
-steps between neighbouring cells, in both directions, pulled towards zero: a convex function again.
+The logit is fitted without pairs first. Then, for each pair of joints, cut into few bins, the possible gain of its
+cells is estimated: the residuals of a class in a cell sum to G, their variances to H, and the sum of G^2 / H is twice
+the gain of one Newton step in each cell (as FAST ranks pairs for interpretml's EBM, Lou, Caruana, Gehrke and Hooker
+2013, which uses splits into four). The best pair is taken, then the best of the remaining joints, so no joint is in two
+pairs and the contribution of a pair depends on no other input. Then all tables are fitted at once, with the differences
+between neighbouring cells, in both directions, pulled towards zero: again a convex function.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from ..tables.collapse import Floats, ScoreTables
 from .logit import TOLERANCE, Column, Fit, column_edges, columns_of, count_of, sparse, spread_out, tables_of
 
 PAIRS, PAIR_BINS, PAIR_SMOOTHNESS = 4, 8, 0.5
-MOST_PAIR_BINS = 16  # 256 cells are the rows of one look-up
+MOST_PAIR_BINS = 16  # 256 cells are the rows of one lookup
 
 
 def fit_pairs(
@@ -42,13 +42,13 @@ def fit_pairs(
     counted: int = 0,
     held: NDArray[np.bool_] | None = None,
 ) -> ScoreTables:
-    """Fit switches (n, s), codes (n, j) and labels (n,) in 0..n_classes-1, with at most so many `pairs` of joints.
+    """Fit switches (n, s), codes (n, j) and labels (n,) in 0..n_classes-1, with at most `pairs` pairs of joints.
 
-    `pair_smoothness` pulls neighbouring cells of a pair towards each other, whose joints have at most `pair_bins` bins
-    there; all else is as in `fit_logit`. Raises BoostingError.
+    `pair_smoothness` pulls neighbouring cells of a pair towards each other; joints have at most `pair_bins` bins in a
+    pair. The other parameters are those of `fit_logit`. Raises BoostingError.
     """
     if not 2 <= pair_bins <= MOST_PAIR_BINS:
-        raise BoostingError(f"pair_bins={pair_bins} must be 2 to {MOST_PAIR_BINS}: a pair is one look-up of bytes")
+        raise BoostingError(f"pair_bins={pair_bins} must be 2 to {MOST_PAIR_BINS}: a pair is one lookup of bytes")
     X, s = np.hstack([switches, codes]), switches.shape[1]
     if not (0 < penalty < np.inf and 0 <= smoothness < np.inf and 0 <= pair_smoothness < np.inf):
         raise BoostingError(f"penalty={penalty} must be above 0, and smoothness at least 0, all finite")
@@ -89,7 +89,7 @@ def _cells(edges: Sequence[Floats], codes: NDArray[np.uint16], pair: tuple[int, 
 def _ranked(
     edges: Sequence[Floats], codes: NDArray[np.uint16], residuals: tuple[Floats, Floats], most: int
 ) -> list[tuple[int, int]]:
-    """Return the pairs of joints that gain most, at most so many, no joint twice; of equal ones the first."""
+    """Return the pairs of joints with the largest gain, at most `most`, no joint twice; ties go to the first."""
     n, gains = len(codes), []
     over, spread = (on_one_grid(each, n) for each in residuals)
     bins = {joint: _bins(edges, codes, joint) for joint in range(codes.shape[1]) if len(edges[joint])}

@@ -1,4 +1,4 @@
-"""`compile_build`: recordings in, a build folder out."""
+"""`compile_build`: turn recordings into a build folder."""
 
 import hashlib
 import sys
@@ -55,12 +55,12 @@ from .ensemble import ensemble_to_bytes
 from .training import (
     Tested,
     Trained,
-    answered,
     built_tables,
     cross_validated,
     cuts_of,
     detection_of,
     groups_for,
+    predicted_classes,
     rates_of,
     rejected_by,
     samples_of,
@@ -70,17 +70,17 @@ from .training import (
 )
 from .verify_firmware import made_firmware
 
-# A build that was compiled for no harness has no scan map, one that is too large for any microcontroller no firmware,
-# one without a report no spec.
+# Without a harness a build has no scan map; a build too large for every microcontroller has no firmware; one without a
+# report has no spec.
 MEMBERS = frozenset({MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME, HAND_NAME, REPORT_NAME, TRY_NAME})
 _FOLDERS = {FIRMWARE_NAME: frozenset(LIBRARY_FILES), SPEC_FOLDER: NAMES}
 
 
 def check_target(folder: Path) -> Path:
-    """Return `folder` resolved, if a build may be put there: a new or empty folder, or one that holds only a build.
+    """Return `folder` resolved, if a build may be written there: a new or empty folder, or one that holds only a build.
 
-    Deletes the leftovers of killed publications next to it, and next to the spec in it. Raises CompileError where no
-    build may be put: files that thenar has not made are never deleted.
+    Deletes the leftovers of interrupted publications next to the folder, and next to its spec. Raises CompileError
+    where no build may be written: files that thenar did not make are never deleted.
     """
     spec = folder.resolve() / SPEC_FOLDER
     if spec.parent.is_dir():
@@ -89,16 +89,16 @@ def check_target(folder: Path) -> Path:
 
 
 def publish(files: Mapping[str, bytes], target: Path) -> None:
-    """Write `files`, path below the folder -> content, as `target`, in place of what `check_target` allows there.
+    """Write `files` (path below the folder -> content) as `target`, replacing what `check_target` allows there.
 
-    Killed, it leaves the old build or the new one, whole. Raises CompileError as `check_target` does.
+    If interrupted, either the old build or the new one is left, complete. Raises CompileError as `check_target` does.
     """
-    # Again, because training takes its time and the folder is the user's.
+    # Check again: training takes a while, and the folder is the user's.
     publish_folder(files, check_target(target), _refuse_foreign, CompileError)
 
 
 def _refuse_foreign(folder: Path) -> tuple[str, ...]:
-    """Return nothing: in a build nothing is the user's. Raises CompileError where something is."""
+    """Return nothing: no file in a build belongs to the user. Raises CompileError if one is found."""
     if any(folder.iterdir()) and not (folder / MANIFEST_NAME).exists():
         raise CompileError(f"{folder} is not empty and not a build: name another folder, or empty this one")
     places = {folder / name: names for name, names in _FOLDERS.items()}
@@ -107,7 +107,7 @@ def _refuse_foreign(folder: Path) -> tuple[str, ...]:
     foreign += [path for place, names in inner.items() for path in _foreign(place, names)]
     if foreign:
         name = foreign[0].relative_to(folder)
-        raise CompileError(f"{folder} holds {name}, which is not of a build: move it, or name another folder")
+        raise CompileError(f"{folder} holds {name}, which is not part of a build: move it, or name another folder")
     return ()
 
 
@@ -118,7 +118,7 @@ def _foreign(folder: Path, members: frozenset[str]) -> list[Path]:
 
 _MOST_REFUSED = 0.5
 
-# A wiring, or what makes one for the names of the kept switches.
+# A wiring, or a function that returns one for the names of the kept switches.
 Wired = Harness | Callable[[Sequence[str]], Harness]
 
 
@@ -135,7 +135,7 @@ def compile_build(
     progress: Progress | None = None,
     **changes: Any,
 ) -> BuildReport:
-    """Choose placement and fit, train, collapse, quantise, prove, and write the build `folder`, whole or not at all.
+    """Choose placement and fit, train, collapse, quantise, prove, and write `folder`, either completely or not at all.
 
     The same recordings, options and harness give the same bytes.
 
@@ -148,24 +148,26 @@ def compile_build(
     options : Options, optional
         How to choose, train and quantise.
     harness : Harness or callable, optional
-        A wiring, or what makes one for the names of the kept switches: the build says how to read its switches there.
+        A wiring, or a function that returns one for the names of the kept switches. It makes the build state how to
+        read its switches.
     ports : PortCosts, optional
-        What reading each switch costs, for methods that ask; None: on a glove of as few MCP23017 as will do.
+        The cost of reading each switch, for methods that use it. None: a glove with as few MCP23017 as possible.
     hand : HandShape, optional
-        Where the switches lie, for `hand.json` and `apart_mm`; None: as the documents' hand has it.
+        Switch positions, for `hand.json` and `apart_mm`. None: the hand of the documents.
     documents : Documents, optional
-        A report and the spec of the glove, to go into the folder.
+        A report and the spec of the glove, to write into the folder.
     jobs : int
-        Worker processes for the folds; -1: all cores. The build is the same for any number of them.
+        Worker processes for the folds; -1: all cores. The build does not depend on their number.
     progress : callable, optional
-        Called with (done, total) as work is done.
+        Called with (done, total) as the work proceeds.
     **changes
-        Single options, such as `prune=13` or `rounds=50`, instead of those in `options`, and settings of the trainer.
+        Single options, such as `prune=13` or `rounds=50`, which override those in `options`, and settings of the
+        trainer.
 
     Returns
     -------
     BuildReport
-        Where the build is, and what is known of it.
+        Where the build is, and its properties.
 
     Raises
     ------
@@ -176,7 +178,7 @@ def compile_build(
 
     Notes
     -----
-    A placement, boosting or a trainer may raise an error of its own, a ThenarError, over its options.
+    A placement method or a trainer may raise another ThenarError about its options.
 
     Examples
     --------
@@ -206,26 +208,26 @@ def compile_build(
 
 
 def _sound(options: Options) -> Options:
-    """Return the options as they are written, whoever spells them. Raises CompileError for what makes no sense."""
+    """Return the options in canonical form, however they were given. Raises CompileError for invalid ones."""
     if options.table_bits not in get_args(TableBits):
-        raise CompileError(f"tables of {options.table_bits} bits: firmware has entries of 8 or 16")
+        raise CompileError(f"table_bits={options.table_bits}: firmware tables have entries of 8 or 16 bits")
     if not 4 <= options.width <= 16:
-        raise CompileError(f"sums of {options.width} bits: tables have 4 to 16")
+        raise CompileError(f"width={options.width}: the sums of tables have 4 to 16 bits")
     if not 0 <= options.refuse < _MOST_REFUSED:
-        raise CompileError(f"{options.refuse} of all grasps may be refused: give a share from 0 up to {_MOST_REFUSED}")
+        raise CompileError(f"refuse={options.refuse}: give a share of grasps of at least 0 and below {_MOST_REFUSED}")
     METHODS.named(options.placement).check_given(options.keep, options.prune)
     only, *others = Training.candidates(options)
     trainer, given = options.trainer, {name: getattr(options, name) for name in SHARED} | options.settings
     if not others:
-        # Nothing is chosen: the options say all. LogitBoost is what those with rounds mean.
+        # Nothing is left to choose. Options with rounds mean LogitBoost.
         trainer, given = AUTO if only.trainer == PAPERS_TRAINER else only.trainer, dict(only.settings)
     values = {name: float(value) if isinstance(value, int) else value for name, value in given.items()}
-    # Of a few names the first is what older versions meant, and is not written.
+    # The first of several names is what older versions used, and is not written.
     usual = {each.name: each.default for each in TRAINERS[only.trainer].settings if each.names}
     own: dict[str, Any] = {n: value for n, value in values.items() if value is not None and value != usual.get(n)}
     shared = {name: own.pop(name, None) for name in SHARED}
     shared |= {name: int(shared[name]) for name in ("rounds", "max_bins") if shared[name] is not None}
-    # A value that is equal to a default is left out if it is the very same object.
+    # msgspec omits a value that equals its default only if it is the same object.
     names = {"placement": sys.intern(options.placement), "trainer": sys.intern(trainer)}
     usually = Options().refuse
     refuse = usually if options.refuse == usually else float(options.refuse)
@@ -233,7 +235,7 @@ def _sound(options: Options) -> Options:
 
 
 class _Steps:
-    """Work done, counted in the steps of a training: one training on all rows, one for each fold."""
+    """Count the work done in training steps: one training on all rows, and one for each fold."""
 
     def __init__(self, report: Progress | None, folds: int) -> None:
         self._report, self._folds, self._steps = report, folds, 1
@@ -248,8 +250,8 @@ class _Steps:
 
 
 class Making:
-    """A build in the making: integers of what was trained on `samples`, held against it, and how to read its
-    switches.
+    """A build in progress: integer tables of the model trained on `samples`, the comparison between the two, and how to
+    read the switches.
     """
 
     def __init__(
@@ -287,7 +289,7 @@ class Making:
         jobs: int,
         progress: Progress | None,
     ) -> BuildReport:
-        """Write the build as `target`, with the `documents` that are asked for."""
+        """Write the build as `target`, with the requested `documents`."""
         files = {TABLES_NAME: tables_to_bytes(self.integers), ENSEMBLE_NAME: ensemble_to_bytes(self.trained.model)}
         if self.scan is not None:
             files[SCAN_NAME] = scanmap_to_bytes(self.scan)
@@ -334,15 +336,15 @@ class Making:
         return try_html(manifest, tables, hand_from_bytes(hand, manifest), self.harness, rows)
 
     def _only_answer(self) -> str | None:
-        answers = np.unique(self.comparison.deployed)
-        return self.samples.grasps[answers[0]] if len(answers) == 1 else None
+        predicted = np.unique(self.comparison.deployed)
+        return self.samples.grasps[predicted[0]] if len(predicted) == 1 else None
 
     def _manifest(self, tested: Tested | None, files: Mapping[str, bytes]) -> Manifest:
-        """Return what `build.json` says, not sealed yet; `files` are name -> content of what lies beside it."""
+        """Return the content of `build.json`, not sealed yet; `files` maps the names of its neighbours to content."""
         digests = {name: _sha256(data) for name, data in files.items()}
         grasp_set, options, fitting = self.grasp_set, self.options, self.trained.fitting
         kept = self.trained.read(self.samples)
-        deployed = answered(self.integers, self.rejection, kept.switches, kept.codes)
+        deployed = predicted_classes(self.integers, self.rejection, kept.switches, kept.codes)
         rates = rates_of("training", self.samples, deployed, options.seed)
         detection = detection_of("training", self.samples, deployed, options.seed)
         switches = zip(self.trained.kept, names_of(grasp_set, self.trained.kept), self.trained.gains, strict=True)
@@ -400,10 +402,10 @@ def _sha256(data: bytes) -> str:
 
 
 def closed_shares(samples: Samples) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return, for each switch and grasp type (s, K), the share of a subject's trials in which it is closed, in 255ths:
-    of the subject with the least, rounded down, and of the one with the most, rounded up.
+    """Return the extreme shares of trials in which each switch is closed, by grasp type, in 255ths: two arrays (s, K).
 
-    A trial counts as closed where most of its frames are. c of n trials are a share of (c + 1/2) / (n + 1).
+    The first array holds the smallest share of any subject, rounded down; the second the largest, rounded up. A trial
+    counts as closed where most of its frames are. c of n trials are a share of (c + 1/2) / (n + 1).
     """
     shape = samples.n_switches, samples.n_classes
     least, most = np.full(shape, 255, np.uint8), np.zeros(shape, np.uint8)

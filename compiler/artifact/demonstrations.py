@@ -22,15 +22,16 @@ Codes = tuple[NDArray[np.int64], NDArray[np.uint16]]
 
 
 def demonstrations(folder: Path, recordings: Sequence[Path]) -> Iterator[Demonstration]:
-    """Yield each recording (.mcap) of what the build reads, and each stream of each set of whole movements (.grasps).
+    """Yield a demonstration for each recording (.mcap) of the build's inputs and for each stream of whole movements.
 
-    Raises SegmentingError where one shows no grasp, and what `segment` raises.
+    Whole movements come from sets (.grasps). Raises SegmentingError where a demonstration shows no grasp, and whatever
+    `segment` raises.
     """
     build = Build.load(folder)
     for path in recordings:
         timelines = segment(folder, path, Policy().lag_us)
         if path.suffix.lower() == MCAP:
-            # Where too little could be read in between, a run goes on after it.
+            # A gap in the readings splits a run into several timelines.
             yield _shown(build, path.name, timelines, [_codes_of_run(build, path)] * len(timelines))
             continue
         grasp_set = GraspSet.load(path)
@@ -62,7 +63,7 @@ def _shown(build: Build, name: str, timelines: Sequence[Timeline], read: Sequenc
 
 
 def _values(build: Build, codes: NDArray[np.uint16]) -> tuple[float, ...]:
-    """Return the median of each joint (n, j), in its unit; nothing where there are no rows."""
+    """Return the median of each joint (n, j), in its unit; an empty tuple if there are no rows."""
     return (
         tuple(
             joint.value_a + (code - joint.code_a) * (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a)

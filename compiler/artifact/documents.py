@@ -1,4 +1,4 @@
-"""What is known of a complete build, and the documents that go into its folder: its report, the spec of its glove."""
+"""The properties of a complete build, and the documents in its folder: its report and the spec of its glove."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -27,38 +27,38 @@ if TYPE_CHECKING:
     from ..segmenting.transitions import Transitions
 
 REPORT_NAME, TRY_NAME, SPEC_FOLDER = "report.html", "try.html", "spec"
-_TRAININGS = 40  # about so many for the paper's tables
+_TRAININGS = 40  # roughly, for the paper's tables
 
 Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BuildReport:
-    """A build, and what is known of it.
+    """A build and its properties.
 
     Attributes
     ----------
     folder : Path
-        Where it is.
+        Its folder.
     manifest : Manifest
         The content of `build.json`.
     tables : IntegerTables
-        What runs; `tables_bytes` is the size of `tables.bin`.
+        The deployed tables; `tables_bytes` is the size of `tables.bin`.
     only_answer : str or None
-        The one grasp type that it gives all rows, if it does: then the inputs tell nothing that a sum over them can
-        tell.
+        The grasp type predicted for every row, if there is only one: then the inputs carry no information that a sum
+        over them can use.
     firmware : str
-        A sentence: what its firmware is laid out for, or why there is none.
+        A sentence: what the firmware is laid out for, or why there is none.
     scan, harness : ScanMap, Harness or None
-        How to read the switches, and the wiring that this reads; None where it was compiled for none.
+        How to read the switches, and the wiring to read them from; None if it was compiled without a harness.
     grasp_set, trained, comparison
-        What was trained on, what came of it, and its rows through the model, its tables and the integers.
+        The training set, the trained model, and the training rows through the model, its tables and the integers.
     faults : FaultCounts
-        What each fault of an input leaves of the rows trained on.
+        The accuracy that remains on the training rows under each input fault.
     has_page : bool
-        Whether it has `try.html`: it has none where tables and hand are too large for a page.
+        Whether it has `try.html`, which is left out where tables and hand are too large for a page.
     confusion : ndarray of int, shape (K, K), or None
-        How often rows of each grasp type were answered by each in the folds; None without folds.
+        How often the folds predicted each grasp type (columns) for rows of each type (rows); None without folds.
     """
 
     folder: Path
@@ -79,16 +79,16 @@ class BuildReport:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Documents:
-    """`report.html` and, where switches are kept, `spec/`: to go into a build's folder.
+    """`report.html` and, where switches are kept, `spec/`, to be written into a build's folder.
 
     Parameters
     ----------
     hand : HandShape, optional
-        The glove that was recorded, laid flat: pictures show the switches on it, if it has them all.
+        The recorded glove, laid flat: pictures show the switches on it, if it has them all.
     hand_length : float, optional
-        Of whom the reduced glove is for, mm; None: as long as `hand`.
+        The wearer's hand length for the reduced glove, mm; None: as long as `hand`.
     frontier, point : Frontier and int, optional
-        The frontier that a point of which is built, and the point's number.
+        The frontier from which a point is built, and the point's number.
     """
 
     hand: HandShape | None = None
@@ -97,7 +97,7 @@ class Documents:
     point: int | None = None
 
     def files(self, made: BuildReport, jobs: int = -1, progress: Progress | None = None) -> Mapping[str, bytes]:
-        """Return path in the build's folder -> content; `jobs` processes work on the paper's tables."""
+        """Return path in the build's folder -> content; `jobs` processes compute the paper's tables."""
         from ..glove.files import spec_files
 
         files = {REPORT_NAME: self._report(made, jobs, progress)}
@@ -140,7 +140,7 @@ class Documents:
 
 
 def _transitions(grasp_set: GraspSet) -> "Transitions | None":
-    """Return which type follows which, where the rows are whole movements."""
+    """Return which type follows which, where the rows are whole movements, else None."""
     from ..segmenting.streams import SegmentingError
     from ..segmenting.transitions import Transitions
 
@@ -151,9 +151,9 @@ def _transitions(grasp_set: GraspSet) -> "Transitions | None":
 
 
 def _study(made: BuildReport, jobs: int, progress: Progress | None) -> "tuple[Study | None, str]":
-    """Return the paper's tables, nested and once, of the build's own folds, trainer and seed; or why there are none.
+    """Return the paper's tables, nested, once, with the build's folds, trainer and seed; or the reason why not.
 
-    Last of all: by then, nothing is wrong with the build.
+    They are computed last, when nothing else can fail any more.
     """
     from ..evaluation.study import Options, evaluate
 
@@ -177,4 +177,4 @@ def _study(made: BuildReport, jobs: int, progress: Progress | None) -> "tuple[St
         work = _TRAININGS * len(made.grasp_set) * (options.rounds or USUAL_ROUNDS)
         return evaluate(made.grasp_set, options, little(work, jobs), progress), ""
     except EvaluationError as reason:
-        return None, f"These recordings have none: {reason}."
+        return None, f"These recordings do not allow the paper's tables: {reason}."

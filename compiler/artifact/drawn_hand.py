@@ -1,4 +1,4 @@
-"""The drawing of a build's hand: `hand.json` from where the glove's switches lie."""
+"""The drawing of a build's hand: `hand.json`, computed from the positions of the glove's switches."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from thenar.runtime.manifest import Manifest
 
 from ..hand import Floats, HandShape
 
-_NEAREST_MM = 0.5  # points of a line nearer to the last one drawn are left out
+_NEAREST_MM = 0.5  # points closer than this to the last one drawn are omitted
 
 
 def drawn_hand(
@@ -20,10 +20,10 @@ def drawn_hand(
     taxel_names: Sequence[str],
     codes: NDArray[np.uint16],
 ) -> HandDrawing:
-    """Return the drawing of a build on `hand`: with all switches and taxels of the recordings, the kept ones marked.
+    """Return the drawing of a build on `hand`, with all recorded switches and taxels and the kept ones marked.
 
-    `codes` (n, j) are those of the build's joints in the rows trained on. Without a hand that knows where the switches
-    lie, those that are kept stand in a grid.
+    `codes` (n, j) are the codes of the build's joints in the training rows. Without a hand that has positions for the
+    switches, the kept ones are drawn in a grid.
     """
     ranges = None if not len(codes) else list(zip(codes.min(axis=0).tolist(), codes.max(axis=0).tolist(), strict=True))
     if not manifest.switches or hand is None or not hand.knows([*switch_names, *taxel_names]):
@@ -57,5 +57,5 @@ def _thinned(points: Floats) -> Line:
 
 
 def _rounded(points: Floats) -> list[tuple[float, float]]:
-    # Adding 0 makes no minus of a rounded zero.
+    # Adding 0 turns a rounded -0 into 0.
     return [(x, y) for x, y in (np.round(points, 1) + 0.0).tolist()]

@@ -1,12 +1,15 @@
-"""`ensemble.bin`: the model that a build was collapsed from, kept so that the build can be verified.
+"""`ensemble.bin`: the model that a build was collapsed from, kept for verification.
 
-A sealed npz (recordings/arrays.py). Format 1, of LogitBoost: columns (M, K) int32, thresholds (M, K) float64 and values
-(M, K, 3) float64, with a JSON header {"n_inputs", "shrinkage"}. Format 2, of every other trainer: bias (K,),
-switch_rows (s, K), bins (j,) int64, thresholds (sum of bins - 1,) uint16 and joint_rows (sum of bins, K), else float64,
-with the header {}. Format 3, of those that have lines, holds in addition lines (n, 3) int64, the joint, the lowest and
-the highest code of each, and line_rows (n, K). Format 4, of those that have pairs of joints, holds in addition to that
-of format 2 pairs (n, 4) int64, both joints and how many thresholds each has, pair_thresholds uint16, pair after pair,
-and pair_rows, (sum of cells, K).
+A sealed npz (recordings/arrays.py) in one of four formats.
+
+Format 1, LogitBoost: columns (M, K) int32, thresholds (M, K) float64 and values (M, K, 3) float64, with a JSON header
+{"n_inputs", "shrinkage"}.
+Format 2, every other trainer: bias (K,), switch_rows (s, K), bins (j,) int64, thresholds (sum of bins - 1,) uint16 and
+joint_rows (sum of bins, K); float64 unless stated; the header is {}.
+Format 3, models with lines: format 2 plus lines (n, 3) int64, the joint and its lowest and highest code, and
+line_rows (n, K).
+Format 4, models with pairs of joints: format 2 plus pairs (n, 4) int64, both joints and the number of thresholds of
+each, pair_thresholds uint16, pair after pair, and pair_rows (sum of cells, K).
 """
 
 from collections.abc import Mapping
@@ -28,7 +31,7 @@ KIND = b"THNRENSM"
 STUMPS, TABLES, LINES, PAIRS = 1, 2, 3, 4  # formats
 MAX_BYTES = 1 << 30
 
-# Some hundred bytes less than these make a gigabyte: a column, a threshold and three values each.
+# This many times a column, a threshold and three values are just below a gigabyte.
 MAX_STUMPS = 29_000_000
 
 _DTYPES = {
@@ -38,7 +41,7 @@ _DTYPES = {
 _DTYPES[LINES] = _DTYPES[TABLES] | {"lines": "<i8", "line_rows": "<f8"}
 _DTYPES[PAIRS] = _DTYPES[TABLES] | {"pairs": "<i8", "pair_thresholds": "<u2", "pair_rows": "<f8"}
 
-# Beyond what boosting gives (boost.LARGEST_Z_MAX), and of thresholds beyond every code.
+# Larger than any value of boosting (boost.LARGEST_Z_MAX); for thresholds, larger than every code.
 _LARGEST_VALUE, _LARGEST_THRESHOLD = 1e6, 1e6
 
 
@@ -80,16 +83,15 @@ def ensemble_to_bytes(model: Model) -> bytes:
 
 
 def ensemble_from_bytes(data: bytes, what: str = "ensemble.bin") -> Model:
-    """Return the model of an `ensemble.bin`, which messages call `what`.
+    """Return the model of an `ensemble.bin`; error messages call the file `what`.
 
-    Raises SealError for a file that is foreign, truncated, altered or newer, BuildError for one that contradicts
-    itself.
+    Raises SealError for a file that is foreign, truncated, altered or newer, and BuildError for an inconsistent one.
     """
     version, payload = unseal(data, KIND, PAIRS, what)
     header_bytes, arrays = unpack(payload, what)
     dtypes = _DTYPES.get(version, {})
     if {name: array.dtype for name, array in arrays.items()} != {n: np.dtype(d) for n, d in dtypes.items()}:
-        raise BuildError(f"{what} is damaged: it holds other arrays than {', '.join(dtypes)}")
+        raise BuildError(f"{what} is damaged: its arrays are not {', '.join(dtypes)}")
     try:
         header = msgspec.json.decode(header_bytes, type=_StumpsHeader if version == STUMPS else _NoHeader)
     except (ValueError, RecursionError) as wrong:
@@ -98,7 +100,7 @@ def ensemble_from_bytes(data: bytes, what: str = "ensemble.bin") -> Model:
 
 
 def model_fault(model: Model, n_switches: int, n_joints: int, n_classes: int) -> str:
-    """Return what is wrong with a model of so many inputs and classes, as it follows "a model that"; "" if nothing."""
+    """Return what is wrong with a model of this many inputs and classes, to follow "a model that"; "" if valid."""
     if isinstance(model, Stumps):
         sizes, wanted = (model.n_inputs, model.n_classes), (n_switches + n_joints, n_classes)
         return (
@@ -107,29 +109,29 @@ def model_fault(model: Model, n_switches: int, n_joints: int, n_classes: int) ->
     shapes = [model.bias.shape, model.switch_rows.shape, *(rows.shape for rows in model.joint_rows)]
     bins = [(len(thresholds) + 1, n_classes) for thresholds in model.thresholds]
     if len(bins) != n_joints or shapes != [(n_classes,), (n_switches, n_classes), *bins]:
-        return f"has tables of other shapes than {n_switches} switches, {n_joints} joints and {n_classes} classes"
+        return f"has tables whose shapes do not fit {n_switches} switches, {n_joints} joints and {n_classes} classes"
     if any(
         thresholds.dtype != np.uint16 or (np.diff(thresholds.astype(int)) < 1).any() for thresholds in model.thresholds
     ):
-        return "has thresholds that are no codes, or do not rise"
+        return "has thresholds that are not codes, or not increasing"
     if fault := _lines_fault(model) or _pairs_fault(model):
         return fault
-    # Written so that what is no number fails as well.
+    # Written so that NaN fails as well.
     more = [line.row for line in model.lines] + [pair.rows for pair in model.pairs]
     numbers = (model.bias, model.switch_rows, *model.joint_rows, *more)
     if not all((np.abs(rows) <= _LARGEST_VALUE).all() for rows in numbers):
-        return "holds numbers beyond a million, or that are none"
+        return "holds numbers beyond a million, or NaN"
     return ""
 
 
 def _lines_fault(model: ScoreTables) -> str:
     joints = [line.joint for line in model.lines]
     if joints != sorted(set(joints)) or any(not 0 <= joint < len(model.joint_rows) for joint in joints):
-        return "has lines of joints that there are not, or not in their order"
+        return "has lines of unknown joints, or not in the order of the joints"
     if any(not 0 <= line.low < line.high <= HIGHEST_CODE for line in model.lines):
-        return "has lines whose ends are no codes, or do not rise"
+        return "has lines whose ends are not codes, or not increasing"
     if any(line.row.shape != model.bias.shape for line in model.lines):
-        return f"has lines of other shapes than {model.n_classes} classes"
+        return f"has lines whose rows do not have {model.n_classes} classes"
     return ""
 
 
@@ -138,30 +140,30 @@ def _pairs_fault(model: ScoreTables) -> str:
     if not joints:
         return ""
     if model.lines:
-        return "has lines and pairs of joints: it may have one of both"
+        return "has both lines and pairs of joints: only one is allowed"
     if any(not 0 <= a < b < len(model.joint_rows) for a, b in (pair.joints for pair in model.pairs)):
-        return "has pairs of joints that there are not"
+        return "has pairs of unknown joints"
     if len(set(joints)) < len(joints) or joints[::2] != sorted(joints[::2]):
-        return "has pairs that share a joint, or not in the order of their joints"
+        return "has pairs that share a joint, or are not in the order of their joints"
     for pair in model.pairs:
         if any(each.dtype != np.uint16 or (np.diff(each.astype(int)) < 1).any() for each in pair.thresholds):
-            return "has pairs whose thresholds are no codes, or do not rise"
+            return "has pairs whose thresholds are not codes, or not increasing"
         if pair.rows.shape != (*(len(each) + 1 for each in pair.thresholds), model.n_classes):
-            return "has pairs whose rows are of other shapes than their thresholds"
+            return "has pairs whose rows do not fit their thresholds"
     return ""
 
 
 def _stumps(header: _StumpsHeader, arrays: Mapping[str, AnyArray], what: str) -> Stumps:
     columns = arrays["columns"].astype(np.int32)
     if columns.ndim != 2 or not columns.size or not 2 <= columns.shape[1] <= MAX_CLASSES:
-        raise BuildError(f"{what} is damaged: it has stumps of shape {columns.shape}, not of rounds and grasp types")
+        raise BuildError(f"{what} is damaged: its stumps have shape {columns.shape}, not (rounds, grasp types)")
     if ((columns < 0) | (columns >= header.n_inputs)).any():
-        raise BuildError(f"{what} is damaged: a stump asks for an input that there is not")
+        raise BuildError(f"{what} is damaged: a stump uses an input that does not exist")
     if arrays["thresholds"].shape != columns.shape or arrays["values"].shape != (*columns.shape, 3):
-        raise BuildError(f"{what} is damaged: its arrays are of different ensembles")
+        raise BuildError(f"{what} is damaged: its arrays belong to different ensembles")
     thresholds, values = arrays["thresholds"].astype(np.float64), arrays["values"].astype(np.float64)
     if not ((np.abs(thresholds) <= _LARGEST_THRESHOLD).all() and (np.abs(values) <= _LARGEST_VALUE).all()):
-        raise BuildError(f"{what} is damaged: it holds numbers beyond a million, or that are none")
+        raise BuildError(f"{what} is damaged: it holds numbers beyond a million, or NaN")
     return Stumps(header.n_inputs, columns, thresholds, values, header.shrinkage)
 
 
@@ -170,9 +172,9 @@ def _tables(arrays: Mapping[str, AnyArray], what: str) -> ScoreTables:
     bins, thresholds = arrays["bins"].astype(np.int64), arrays["thresholds"].astype(np.uint16)
     dimensions = (bias.ndim, switch_rows.ndim, bins.ndim, thresholds.ndim, joint_rows.ndim)
     if dimensions != (1, 2, 1, 1, 2) or not 2 <= len(bias) <= MAX_CLASSES or len(bins) > MAX_JOINTS:
-        raise BuildError(f"{what} is damaged: its arrays are no tables")
+        raise BuildError(f"{what} is damaged: its arrays do not form tables")
     if (bins < 1).any() or sum(bins.tolist()) != len(joint_rows) or len(thresholds) != len(joint_rows) - len(bins):
-        raise BuildError(f"{what} is damaged: its arrays are of different tables")
+        raise BuildError(f"{what} is damaged: its arrays belong to different tables")
     ends = np.cumsum(bins)[:-1]
     steps = np.split(thresholds, ends - np.arange(1, len(bins))) if len(bins) else []
     rows = np.split(joint_rows, ends) if len(bins) else []
@@ -187,7 +189,7 @@ def _lines(arrays: Mapping[str, AnyArray], what: str) -> tuple[Line, ...]:
         return ()
     lines, rows = arrays["lines"].astype(np.int64), arrays["line_rows"].astype(np.float64)
     if lines.ndim != 2 or rows.ndim != 2 or lines.shape != (len(rows), 3) or not len(rows):
-        raise BuildError(f"{what} is damaged: its lines are no table")
+        raise BuildError(f"{what} is damaged: its lines do not form a table")
     return tuple(Line(joint, low, high, row) for (joint, low, high), row in zip(lines.tolist(), rows, strict=True))
 
 
@@ -197,13 +199,13 @@ def _pairs(arrays: Mapping[str, AnyArray], what: str) -> tuple[Pair, ...]:
     pairs, steps = arrays["pairs"].astype(np.int64), arrays["pair_thresholds"].astype(np.uint16)
     rows = arrays["pair_rows"].astype(np.float64)
     if (pairs.ndim, steps.ndim, rows.ndim) != (2, 1, 2) or not pairs.size or pairs.shape[1] != 4:
-        raise BuildError(f"{what} is damaged: its pairs are no table")
+        raise BuildError(f"{what} is damaged: its pairs do not form a table")
     counts = pairs[:, 2:]
     if (counts < 0).any() or counts.max() > HIGHEST_CODE:
-        raise BuildError(f"{what} is damaged: its pairs have thresholds that are no codes")
+        raise BuildError(f"{what} is damaged: its pairs have thresholds that are not codes")
     cells = (counts + 1).prod(axis=1)
     if counts.sum() != len(steps) or cells.sum() != len(rows):
-        raise BuildError(f"{what} is damaged: its pairs are of different tables")
+        raise BuildError(f"{what} is damaged: its pairs belong to different tables")
     own = iter(np.split(steps, np.cumsum(counts.ravel())[:-1]))
     blocks = np.split(rows, np.cumsum(cells)[:-1])
     found = (

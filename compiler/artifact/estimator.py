@@ -1,4 +1,4 @@
-"""From scikit-learn and back to C: a fitted estimator becomes a build, a build becomes firmware."""
+"""Turn a fitted scikit-learn estimator into a build, and a build into C."""
 
 from dataclasses import replace
 from functools import partial
@@ -39,12 +39,12 @@ from .documents import BuildReport, Documents, Progress
 from .ensemble import model_fault
 from .training import Scores, Trained, cross_validated, cuts_of, integers_of
 
-# The score of a class that a fold's training rows do not have.
+# The score of a class that is absent from a fold's training rows.
 _UNSEEN = -1e6
 
 
 class Build(LoadedBuild):
-    """A build as `thenar.runtime.Build` loads it, that can be written as C besides.
+    """A build, loaded as by `thenar.runtime.Build`, that can also be exported as C.
 
     Examples
     --------
@@ -67,31 +67,31 @@ class Build(LoadedBuild):
         flash: int | None = None,
         overwrite: bool = False,
     ) -> tuple[Path, ...]:
-        """Write C99 that recognises as this build does, bit for bit, into `folder`, and return the files.
+        """Write C99 that predicts exactly as this build does into `folder`, and return the files.
 
         Parameters
         ----------
         folder : path
             The folder to write.
         target : str
-            What `thenar firmware --target` calls it: one of `TARGETS`.
+            The name of `thenar firmware --target`: one of `TARGETS`.
         mode : {"classify", "scan", "glove"}
-            The classifier alone, a board that scans, or a glove that recognises by itself.
+            Classifier only, a board that scans, or a glove that predicts by itself.
         board : Board, optional
             How the microcontroller is wired, for the modes "scan" and "glove".
         name : str
-            The beginning of every C name.
+            The prefix of every C name.
         flash : int, optional
-            How many bytes of flash the classifier may take; None: half of the part's.
+            Bytes of flash that the classifier may use; None: half of the part's flash.
         overwrite : bool
-            Whether files that are there may be replaced.
+            Whether existing files may be replaced.
 
         Raises
         ------
         MemberError
             If there is no such target.
         FirmwareError
-            If the target cannot hold the build, or these do not go together.
+            If the build does not fit the target, or the arguments contradict each other.
         """
         files = Firmware(self.tables, self.manifest, target, mode, name, board, flash, self.scan).files()
         write_folder(files, Path(folder), overwrite=overwrite)
@@ -113,20 +113,20 @@ def compile(  # noqa: A001
     jobs: int = -1,
     progress: Progress | None = None,
 ) -> BuildReport:
-    """Write a fitted estimator as a build: `folder`, whole or not at all.
+    """Write a fitted estimator as a build in `folder`, either completely or not at all.
 
     Parameters
     ----------
     estimator : LogitBoostClassifier, AdditiveLogitClassifier or Pipeline
         Fitted on X, y = `Samples.of(grasp_set).inputs`, `grasp_set.grasps`. The last step of a pipeline is the
-        classifier; those before it select columns. Any classifier will do that has `classes_` and its model as
-        `stumps_` (Stumps) or `tables_` (ColumnTables; or ScoreTables, of the switches first).
+        classifier; the steps before it select columns. Any classifier with `classes_` and its model as `stumps_`
+        (Stumps) or `tables_` (ColumnTables; or ScoreTables, switches first) is accepted.
     grasp_set : GraspSet
-        The recordings: their names and calibrations go into the build, their rows prove its integers.
+        The recordings: the build takes names and calibrations from them, and their rows prove its integers.
     folder : path
         The folder to write: new, empty, or a build, which is replaced.
     folds, seed, by
-        As in Options, of clones of the estimator.
+        As in Options; folds fit clones of the estimator.
     table_bits, width : int
         As in Options.
     harness, documents, jobs
@@ -137,12 +137,12 @@ def compile(  # noqa: A001
     Returns
     -------
     BuildReport
-        Where the build is, and what is known of it.
+        Where the build is, and its properties.
 
     Raises
     ------
     CompileError
-        If the estimator was fitted on other columns or labels, changes them, or has no model that is a sum over them.
+        If the estimator was fitted on other columns or labels, changes them, or its model is not a sum over them.
 
     Examples
     --------
@@ -158,8 +158,8 @@ def compile(  # noqa: A001
     target = check_target(Path(folder))
     if grasp_set.taxel_columns:
         raise CompileError(
-            "the recordings have taxels, whose thresholds compile_build learns: import them with fixed thresholds for "
-            "an estimator"
+            "the recordings have taxels, whose thresholds only compile_build learns: import them with fixed thresholds "
+            "to use an estimator"
         )
     samples, classifier = Samples.of(grasp_set), _classifier(estimator)
     _columns(estimator, samples.inputs)
@@ -189,7 +189,7 @@ def _classifier(estimator: Any) -> Any:
 
 
 def _trained(estimator: Any, samples: Samples) -> Trained:
-    """Return what an estimator has learnt from these samples, and the switches and joints that it looks at."""
+    """Return the model that an estimator learned from these samples, and the switches and joints that it uses."""
     columns = _columns(estimator, samples.inputs)
     switches = tuple(column for column in columns if column < samples.n_switches)
     joints = tuple(column - samples.n_switches for column in columns if column >= samples.n_switches)
@@ -201,7 +201,7 @@ def _trained(estimator: Any, samples: Samples) -> Trained:
 
 
 def _columns(estimator: Any, X: NDArray[np.uint16]) -> Columns:
-    """Return the columns of X that the classifier gets."""
+    """Return the columns of X that reach the classifier."""
     fitted = getattr(estimator, "n_features_in_", None)
     if fitted != X.shape[1]:
         raise CompileError(
@@ -218,19 +218,21 @@ def _columns(estimator: Any, X: NDArray[np.uint16]) -> Columns:
     except (AttributeError, ValueError) as reason:
         raise CompileError(f"the steps before the classifier must select columns: {reason}") from None
     if not same:
-        raise CompileError("the steps before the classifier must select columns, and leave their values as they are")
+        raise CompileError("the steps before the classifier must select columns without changing their values")
     return columns
 
 
 def _labelled(samples: Samples, grasp_set: GraspSet, classes: NDArray[Any]) -> Samples:
-    """Return the samples with the classes of the estimator: names of grasp types, or their numbers in the taxonomy."""
+    """Return the samples with the estimator's classes: names of grasp types, or their numbers in the taxonomy."""
     types, numbered = grasp_set.taxonomy.names, classes.dtype.kind in "iu"
     names = [types[number] if numbered and 0 <= number < len(types) else str(number) for number in classes.tolist()]
     if samples.has_none and NONE in names[:-1]:
         raise CompileError(f"the estimator sorts {NONE!r} before {names[-1]!r}: fit it on grasp_set.labels instead")
     lacking = sorted(set(samples.grasps) - set(names))
     if lacking:
-        raise CompileError(f"the estimator knows no {lacking[0]!r}: fit it with the names of all grasp types as labels")
+        raise CompileError(
+            f"the estimator does not know {lacking[0]!r}: fit it with the names of all grasp types as labels"
+        )
     labels = np.array([names.index(samples.grasps[label]) for label in samples.labels], dtype=np.intp)
     return replace(samples, labels=labels, grasps=tuple(names))
 
@@ -252,8 +254,8 @@ def _model(classifier: Any, columns: Columns, n_switches: int) -> Model:
 
 
 def _placed_by(estimator: Any, options: Options) -> tuple[Options, tuple[float, ...]]:
-    """Return the options with the method of the one SwitchSelector of a pipeline, if it has one; and what each switch,
-    in the order of the columns, brought to the tree of ID3.
+    """Return the options with the method of the pipeline's SwitchSelector, if it has exactly one, and the gain of each
+    switch in the ID3 tree, in the order of the columns.
     """
     steps = [step for _, step in getattr(estimator, "steps", ())]
     steps += [part for step in steps for part in getattr(step, "named_transformers_", {}).values()]
@@ -285,7 +287,7 @@ def _trained_by(classifier: Any, options: Options) -> Options:
 
 
 def _scores_of(estimator: Any, samples: Samples, options: Options, fold: Fold) -> Scores:
-    """Fit a clone on the fold's training rows alone; return the scores (m, K) that its integers give the test rows."""
+    """Fit a clone on the fold's training rows only; return the scores (m, K) of its integers on the test rows."""
     learnt, classes = samples.rows(fold.train), estimator.classes_
     fitted = clone(estimator).fit(learnt.inputs, classes[learnt.labels])
     trained = _trained(fitted, learnt)

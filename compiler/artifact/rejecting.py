@@ -1,10 +1,10 @@
-"""What a build refuses that was trained without rows of nothing held: thresholds, learnt from its training rows.
+"""Thresholds by which a build rejects unfamiliar frames, when it was trained without rows in which nothing is held.
 
-A held-out frame lies beyond what its candidate's type was trained on by three deviations: its score below the least of
-the type's rows; its closed switches below their least or above their most; and how many of its joints are outside the
-ranges that hold all but TAIL of the type's rows at either end. How far a grasp may lie beyond, the slack of each, is
-learnt from inner folds: no more than the share asked for is refused there. As ranks, deviations are comparable: a frame
-is refused for the rank of its rarest one, and one limit of ranks makes all three slacks.
+Three deviations say how far a frame lies outside the training rows of its candidate type: its score is below the lowest
+score of the type's rows; its number of closed switches is outside their range; and some of its joints are outside the
+ranges that hold all but TAIL of the type's rows at either end. The slack allowed for each deviation is learned from
+inner folds, such that at most the requested share of held-out grasps is rejected. Deviations are comparable as ranks: a
+frame is rejected for the rank of its rarest deviation, so one limit on ranks determines all three slacks.
 """
 
 import numpy as np
@@ -24,27 +24,29 @@ from ..trainers.base import Training
 
 Floats = NDArray[np.float64]
 
-# Of kamakura's open hands that are taken for Add, 2 % were refused with whole ranges, 58 with 1 % less at either end,
-# 43 with 5: the narrower they are, the more joints of a held-out grasp are outside.
+# Of kamakura's open hands that are taken for Add, 2 % were rejected with whole ranges, 58 % with 1 % cut off at either
+# end, 43 % with 5 %: the narrower the ranges, the more joints of a held-out grasp are outside.
 TAIL = 0.01
 
 
 def rejection_of(
     samples: Samples, tables: IntegerTables, training: Training, options: Options, groups: NDArray[np.generic] | None
 ) -> Rejection | None:
-    """Return what a build of these tables refuses; None where none is a class, nothing is to be refused, there are too
-    few trials, or a single group: how far a new one lies beyond it is not known.
+    """Return the rejection rule of a build with these tables.
 
-    samples   the rows that the tables were trained on, of the kept switches and joints
-    training  what made them
-    groups    of each row (n,), what inner folds leave out together
+    Return None if none is already a class, nothing is to be rejected, or there are too few trials or only one group, so
+    that the deviation of a new group cannot be estimated.
+
+    samples   the rows that the tables were trained on, with the kept switches and joints
+    training  how the tables were trained
+    groups    for each row (n,), the group that inner folds leave out together
     """
     if not options.refuse or samples.has_none or NONE in samples.grasps:
         return None
     several = 0 if groups is None else len(np.unique(groups))
     if several == 1:
         return None
-    # Fits may be compared on trials where two groups are left; how far a new group lies beyond shows in groups alone.
+    # Two groups suffice to compare fits on trials; the deviation of a new group needs folds by group.
     folds = leave_groups_out(groups, "group") if groups is not None and several == 2 else None
     deviations = [
         _Limits(samples.rows(fold.train), _tables(samples.rows(fold.train), training, options)).deviations(
@@ -64,13 +66,13 @@ def _tables(samples: Samples, training: Training, options: Options) -> IntegerTa
 
 
 class _Limits:
-    """What rows of each type show: least scores, in units, least and most closed switches, and ranges of codes."""
+    """Limits of each type in the training rows: lowest score (in units), range of closed switches, ranges of codes."""
 
     def __init__(self, samples: Samples, tables: IntegerTables) -> None:
         self._tables, self._k = tables, samples.n_classes
         scores, closed = self._scores(samples), samples.switches.sum(axis=1)
         n_joints = samples.codes.shape[1]
-        # A type without rows keeps limits that nothing is beyond.
+        # A type without rows keeps limits that no frame can exceed.
         self.least = np.full(self._k, -np.inf)
         self.closed = np.tile(np.array([0, samples.n_switches]), (self._k, 1))
         self.ranges = np.tile(np.array([0, HIGHEST_CODE]), (self._k, n_joints, 1))
@@ -87,7 +89,7 @@ class _Limits:
         return scores
 
     def deviations(self, samples: Samples) -> Floats:
-        """Return by how much each row lies beyond the limits of its candidate, (n, 3)."""
+        """Return how far each row lies beyond the limits of its candidate, (n, 3)."""
         scores, closed, codes = self._scores(samples), samples.switches.sum(axis=1), samples.codes
         best = scores.argmax(axis=1)
         low, high = np.moveaxis(self.ranges[best], 2, 0)
@@ -101,7 +103,7 @@ class _Limits:
         least = np.floor(np.maximum(self.least - score, -LIMIT / self._tables.scale) * self._tables.scale)
         ranges = self.ranges.copy()
         if code_bits(self._tables) == 8:
-            # Firmware takes codes above 255 for 255.
+            # Firmware treats codes above 255 as 255.
             ranges[:, :, 0] = np.minimum(ranges[:, :, 0], 255)
             ranges[:, :, 1][ranges[:, :, 1] >= 255] = HIGHEST_CODE
         fewest, most = np.maximum(0, self.closed[:, 0] - int(closed)), self.closed[:, 1] + int(closed)
@@ -115,10 +117,10 @@ class _Limits:
 
 
 def _slacks(deviations: Floats, share: float) -> tuple[float, float, float]:
-    """Return how far each deviation may go, so that no more than `share` of the rows (n, 3) have one beyond."""
+    """Return the limit of each deviation such that at most `share` of the rows (n, 3) exceed one of them."""
     n = len(deviations)
     sorted_ = np.sort(deviations, axis=0)
-    # How many rows deviate by as much or more: few is rare.
+    # The number of rows that deviate by as much or more: a small number is a rare deviation.
     ranks = np.column_stack(
         [n - np.searchsorted(column, own) for column, own in zip(sorted_.T, deviations.T, strict=True)]
     )

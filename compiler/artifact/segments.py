@@ -1,4 +1,4 @@
-"""`segment`: the segments that a build finds in whole movements, or in a recording of a live glove."""
+"""`segment`: find a build's segments in whole movements, or in a recording of a live glove."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -38,14 +38,14 @@ def segment(
     folder : path
         The build.
     recordings : GraspSet or path
-        Whole movements, as a set or its file; or a recording (.mcap) of all that the build reads: of a live run, of
-        this build or another, or of a collection.
+        Whole movements, as a set or its file; or a recording (.mcap) that has all inputs of the build: a live run of
+        this or another build, or a collection.
     lag_us : int, optional
-        Decide live, so long after each moment. None: from the whole stream, which is exact.
+        Decide live, this long after each moment. None: decide from the whole stream, which is exact.
     progress : callable, optional
-        Called with (done, total) as streams are done.
+        Called with (done, total) after each stream.
     warn : callable, optional
-        Takes a sentence on each fault of a recording.
+        Called with a sentence for each fault of a recording.
 
     Returns
     -------
@@ -55,11 +55,11 @@ def segment(
     Raises
     ------
     SegmentingError
-        If the recordings are no whole movements, or hold nothing.
+        If the recordings are not whole movements, or are empty.
     SettingError
-        If the lag makes no sense, or a recording lacks an input of the build.
+        If the lag is out of range, or a recording lacks an input of the build.
     BuildError, SealError, McapError, CompileError
-        If a file is not sound, or the recordings lack inputs of the build.
+        If a file is damaged, or the recordings lack inputs of the build.
 
     Examples
     --------
@@ -68,13 +68,13 @@ def segment(
     >>> [(one.type, one.start_s, one.end_s) for one in timelines[0].segments()]  # doctest: +SKIP
     """
     if lag_us is not None and not 0 <= lag_us <= _LONGEST_LAG_US:
-        raise SettingError(f"a lag of {lag_us} us: it is 0 to {_LONGEST_LAG_US}")
+        raise SettingError(f"lag_us={lag_us}: the lag must be 0 to {_LONGEST_LAG_US} us")
     build = Build.load(folder)
     if not isinstance(recordings, GraspSet) and Path(recordings).suffix.lower() == MCAP:
         return _of_run(build, Path(recordings), lag_us, warn)
     grasp_set = recordings if isinstance(recordings, GraspSet) else GraspSet.load(recordings)
     if not len(grasp_set):
-        raise SegmentingError("the set has no rows: there is nothing to find segments in")
+        raise SegmentingError("the set has no rows to find segments in")
     streams = streams_of(grasp_set, build.manifest.segmenting.tick_us)
     bits, codes = select_inputs(grasp_set, build.manifest)
     types = build.grasps[: build.manifest.segmenting.n_types]
@@ -96,7 +96,7 @@ def segment(
 def _decoded(
     build: Build, scores: NDArray[np.integer], no: NDArray[np.bool_] | None, lag_us: int | None
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Return the state of each tick of scores (T, n_lanes), of which some are refused, and its probability."""
+    """Return the state of each tick of scores (T, n_lanes), some of which are rejected, and its probability."""
     model = build.manifest.segmenting
     if lag_us is None:
         states = decode(model, emissions(scores, model, no))
@@ -106,7 +106,7 @@ def _decoded(
 
 
 def _of_run(build: Build, path: Path, lag_us: int | None, warn: Callable[[str], None]) -> tuple[Timeline, ...]:
-    """Return the timelines of a live run, cut where too little could be read; the tick takes the newest scores."""
+    """Return the timelines of a live run, cut where too little could be read; each tick takes the newest scores."""
     tick_us, types = build.manifest.segmenting.tick_us, build.grasps[: build.manifest.segmenting.n_types]
     parts: list[tuple[int, list[tuple[Sequence[int], bool]]]] = []
     zero_us: int | None = None
@@ -125,7 +125,7 @@ def _of_run(build: Build, path: Path, lag_us: int | None, warn: Callable[[str], 
             due_us += tick_us
         before = scores
     if not parts:
-        raise SegmentingError(f"{path.name} holds no moment in which the build could read enough")
+        raise SegmentingError(f"{path.name} holds no moment with enough readings for the build")
     found = []
     for number, (start_us, rows) in enumerate(parts, 1):
         lanes, no = (np.array(each) for each in zip(*rows, strict=True))

@@ -1,7 +1,7 @@
-"""`evaluate --streams`: how well whole movements of new subjects are cut into grasps, live and afterwards.
+"""`evaluate --streams`: how accurately whole movements of new subjects are cut into grasps, live and offline.
 
-Each subject is left out in turn. Placement, model, tables and costs of segments are learnt from the others; what is
-tried for the costs is tried on inner folds of them. Every row of the result decodes the same scores of the same tables.
+Each subject is left out in turn. Placement, model, tables and segment costs are learned from the others, and candidate
+costs are compared on inner folds of them. Every row of the result decodes the same scores of the same tables.
 """
 
 from collections.abc import Callable, Mapping
@@ -36,7 +36,7 @@ from .training import integers_of, scores_of, segments_for, train
 Labels = NDArray[np.intp]
 _INNER = 4
 _ERROR_RATE = 0.01  # of the sequential test
-# What is compared, in the order of the table; the first is what a live glove does.
+# The methods compared, in the order of the table; the first is the one that a live glove uses.
 METHODS = {
     "decoder, live": f"lag {LAG_TICKS * TICK_US // 1000} ms",
     "decoder, afterwards": "exact",
@@ -51,7 +51,7 @@ FALSE = "false per 100"
 
 
 class Measured(msgspec.Struct, frozen=True):
-    """A mean over subjects and its 95 % interval (Student's t; None of one subject); None: nothing was measured."""
+    """A mean over subjects and its 95 % interval (Student's t; None with one subject); None: nothing was measured."""
 
     mean: float | None
     low: float | None
@@ -60,8 +60,9 @@ class Measured(msgspec.Struct, frozen=True):
 
 
 class MethodRow(msgspec.Struct, frozen=True):
-    """What one method reaches with some inputs; `values` by column: shares in 0..1, times in ms, false ones a hundred
-    movements.
+    """The result of one method with some inputs.
+
+    `values` by column: shares in 0..1, times in ms, false announcements per hundred movements.
     """
 
     inputs: Inputs
@@ -71,7 +72,7 @@ class MethodRow(msgspec.Struct, frozen=True):
 
 
 class StreamStudy(msgspec.Struct, frozen=True):
-    """The result: whose streams, how many movements, and the rows."""
+    """The result: the subjects, the number of movements, and the rows."""
 
     fingerprint: str
     subjects: tuple[str, ...]
@@ -83,16 +84,16 @@ class StreamStudy(msgspec.Struct, frozen=True):
 def study_streams(
     grasp_set: GraspSet, options: Options, jobs: int = -1, progress: Progress | None = None
 ) -> StreamStudy:
-    """Evaluate segments of subjects that were left out.
+    """Evaluate segmentation on subjects that were left out.
 
     Parameters
     ----------
     grasp_set : GraspSet
-        Whole movements of two subjects or more, with rows in which nothing is held.
+        Whole movements of two or more subjects, with rows in which nothing is held.
     options : Options
         How to place and train.
     jobs : int
-        Worker processes; the result is the same for any number.
+        Worker processes; the result does not depend on their number.
     progress : callable, optional
         Called with (done, total) after each subject.
 
@@ -104,7 +105,7 @@ def study_streams(
     Raises
     ------
     SegmentingError
-        If the set holds no whole movements, no rows of nothing held, or a single subject.
+        If the set holds no whole movements, no rows in which nothing is held, or only one subject.
     """
     streams = streams_of(grasp_set)
     if not grasp_set.is_none.any():
@@ -114,7 +115,7 @@ def study_streams(
         )
     subjects = tuple(sorted({stream.subject for stream in streams}))
     if len(subjects) < 2:
-        raise SegmentingError(f"the set holds streams of {subjects[0]} alone: a subject is left out, so it takes two")
+        raise SegmentingError(f"the set holds streams of {subjects[0]} only: leaving a subject out takes two")
     there: dict[Inputs, bool] = {"switches": bool(grasp_set.element_names), "joints": bool(grasp_set.joints)}
     kinds = [kind for kind, some in {"both": all(there.values()), **there}.items() if some]
     tasks = [(kind, subject) for kind in kinds for subject in subjects]
@@ -165,7 +166,7 @@ def _of_subject(
 
 
 def _inner_folds(learning: Samples, own: GraspSet, options: Options) -> list[Fold]:
-    """Return folds that test all rows of streams: each leaves out some of their subjects, or half of the movements of
+    """Return folds that together test all rows of streams: each leaves out some subjects, or half of the movements of
     the only one.
     """
     rows = np.flatnonzero(moving(own))
@@ -180,7 +181,7 @@ def _inner_folds(learning: Samples, own: GraspSet, options: Options) -> list[Fol
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Decoded:
-    """Scores (T, K + 1) of a stream, and what each method makes of them: states, and what is announced when."""
+    """Scores (T, K + 1) of a stream, and each method's result: states, and announcements in time."""
 
     lanes: NDArray[np.int32]
     scorer: Scorer
@@ -213,7 +214,7 @@ class _Decoded:
         return np.array(states, np.intp)
 
     def _hidden_markov(self) -> Labels:
-        """Return the most probable states of a chain with the changes a tick that were counted, and softmax scores."""
+        """Return the most probable states of a chain with the counted changes per tick and softmax scores."""
         ticks = np.array([sum(own) for own in self.counts.durations]) + 1.0
         changes = self.counts.changes + 0.5 * (1 - np.eye(len(ticks)))
         changes = changes * (1 - np.eye(len(ticks)))

@@ -1,4 +1,4 @@
-"""What `compile` trains: a placement, then a model on the kept switches and the joints; and both once more in folds."""
+"""The training of `compile`: choose a placement, fit a model on kept switches and joints, and repeat both in folds."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -37,20 +37,19 @@ from . import CompileError
 from .ensemble import MAX_STUMPS, model_fault
 from .rejecting import rejection_of
 
-Answers = NDArray[np.intp]
+Classes = NDArray[np.intp]
 Groups = NDArray[np.str_] | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trained:
-    """What was chosen and trained.
+    """A trained model and the choices behind it.
 
-    elements  switches, and levels of taxels, that there were to choose from
-    columns   places of the kept ones among them, in the order in which they were chosen
-    gains     what each of these brought (bits): to the tree of ID3, which is None where another method chose, and alone
-              otherwise
+    elements  switches, and levels of taxels, that were available
+    columns   indices of the kept ones among them, in the order in which they were chosen
+    gains     the gain of each (bits): in the ID3 tree, where None means that another method chose; else on its own
     joints    columns of the kept joints
-    fitting   how the fit was chosen; training: what made the model. None where an estimator did
+    fitting   how the fit was chosen; training: how the model was trained. None for an estimator
     """
 
     elements: Elements
@@ -68,38 +67,38 @@ class Trained:
         return tuple(self.elements[column] for column in self.columns)
 
     def read(self, samples: Samples) -> Samples:
-        """Return what a glove of the kept elements and joints reads of these rows."""
+        """Return these samples as a glove with only the kept elements and joints reads them."""
         return bits_of(samples.with_joints(self.joints), self.kept)
 
     @property
     def stopped_after(self) -> int:
-        """After how many rounds a tolerance ended the training; 0 if none did."""
+        """The number of rounds after which a tolerance ended the training; 0 if none did."""
         early = isinstance(self.model, Stumps) and self.model.stopped_early
         return self.rounds if early else 0
 
     @property
     def rounds(self) -> int:
-        """How many rounds of boosting made the model."""
+        """The number of boosting rounds in the model."""
         return self.model.n_rounds if isinstance(self.model, Stumps) else 0
 
     @property
     def zero_gain_nodes(self) -> int:
-        """At how many decisions of the tree no switch gained anything alone."""
+        """The number of tree nodes at which no single switch gained anything."""
         return 0 if self.tree is None else self.tree.n_zero_gain
 
 
 def samples_of(grasp_set: GraspSet, options: Options) -> Samples:
-    """Return what of `grasp_set` the option `inputs` allows. Raises CompileError if that is nothing to learn from."""
+    """Return the samples of `grasp_set` for the option `inputs`. Raises CompileError if nothing can be learned."""
     wanted = options.inputs
     for kind, names in (("switches", grasp_set.element_names), ("joints", grasp_set.joint_names)):
         if wanted == kind and not names:
             raise CompileError(f"the recordings have no {kind}: choose other inputs than {kind!r}")
     if (types := len(np.unique(grasp_set.labels[~grasp_set.is_none]))) < 2:
-        raise CompileError(f"the recordings hold {types} grasp type(s): there is nothing to tell apart")
+        raise CompileError(f"the recordings hold {types} grasp type(s): there is nothing to distinguish")
     samples = Samples.of(grasp_set, wanted)
     found = samples.n_classes
     if options.keep_joints is not None and not samples.codes.shape[1]:
-        raise CompileError("there are no joints to keep some of: leave keep_joints (--keep-joints) out")
+        raise CompileError("the recordings have no joints to choose from: leave keep_joints (--keep-joints) out")
     there = samples.codes.shape[1]
     joints = min(options.keep_joints or there, there)
     check_types(found, CompileError)
@@ -108,7 +107,7 @@ def samples_of(grasp_set: GraspSet, options: Options) -> Samples:
     rounds = max(int(each.settings.get("rounds") or 0) for each in Training.candidates(options))
     if rounds * found > MAX_STUMPS:
         raise CompileError(
-            f"{rounds} rounds of {found} grasp types are {rounds * found} stumps, a build has at most {MAX_STUMPS}: "
+            f"{rounds} rounds of {found} grasp types are {rounds * found} stumps; a build has at most {MAX_STUMPS}: "
             "boost for fewer rounds"
         )
     return samples
@@ -123,20 +122,20 @@ def train(
     jobs: int = 1,
     limits: Limits | None = None,
 ) -> Trained:
-    """Choose elements and fit, and train on them and the joints. Raises CompileError if no input tells grasps apart.
+    """Choose elements and fit, and train on them and the joints. Raises CompileError if no input separates grasp types.
 
-    Elements and joints are chosen to tell grasp types apart: rows of nothing held take part in the fit alone, and no
-    more of them than there are of grasps.
+    Elements and joints are chosen to distinguish grasp types. Rows in which nothing is held are used only for the fit,
+    and no more of them than there are rows of grasps.
 
-    ports   what reading switches and taxels costs, for methods that ask
-    groups  what of each row (n,) is left out where the fit is to recognise new subjects, objects or sessions
+    ports   the cost of reading switches and taxels, for methods that use it
+    groups  for each row (n,), what is left out where the fit is to generalise to new subjects, objects or sessions
     jobs    worker processes that compare fits
-    limits  what the placement must obey
+    limits  constraints on the placement
     """
     held, rows = samples.without_none(), samples.balanced()
     elements = elements_of(held, options.levels)
     held = bits_of(held, elements)
-    # Without switches the tree is a leaf.
+    # Without switches the tree is a single leaf.
     method = options.placement if held.n_switches else PAPERS
     parameter = options.keep or 0 if METHODS.named(method).by_number else options.prune
     own = None if ports is None else ports_of(ports, elements)
@@ -150,31 +149,31 @@ def train(
     check_inputs(len(samples.grasps), len(columns), len(joints), CompileError)
     inputs = kept.inputs
     if not (inputs != inputs[0]).any():
-        raise CompileError("no input differs between rows: there is nothing to tell grasp types apart by")
+        raise CompileError("no input differs between rows: nothing distinguishes the grasp types")
     candidates, of = Training.candidates(options), OF[options.by or "subject"]
     by = None if groups is None else groups[rows]
     fitting = choose_training(kept, candidates, seed=options.seed, groups=by, of=of, jobs=jobs, report=report)
     training = Training.chosen(fitting, masked=options.robust)
     model = training.train(kept, report if len(candidates) == 1 else None)
     if fault := model_fault(model, kept.n_switches, kept.codes.shape[1], kept.n_classes):
-        raise CompileError(f"trainer {fitting.trainer!r} made a model that {fault}: it is at fault")
+        raise CompileError(f"trainer {fitting.trainer!r} returned an invalid model that {fault}: fix the trainer")
     return Trained(elements, columns, chosen.gains, chosen.tree, model, joints, fitting, training)
 
 
 def integers_of(trained: Trained, samples: Samples, options: Options) -> IntegerTables:
-    """Return the integer tables of what was trained on these samples."""
+    """Return the integer tables of a model trained on these samples."""
     kept = trained.read(samples.rows(samples.balanced()))
     tables = collapse(trained.model, kept.n_switches)
     return quantise(tables, kept.switches, kept.codes, options.width, options.table_bits)
 
 
 def built_tables(trained: Trained, samples: Samples, options: Options) -> IntegerTables:
-    """Return the integer tables of what was trained on these samples, with what stands in for lost inputs fitted."""
+    """Return the integer tables of a model trained on these samples, with fitted substitutes for lost inputs."""
     kept = trained.read(samples.rows(samples.balanced()))
     return fit_lost(integers_of(trained, samples, options), kept.switches, kept.codes, kept.labels)
 
 
-USUAL_ROUNDS = 100  # where a fit is chosen, its work is taken to be that of so many
+USUAL_ROUNDS = 100  # assumed amount of work where the fit is still to be chosen
 
 Scores = NDArray[np.float64]
 Test = Callable[[Fold], Scores]
@@ -182,7 +181,7 @@ Test = Callable[[Fold], Scores]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cut:
-    """Folds of all rows; what is new about the rows that they test, and to whom or what each row (n,) belongs then."""
+    """Folds of all rows; what is new about their test rows, and the group of each row (n,) for that."""
 
     of: Of
     folds: tuple[Fold, ...]
@@ -190,7 +189,7 @@ class Cut:
 
 
 def groups_for(grasp_set: GraspSet, options: Options) -> Groups:
-    """Return the subject, object or session of each row (n,), if the headline is of new ones."""
+    """Return the subject, object or session of each row (n,), if the headline rate is for new ones."""
     return groups_of(grasp_set, _by(grasp_set, options))
 
 
@@ -199,9 +198,9 @@ def _by(grasp_set: GraspSet, options: Options) -> By:
 
 
 def cuts_of(grasp_set: GraspSet, options: Options) -> tuple[Cut, ...]:
-    """Return the folds of each rate that is to be measured, those of the headline first; none without folds.
+    """Return the folds for each rate to measure, the headline first; none without folds.
 
-    No fold parts a movement. Raises EvaluationError where the recordings cannot be cut so.
+    No fold splits a movement. Raises EvaluationError where the recordings cannot be divided that way.
     """
     if not options.folds:
         return ()
@@ -221,9 +220,10 @@ def cuts_of(grasp_set: GraspSet, options: Options) -> tuple[Cut, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tested:
-    """What came of the folds: the rates, the headline first; and how often frames of each class (rows) were answered by
-    each (columns) in the folds of the headline, (K, K); and the scores of all rows, (n, K), in the first folds that all
-    learn from rows of nothing held, if the set has any.
+    """The result of the folds.
+
+    The rates, the headline first; the confusion matrix (K, K) of frames in the headline folds, with a row for each true
+    class; the scores of all rows (n, K), from the first folds that all learn from rows of nothing held, if any do.
     """
 
     rates: tuple[Recognised, ...]
@@ -235,17 +235,17 @@ class Tested:
 def scores_of(
     samples: Samples, options: Options, ports: PortCosts | None, groups: Groups, limits: Limits | None, fold: Fold
 ) -> Scores:
-    """Choose and train on the fold's training rows alone; return the scores (m, K), in units, that the integers give
-    its test rows. Where frames are refused, column K is infinite for those that are, and else its negative.
+    """Choose and train on the fold's training rows only; return the scores (m, K), in units, of its test rows.
 
-    Raises CompileError, which names the fold, as `train` does.
+    Scores come from the integer tables. If frames can be rejected, column K is +infinity for rejected ones and
+    -infinity for the others. Raises CompileError, which names the fold, as `train` does.
     """
     learning = samples.rows(fold.train)
     try:
         own = None if groups is None else groups[fold.train]
         trained = train(learning, options, ports=ports, groups=own, limits=limits)
     except CompileError as wrong:
-        raise CompileError(f"in fold {fold.name}: {wrong}, or do without folds (0)") from None
+        raise CompileError(f"in fold {fold.name}: {wrong}, or compile without folds (0)") from None
     tables = integers_of(trained, learning, options)
     rejection = rejected_by(trained, learning, tables, options, own)
     test = trained.read(samples.rows(fold.test))
@@ -259,18 +259,18 @@ def scores_of(
 def rejected_by(
     trained: Trained, samples: Samples, tables: IntegerTables, options: Options, groups: Groups
 ) -> Rejection | None:
-    """Return what a build of these tables refuses, learnt from the rows trained on; None of an estimator's."""
+    """Return the rejection rule learned from the training rows for these tables; None for an estimator."""
     if trained.training is None:
         return None
     return rejection_of(trained.read(samples), tables, trained.training, options, groups)
 
 
-def answered(
+def predicted_classes(
     tables: IntegerTables, rejection: Rejection | None, bits: NDArray[np.bool_], codes: NDArray[np.uint16]
-) -> Answers:
-    """Return the classes (n,) that integers give rows of kept switches (n, s) and codes (n, j); K: refused."""
+) -> Classes:
+    """Return the predicted classes (n,) of rows of kept switches (n, s) and codes (n, j); K: rejected."""
     scores = integer_scores(tables, bits, codes)
-    found: Answers = scores.argmax(axis=1)
+    found: Classes = scores.argmax(axis=1)
     if rejection is not None:
         found[refused(rejection, scores, bits, codes)] = tables.n_classes
     return found
@@ -279,39 +279,40 @@ def answered(
 def cross_validated(
     samples: Samples, cuts: Sequence[Cut], options: Options, test: Test, jobs: int, report: Report
 ) -> Tested | None:
-    """Return what comes of the folds, None if there are none; `test` returns the scores of a fold's test rows.
+    """Return the result of the folds, None without folds; `test` returns the scores of a fold's test rows.
 
-    jobs  worker processes that call `test`; report: called with (done, all) after each fold
+    jobs  worker processes that call `test`; report: called with (done, total) after each fold
     """
     if not cuts:
         return None
     folds = [(place, fold) for place, cut in enumerate(cuts) for fold in cut.folds]
-    answers = np.empty((len(cuts), len(samples.labels)), np.intp)
+    predicted = np.empty((len(cuts), len(samples.labels)), np.intp)
     scores = np.empty((len(samples.labels), samples.n_classes))
     knows = [learns_none(samples, cut) for cut in cuts]
-    # Those that segments are learnt from know what nothing held is like, if any do.
+    # Segments are learned from folds that know rows in which nothing is held, if there are any.
     scored = next((place for place, rows in enumerate(knows) if rows.all()), 0)
     tasks = ((place, fold, test) for place, fold in folds)
     for done, (place, fold, found) in enumerate(
         in_workers(_done, tasks, little(len(folds) * len(samples.labels) * (options.rounds or USUAL_ROUNDS), jobs)), 1
     ):
-        answers[place, fold.test] = found.argmax(axis=1)
+        predicted[place, fold.test] = found.argmax(axis=1)
         if place == scored:
             scores[fold.test] = found[:, : samples.n_classes]
         report(done, len(folds))
-    refuses = not samples.has_none and bool((answers == samples.n_classes).any())
+    refuses = not samples.has_none and bool((predicted == samples.n_classes).any())
     confusion = np.zeros((samples.n_classes + refuses,) * 2, dtype=np.intp)
-    np.add.at(confusion, (samples.labels[knows[0]], answers[0, knows[0]]), 1)
-    measured, seed = list(zip(cuts, answers, strict=True)), options.seed
+    np.add.at(confusion, (samples.labels[knows[0]], predicted[0, knows[0]]), 1)
+    measured, seed = list(zip(cuts, predicted, strict=True)), options.seed
     rates = [rate for cut, own in measured for rate in rates_of("nested", samples, own, seed, cut)]
     detection = [each for cut, own in measured for each in detection_of("nested", samples, own, seed, cut)]
     return Tested(tuple(rates), tuple(detection), confusion, scores)
 
 
 def learns_none(samples: Samples, cut: "Cut") -> NDArray[np.bool_]:
-    """Return (n,) which rows are tested by a fold whose training rows hold some of nothing held; all, where none do.
+    """Return which rows (n,) are tested by a fold whose training rows include some in which nothing is held.
 
-    A subject may be the only one whose whole movements were recorded: who is tested on it has not learnt what is not.
+    If none do, return all rows. When only one subject's whole movements were recorded, the fold that tests this subject
+    has no such training rows.
     """
     found = np.ones(len(samples.labels), bool)
     for fold in cut.folds if samples.has_none else ():
@@ -325,8 +326,9 @@ def _done(task: tuple[int, Fold, Test]) -> tuple[int, Fold, Scores]:
 
 
 def segments_for(grasp_set: GraspSet, samples: Samples, scores: Scores | None, scale: float) -> SegmentModel | None:
-    """Return the costs of segments for tables of `scale` steps per unit, learnt from whole movements and from the
-    scores (n, K) of folds; None without movements.
+    """Return the segment costs for tables with `scale` steps per unit; None without movements.
+
+    They are learned from whole movements and from the scores (n, K) of folds.
     """
     if not samples.is_none.any():
         return None
@@ -338,22 +340,23 @@ def segments_for(grasp_set: GraspSet, samples: Samples, scores: Scores | None, s
 
 
 def rates_of(
-    protocol: Protocol, samples: Samples, answers: Answers, seed: int, cut: Cut | None = None
+    protocol: Protocol, samples: Samples, predicted: Classes, seed: int, cut: Cut | None = None
 ) -> tuple[Recognised, ...]:
-    """Return the rate of trials of grasps, and that of their frames where trials have several."""
-    return _rates(protocol, samples, answers, samples.labels, ~samples.is_none, seed, cut)
+    """Return the accuracy by trials of grasps, and by their frames where trials have several."""
+    return _rates(protocol, samples, predicted, samples.labels, ~samples.is_none, seed, cut)
 
 
 def detection_of(
-    protocol: Protocol, samples: Samples, answers: Answers, seed: int, cut: Cut | None = None
+    protocol: Protocol, samples: Samples, predicted: Classes, seed: int, cut: Cut | None = None
 ) -> tuple[Detected, ...]:
-    """Return the share of trials of grasps in which something is said to be held, and of those of nothing held in which
-    nothing is; and those of their frames where trials have several. There are none where no row is said to show that.
+    """Return the detection rates: of trials with a grasp, and of trials without one, that are detected as such.
+
+    Frames have rates as well where trials have several. There are no rates if no row is labelled as holding nothing.
     """
     none = samples.is_none
-    if not (none.any() or (answers == samples.n_types).any()):
+    if not (none.any() or (predicted == samples.n_types).any()):
         return ()
-    said = (answers == samples.n_types).astype(np.intp)
+    said = (predicted == samples.n_types).astype(np.intp)
     knows = np.ones(len(none), bool) if cut is None else learns_none(samples, cut)
     held, empty = (
         {rate.unit: rate for rate in _rates(protocol, samples, said, none.astype(np.intp), rows & knows, seed, cut)}
@@ -366,18 +369,18 @@ def detection_of(
 def _rates(
     protocol: Protocol,
     samples: Samples,
-    answers: Answers,
-    truth: Answers,
+    predicted: Classes,
+    truth: Classes,
     rows: NDArray[np.bool_],
     seed: int,
     cut: Cut | None,
 ) -> tuple[Recognised, ...]:
-    """Return what `rated` does of these rows (n,)."""
+    """Return the result of `rated` on these rows (n,)."""
     cut = cut or Cut("pooled", ())
     if not rows.any():
         return ()
     groups = None if cut.groups is None else cut.groups[rows]
-    found = rated(answers[rows], truth[rows], samples.trials[rows], of=cut.of, groups=groups)
+    found = rated(predicted[rows], truth[rows], samples.trials[rows], of=cut.of, groups=groups)
     return tuple(
         Recognised(
             protocol=protocol,
@@ -387,7 +390,7 @@ def _rates(
             total=rate.total,
             of=cut.of,
             unit=rate.unit,
-            # The last digits of a quantile may differ between machines.
+            # The last digits of a quantile can differ between machines.
             low=round(rate.low, 6),
             high=round(rate.high, 6),
         )

@@ -1,4 +1,4 @@
-"""`verify`: is what runs what was trained, on every row of these recordings and in the worst frame there is?"""
+"""`verify`: compare what is deployed with what was trained, on every recorded row and in the worst frame."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,12 +23,12 @@ from ..tables.faults import count_faults, groups_of, worst_faults
 from . import CompileError
 from .documents import Progress
 from .ensemble import MAX_BYTES, ensemble_from_bytes, model_fault
-from .training import answered
+from .training import predicted_classes
 from .verify_firmware import FirmwareVerification, select_inputs, verify_firmware
 
 
 class ChangedRow(Struct, frozen=True):
-    """A row, from 0, that the integers give another grasp type: recorded, by the ensemble, by the integers."""
+    """A row, counted from 0, whose grasp type changes: as recorded, by the ensemble, by the integers."""
 
     row: int
     recorded: str
@@ -38,8 +38,9 @@ class ChangedRow(Struct, frozen=True):
 
 
 class Counted(Struct, frozen=True):
-    """How many trials (the majority of a trial's frames) or frames were recognised, of `total`: by the ensemble, and by
-    the integers; and the 95 % interval of the integers' rate.
+    """The number of correct trials (majority of frames) or frames, of `total`, by the ensemble and by the integers.
+
+    `low` and `high` bound the 95 % interval of the accuracy of the integers.
     """
 
     unit: Unit
@@ -51,15 +52,15 @@ class Counted(Struct, frozen=True):
 
     @property
     def rate(self) -> float:
-        """What the integers recognise, as a share of all."""
+        """The accuracy of the integers."""
         return self.integers / self.total
 
 
 class ScanCheck(Struct, frozen=True):
-    """What became of rows that were scanned port by port until they were decided.
+    """The result of scanning rows port by port until they are decided.
 
-    ports are those of the scan map, mean_read how many of them were read on average; changed counts the rows that have
-    another grasp type then than after a whole scan.
+    ports is the number of ports of the scan map, mean_read how many of them were read on average; changed counts the
+    rows whose grasp type differs from that of a complete scan.
     """
 
     ports: int
@@ -68,8 +69,8 @@ class ScanCheck(Struct, frozen=True):
 
 
 class NothingHeld(Struct, frozen=True):
-    """How many rows of grasps there are, of how many the integers say that nothing is held; and the same of rows in
-    which nothing is.
+    """How many rows show grasps, and how many of these are predicted as nothing held; the same for rows in which
+    nothing is held.
     """
 
     grasps: int
@@ -79,13 +80,13 @@ class NothingHeld(Struct, frozen=True):
 
 
 class Verification(Struct, frozen=True, kw_only=True):
-    """What verification found on `rows` rows; differences beside the bounds that they must keep.
+    """The result of verification on `rows` rows: differences, and the bounds that they must keep.
 
     collapse_* compare the ensemble with the float tables, in units of score; integer_* the float tables with the
     integers, in steps. covered counts rows whose margin exceeds safe_margin, covered_changed those of them that change.
-    recognised counts trials of grasps, and frames where trials have several; independent says that the recordings state
-    each row to be a trial. nothing_held is there if the build ever says so. worst looks beyond the rows; scan is there
-    if the build says how to read a harness, firmware if it was asked for.
+    recognised counts trials of grasps, and frames where trials have several; independent says that each recorded row is
+    a trial. nothing_held is present if the build can predict that nothing is held. worst looks beyond the rows; scan is
+    present if the build has a scan map, firmware if requested.
     """
 
     same_recordings: bool
@@ -113,32 +114,32 @@ def verify(
     firmware: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Verification:
-    """Compare a build's model, float tables and integer tables on every row of recordings, and beyond them.
+    """Compare a build's model, float tables and integer tables on every row of recordings, and over all frames.
 
     Parameters
     ----------
     folder : path
         The build.
     grasp_set : GraspSet
-        Recordings, compiled from or not. Columns are found by name.
+        Any recordings with the inputs of the build. Columns are found by name.
     firmware : sequence of {"host", "avr", "cortex-m", "riscv", "xtensa"}
-        What to compile the classifier for as well, to hold its scores against Python's.
+        Targets to compile the classifier for, to compare its scores with those of Python.
     progress : callable, optional
-        Called with (done, total) as rows and compiled classifiers are done.
+        Called with (done, total) after blocks of rows and compiled classifiers.
 
     Returns
     -------
     Verification
-        Differences and the bounds that they must keep; `holds` says whether they do.
+        Differences and the bounds that they must keep; `holds` is true if they do.
 
     Raises
     ------
     BuildError, SealError
-        If the folder is no sound build.
+        If the folder is not a valid build.
     CompileError
-        If the recordings lack its inputs, or have no rows.
+        If the recordings lack inputs of the build, or have no rows.
     FirmwareError
-        If a tool is missing, or a part cannot hold the build.
+        If a tool is missing, or the build does not fit a part.
 
     Examples
     --------
@@ -157,7 +158,7 @@ def verify(
     scan = None if build.scan is None else check_scan(build.scan, build.tables, bits, codes, comparison.deployed)
     tried = verify_firmware(folder, grasp_set, firmware, progress) if firmware else None
     grasps, empty = np.array(build.grasps), grasp_set.is_none
-    answers = answered(build.tables, build.manifest.rejection, bits, codes)
+    predicted = predicted_classes(build.tables, build.manifest.rejection, bits, codes)
     says = build.none if build.rejector is None else len(grasps)
     return Verification(
         same_recordings=grasp_set.fingerprint() == build.manifest.source.fingerprint,
@@ -170,13 +171,13 @@ def verify(
         safe_margin=comparison.safe_margin,
         covered=int(np.count_nonzero(comparison.covered)),
         covered_changed=int(np.count_nonzero(comparison.covered[comparison.changed])),
-        recognised=_recognised(comparison.trained, answers, grasps, grasp_set),
+        recognised=_recognised(comparison.trained, predicted, grasps, grasp_set),
         worst=worst,
         changed=_changed(comparison, grasps, grasp_set),
         scan=scan,
         holds=comparison.holds and worst.holds and not (scan and scan.changed) and (tried is None or tried.holds),
         firmware=tried,
-        nothing_held=None if says is None else _nothing_held(answers == says, empty),
+        nothing_held=None if says is None else _nothing_held(predicted == says, empty),
     )
 
 
@@ -192,7 +193,7 @@ def _build_for(folder: str | Path, grasp_set: GraspSet) -> Build:
 
 
 class InputFaults(Struct, frozen=True):
-    """How many trials are recognised where an input is lost, and where it is stuck at the value that leaves least."""
+    """The number of correct trials with an input lost, and with it stuck at the value that does the most harm."""
 
     name: str
     lost: int
@@ -201,35 +202,35 @@ class InputFaults(Struct, frozen=True):
 
 
 class FaultCheck(Struct, frozen=True):
-    """What faults leave of these recordings: the worst of each kind, and each input."""
+    """The effect of faults on these recordings: the worst of each kind, and each input."""
 
     worst: Faults
     inputs: tuple[InputFaults, ...]
 
 
 def verify_faults(folder: str | Path, grasp_set: GraspSet, progress: Progress | None = None) -> FaultCheck:
-    """Put every fault of an input, and of the build's ports, chips and boards, to every row of recordings.
+    """Simulate every fault of an input, and of the build's ports, chips and boards, on every row of recordings.
 
     Parameters
     ----------
     folder : path
         The build.
     grasp_set : GraspSet
-        Recordings, compiled from or not. Columns are found by name.
+        Any recordings with the inputs of the build. Columns are found by name.
     progress : callable, optional
-        Called with (done, total) as blocks of rows are done.
+        Called with (done, total) after blocks of rows.
 
     Returns
     -------
     FaultCheck
-        Counts of trials, each recognised as most of its frames are.
+        Counts of correct trials; the majority of a trial's frames decides.
 
     Raises
     ------
     BuildError, SealError
-        If the folder is no sound build.
+        If the folder is not a valid build.
     CompileError
-        If the recordings lack its inputs, or have no rows.
+        If the recordings lack inputs of the build, or have no rows.
 
     Examples
     --------
@@ -260,7 +261,7 @@ def verify_faults(folder: str | Path, grasp_set: GraspSet, progress: Progress | 
 
 
 def _labels(grasps: NDArray[np.str_], grasp_set: GraspSet) -> NDArray[np.intp]:
-    """Return the class of each row (n,); a type that the build does not know is none of its classes."""
+    """Return the class of each row (n,); types that the build does not know get a number beyond its classes."""
     known = np.append(grasp_set.grasps[:, None] == grasps, np.ones((len(grasp_set), 1), bool), axis=1)
     return np.asarray(known.argmax(axis=1))
 
@@ -273,7 +274,7 @@ def _load_ensemble(folder: Path, build: Build) -> Model:
     if isinstance(model, Stumps):
         foreign |= model.shrinkage != fit.settings.get("shrinkage") or model.n_rounds > fit.number("rounds")
     if foreign:
-        raise BuildError(f"{path} is the ensemble of another build: compile the build again")
+        raise BuildError(f"{path} belongs to another build: compile the build again")
     return model
 
 
@@ -286,7 +287,7 @@ def check_scan(
 ) -> ScanCheck:
     """Scan all rows, bits (n, s) and codes (n, j), port by port.
 
-    deployed (n,) are their classes as the integers run: what a whole scan gives.
+    deployed (n,) are the classes that the integers predict after a complete scan.
     """
     ports = [port.elements for port in scan.ports]
     frames = Decided(tables, ports, bits, codes)
@@ -304,13 +305,11 @@ def _recognised(
     trained: NDArray[np.intp], deployed: NDArray[np.intp], grasps: NDArray[np.str_], grasp_set: GraspSet
 ) -> tuple[Counted, ...]:
     labels, held = _labels(grasps, grasp_set), ~grasp_set.is_none
-    # A type that the build does not know is not what refused frames are.
+    # The number of an unknown type must differ from the one of rejected frames.
     labels[labels == len(grasps)] = len(grasps) + 1
     if not held.any():
         return ()
-    both = [
-        rated(answers[held], labels[held], grasp_set.trial_ids[held], of="pooled") for answers in (trained, deployed)
-    ]
+    both = [rated(found[held], labels[held], grasp_set.trial_ids[held], of="pooled") for found in (trained, deployed)]
     return tuple(
         Counted(one.unit, one.total, one.correct[0], other.correct[0], other.low, other.high)
         for one, other in zip(*both, strict=True)

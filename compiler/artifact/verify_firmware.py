@@ -1,6 +1,6 @@
-"""Do compiled classifiers answer as Python does, in every score of every frame that is tried?
+"""Compare compiled classifiers with Python, in every score of every frame that is tried.
 
-And is the firmware that a build carries what would be made of it today?
+Also check whether a build's firmware is the firmware that thenar would generate for it today.
 """
 
 from collections.abc import Callable, Sequence
@@ -36,7 +36,7 @@ from . import CompileError
 def select_inputs(grasp_set: GraspSet, manifest: Manifest) -> tuple[NDArray[np.bool_], NDArray[np.uint16]]:
     """Return the kept switches (n, s) and the joints' codes (n, j) of `grasp_set` in the build's order.
 
-    Raises CompileError naming the inputs that the recordings lack, or joints whose codes mean something else there.
+    Raises CompileError naming the inputs that the recordings lack, or joints whose codes have another meaning there.
     """
     switches = _columns("switches", [switch.source for switch in manifest.switches], grasp_set.element_names)
     joints = _columns("joints", [joint.name for joint in manifest.joints], grasp_set.joint_names)
@@ -49,12 +49,12 @@ def select_inputs(grasp_set: GraspSet, manifest: Manifest) -> tuple[NDArray[np.b
 
 
 def _bits(grasp_set: GraspSet, switch: Switch, column: int) -> NDArray[np.bool_]:
-    """Return a kept switch (n,), or the level of a taxel that it is."""
+    """Return the values (n,) of a kept switch, or of a kept level of a taxel."""
     taxel = column - len(grasp_set.switch_names)
     if (taxel < 0) != (switch.threshold is None):
         here, built = ("a switch", "a taxel") if taxel < 0 else ("a taxel", "a switch")
         raise CompileError(
-            f"{switch.source} is {here} here, in the build {built}: import these recordings as the build's"
+            f"{switch.source} is {here} here, but {built} in the build: import these recordings as the build's were"
         )
     if switch.threshold is None:
         return grasp_set.switches[:, column]
@@ -66,7 +66,7 @@ def _columns(kind: str, wanted: list[str], there: tuple[str, ...]) -> list[int]:
     number = {name: column for column, name in enumerate(there)}
     missing = [name for name in wanted if name not in number]
     if missing:
-        raise CompileError(f"the recordings lack {kind} that the build needs: {list_names(missing)}")
+        raise CompileError(f"the recordings lack {kind} of the build: {list_names(missing)}")
     return [number[name] for name in wanted]
 
 
@@ -78,26 +78,26 @@ def _check_calibration(kind: str, built: Calibration, recorded: Joint) -> None:
         point = int(same.argmin())
         code = (built.code_a, built.code_b)[point]
         raise CompileError(
-            f"{kind} {built.name} is coded differently here: code {code} is {meant[point]:g} {recorded.unit}, in the "
-            f"build {values[point]:g} {built.unit}; import these recordings with the build's grid and origin"
+            f"{kind} {built.name} is coded differently here: code {code} is {meant[point]:g} {recorded.unit}, but "
+            f"{values[point]:g} {built.unit} in the build; import these recordings with the build's grid and origin"
         )
 
 
 RANDOM_FRAMES = 10_000
 _SEED = 1
-Answer = Literal["classify", "update"]
-ANSWERS: tuple[Answer, ...] = ("classify", "update")
+Function = Literal["classify", "update"]
+FUNCTIONS: tuple[Function, ...] = ("classify", "update")
 
 
 class Carried(Struct, frozen=True):
-    """Whether a build has the folder `firmware/`, and which of its files are not what thenar makes of the build now."""
+    """Whether a build has the folder `firmware/`, and which of its files differ from those generated for it now."""
 
     present: bool
     outdated: tuple[str, ...]
 
 
 def made_firmware(manifest: Manifest, tables: IntegerTables, scan: ScanMap | None) -> tuple[dict[str, str], str]:
-    """Return path in the build -> text of its firmware, and a sentence that says what for, or why there is none."""
+    """Return path in the build -> text of its firmware, and a sentence on its target, or on why there is none."""
     try:
         fit = smallest_fit(tables, ports=ports_of_scan(scan))
         made = Library(LIBRARY_NAME, manifest, fit.choice.layout, fit.target.avr, fit.notes()).whole
@@ -107,7 +107,7 @@ def made_firmware(manifest: Manifest, tables: IntegerTables, scan: ScanMap | Non
 
 
 def carried_firmware(folder: Path, build: Build) -> Carried:
-    """Return how the firmware in the build `folder` stands."""
+    """Compare the firmware in the build `folder` with the firmware generated now."""
     if not (folder / FIRMWARE_NAME).is_dir():
         return Carried(False, ())
     made, _ = made_firmware(build.manifest, build.tables, build.scan)
@@ -124,8 +124,9 @@ def _content(path: Path) -> bytes | None:
 
 
 class Difference(Struct, frozen=True):
-    """A frame that is answered otherwise: which it is, what is closed, coded and missing in it, and both answers;
-    `said` are the margin and the probability of one grasp type, in 65535ths, where these were asked.
+    """A frame with different results: its inputs (closed, coded, missing), and the results of both sides.
+
+    `said` holds the margin and the probability of one grasp type, in 65535ths, where they were requested.
     """
 
     frame: str
@@ -141,22 +142,22 @@ class Difference(Struct, frozen=True):
 
 
 class TargetCheck(Struct, frozen=True, kw_only=True):
-    """What came of one part.
+    """The result for one part.
 
     layout     which layout was compiled, and why
-    answer     "classify": every frame from nothing; "update": from what changed since the frame before
-    missing    whether inputs are missing in all frames, in every second one alone
-    frames     how many were answered, `differing` of them with another score, grasp type, margin or probability than
-               in Python
-    shares     whether margins and probabilities were asked for: on an AVR only where inputs are missing
-    first      the first of those
-    misnamed   how many grasp types thenar_NAME_grasp calls otherwise than the manifest; None: not asked, on an AVR
-    worst      what the slowest answer took, in `unit`, and `stack` the bytes that answers need; None: not counted
+    answer     "classify": every frame from scratch; "update": from the changes since the previous frame
+    missing    whether inputs are missing in every frame; in every second frame it is a single one
+    frames     how many were classified; `differing` of them differ from Python in a score, grasp type, margin or
+               probability
+    shares     whether margins and probabilities were requested: on an AVR only where inputs are missing
+    first      the first differing frame
+    misnamed   how many grasp types thenar_NAME_grasp names differently from the manifest; None: not tested, on an AVR
+    worst      the cost of the slowest call, in `unit`; `stack`: bytes of stack that a call needs; None: not counted
     """
 
     part: str
     layout: str
-    answer: Answer
+    answer: Function  # codespell:ignore answer
     missing: bool
     shares: bool
     frames: int
@@ -169,7 +170,7 @@ class TargetCheck(Struct, frozen=True, kw_only=True):
 
 
 class FirmwareTrial:
-    """Frames, in three lots, and Python's scores of them: those of the very `Build` that the runtime runs."""
+    """Frames, in three sets, and their scores in Python, from the same `Build` that the runtime uses."""
 
     def __init__(self, build: Build, rows: Probes, extreme: Probes, random: Probes) -> None:
         self._build, self._lots = build, (("row", rows), ("extreme frame", extreme), ("random frame", random))
@@ -180,40 +181,40 @@ class FirmwareTrial:
 
     @cached_property
     def _scores_without(self) -> NDArray[np.int64]:
-        """The scores where `_lost` inputs are missing."""
+        """Return the scores with the `_lost` inputs missing."""
         frames = zip(self._frames.bits, self._frames.codes, self._lost, strict=True)
         switches = self._build.tables.n_switches
         without = self._build.scorer.lanes_without
         lanes = [without(bits, codes, lost[:switches], lost[switches:]) for bits, codes, lost in frames]
         return np.array(lanes) - LANE_OFFSET
 
-    def check(self, fit: Fit, answer: Answer, *, missing: bool = False) -> TargetCheck:
-        """Compile the classifier as `fit` says and hold its answers against Python's. Raises FirmwareError."""
-        answers = self._run(fit, incremental=answer == "update", lost=self._lost if missing else None)
+    def check(self, fit: Fit, function: Function, *, missing: bool = False) -> TargetCheck:
+        """Compile the classifier with layout `fit` and compare its results with Python's. Raises FirmwareError."""
+        found = self._run(fit, incremental=function == "update", lost=self._lost if missing else None)
         scores = self._scores_without if missing else self._scores
-        # On an AVR cycles are counted of classify() alone: held() refuses in the frames where inputs are missing.
+        # On an AVR only classify() is timed; held(), which rejects, runs on the frames with missing inputs.
         bare = fit.target.avr and not missing
         classes = scores.argmax(axis=1) if bare else self._classes(scores, missing=missing)
-        wrong = (answers.scores != scores).any(axis=1) | (answers.classes != classes)
-        if (said := _said(answers)) is not None:
+        wrong = (found.scores != scores).any(axis=1) | (found.classes != classes)
+        if (said := _said(found)) is not None:
             wrong |= (said != self._said(missing=missing)).any(axis=1)
         return TargetCheck(
             part=fit.target.part,
             layout=fit.choice.why,
-            answer=answer,
+            answer=function,  # codespell:ignore answer
             missing=missing,
             shares=said is not None,
             frames=len(wrong),
             differing=int(np.count_nonzero(wrong)),
-            first=self._difference(int(wrong.argmax()), answers, missing=missing) if wrong.any() else None,
-            misnamed=self._misnamed(answers),
-            worst=None if answers.cost is None else int(answers.cost.max()),
-            unit=answers.unit,
-            stack=answers.stack,
+            first=self._difference(int(wrong.argmax()), found, missing=missing) if wrong.any() else None,
+            misnamed=self._misnamed(found),
+            worst=None if found.cost is None else int(found.cost.max()),
+            unit=found.unit,
+            stack=found.stack,
         )
 
     def _classes(self, scores: NDArray[np.int64], *, missing: bool) -> NDArray[np.intp]:
-        """Return the class of each frame (n,), the number of classes where it is refused."""
+        """Return the class of each frame (n,); rejected frames get the number of classes."""
         rejector, (n, k), found = self._build.rejector, scores.shape, np.asarray(scores.argmax(axis=1))
         if rejector is None:
             return found
@@ -227,17 +228,17 @@ class FirmwareTrial:
         return np.asarray(np.where(refused, k, found))
 
     def _said(self, *, missing: bool) -> NDArray[np.int64]:
-        """Return the margin of each frame, and the probability of one grasp type, each in turn: (n, 2)."""
+        """Return the margin of each frame and the probability of one grasp type, cycling through the types: (n, 2)."""
         scores = self._scores_without if missing else self._scores
         best, second = np.sort(scores, axis=1)[:, :-3:-1].T
         softmax = self._build.softmax
         shares = [softmax.probabilities(own)[n % len(own)] for n, own in enumerate(scores.tolist())]
         return np.stack([best - second, shares], axis=1)
 
-    def _misnamed(self, answers: Answers) -> int | None:
-        if answers.names is None:
+    def _misnamed(self, found: Answers) -> int | None:
+        if found.names is None:
             return None
-        return sum(name != grasp for name, grasp in zip(answers.names, self._build.grasps, strict=True))
+        return sum(name != grasp for name, grasp in zip(found.names, self._build.grasps, strict=True))
 
     def _run(self, fit: Fit, *, incremental: bool, lost: Lost | None) -> Answers:
         layout, target = fit.choice.layout, fit.target
@@ -245,20 +246,20 @@ class FirmwareTrial:
         frames = layout.frame_bytes(self._frames.bits, self._frames.codes)
         return target.run(files, LIBRARY_NAME, layout, frames, incremental=incremental, lost=lost)
 
-    def _difference(self, frame: int, answers: Answers, *, missing: bool) -> Difference:
+    def _difference(self, frame: int, found: Answers, *, missing: bool) -> Difference:
         scores = self._scores_without if missing else self._scores
         described = self._build.manifest
         inputs = [*(switch.name for switch in described.switches), *(joint.name for joint in described.joints)]
         build, bits, codes = self._build, self._frames.bits[frame], self._frames.codes[frame]
-        said = _said(answers)
+        said = _said(found)
         return Difference(
             frame=self._name(frame),
             closed=tuple(switch.name for switch, bit in zip(build.manifest.switches, bits, strict=True) if bit),
             codes=tuple(codes.tolist()),
             grasp=build.grasps[int(scores[frame].argmax())],
             scores=tuple(scores[frame].tolist()),
-            compiled_grasp=self._grasp(int(answers.classes[frame])),
-            compiled_scores=tuple(answers.scores[frame].tolist()),
+            compiled_grasp=self._grasp(int(found.classes[frame])),
+            compiled_scores=tuple(found.scores[frame].tolist()),
             said=() if said is None else tuple(self._said(missing=missing)[frame].tolist()),
             compiled_said=() if said is None else tuple(said[frame].tolist()),
             lost=tuple(compress(inputs, self._lost[frame])) if missing else (),
@@ -272,24 +273,24 @@ class FirmwareTrial:
         raise IndexError(frame)
 
     def _grasp(self, number: int) -> str:
-        return self._build.grasps[number] if number < len(self._build.grasps) else f"type {number}, which there is not"
+        return self._build.grasps[number] if number < len(self._build.grasps) else f"type {number}, which is unknown"
 
 
-def _said(answers: Answers) -> NDArray[np.int64] | None:
-    """Return what a program said of margin and probability, (n, 2); None where it was not asked."""
-    if answers.margins is None or answers.shares is None:
+def _said(found: Answers) -> NDArray[np.int64] | None:
+    """Return the margins and probabilities of a program, (n, 2); None where they were not requested."""
+    if found.margins is None or found.shares is None:
         return None
-    return np.stack([answers.margins, answers.shares], axis=1).astype(np.int64)
+    return np.stack([found.margins, found.shares], axis=1).astype(np.int64)
 
 
 def _masks(flags: NDArray[np.bool_]) -> list[int]:
-    """Return each row of flags (n, m) as a mask, the first the lowest bit."""
+    """Return each row of flags (n, m) as a mask whose lowest bit is the first flag."""
     return [int.from_bytes(row.tobytes(), "little") for row in np.packbits(flags, axis=1, bitorder="little")]
 
 
 class FirmwareVerification(Struct, frozen=True, kw_only=True):
-    """What verification of firmware found: every check on the same rows, extreme and random frames; and what the
-    build's own `firmware/` is worth.
+    """The result of firmware verification: each check on the same rows, extreme and random frames, and the state of the
+    build's own `firmware/`.
     """
 
     rows: int
@@ -300,8 +301,8 @@ class FirmwareVerification(Struct, frozen=True, kw_only=True):
 
     @property
     def holds(self) -> bool:
-        """Whether every score, grasp type, margin, probability and name is the same everywhere, and the build carries
-        no other firmware.
+        """Whether every score, grasp type, margin, probability and name agrees, and the build's own firmware, if any,
+        is up to date.
         """
         return not self.carried.outdated and not any(check.differing or check.misnamed for check in self.checks)
 
@@ -312,32 +313,32 @@ def verify_firmware(
     kinds: Sequence[str],
     progress: Callable[[int, int], None] | None = None,
 ) -> FirmwareVerification:
-    """Hold the classifiers that gcc makes for `kinds` against Python: every row, extreme frames, 10,000 random ones.
+    """Compile the classifier for `kinds` and compare it with Python: every row, extreme frames, 10,000 random frames.
 
-    "host" runs with the address and undefined behaviour sanitizers, "avr" is the smallest AVR that the classifier
-    fits, "cortex-m" both cores, "riscv" and "xtensa" one. Each is run from nothing for every frame, and once more
-    from the changes between frames, on all but "avr" with every switch set by set_switch() and every name asked
-    for; and both again with inputs missing, in turn and several at once. Of a build that no AVR holds, host runs
-    the layout of the larger core.
-    Raises FirmwareError where a tool is missing, a kind is none of `firmware.targets.kinds()`, or a part cannot hold
-    the build, else as `verify` does.
+    "host" runs with the address and undefined behaviour sanitizers, "avr" is the smallest AVR that fits the classifier,
+    "cortex-m" means both cores, "riscv" and "xtensa" one each. Each classifies every frame from scratch, then once more
+    from the changes between frames, then both again with inputs missing, one at a time and several at once. Except on
+    "avr", set_switch() also sets every switch and every name is read. If no AVR fits the build, host runs the layout of
+    the larger core.
+    Raises FirmwareError where a tool is missing, a kind is not in `firmware.targets.kinds()`, or the build does not fit
+    a part; otherwise raises as `verify` does.
     """
     if unknown := [kind for kind in kinds if kind not in every_kind()]:
-        raise FirmwareError(f"nothing runs firmware for {unknown[0]!r}: choose among {', '.join(every_kind())}")
+        raise FirmwareError(f"no simulator runs firmware for {unknown[0]!r}: choose from {', '.join(every_kind())}")
     build = Build.load(folder)
     fits = [fit for kind in every_kind() if kind in kinds for fit in _fits(build, kind)]
     for fit in fits:
         if lack := fit.target.missing():
-            raise FirmwareError(f"firmware for {fit.target.part} cannot be tried here: {lack}")
+            raise FirmwareError(f"firmware for {fit.target.part} cannot be run here: {lack}")
     bits, codes = select_inputs(grasp_set, build.manifest)
     extreme, random = extreme_frames(build.tables), random_frames(build.tables, RANDOM_FRAMES, _SEED)
     trial = FirmwareTrial(build, Probes(bits, codes), extreme, random)
-    runs = list(product(fits, (False, True), ANSWERS))
+    runs = list(product(fits, (False, True), FUNCTIONS))
     checks: list[TargetCheck] = []
-    for fit, missing, answer in runs:
+    for fit, missing, function in runs:
         if progress is not None:
             progress(len(checks), len(runs))
-        checks.append(trial.check(fit, answer, missing=missing))
+        checks.append(trial.check(fit, function, missing=missing))
     return FirmwareVerification(
         rows=len(bits),
         extreme=len(extreme),
@@ -348,7 +349,7 @@ def verify_firmware(
 
 
 def _fits(build: Build, kind: str) -> list[Fit]:
-    """Return the parts of a kind to try, each with its layout: of parts that are alike, the smallest that will do."""
+    """Return the parts of a kind to try, each with its layout: of similar parts, the smallest that fits."""
     tables, ports = build.tables, ports_of_scan(build.scan)
     targets = [target for target in TARGETS.values() if target.kind == kind]
     if all(target.alike for target in targets):

@@ -1,7 +1,7 @@
 """Columns as bins between neighbouring values, and the sums of weights and responses left of every split.
 
-Columns of two values are taken several at a time: rows of the same values share a cell. A column of more values, or
-with missing ones, has a cell for each bin. One sparse product sums all cells; a running sum makes splits of bins.
+Columns of two values are processed several at a time: rows of the same values share a cell. A column of more values, or
+with missing ones, has a cell for each bin. One sparse product sums all cells; a running sum gives the splits of bins.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,15 +18,15 @@ Floats = NDArray[np.float64]
 
 # Elements of the sums over a batch of cells: 512 KiB of doubles stay in a processor's cache.
 _BATCH_ELEMENTS = 1 << 16
-# Of the columns that are looked at together: 8 MiB of doubles.
+# Elements of the columns processed together: 8 MiB of doubles.
 _BLOCK_ELEMENTS = 1 << 20
-# Columns of two values that share a partition of the rows, at most: 2^8 cells.
+# The most columns of two values that share a partition of the rows: 2^8 cells.
 _MOST_BITS = 8
 
 
 @dataclass(frozen=True, slots=True)
 class SplitSums:
-    """Sums of a batch of c columns of at most B bins, over R summands: exact integers."""
+    """Sums for a batch of c columns of at most B bins, over R summands: exact integers."""
 
     columns: NDArray[np.intp]  # (c,) ascending
     left: Floats  # (c, R, B) rows with a value in a bin or below it
@@ -42,7 +42,7 @@ class TwoValued:
         self.columns = columns
         self._low = low
         self._thresholds = thresholds
-        # 2^bits cells a partition, and all together not many more than rows.
+        # 2^bits cells per partition, and in total not many more than there are rows.
         few = [bits for bits in range(2, _MOST_BITS + 1) if -(-len(low) // bits) << bits <= 2 * low.shape[1]]
         self._bits = max(few, default=1)
         self._batches: list[csc_array] = []
@@ -58,20 +58,20 @@ class TwoValued:
         return np.concatenate(sums).reshape(-1, summands)[: len(self._low)]
 
     def goes_left(self, position: int, split: int) -> NDArray[np.bool_]:
-        """Return (n,) whether each row lies left of the only split of column number `position` of this group."""
+        """Return (n,) whether each row lies left of the only split of the column at `position` in this group."""
         rows: NDArray[np.bool_] = self._low[position]
         return rows
 
     def is_missing(self, position: int) -> None:
-        """Nothing is missing here."""
+        """Return None: no value is missing here."""
         return
 
     def n_splits(self, position: int) -> int:
-        """One."""
+        """Return 1, the number of splits."""
         return 1
 
     def threshold(self, position: int, split: int) -> float:
-        """Return the value between the two of the column."""
+        """Return the threshold between the two values of the column."""
         return float(self._thresholds[position])
 
     def _cells(self, batch: slice) -> Iterator[NDArray[np.int32]]:
@@ -86,7 +86,7 @@ class ManyValued:
     """Columns of three or more values, or with missing ones."""
 
     def __init__(self, columns: list[int], bins: list[NDArray[np.int32]], edges: list[Floats]) -> None:
-        """`bins` (n,) a column, the last bin number (len(edges) + 1) standing for missing; `edges` the splits."""
+        """`bins` (n,) per column, with the last bin number (len(edges) + 1) for missing values; `edges` are splits."""
         self.columns = np.array(columns, dtype=np.intp)
         self._bins = bins
         self._edges = edges
@@ -105,7 +105,7 @@ class ManyValued:
                 self._batches.append((batch, width, _one_hot(cells, width)))
         for batch, width, one_hot in self._batches:
             histogram = (one_hot @ by_row).reshape(-1, width, summands)
-            # Two at a time, as complex numbers: numpy's cumsum goes one element after the other.
+            # Two at a time, as complex numbers: numpy's cumsum processes one element after the other.
             left = np.cumsum(histogram[:, :-1].view(np.complex128), axis=1).view(np.float64)
             splits = np.array([len(edges) for edges in self._edges[batch]])
             is_split = np.arange(width - 1) < splits[:, np.newaxis]
@@ -114,25 +114,25 @@ class ManyValued:
             )
 
     def goes_left(self, position: int, split: int) -> NDArray[np.bool_]:
-        """Return (n,) whether each row lies left of a split of column number `position` of this group."""
+        """Return (n,) whether each row lies left of a split of the column at `position` in this group."""
         return self._bins[position] <= split
 
     def is_missing(self, position: int) -> NDArray[np.bool_]:
-        """Return (n,) whether the column has no value."""
+        """Return (n,) whether the column's value is missing."""
         absent: NDArray[np.bool_] = self._bins[position] == len(self._edges[position]) + 1
         return absent
 
     def n_splits(self, position: int) -> int:
-        """In how many places column number `position` of this group may be split."""
+        """Return the number of possible splits of the column at `position` in this group."""
         return len(self._edges[position])
 
     def threshold(self, position: int, split: int) -> float:
-        """Return the value between the two that the split parts."""
+        """Return the threshold of the split, between two neighbouring values."""
         return float(self._edges[position][split])
 
 
 def _batches(widths: Sequence[int], n_summands: int) -> Iterator[tuple[slice, int]]:
-    """Yield batches of partitions, as many as fit but at least one, and the cells of the widest."""
+    """Yield batches of partitions, as many as fit but at least one, and the number of cells of the widest."""
     start = 0
     while start < len(widths):
         stop, width = start, 0
@@ -148,9 +148,9 @@ def _batches(widths: Sequence[int], n_summands: int) -> Iterator[tuple[slice, in
 def _one_hot(partitions: Iterator[NDArray[np.int32]], width: int) -> "csc_array":
     """Return the matrix (p * width, n) of p partitions of n rows into cells below `width`.
 
-    By columns: a product reads each row of summands once, and adds it to sums that stay in the cache.
+    Stored by columns: a product reads each row of summands once, and adds it to sums that stay in the cache.
     """
-    # Help of commands lists the methods, and none of it takes scipy's half a second.
+    # Imported late: the help of commands lists the methods and should not load scipy, which takes half a second.
     from scipy.sparse import csc_array
 
     cells = np.column_stack([cells + np.int32(number * width) for number, cells in enumerate(partitions)])
@@ -168,15 +168,15 @@ class Binned:
 
 
 def bin_columns(X: NDArray[np.generic], max_bins: int | None = None, weights: Floats | None = None) -> Binned:
-    """Sort the columns of `X` (n, d), numbers with NaN for missing, into groups; constant ones are left out.
+    """Sort the columns of `X` (n, d), numbers with NaN for missing, into groups; constant ones are omitted.
 
-    Columns have at most `max_bins` bins (2 or more; None: one for each value), that hold rows as evenly as can be; a
-    row counts as often as `weights` (n,) say, of which every sum must be exact.
+    Columns have at most `max_bins` bins (2 or more; None: one for each value) that hold rows as evenly as possible.
+    Rows count with `weights` (n,), every sum of which must be exact.
     """
     two, rest = _two_valued(X)
     binned = [(column, *_bin(np.asarray(X[:, column], dtype=np.float64), max_bins, weights)) for column in rest]
     varying = [(column, bins, edges) for column, bins, edges in binned if edges.size]
-    # With few bins a column of many values may have two.
+    # With few bins a column of many values may have only two.
     two += [([column], [bins == 0], edges) for column, bins, edges in varying if bins.max() == 1]
     many = [(column, bins, edges) for column, bins, edges in varying if bins.max() > 1]
     groups: list[TwoValued | ManyValued] = []
@@ -191,10 +191,10 @@ def bin_columns(X: NDArray[np.generic], max_bins: int | None = None, weights: Fl
 
 
 def _two_valued(X: NDArray[np.generic]) -> tuple[list[tuple[Any, Any, Floats]], list[int]]:
-    """Return the columns of two values and no missing one, and the numbers of those of more; constant ones are in none.
+    """Return the columns of two values and none missing, and the indices of columns of more; constant ones are omitted.
 
-    Most columns are switches: many at a time, and no need to sort them. Each part of the first is what `TwoValued` is
-    made of: columns (c,), low (c, n), thresholds (c,).
+    Most columns are switches: they are processed many at a time, without sorting. Each part of the first result holds
+    the arguments of `TwoValued`: columns (c,), low (c, n), thresholds (c,).
     """
     two: list[tuple[Any, Any, Floats]] = []
     rest: list[int] = []
@@ -204,16 +204,16 @@ def _two_valued(X: NDArray[np.generic]) -> tuple[list[tuple[Any, Any, Floats]], 
         least, most = numbers.min(axis=0), numbers.max(axis=0)
         is_low = numbers == least
         few = (is_low | (numbers == most)).all(axis=0)
-        parted = few & (least < most)
-        if parted.any():
-            columns = start + np.flatnonzero(parted)
-            two.append((columns, is_low.T[parted], _between(least[parted], most[parted])))
+        split = few & (least < most)
+        if split.any():
+            columns = start + np.flatnonzero(split)
+            two.append((columns, is_low.T[split], _between(least[split], most[split])))
         rest += (start + np.flatnonzero(~few)).tolist()
     return two, rest
 
 
 def _bin(numbers: Floats, max_bins: int | None, weights: Floats | None = None) -> tuple[NDArray[np.int32], Floats]:
-    """Return the bin (n,) of every number and the edges between bins; a missing one gets bin len(edges) + 1."""
+    """Return the bin (n,) of every number and the edges between bins; missing numbers get bin len(edges) + 1."""
     values, bins, counts = np.unique(numbers, return_inverse=True, return_counts=True)
     present = ~np.isnan(values)
     edges = midpoints(values[present])
@@ -226,9 +226,9 @@ def _bin(numbers: Floats, max_bins: int | None, weights: Floats | None = None) -
 
 
 def _even(counts: NDArray[np.intp] | Floats, bins: int) -> NDArray[np.intp]:
-    """Return after which of the values, each with as many rows as `counts` says, to part them into `bins` at most.
+    """Return the positions at which to split sorted values with these row `counts` into at most `bins` bins.
 
-    An edge lies where the share of rows below it is nearest to 1, 2, ... of so many parts; of equally near ones first.
+    Edge i lies where the share of rows below it is nearest to i of `bins` equal parts; ties go to the first position.
     """
     below = np.cumsum(counts)[:-1]
     wanted = np.arange(1, bins) * counts.sum()
@@ -238,8 +238,8 @@ def _even(counts: NDArray[np.intp] | Floats, bins: int) -> NDArray[np.intp]:
 def midpoints(values: Floats) -> Floats:
     """Return the thresholds between neighbouring `values` (m,), ascending: (m - 1,), each with v[i] <= t < v[i + 1].
 
-    Where the midpoint rounds up to v[i + 1] (neighbours 1 ulp apart), the threshold is v[i]: what was counted on the
-    right stays there. Weka 3.6 keeps the midpoint and sends v[i + 1] left. Halving first keeps the largest doubles
+    Where the midpoint rounds up to v[i + 1] (neighbours 1 ulp apart), the threshold is v[i]: rows that were counted on
+    the right stay there. Weka 3.6 keeps the midpoint and sends v[i + 1] left. Halving first keeps the largest doubles
     finite.
     """
     return _between(values[:-1], values[1:])

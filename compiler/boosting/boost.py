@@ -1,7 +1,7 @@
-"""LogitBoost for J classes on decision stumps: the rounds (Friedman, Hastie, Tibshirani 2000; Weka 3.6's choices).
+"""The rounds of multi-class LogitBoost on decision stumps (Friedman, Hastie, Tibshirani 2000; Weka 3.6's choices).
 
-Where Weka's own answer hangs on rounding, thenar goes on in a stable way instead (docs/project/weka-parity.md): sums are exact
-(exactsums), a branch of next to no weight counts as empty, and no branch answers with more than z_max.
+Where Weka's result depends on rounding, thenar uses a numerically stable rule instead (docs/project/weka-parity.md):
+sums are exact (exactsums), a branch with almost no weight counts as empty, and branch outputs are clipped to +-z_max.
 """
 
 import math
@@ -20,17 +20,17 @@ from .stumps import Stumps, centred
 
 Floats = NDArray[np.float64]
 
-# Ties are counted on the grid in units that grow with the square of z_max: far above this, all stumps would tie.
+# Ties are counted on a grid whose units grow with the square of z_max: far above this, all stumps would tie.
 LARGEST_Z_MAX = 100.0
-# Next to the largest, 32 MiB, that glibc takes notice of.
+# Close to 32 MiB, the largest value that glibc respects.
 _LARGE_BYTES = 31 << 20
 TIES = ("first", "least-used")
-# Far below this, the scores of a hundred rounds would all lie within what counts as a tie (stumps.TIE).
+# Far below this, all scores of a hundred rounds would lie within the tolerance of a tie (stumps.TIE).
 SMALLEST_SHRINKAGE = 1e-6
 
 
 class BoostingError(ThenarError, ValueError):
-    """A training set, or an option of a fit to it, makes no sense."""
+    """An invalid training set, or an invalid option of a fit to it."""
 
 
 def boost(
@@ -50,9 +50,9 @@ def boost(
     """Train `rounds` rounds on X (n, d) numbers (NaN: missing), labels (n,) in 0..n_classes-1, weights (n,) >= 0.
 
     Stops early where the mean log-likelihood changes by less than `tolerance` in a round (Weka's -L; None: never), or
-    where no column varies. With `max_bins` (2 or more) no column has more bins than that; they hold rows as evenly as
-    can be. Of stumps that explain the same, `ties` takes the lowest column ("first", Weka's rule), or the one that the
-    fewest stumps look at so far ("least-used"). `on_round(done, rounds)` is called after every round.
+    where no column varies. With `max_bins` (2 or more) columns have at most that many bins, which hold rows as evenly
+    as possible. Between stumps that explain the same, `ties` takes the lowest column ("first", Weka's rule), or the one
+    that the fewest stumps have used so far ("least-used"). `on_round(done, rounds)` is called after every round.
 
     Return the ensemble, and the losses before the first round and after every round: the mean of -ln P(true class).
     Raises BoostingError.
@@ -60,12 +60,12 @@ def boost(
     _check_options(rounds, shrinkage, z_max, tolerance, max_bins, ties)
     check_rows(X, labels, n_classes, weights)
     if weights is not None:
-        # By a power of two, which changes no answer: now sums of huge weights stay finite, and of tiny ones exact.
+        # Scale by a power of two, which changes no result: sums of huge weights stay finite, of tiny ones exact.
         weights = np.ldexp(weights, -np.frexp(weights.max())[1])
     binned = bin_columns(X, max_bins)
     many = sum(len(group.columns) for group in binned.groups if not isinstance(group, TwoValued))
     check_memory(len(X), n_classes, BoostingError, len(binned.home) - many, many)
-    # glibc returns freed memory to the system, and faults it in again, beyond twice the largest array ever freed.
+    # glibc returns freed memory above twice the largest array ever freed to the system, and faults it in again.
     np.empty(_LARGE_BYTES, dtype=np.uint8)
     member = labels == np.arange(n_classes)[:, np.newaxis]
     scores = carry = np.zeros((n_classes, len(X)))
@@ -76,9 +76,9 @@ def boost(
     stopped = False
     while len(fitted) < rounds and binned.groups and not stopped:
         stumps = fit_stumps(binned, working_targets(probability, member, z_max, weights), z_max, used)
-        # Not the answers: of a million rows they would be a hundred megabytes a round.
+        # Drop the outputs: with a million rows they would take a hundred megabytes a round.
         fitted.append((stumps.columns, stumps.thresholds, stumps.values))
-        scores, carry = add_exactly(scores, carry, centred(stumps.answers, shrinkage))
+        scores, carry = add_exactly(scores, carry, centred(stumps.outputs, shrinkage))
         probability, loss = softmax_and_loss(scores + carry, labels, weights)
         losses.append(loss)
         stopped = tolerance is not None and abs(losses[-2] - losses[-1]) < tolerance
@@ -102,7 +102,7 @@ def weights_and_responses(
     own = np.where(member, probability, complement)
     other = np.where(member, complement, probability)  # |Y - P|
     sizes = other if row_weights is None else other * row_weights
-    # |z| = min(1/own, z_max), so w = |Y - P| / |z| = |Y - P| * max(own, 1/z_max): no division, and never by zero.
+    # |z| = min(1/own, z_max), so w = |Y - P| / |z| = |Y - P| * max(own, 1/z_max): no division, hence none by zero.
     return sizes * np.maximum(own, 1.0 / z_max), np.where(member, sizes, -sizes)
 
 
@@ -128,19 +128,19 @@ def _check_options(
     if rounds < 1:
         raise BoostingError(f"rounds={rounds} must be at least 1")
     if max_bins is not None and max_bins < 2:
-        raise BoostingError(f"max_bins={max_bins} must be at least 2: one bin tells nothing")
+        raise BoostingError(f"max_bins={max_bins} must be at least 2: a single bin carries no information")
     if not SMALLEST_SHRINKAGE <= shrinkage <= 1:
         raise BoostingError(f"shrinkage={shrinkage} must be at least {SMALLEST_SHRINKAGE:g} and at most 1")
     if not 1 < z_max <= LARGEST_Z_MAX:
         raise BoostingError(f"z_max={z_max} must be above 1 and at most {LARGEST_Z_MAX:g}")
     if tolerance is not None and not 0 <= tolerance < math.inf:
         raise BoostingError(
-            f"tolerance={tolerance} must be a change of the loss, at least 0; without one, training never stops early"
+            f"tolerance={tolerance} must be a change of the loss of at least 0; leave it out to train all rounds"
         )
 
 
 def check_rows(X: NDArray[np.generic], labels: NDArray[np.intp], n_classes: int, weights: Floats | None) -> None:
-    """Raise BoostingError unless these are a training set."""
+    """Raise BoostingError unless these arguments form a valid training set."""
     if X.ndim != 2 or len(X) == 0 or labels.shape != (len(X),):
         raise BoostingError(f"inputs {X.shape} and labels {labels.shape} must be (n, d) and (n,) with at least one row")
     if labels.min() < 0 or labels.max() >= n_classes:
@@ -153,6 +153,6 @@ def check_rows(X: NDArray[np.generic], labels: NDArray[np.intp], n_classes: int,
 
 
 def check_weights(weights: Floats, n: int) -> None:
-    """Raise BoostingError unless these are weights of n rows."""
+    """Raise BoostingError unless these are valid weights of n rows."""
     if weights.shape != (n,) or not (np.isfinite(weights).all() and (weights >= 0).all() and weights.any()):
-        raise BoostingError("row weights must be (n,) finite numbers of at least 0, none negative, and not all zero")
+        raise BoostingError("row weights must be (n,) finite, non-negative numbers, not all zero")

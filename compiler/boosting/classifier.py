@@ -1,4 +1,4 @@
-"""Additive classifiers as scikit-learn estimators, and LogitBoost on decision stumps as one."""
+"""Additive classifiers as scikit-learn estimators, and LogitBoost on decision stumps as one of them."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[misc]
-    """A classifier whose scores are a sum over inputs. One derived from it has a parameter `classes`, and learns."""
+    """A classifier whose scores are a sum over inputs. Subclasses have a parameter `classes` and implement `_learn`."""
 
     classes: Sequence[Any] | None
 
@@ -39,19 +39,19 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[m
         y : array-like, shape (n,)
             Labels.
         sample_weight : array-like, shape (n,), optional
-            A row counts so many times; 0 removes it.
+            The weight of each row; 0 removes it.
         progress : callable, optional
-            Called with (done, total) after every round; what has no rounds does not call it.
+            Called with (done, total) after every round, if the method has rounds.
 
         Returns
         -------
         AdditiveClassifier
-            The same, fitted.
+            This estimator, fitted.
 
         Raises
         ------
         BoostingError
-            A ValueError, if a parameter, a weight or a label makes no sense.
+            A ValueError, if a parameter, a weight or a label is invalid.
         """
         inputs, targets = validate_data(self, X, y, ensure_all_finite="allow-nan", dtype=_kept_dtypes(X))
         if self.classes is None:
@@ -61,16 +61,16 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[m
         if sample_weight is not None:
             weights = check_array(sample_weight, ensure_2d=False, dtype=np.float64, input_name="sample_weight")
             check_weights(weights, len(inputs))
-            # A row of no weight is a row that is not there: its values make no thresholds (in Weka they do).
+            # Remove rows of zero weight: their values make no thresholds (in Weka they do).
             kept = weights > 0
             inputs, labels, weights = inputs[kept], labels[kept], weights[kept]
         self._learn(inputs, labels, weights, progress)
         return self
 
     def decision_function(self, X: ArrayLike) -> Floats:
-        """Return the additive scores F (n, K) of X (n, d); of two classes the second's less the first's, (n,).
+        """Return the additive scores F (n, K) of X (n, d); with two classes the second's minus the first's, (n,).
 
-        The class of the largest score is the answer, the lowest number at a tie.
+        The class with the largest score is predicted, the lowest number at a tie.
         """
         return self._decided(self._scores(X))
 
@@ -80,13 +80,13 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[m
         return np.ascontiguousarray(softmax(np.ascontiguousarray(scores.T)).T)
 
     def predict(self, X: ArrayLike) -> NDArray[Any]:
-        """Return the label (n,) of the largest score."""
+        """Return the label (n,) with the largest score."""
         best = winners(self._scores(X))
         labels: NDArray[Any] = self.classes_[best]
         return labels
 
     def __sklearn_tags__(self) -> Tags:
-        """Tell scikit-learn that NaN is welcome."""
+        """Tell scikit-learn that NaN is allowed."""
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
         return tags
@@ -99,7 +99,7 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[m
         weights: Floats | None,
         progress: Callable[[int, int], None] | None,
     ) -> None:
-        """Set what is learnt of inputs (n, d), class numbers (n,), and weights (n,) above 0."""
+        """Fit inputs (n, d), class numbers (n,), and weights (n,) above 0, and set the fitted attributes."""
 
     @abstractmethod
     def _sums(self, inputs: NDArray[Any]) -> Floats:
@@ -109,7 +109,7 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[m
         if len(self.classes_) != 2:
             return scores
         lead = scores[:, 1] - scores[:, 0]
-        # Tied scores, which go to the first class, lead by nothing.
+        # Tied scores, which go to the first class, have a lead of zero.
         return np.where(np.abs(lead) <= TIE, 0.0, lead)
 
     def _scores(self, X: ArrayLike) -> Floats:
@@ -134,36 +134,36 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[m
 class LogitBoostClassifier(AdditiveClassifier):
     """Additive logistic regression on decision stumps, multi-class as Weka 3.6's LogitBoost computes it.
 
-    Inputs are bits, integer codes or floating-point numbers, X (n, d); NaN is a missing value, which gets a branch of
-    its own. A threshold lies midway between two neighbouring values of the training set. It is what `compile_build`
-    trains, and `compile` makes a build of a fitted one.
+    Inputs are bits, integer codes or floating-point numbers, X (n, d); NaN is a missing value, which gets a separate
+    branch. A threshold lies midway between two neighbouring values of the training set. `compile_build` trains this
+    classifier, and `compile` makes a build of a fitted one.
 
     Parameters
     ----------
     rounds : int, default=100
         Number of boosting rounds; each fits one stump a class (the paper: 100).
     shrinkage : float, default=1.0
-        Factor on every stump's answer, in [1e-6, 1] (Weka's -H).
+        Factor on every stump's output, in [1e-6, 1] (Weka's -H).
     z_max : float, default=3.0
-        Clamp of the working response and of every stump's answer, in (1, 100] (Weka 3.6: the constant 3).
+        Clamp of the working response and of every stump's output, in (1, 100] (Weka 3.6: the constant 3).
     tolerance : float, optional
-        Training stops where the mean log-likelihood changes by less than this in a round (Weka's -L); None never stops.
+        Training stops where the mean log-likelihood changes by less than this in a round (Weka's -L); None: never.
     max_bins : int, optional
-        No input has more bins than this (2 or more); they hold rows as evenly as can be. None: one for each value.
+        The most bins per input (2 or more); they hold rows as evenly as possible. None: one for each value.
     ties : {"first", "least-used"}, default="first"
-        Of inputs whose stumps explain the same, the first is taken (Weka's rule), or the one that the fewest stumps
-        look at so far, so that with few rows the classifier does not hang on a few inputs.
+        Between inputs whose stumps explain the same, take the first (Weka's rule), or the one that the fewest stumps
+        have used so far, so that with few rows the classifier does not depend on a few inputs.
     classes : sequence, optional
-        Labels that exist even where y lacks some of them (a fold without a rare class). None: those in y.
+        All labels, if y may lack some of them (a fold without a rare class). None: those in y.
 
     Attributes
     ----------
     classes_ : ndarray, shape (K,)
         The labels, in the order of the columns of scores and probabilities.
     stumps_ : Stumps
-        The ensemble, `n_rounds_` rounds of K stumps.
+        The ensemble: `n_rounds_` rounds of K stumps.
     n_rounds_ : int
-        The rounds that were trained.
+        The number of rounds trained.
     losses_ : ndarray of float, shape (n_rounds_ + 1,)
         Mean of -ln P(true class) on the training rows before and after every round.
 
@@ -199,7 +199,7 @@ class LogitBoostClassifier(AdditiveClassifier):
         self.classes = classes
 
     def staged_decision_function(self, X: ArrayLike) -> Iterator[Floats]:
-        """Yield the scores after 1, 2, ... rounds: one training serves every number of rounds."""
+        """Yield the scores after 1, 2, ... rounds: one training gives every number of rounds."""
         inputs = self._inputs(X)
         return map(self._decided, self.stumps_.staged_scores(inputs))
 
@@ -231,6 +231,6 @@ class LogitBoostClassifier(AdditiveClassifier):
 
 
 def _kept_dtypes(X: ArrayLike) -> str | list[type]:
-    """Bits and integer codes stay what they are; all else becomes float64, on which thresholds are computed."""
+    """Keep bits and integer codes as they are; convert all else to float64, on which thresholds are computed."""
     kind = getattr(getattr(X, "dtype", None), "kind", "")
     return "numeric" if kind in ("b", "i", "u") else [np.float64]

@@ -2,9 +2,9 @@
 
 A double holds every integer up to 2^53. So numbers rounded to multiples of 2^-e, with e chosen such that the sum of
 their magnitudes stays below 2^52 multiples, can be added and subtracted in any order, by any BLAS, on any number of
-threads, and give the same integer. The rounding costs at most half a multiple a number, n * 2^-51 of the total in the
-worst case: four times what an ordinary floating-point sum of n numbers may lose. What the rounding left over can be put
-on a finer grid of its own, where a sum needs more than that.
+threads, with the same integer result. Rounding costs at most half a multiple per number, n * 2^-51 of the total in the
+worst case: four times the possible loss of an ordinary floating-point sum of n numbers. The remainder of the rounding
+can be put on a second, finer grid, where a sum needs more accuracy than that.
 """
 
 import math
@@ -22,7 +22,7 @@ _FINEST = 1000
 
 @dataclass(frozen=True, slots=True)
 class OnGrid:
-    """Numbers (K, n) as whole units: row k stands for units[k] * 2^-exponents[k], and any sum of units is exact."""
+    """Numbers (K, n) as integer units: row k is units[k] * 2^-exponents[k], and any sum of units is exact."""
 
     units: Floats  # (K, n) integers whose magnitudes sum to at most 2^52 a row and, unless all are 0, to 2^50 at least
     exponents: NDArray[np.int32]  # (K,)
@@ -30,8 +30,8 @@ class OnGrid:
     def branch_sums(self, left: Floats, missing: Floats | None, base: NDArray[np.int32]) -> Floats:
         """Return the sums (3, K) over the rows left of, right of and missing in a split; members are 0 or 1, (K, n).
 
-        In units of 2^-base, base (K,): of the class's own grid, so that numbers next to the smallest doubles keep their
-        bits. The right sum is a difference, and exact all the same: all three are whole units.
+        Sums are in units of 2^-base, base (K,), of the class's own grid, so that numbers near the smallest doubles keep
+        their bits. The right sum is a difference, and still exact: all three are integer units.
         """
         in_left = np.einsum("kn,kn->k", self.units, left)
         in_missing = np.zeros_like(in_left) if missing is None else np.einsum("kn,kn->k", self.units, missing)
@@ -41,17 +41,17 @@ class OnGrid:
 
 
 def on_grids(values: Floats) -> tuple[OnGrid, OnGrid]:
-    """Round each row of `values` (K, n) to the finest grid on which its sums are exact, and the rest to a finer one."""
+    """Round each row of `values` (K, n) to the finest grid with exact sums, and the remainder to a finer one."""
     n = values.shape[1]
     sizes = np.abs(values)
-    # First from the largest magnitude, which no order of summation can change, then from the exact sum that it allows.
+    # First from the largest magnitude, which no order of summation can change, then from the exact sum on that grid.
     rough = SUM_BITS - _bits(sizes.max(axis=1, initial=0.0) * n)
     total = np.rint(_scaled(sizes, rough)).sum(axis=1)
     # One bit is left as room for n/2 units of rounding, which is enough as long as n < 2^50.
     exponents = (rough + np.where(total > 0, SUM_BITS - 1 - _bits(total), 0)).astype(np.int32)
     scaled = _scaled(values, exponents)
     units = np.rint(scaled)
-    # The rest is at most half a unit a number, n/2 a row: that gives its grid without another look.
+    # The remainder is at most half a unit per number, n/2 per row, which determines its grid.
     finer = SUM_BITS - n.bit_length()
     scaled -= units
     scaled *= 2.0**finer
@@ -60,9 +60,10 @@ def on_grids(values: Floats) -> tuple[OnGrid, OnGrid]:
 
 
 def on_one_grid(values: Floats, terms: float) -> Floats:
-    """Round all `values`, any shape, to the finest grid on which every sum of so many of them is exact.
+    """Round all `values`, any shape, to the finest grid on which every sum of `terms` values is exact.
 
-    Each is off by 2^-52 of `terms` times the largest at most, or by 2^-1001. So are sums of their products with bits.
+    The error of each is at most 2^-52 of `terms` times the largest, or 2^-1001. Sums of products with bits are exact
+    too.
     """
     top = max(float(values.max(initial=0.0)), -float(values.min(initial=0.0)))
     exponent = min(SUM_BITS - math.frexp(top * terms)[1], _FINEST) if top else 0
@@ -72,17 +73,17 @@ def on_one_grid(values: Floats, terms: float) -> Floats:
 
 
 def exact_sum(values: Floats) -> float:
-    """Return the sum of `values`, any shape, as `on_one_grid` rounds them."""
+    """Return the sum of `values`, any shape, rounded as by `on_one_grid`."""
     return float(on_one_grid(values, values.size).sum())
 
 
 def dot(a: Floats, b: Floats) -> float:
-    """Return the sum of a * b, arrays of one shape; see `exact_sum`."""
+    """Return the sum of a * b, arrays of the same shape; see `exact_sum`."""
     return exact_sum(a * b)
 
 
 def _scaled(values: Floats, exponents: NDArray[np.int32]) -> Floats:
-    """Return each row of `values` (K, n) times a power of two, as ldexp does, which takes several times as long."""
+    """Return each row of `values` (K, n) times a power of two, several times faster than ldexp."""
     if exponents.max(initial=0) > _LARGEST_POWER:
         return np.ldexp(values, exponents[:, np.newaxis])
     return values * np.ldexp(1.0, exponents)[:, np.newaxis]

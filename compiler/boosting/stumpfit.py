@@ -1,8 +1,8 @@
-"""The best decision stump of every class for one round's weights and responses.
+"""The best decision stump for every class, given one round's weights and responses.
 
 A stump's residual sum of squares is sum w z^2 less the explained part, sum over branches C_b^2 / W_b with W_b = sum w
-and C_b = sum w z. The first term is the same for every stump, so the explained parts are compared: sums of positive
-terms, without the cancellation that comparing residuals suffers once they are small.
+and C_b = sum w z. The first term is the same for every stump, so explained parts are compared: sums of positive terms,
+which avoid the cancellation in comparing small residuals.
 """
 
 from collections.abc import Sequence
@@ -17,9 +17,9 @@ from .exactsums import on_grids
 Floats = NDArray[np.float64]
 Place = tuple[TwoValued | ManyValued, int, int]  # group of columns, position in it, split
 
-# A branch with less than this share of its class's weight is empty: at most 2^13 of the 2^50 to 2^51 units that the
-# class has on the grid, below which its mean would be made of what the grid rounded away. A share, and not a number of
-# units, so that a set and the same set three times over agree.
+# A branch with less than this share of its class's weight counts as empty. This is at most 2^13 of the 2^50 to 2^51
+# units of the class on the grid; with less, its mean would consist of rounding errors. It is a share, not a number of
+# units, so that three copies of a set give the same result as one.
 EMPTY_SHARE = 2.0**-38
 
 
@@ -27,14 +27,14 @@ class Targets:
     """Weights w and weighted responses w z of one round (K, n), 1 <= |z| <= z_max, and how to sum them exactly."""
 
     def __init__(self, weights: Floats, responses: Floats) -> None:
-        """Put both on grids: coarse ones to compare stumps by, and the rest on fine ones for the values of branches."""
+        """Put both on grids: coarse ones to compare stumps, and the remainders on fine ones for branch values."""
         self.weights, self._fine_weights = on_grids(weights)
         self.responses, self._fine_responses = on_grids(responses)
 
     def branch_sums(self, left: Floats, missing: Floats | None) -> tuple[Floats, Floats]:
         """Return sum w and sum w z (3, K) over the rows left, right and missing, in grid units of the weights.
 
-        Each is within two roundings of what the grids hold.
+        Each is within two roundings of the exact value on the grids.
         """
         base = self.weights.exponents
         weight, response = (
@@ -46,33 +46,33 @@ class Targets:
 
 @dataclass(frozen=True, slots=True)
 class FittedStumps:
-    """The stumps of one round, and what they answer to the training rows."""
+    """The stumps of one round, and their outputs on the training rows."""
 
     columns: NDArray[np.int32]  # (K,)
     thresholds: Floats  # (K,)
     values: Floats  # (K, 3) left, right, missing
-    answers: Floats  # (K, n)
+    outputs: Floats  # (K, n)
 
 
 def fit_stumps(binned: Binned, targets: Targets, z_max: float, used: NDArray[np.int64] | None = None) -> FittedStumps:
-    """Fit one stump a class. Equal stumps: the lowest column, then the lowest threshold wins. |value| <= z_max.
+    """Fit one stump per class. Ties go to the lowest column, then to the lowest threshold. |value| <= z_max.
 
-    With `used` (d,), how many stumps look at each column, a least used column wins; and each stump is counted there.
+    With `used` (d,), the number of stumps on each column, ties go to the least used column; the counts are updated.
     """
     columns, splits = _best_splits(binned, targets, z_max, _tie_bound(targets, z_max), used)
     places = [(*binned.home[int(column)], int(split)) for column, split in zip(columns, splits, strict=True)]
     left = np.array([group.goes_left(position, split) for group, position, split in places])
     missing = _missing(places, left.shape)
     values = _branch_values(targets, left, missing, z_max)
-    answers = np.where(left, values[:, :1], values[:, 1:2])
+    outputs = np.where(left, values[:, :1], values[:, 1:2])
     if missing is not None:
-        answers = np.where(missing, values[:, 2:], answers)
+        outputs = np.where(missing, values[:, 2:], outputs)
     thresholds = np.array([group.threshold(position, split) for group, position, split in places])
-    return FittedStumps(columns.astype(np.int32), thresholds, values, answers)
+    return FittedStumps(columns.astype(np.int32), thresholds, values, outputs)
 
 
 def _missing(places: Sequence[Place], shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
-    """Return (K, n) whether a row lacks the stump's column; None where no row lacks any."""
+    """Return (K, n) whether the stump's column is missing in a row; None where no value is missing."""
     absent = [group.is_missing(position) for group, position, _ in places]
     if all(rows is None for rows in absent):
         return None
@@ -80,11 +80,11 @@ def _missing(places: Sequence[Place], shape: tuple[int, ...]) -> NDArray[np.bool
 
 
 def _tie_bound(targets: Targets, z_max: float) -> Floats:
-    """Return, for each class (K,), how far apart rounding to the grid can bring two explained parts that are equal.
+    """Return, for each class (K,), the largest difference that grid rounding can cause between equal explained parts.
 
-    n rows rounded by half a unit each put at most n/2 units on C_b and on W_b, and with |C_b / W_b| <= z_max
-    |d(C^2/W)| <= 2 z_max |dC| + z_max^2 |dW|, summed over branches; twice that between two stumps. The 64 stands for
-    the roundings of the squares and quotients themselves. Units are those of `_explained`.
+    Rounding n rows by half a unit each changes C_b and W_b by at most n/2 units, and with |C_b / W_b| <= z_max
+    |d(C^2/W)| <= 2 z_max |dC| + z_max^2 |dW|, summed over branches; twice that between two stumps. The 64 covers the
+    rounding of the squares and quotients themselves. Units are those of `_explained`.
     """
     n = targets.weights.units.shape[1]
     unit = _unit(targets)
@@ -93,8 +93,8 @@ def _tie_bound(targets: Targets, z_max: float) -> Floats:
 
 
 def _unit(targets: Targets) -> Floats:
-    """Return (K,) a unit of weights in units of responses."""
-    # Without weight nothing is explained, and this unit may be more than a double holds.
+    """Return (K,) the unit of weights, in units of responses."""
+    # Without weight nothing is explained, and this unit may exceed the range of doubles.
     apart = np.where(targets.weights.units.any(axis=1), targets.responses.exponents - targets.weights.exponents, 0)
     return np.ldexp(1.0, apart)
 
@@ -102,12 +102,12 @@ def _unit(targets: Targets) -> Floats:
 def _best_splits(
     binned: Binned, targets: Targets, z_max: float, tie_bound: Floats, used: NDArray[np.int64] | None
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the column and split (K,) that explain most, for each class; of equal ones the lowest."""
+    """Return the column and split (K,) that explain most, for each class; ties go to the lowest."""
     n_classes, n = targets.weights.units.shape
     by_row = np.empty((n, 2 * n_classes))
     by_row[:, :n_classes], by_row[:, n_classes:] = targets.weights.units.T, targets.responses.units.T
     totals = by_row.sum(axis=0)
-    # Nothing is explained of a class without weight, of which at most responses have not underflown.
+    # Nothing is explained for a class without weight, where at most some responses have not underflown.
     least = np.where(totals[:n_classes] > 0, totals[:n_classes] * EMPTY_SHARE, np.inf)
     explained = np.full((binned.n_columns, n_classes), -np.inf)
     splits = np.zeros((binned.n_columns, n_classes), dtype=np.intp)
@@ -132,11 +132,11 @@ def _best_splits(
 
 
 def _least_used(tied: NDArray[np.bool_], used: NDArray[np.int64], varying: int) -> NDArray[np.intp]:
-    """Return the column of each class (K,), of the `tied` ones (d, K) the least used so far, and count it."""
+    """Return the least used of the `tied` columns (d, K) for each class, (K,), and count its use."""
     columns: NDArray[np.intp] = tied.argmax(axis=0)
     for k, among in enumerate(tied.T):
         candidates = np.flatnonzero(among)
-        # Where all columns tie, none tells anything: others need no threshold because of it.
+        # Where all columns tie, none is informative: do not spread thresholds over others because of that.
         if len(candidates) < varying:
             columns[k] = candidates[used[candidates].argmin()]
         used[columns[k]] += 1
@@ -144,10 +144,10 @@ def _least_used(tied: NDArray[np.bool_], used: NDArray[np.int64], varying: int) 
 
 
 def _roughly_explained(sums: SplitSums, totals: Floats, least: Floats) -> tuple[Floats, Floats]:
-    """Return (c, K) the most that a split of each column explains, less what no split can change, and that.
+    """Return (c, K) an estimate of the most that a split of each column explains, less a constant, and that constant.
 
-    C_L^2 / W_L + C_R^2 / W_R - C^2 / W = (W C_L - C W_L)^2 / (W W_L W_R): one division. Not below what `_explained`
-    finds by more than `_slack`.
+    C_L^2 / W_L + C_R^2 / W_R - C^2 / W = (W C_L - C W_L)^2 / (W W_L W_R) needs one division. It is below the result of
+    `_explained` by `_slack` at most.
     """
     K = least.size
     present = totals - sums.missing
@@ -168,12 +168,12 @@ def _roughly_explained(sums: SplitSums, totals: Floats, least: Floats) -> tuple[
 
 
 def _slack(targets: Targets, z_max: float, least: Floats) -> Floats:
-    """Return (K,) how far below `_explained` the rough way may come, in its units.
+    """Return (K,) how far the rough estimate may be below `_explained`, in its units.
 
-    With |C_b| <= ratio W_b + r, where r is n rows' half units of both grids (and of the smallest doubles, which round
-    what is weighed), a branch of less than the least weight explains less than ratio^2 least, or at most (11 r)^2 /
-    least below W_b = 10 r / ratio; so little also counts where only one way takes it for empty. All else is the
-    rounding of doubles: 2^-53 of ratio^2 W some hundred times, where least is 2^-38 W.
+    With |C_b| <= ratio W_b + r, where r is n rows' half units of both grids (and of the smallest doubles, to which
+    products with weights are rounded), a branch below the least weight explains less than ratio^2 least, or at most
+    (11 r)^2 / least below W_b = 10 r / ratio. This also covers a branch that only one of the two computations takes as
+    empty. The rest is the rounding of doubles: 2^-53 of ratio^2 W some hundred times, where least is 2^-38 W.
     """
     n, exponents = targets.weights.units.shape[1], targets.responses.exponents
     ratio = z_max * _unit(targets)
@@ -185,7 +185,7 @@ def _slack(targets: Targets, z_max: float, least: Floats) -> Floats:
 def _explained(
     sums: SplitSums, totals: Floats, least: Floats, places: NDArray[np.intp], classes: NDArray[np.intp]
 ) -> Floats:
-    """Return (S, B) what the splits of some columns explain, for a class each; -inf where there is no split."""
+    """Return (S, B) what the splits of some columns explain, for one class each; -inf where there is no split."""
     K = least.size
     pair = np.array([classes, K + classes])
     left = sums.left[places, pair]
@@ -205,7 +205,7 @@ def _shares(sums: Floats, least: Floats) -> Floats:
 
 
 def _share(weight: Floats, response: Floats, least: Floats) -> Floats:
-    # Below the least weight that counts this is less than the branch explains, and next to nothing.
+    # Below the least weight that counts, this is smaller than what the branch explains, and close to zero.
     part: Floats = response * response
     part /= np.maximum(weight, least)
     return part

@@ -1,4 +1,4 @@
-"""The ensemble: one decision stump a round and class, and the additive scores that they give."""
+"""The ensemble: one decision stump per round and class, and its additive scores."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ from ..elementary import add_exactly, add_up
 
 Floats = NDArray[np.float64]
 
-# Scores closer than this are tied. Equal scores reached by different sums differ by some 1e-14; Weka's own settings
-# part by 1e-10 without a reason in the data.
+# Scores closer than this are tied. Equal scores that are reached by different sums differ by some 1e-14; different
+# settings of Weka differ by 1e-10 without a reason in the data.
 TIE = 1e-9
 
 
@@ -24,7 +24,7 @@ class Stumps:
     n_inputs: int
     columns: NDArray[np.int32]  # (M, K) which input
     thresholds: Floats  # (M, K)
-    values: Floats  # (M, K, 3) what is answered left, right, and where the input is missing
+    values: Floats  # (M, K, 3) outputs left, right, and where the input is missing
     shrinkage: float
     stopped_early: bool = False  # a tolerance ended the training
 
@@ -39,7 +39,7 @@ class Stumps:
         return int(self.columns.shape[1])
 
     def first(self, rounds: int) -> "Stumps":
-        """Return the ensemble of the first rounds: boosting for longer never changes what came before."""
+        """Return the ensemble of the first rounds: further rounds never change earlier ones."""
         return Stumps(
             self.n_inputs, self.columns[:rounds], self.thresholds[:rounds], self.values[:rounds], self.shrinkage
         )
@@ -52,9 +52,9 @@ class Stumps:
         for columns, thresholds, values in zip(self.columns, self.thresholds, self.values, strict=True):
             inputs = X[:, columns].T.astype(np.float64)
             left, right, missing = values.T[:, :, np.newaxis]
-            answers = np.where(inputs <= thresholds[:, np.newaxis], left, right)
-            answers = np.where(np.isnan(inputs), missing, answers)
-            scores, carry = add_exactly(scores, carry, centred(answers, self.shrinkage))
+            outputs = np.where(inputs <= thresholds[:, np.newaxis], left, right)
+            outputs = np.where(np.isnan(inputs), missing, outputs)
+            scores, carry = add_exactly(scores, carry, centred(outputs, self.shrinkage))
             yield (scores + carry).T
 
     def scores(self, X: NDArray[np.generic]) -> Floats:
@@ -65,28 +65,28 @@ class Stumps:
         return scores
 
 
-def centred(answers: Floats, shrinkage: float) -> Floats:
-    """Return what a round adds to F (K, n) for its stumps' answers (K, n): LogitBoost's symmetric step.
+def centred(outputs: Floats, shrinkage: float) -> Floats:
+    """Return the contribution of a round to F (K, n), given its stumps' outputs (K, n): LogitBoost's symmetric step.
 
-    f_j = (K - 1)/K * (g_j - mean_k g_k) with g = shrinkage * answer (Friedman, Hastie, Tibshirani 2000, algorithm 6).
-    The mean over classes is zero but for rounding: K + 6 units of 2^-53 of the largest |g|, so that M rounds leave a
-    mean of at most M (K + 6) 2^-53 z_max: 1.3e-10 after 10,000 rounds of 33 classes, an eighth of TIE.
+    f_j = (K - 1)/K * (g_j - mean_k g_k) with g = shrinkage * output (Friedman, Hastie, Tibshirani 2000, algorithm 6).
+    The mean over classes is zero except for rounding, K + 6 units of 2^-53 of the largest |g|, so M rounds leave a mean
+    of at most M (K + 6) 2^-53 z_max: 1.3e-10 after 10,000 rounds of 33 classes, an eighth of TIE.
     """
-    k = len(answers)
-    g = answers * shrinkage
+    k = len(outputs)
+    g = outputs * shrinkage
     return (g - add_up(g) / k) * (k - 1) / k
 
 
-def spread(answers: Floats, n_classes: int, shrinkage: float) -> tuple[Floats, Floats]:
-    """Return what `centred` makes of answers (n,) of one stump each where all others answer 0: what it adds to the
-    stump's own class, and to each other class, both (n,); to the last bit.
+def spread(outputs: Floats, n_classes: int, shrinkage: float) -> tuple[Floats, Floats]:
+    """Return the result of `centred` for outputs (n,) of one stump each if all other outputs are 0: the contributions
+    to the stump's own class and to each other class, both (n,), to the last bit.
     """
-    g = answers * shrinkage
+    g = outputs * shrinkage
     mean = g / n_classes
     return (g - mean) * (n_classes - 1) / n_classes, (0.0 - mean) * (n_classes - 1) / n_classes
 
 
 def winners(scores: Floats) -> NDArray[np.intp]:
-    """Return the class (n,) of the largest score of each row of (n, K); of tied ones the lowest number."""
+    """Return the class (n,) with the largest score of each row of (n, K); ties go to the lowest number."""
     best: NDArray[np.intp] = (scores >= scores.max(axis=1, keepdims=True) - TIE).argmax(axis=1)
     return best

@@ -40,7 +40,7 @@ class Expected:
 
 @dataclass(frozen=True, slots=True)
 class LearningCurve:
-    """A trainer's, or a rival's, rates after each number of repetitions, and those to expect of more of them."""
+    """A trainer's, or a baseline's, rates after each number of repetitions, and those to expect of more of them."""
 
     learner: str
     rates: tuple[Rate, ...]
@@ -53,7 +53,7 @@ class Learning:
 
     inputs       what the classifiers read            of     what the rates are of
     repetitions  trials of each grasp type and person that were trained on; the last, all there are: the mean
-    curves       one a trainer or rival               note   why nothing is expected of more; "" where something is
+    curves       one a trainer or baseline               note   why nothing is expected of more; "" where something is
     """
 
     inputs: str

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 # Curves are no inputs: colours that no inputs have.
-_CURVES = ("ink", "picked", "link", "rival-1", "rival-2", "rival-3")
+_CURVES = ("ink", "picked", "link", "baseline-1", "baseline-2", "baseline-3")
 LEARNING_NAME = "learning-curve.svg"
 
 

@@ -21,10 +21,10 @@ from ..samples import Columns, Samples
 from ..tables.collapse import model_scores
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
+from .baselines import CLASSIFIERS
 from .choosing import choose_training
 from .folds import Fold, Rows
 from .populations import Population, Protocol, Scheme, groups_of
-from .rivals import CLASSIFIERS
 
 Labels = NDArray[np.intp]
 Progress = Callable[[int, int], None]
@@ -173,7 +173,7 @@ def available(n_switches: int, n_joints: int) -> tuple[Composition, ...]:
 TableName = Literal["compositions", "generality", "pruning", "baselines", "trainers", "joints"]
 Select = Callable[[Population, Fold], Elements]
 
-RIVALS = ("cmim", "mutual-information")
+BASELINES = ("cmim", "mutual-information")
 REFERENCE = "logitboost"  # of the trainers: the others are compared with it
 JOINTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 18)  # how many are kept, of the joints alone
 DRAWS = 5  # random placements that a placement is compared with
@@ -219,9 +219,9 @@ class RowPlan:
 class Planner:
     """Plans the tables for populations of one set.
 
-    samples  of all rows; prune: S of the paper's placements; rivals: methods of the baselines; levels: of a taxel, at
-             most; keep_joints: how many joints classifiers get, chosen from the training rows, given the switches.
-             A method learns once from the same rows.
+    samples  of all rows; prune: S of the paper's placements; baselines: placement methods to compare with; levels:
+             the most of a taxel; keep_joints: how many joints classifiers get, chosen from the training rows, given
+             the switches. A method learns once from the same rows.
     """
 
     parts: tuple[Population, ...]
@@ -229,7 +229,7 @@ class Planner:
     prune: int
     prune_list: tuple[int, ...]
     seed: int
-    rivals: tuple[str, ...] = RIVALS
+    baselines: tuple[str, ...] = BASELINES
     levels: int | None = None
     keep_joints: int | None = None
     _choosers: dict[tuple[str, bytes], Chooser] = field(default_factory=dict, init=False, repr=False)
@@ -275,7 +275,7 @@ class Planner:
         return [everything, *pruned]
 
     def _baselines(self, protocol: Protocol) -> list[RowPlan]:
-        def rival(name: str, part: Population, fold: Fold) -> Elements:
+        def baseline(name: str, part: Population, fold: Fold) -> Elements:
             return self.chosen(name, protocol.may_choose(part, fold), len(self.own(protocol, part, fold)))
 
         def drawn(draw: int, part: Population, fold: Fold) -> Elements:
@@ -283,11 +283,11 @@ class Planner:
             places = random_placement(len(every), len(self.own(protocol, part, fold)), self.seed + draw)
             return tuple(every[place] for place in places)
 
-        rivals = [METHODS.named(name) for name in self.rivals]
+        baselines = [METHODS.named(name) for name in self.baselines]
         draws = [self._row("random", f"mean of {DRAWS} draws", SELECTED, partial(drawn, draw)) for draw in range(DRAWS)]
         return [
             self._row(METHODS[PAPERS].title, "the paper's placement", SELECTED, partial(self.own, protocol)),
-            *(self._row(each.title, each.help, SELECTED, partial(rival, each.name)) for each in rivals),
+            *(self._row(each.title, each.help, SELECTED, partial(baseline, each.name)) for each in baselines),
             _joined(draws),
         ]
 

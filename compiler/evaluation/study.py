@@ -18,7 +18,7 @@ from ..trainers.base import Training, changed
 from .folds import EvaluationError
 from .learning import Learning, plan_learning
 from .permutation import Permutations, Permuted
-from .plan import RIVALS, Data, Planner, Progress, TableName, is_blind, run_fits, ways_of
+from .plan import BASELINES, Data, Planner, Progress, TableName, is_blind, run_fits, ways_of
 from .populations import NESTED, OF, PROTOCOLS, Population, ProtocolName, Scheme, concerns, populations
 from .tables import RateTable, Reader
 
@@ -41,7 +41,7 @@ class Options:
     repeats     of `trial`, with seeds seed, seed + 1, ...
     prune       S of the placements of the compositions, the generality and the baselines
     prune_list  each S of the table of pooled and pruned placements
-    rivals      methods that ID3 is compared with in the baselines, besides random placements
+    baselines   methods that ID3 is compared with in the baselines, besides random placements
     trainer     what makes every classifier, with its `settings`; rounds are LogitBoost's, None: the paper's hundred. In
                 the table of trainers and the learning curve, what is not given is chosen from the training rows
     levels      most levels of a taxel that there are to choose from, None: as many as are usual
@@ -60,7 +60,7 @@ class Options:
     protocols: tuple[ProtocolName, ...] = ("paper", "nested")
     tables: tuple[TableName, ...] = TABLES
     seed: int = 1
-    rivals: tuple[str, ...] = RIVALS
+    baselines: tuple[str, ...] = BASELINES
     trainer: str = "logitboost"
     settings: Mapping[str, float | str] = field(default_factory=dict)
     permute: int = 0
@@ -144,7 +144,7 @@ def evaluate(
     EvaluationError
         If the set cannot be cut as asked, or its rows look like frames of fewer trials than it has.
     MemberError, TrainerError
-        For a rival that is no method, or a trainer that is not there or takes no such setting.
+        For a baseline that is no method, or a trainer that is not there or takes no such setting.
 
     Examples
     --------
@@ -155,9 +155,9 @@ def evaluate(
     True
     """
     options = replace(options or Options(), **changes)
-    for name in options.rivals:
+    for name in options.baselines:
         if not METHODS.named(name).by_number:
-            raise EvaluationError(f"{name} takes S: a rival is a method that takes a number of switches")
+            raise EvaluationError(f"{name} takes S: a baseline is a method that takes a number of switches")
     wanted = changed(Manifested(rounds=options.rounds, trainer=options.trainer), options.settings)
     training, ways = Training.of(wanted), ways_of(wanted)
     chosen = _of_subjects(grasp_set.without_none(), options.subjects)
@@ -171,7 +171,7 @@ def evaluate(
         options.prune,
         options.prune_list,
         options.seed,
-        options.rivals,
+        options.baselines,
         options.levels,
         options.keep_joints,
     )

@@ -25,7 +25,7 @@ _TITLES: dict[TableName, str] = {
     "generality": "One subject's placement (row) on another's data (column), selected switches (Tables III and VI)",
     "pruning": "Placement of all subjects pooled, pruned by S, selected switches (Tables IV and VII)",
     "baselines": "ID3 beside other placements of as many switches, selected switches",
-    "trainers": f"Trainers, their settings chosen from the training rows, and rivals; paired with {REFERENCE}",
+    "trainers": f"Trainers, their settings chosen from the training rows, and baselines; paired with {REFERENCE}",
     "joints": "The best joints alone, chosen from the training rows by backward elimination",
 }
 

@@ -1,7 +1,7 @@
-"""Firmware: a build as C99, arranged for the microcontroller that it is for."""
+"""Firmware: a build as C99, laid out for its microcontroller."""
 
 from thenar.drivers.errors import ThenarError
 
 
 class FirmwareError(ThenarError, ValueError):
-    """What was asked for cannot be made: tables that do not fit, a board that lacks a switch, an unknown part."""
+    """The firmware cannot be made: tables that do not fit, a board that lacks a switch, an unknown part."""

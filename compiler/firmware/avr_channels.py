@@ -1,4 +1,4 @@
-"""The files that read a board's taxels: channels of the part's converter, straight or behind multiplexers."""
+"""The files that read a board's taxels through the part's converter, directly or through multiplexers."""
 
 from math import ceil
 
@@ -8,12 +8,12 @@ from .board_inputs import channels_header, taxel_rows
 
 
 def channels_files(board: Board) -> dict[str, str]:
-    """Return name -> text of what reads the board's taxels; nothing for a board without."""
+    """Return name -> text of the files that read the board's taxels; empty for a board without taxels."""
     taxels = board.taxels
     if taxels is None:
         return {}
     part, prescaler = avr_of(board), prescaler_of(board.clock_hz)
-    # A conversion that is begun by hand waits for the converter's next clock.
+    # A conversion that is started by software waits for the converter's next clock.
     conversion_us = (CONVERSION_CYCLES + 1) * 2**prescaler * 1e6 / board.clock_hz
     pins = [part.analog[channel] for channel in taxels.inputs]
     source = text(

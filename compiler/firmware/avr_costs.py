@@ -1,8 +1,8 @@
-"""Cycles, flash and RAM of the classifier on an AVR, counted in its assembly as it is rendered, instruction by
-instruction along the longest path.
+"""Cycles, flash and RAM of the classifier on an AVR, counted instruction by instruction in its rendered assembly, along
+the longest path.
 
-All frames take equally long but for two things: each class that is better than all before it costs a cycle, and so
-does each code of 16 bits that is beyond the ends of a slope.
+All frames take the same time with two exceptions: each class whose score exceeds all earlier ones costs a cycle, and so
+does each 16-bit code outside the range of a slope.
 """
 
 import re
@@ -34,8 +34,8 @@ from .costs import NAME_BYTES, Cost
 from .layout import Field, JointLayout, Layout, Lookup
 from .words import numbered
 
-# AVR Instruction Set Manual, DS40002198, table 5-1: cores AVRe (ATmega328P) and AVRe+ (ATmega2560), whose program
-# counter of three bytes makes calls and returns a cycle longer. A branch or a skip that is taken costs more.
+# AVR Instruction Set Manual, DS40002198, table 5-1: cores AVRe (ATmega328P) and AVRe+ (ATmega2560). The latter's
+# three-byte program counter makes calls and returns a cycle longer. A branch or a skip that is taken costs more.
 _ONE = (
     "adc add and andi bst clr cp cpc clt cpi eor inc ldi lsl lsr mov movw neg or ori ror sbc sbci set sub subi swap tst"
 )
@@ -49,12 +49,12 @@ _COMMENT, _LOOP = re.compile(r"/\*.*?\*/", re.DOTALL), re.compile(r"/\* (\d+) ti
 
 
 Ways = tuple[int, int]
-"""The fewest and the most cycles of all ways through some code."""
+"""The fewest and the most cycles of all paths through some code."""
 
 
 class Instruction(NamedTuple):
-    """An instruction, where it may jump to or call, how often it is met if it ends a loop (0: it always jumps), its
-    bytes, and its cycles; 0 where these depend on what follows.
+    """An instruction: its target if it jumps or calls, how often it runs if it ends a loop (0: it always jumps), its
+    bytes, and its cycles; 0 where the cycles depend on what follows.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Instruction(NamedTuple):
 
 
 class Line(NamedTuple):
-    """A line of assembly: its first word, its label, "" if it has none, and its instruction if it has one."""
+    """A line of assembly: its first word, its label or "", and its instruction if it has one."""
 
     first: str
     label: str
@@ -73,7 +73,7 @@ class Line(NamedTuple):
 
 
 class Assembly:
-    """The instructions of rendered assembly: macros of its own put in, preprocessed for a part that has ELPM or not."""
+    """The instructions of rendered assembly, its macros expanded, preprocessed for a part with or without ELPM."""
 
     def __init__(self, text: str, *, elpm: bool) -> None:
         self._counter = 3 if elpm else 2
@@ -106,7 +106,7 @@ class Assembly:
                 self._add(_expanded(line, macros), section)
 
     def _add(self, lines: list["Line"], section: str) -> None:
-        """Note the labels and the instructions of lines."""
+        """Add the labels and the instructions of the lines."""
         for _, label, found in lines:
             if label:
                 self._labels.setdefault(label, []).append(len(self._code))
@@ -115,12 +115,12 @@ class Assembly:
                 self._sections.append(section)
 
     def size(self, section: str = "") -> int:
-        """Return the bytes of code, of one section or of all."""
+        """Return the bytes of code, of one section or of all sections."""
         pairs = zip(self._code, self._sections, strict=True)
         return sum(each.size for each, its in pairs if section in ("", its))
 
     def cycles(self, label: str) -> Ways:
-        """Return the cycles from a label to the return from there, which is counted."""
+        """Return the cycles from a label to its return, the return included."""
         return self._from(self._labels[label][0])
 
     def _from(self, start: int) -> Ways:
@@ -130,7 +130,7 @@ class Assembly:
         return self._found[start]
 
     def _end(self, start: int) -> int:
-        """Return the first instruction that ends what begins at `start`: no branch leads across it."""
+        """Return the first instruction after `start` that ends its block: no branch leads across it."""
         reached = start
         for at in range(start, len(self._code)):
             name = self._code[at].name
@@ -141,19 +141,19 @@ class Assembly:
         raise AssertionError("assembly that does not return")
 
     def _at(self, target: str, at: int) -> int:
-        """Return the instruction that a jump or call at `at` leads to, -1 for one outside."""
+        """Return the instruction that a jump or call at `at` leads to, or -1 for one outside."""
         if target[:-1].isdigit():
             places = self._labels[target[:-1]]
             return places[bisect_right(places, at) - (target[-1] == "b")]
         return self._labels[target][0] if target in self._labels else -1
 
     def _stops(self, at: int) -> bool:
-        """Return whether an instruction leaves this assembly for good: no answer takes that way."""
+        """Return whether an instruction leaves this assembly for good: no classification takes that path."""
         return self._code[at].name in _JUMPS and self._to[at] < 0
 
     def _path(self, start: int, end: int) -> Ways:
-        """Return the cycles of code from `start` on until it comes to `end` or returns."""
-        left = {end: (0, 0), end + 1: (0, 0)}  # cycles from an instruction on
+        """Return the cycles from `start` until the code reaches `end` or returns."""
+        left = {end: (0, 0), end + 1: (0, 0)}  # remaining cycles from an instruction
         for at in range(end - 1, start - 1, -1):
             cycles = self._code[at].cycles
             least, most = left[at + 1]
@@ -161,7 +161,7 @@ class Assembly:
         return left[start]
 
     def _ways(self, at: int, left: dict[int, Ways]) -> Ways:
-        """Return the cycles from an instruction on that may be followed by another than the next one."""
+        """Return the cycles from an instruction that may be followed by one other than the next."""
         each, to, after = self._code[at], self._to[at], left[at + 1]
         if each.name in _CALLS:
             called = _CALLS[each.name] + self._counter - 2
@@ -171,7 +171,7 @@ class Assembly:
         if each.name in _SKIPS:
             skipped = _more(1 + self._code[at + 1].size // 2, left[at + 2])
             return skipped if self._stops(at + 1) else _either(_more(1, after), skipped)
-        if not each.times:  # something is missing: what that takes is not counted
+        if not each.times:  # an input is missing: that path is not counted
             return _more(2, left[to])
         if to > at:
             return _either(_more(1, after), _more(2, left[to]))
@@ -192,7 +192,7 @@ def _either(one: Ways, other: Ways) -> Ways:
 
 
 def _expanded(line: Line, macros: Mapping[str, list[Line]]) -> list[Line]:
-    """Return the line, or those of the macro that it calls."""
+    """Return the line, or the lines of the macro that it invokes."""
     return (
         [each for inner in macros[line.first] for each in _expanded(inner, macros)] if line.first in macros else [line]
     )
@@ -208,7 +208,7 @@ def _read_line(line: str) -> Line:
         return Line(first, label, None)
     size = 4 if name in _TWO_WORDS else 2
     depends = name in _JUMPS or name in _CALLS or name in _SKIPS or name.startswith("br")
-    cycles = 0 if depends else _CYCLES.get(name, -1)  # -1: no instruction, a macro perhaps
+    cycles = 0 if depends else _CYCLES.get(name, -1)  # -1: not an instruction, perhaps a macro
     target = operands[0].strip() if operands else ""
     return Line(first, label, Instruction(name, target, int(times or 1), size, cycles))
 
@@ -218,13 +218,13 @@ def _times(comment: str) -> str:
     return f"\0{said[1]}" if said else ""
 
 
-_LARGE = 5  # numbers from here on are multiplied by `mul`
-# Bytes of C code, rounded up; a table of whole pages of bins begins at one.
+_LARGE = 5  # numbers from here on are multiplied with `mul`
+# Bytes of C code, rounded up; a table of whole pages of bins starts at a page boundary.
 _SET_SWITCH, _GRASP, _INIT, _PAGE = 80, 40, 70, 256
 _LOSING, _LOSING_JOINTS = 400, 300
-_POINTER = 2  # bytes of variables: what is done while an input is missing, and the glove, where rows are found first
-# Return addresses of update() and of what it calls about a change; then either registers that finding a row borrows, or
-# a row's number and the return address of what adds the row.
+_POINTER = 2  # bytes of variables: state while an input is missing, and the glove's pointer, where rows are found first
+# Return addresses of update() and of the function it calls for a change; then either the registers that finding a row
+# saves, or a row's number and the return address of the routine that adds the row.
 _CALLS_DEEP = 2
 
 
@@ -234,8 +234,8 @@ _DRAWN, _CLIMBED, _ROUNDS, _BETWEEN = 4096, 8, 20, 33
 
 
 class Counts(NamedTuple):
-    """The fewest cycles of classify, the most of it and of update, bytes of all code and of what is not needed to
-    classify.
+    """The fewest cycles of classify, the most of it and of update, bytes of all code and of the code that classify does
+    not need.
     """
 
     least: int
@@ -245,13 +245,13 @@ class Counts(NamedTuple):
     uncalled: int
 
     def plus(self, more: "Counts", times: int = 1) -> "Counts":
-        """Return the sum of these and of `times` more."""
+        """Return the sum of these counts and `times` more."""
         return Counts(*(one + times * other for one, other in zip(self, more, strict=True)))
 
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """Look-ups of a layout, equal to all that take the same code there."""
+    """Lookups of a layout, equal for all lookups that need the same code."""
 
     key: tuple[object, ...]
     layout: Layout = field(compare=False)
@@ -259,7 +259,7 @@ class _Part:
 
 
 def _of_joint(layout: Layout, joint: JointLayout) -> tuple[int, ...]:
-    """Return what the code that finds a row has of a joint: its steps, and what it is multiplied by, or its clamps."""
+    """Return the joint's part in the code that finds a row: its steps, and its multiplier, or its clamps."""
     place, wide = len(layout.ports) + layout.padding + joint.number * layout.code_bits // 8, layout.code_bits == 16
     beyond = far(place, wide=wide)
     if joint.compared:
@@ -270,7 +270,7 @@ def _of_joint(layout: Layout, joint: JointLayout) -> tuple[int, ...]:
 
 
 def _of_group(layout: Layout, lookup: Lookup) -> tuple[Field, ...]:
-    """Return what the code that puts a group together has of it, wherever its ports are."""
+    """Return the group's part in the code that assembles its byte, independent of the ports' addresses."""
     return () if lookup.group is None else _anywhere(layout.fields[lookup.group])
 
 
@@ -281,7 +281,7 @@ def _anywhere(fields: tuple[Field, ...]) -> tuple[Field, ...]:
 
 @lru_cache(maxsize=4096)
 def _counted(part: _Part, near: bool, elpm: bool) -> Counts:
-    """Return what there is to count in the assembly of a layout of these look-ups alone."""
+    """Return the counts of the assembly of a layout that consists of these lookups alone."""
     layout = replace(part.layout, lookups=part.lookups)
     values = assembly_values("x", numbered(layout.tables), layout, near=near)
     common = {"name": "x", "opening": "", "biased": layout.biased, "width": layout.parts.width}
@@ -294,10 +294,10 @@ def _counted(part: _Part, near: bool, elpm: bool) -> Counts:
 
 
 class AvrCosts:
-    """The costs of a layout on an AVR of so many bytes of flash, of which depends how wide its program counter is.
+    """The costs of a layout on an AVR with `flash` bytes of flash, which determine the width of its program counter.
 
-    Look-ups follow one another. So what each adds is counted once for all layouts: in the assembly of it alone, less
-    what is left of that without it, which is what it takes alone less than twice.
+    Lookups follow one another, so the contribution of each is counted once for all layouts: twice the count of its
+    assembly alone, less the count of the assembly with two of it.
     """
 
     def __init__(self, layout: Layout, flash: int) -> None:
@@ -306,7 +306,7 @@ class AvrCosts:
         kind = layout.entry_bits, layout.sum_bits, layout.entry_shift, layout.code_bits, layout.adding
         self._of_all = (layout.tables.n_classes, layout.tables.relative, layout.tables.slopes, *kind)
         if spare_registers(layout) != spare_registers(replace(layout, lookups=layout.lookups[:1])):
-            # With so many look-ups that X is needed as well, each takes more than it takes alone.
+            # With enough lookups to need X as well, each lookup takes more than it takes alone.
             self._counts = self._count(*layout.lookups)
             return
         ordered = sorted(layout.lookups, key=lambda lookup: not lookup.joints)
@@ -333,7 +333,7 @@ class AvrCosts:
 
     @property
     def cost(self) -> Cost:
-        """What the classifier takes at most, a few bytes more of flash and RAM."""
+        """The most that the classifier takes; flash and RAM include a few spare bytes."""
         names = NAME_BYTES * (self._layout.tables.n_classes + 1)
         flash, counts = self.flash + names, self._counts
         return Cost(counts.classify, counts.update, flash, flash - counts.uncalled - self.losing, self.ram)
@@ -345,11 +345,11 @@ class AvrCosts:
 
     @property
     def flash(self) -> int:
-        """Bytes of tables and code, at most; the names of the grasp types come on top."""
+        """Bytes of tables and code, at most; the names of the grasp types are added to this."""
         layout, parts = self._layout, self._layout.parts
         tables = layout.n_rows * len(parts.firsts) * parts.width * layout.entry_bits // 8
         tables += 2 * layout.tables.n_switches * (2 if len(layout.ports) > 255 else 1)
-        tables += 2 * layout.tables.n_classes  # what scores begin with
+        tables += 2 * layout.tables.n_classes  # the initial scores
         bins = sum(len(joint.bins) for joint in layout.joints)
         tables += bins + (_PAGE - 1 if layout.bins == "direct" and bins else 0)
         return tables + self.losing + self._counts.size + _INIT + _GRASP + (_SET_SWITCH if layout.groups else 0)
@@ -364,14 +364,14 @@ class AvrCosts:
 
     @property
     def losing(self) -> int:
-        """Bytes of flash, at most and without the assembly, of what replaces missing inputs by their means."""
+        """Bytes of flash, at most and without the assembly, of the code that replaces missing inputs by their means."""
         means = self._layout.means.size * (1 if self._layout.narrow_means else 2)
         return means + (_LOSING if self._layout.groups else _LOSING_JOINTS)
 
 
 def rises(layout: Layout, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.int64]:
-    """Return how many classes of each frame, bits (n, s) and codes (n, j), are better than all before them, (n,), and
-    how many codes of 16 bits are beyond their slopes: the cycles that classify takes beyond the fixed ones.
+    """Return the cycles (n,) that classify takes beyond the fixed ones for bits (n, s) and codes (n, j): one for each
+    class whose score exceeds all earlier ones, and one for each 16-bit code outside the range of its slope.
     """
     scores = layout.scores(bits, codes)
     if len(layout.parts.firsts) == 1:
@@ -385,11 +385,10 @@ def rises(layout: Layout, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) ->
 
 
 def worst_frame(layout: Layout) -> Frame:
-    """Return bits (s,) and codes (j,) of a frame than which none was found to take longer on an AVR; the same one every
-    time.
+    """Return the bits (s,) and codes (j,) of the slowest frame found on an AVR; the result is deterministic.
 
-    The worst frame is the one with the most classes that are better than all before them, alike on all parts. It is
-    sought by a climb from random frames, one input at a time, and proved the worst where it reaches the bound.
+    The slowest frame has the most classes whose score exceeds all earlier ones, the same on all parts. The search
+    climbs from random frames, one input at a time; the result is proved optimal where it reaches the bound.
     """
     random = np.random.default_rng(0)
     choices = [_codes(layout, number) for number in range(layout.tables.n_joints)]
@@ -403,7 +402,7 @@ def worst_frame(layout: Layout) -> Frame:
 
 
 def _codes(layout: Layout, number: int) -> NDArray[np.uint16]:
-    """Return codes of a joint that differ in row or time: the least of each bin and, below all bins, zero."""
+    """Return codes of a joint that differ in row or time: the lowest of each bin and, below all bins, zero."""
     steps, slope = layout.tables.steps_of(number) + 1, layout.tables.slope_of(number)
     if slope is not None:
         between = np.linspace(slope.low, slope.high, _BETWEEN).astype(np.int64)
@@ -412,7 +411,7 @@ def _codes(layout: Layout, number: int) -> NDArray[np.uint16]:
 
 
 def _climb(layout: Layout, frame: Frame, choices: list[NDArray[np.uint16]]) -> Frame:
-    """Return what the frame becomes by taking, again and again, the best of those that differ in one input."""
+    """Improve the frame greedily, one input at a time, until no change helps, and return it."""
     for _ in range(_ROUNDS):
         bits, codes = _neighbours(frame, choices)
         cycles = rises(layout, bits, codes)
@@ -424,7 +423,7 @@ def _climb(layout: Layout, frame: Frame, choices: list[NDArray[np.uint16]]) -> F
 
 
 def _neighbours(frame: Frame, choices: list[NDArray[np.uint16]]) -> tuple[NDArray[np.bool_], NDArray[np.uint16]]:
-    """Return the frame itself, then all that differ from it in one input: bits (n, s) and codes (n, j)."""
+    """Return the frame itself, then all frames that differ from it in one input: bits (n, s) and codes (n, j)."""
     bits, codes = frame
     n = 1 + len(bits) + sum(map(len, choices))
     all_bits, all_codes = np.tile(bits, (n, 1)), np.tile(codes, (n, 1))

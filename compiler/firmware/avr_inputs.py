@@ -1,4 +1,4 @@
-"""What an AVR reads by its own registers: switches on pins and in a matrix, and joints on its converter."""
+"""AVR code for inputs on its own pins: switches on pins and in a matrix, and joints on its converter."""
 
 from collections.abc import Iterable, Sequence
 from math import ceil
@@ -29,11 +29,11 @@ def avr_of(board: Board) -> Avr:
 
 
 _WHOLE_PORT = 0xFF
-_CHARGE_US = 100  # the wires of switches on pins have risen long before
+_CHARGE_US = 100  # far longer than the wires of switches on pins take to rise
 
 
 def by_port(pins: Iterable[str]) -> list[Row]:
-    """Return, port by port, what clears and what sets the bits of these pins ("PD2") in a register, in C's words."""
+    """Return, port by port, the C expressions that clear and that set the bits of these pins ("PD2") in a register."""
     masks: dict[str, int] = {}
     for pin in pins:
         masks[pin[1]] = masks.get(pin[1], 0) | 1 << int(pin[2])
@@ -84,11 +84,11 @@ def matrix_file(board: Board, matrix: Matrix) -> str:
 
 
 def needs_jtag_off(board: Board, pins: Iterable[str]) -> bool:
-    """Return whether any of the pins belongs to the part's JTAG interface as long as that is on."""
+    """Return whether any of the pins belongs to the part's JTAG interface while that is enabled."""
     return bool(set(pins) & set(avr_of(board).jtag))
 
 
-# The converter is exact to its last bit up to this clock; a conversion takes 13 of its cycles.
+# The converter is accurate to its last bit up to this clock; a conversion takes 13 of its cycles.
 _CONVERTER_HZ, CONVERSION_CYCLES = 200_000, 13
 
 
@@ -113,17 +113,17 @@ def adc_file(name: str, board: Board, joints: Sequence[Calibration]) -> str:
 
 
 def prescaler_of(clock_hz: int) -> int:
-    """Return the data sheet's ADPS: the clock is divided by 2 to its power, 1 to 7."""
+    """Return the data sheet's ADPS: the clock is divided by 2 to the power of ADPS, 1 to 7."""
     return next(power for power in range(1, 8) if clock_hz >> power <= _CONVERTER_HZ)
 
 
 def channel_number(channel: str) -> int:
-    """Return the number of a channel: 3 of "ADC3"."""
+    """Return the number of a channel: 3 for "ADC3"."""
     return int(channel.removeprefix("ADC"))
 
 
 def disabled_inputs(board: Board, channels: Sequence[str]) -> list[Row]:
-    """Return the digital inputs to switch off: DIDR0 is for channels 0 to 7, DIDR2 for 8 to 15, each bit a pin."""
+    """Return the digital inputs to disable: DIDR0 is for channels 0 to 7, DIDR2 for 8 to 15, one bit a pin."""
     masks = {0: 0, 2: 0}
     for number in (channel_number(channel) for channel in channels if board.microcontroller.analog[channel]):
         masks[0 if number < 8 else 2] |= 1 << number % 8

@@ -1,4 +1,4 @@
-"""The firmware of an AVR under the portable one: clock, UARTs, bus, main() and the Makefile."""
+"""The AVR layer below the portable firmware: clock, UARTs, bus, main() and the Makefile."""
 
 from collections.abc import Collection, Mapping, Sequence
 from math import ceil
@@ -15,14 +15,14 @@ from .targets.base import Mode
 
 __all__ = ["base_files", "bus_files", "channels_files", "folder", "joints_files", "keys_files", "uart_files"]
 
-_TIMER_US, _TIMER_DIVIDER = 20_000, 8  # the timer begins anew so often, and counts such a part of the clock
+_TIMER_US, _TIMER_DIVIDER = 20_000, 8  # the timer's period, and the divider of the clock that it counts
 _BITS_A_BYTE = 9
-_LONGEST_TRANSFER, _PATIENCE = 20, 4  # bytes, of which no transaction has so many; how often its time it may take
+_LONGEST_TRANSFER, _PATIENCE = 20, 4  # bytes, more than any transaction has; the factor of the timeout
 _RECOVERY_US, _FREEING_US = 5, 110
 
 
 def base_files(board: Board, about: str) -> dict[str, str]:
-    """Return name -> text of main(), the clock, the watchdog, and the host's line."""
+    """Return name -> text of main(), the clock, the watchdog, and the host line."""
     counts = board.clock_hz // _TIMER_DIVIDER * _TIMER_US // 1_000_000
     clock = text(
         "thenar_clock.c",
@@ -37,14 +37,14 @@ def base_files(board: Board, about: str) -> dict[str, str]:
 
 
 def keys_files(board: Board, switches: Sequence[str]) -> dict[str, str]:
-    """Return name -> text of what reads switches on pins or in a matrix."""
+    """Return name -> text of the files that read switches on pins or in a matrix."""
     if board.matrix is not None:
         return {"thenar_matrix.c": matrix_file(board, board.matrix)}
     return {"thenar_pins.c": pins_file(board, switches)}
 
 
 def joints_files(name: str, board: Board, joints: Sequence[Calibration]) -> dict[str, str]:
-    """Return name -> text of what reads joints on the converter."""
+    """Return name -> text of the files that read joints on the converter."""
     return {"thenar_adc.c": adc_file(name, board, joints)}
 
 
@@ -53,11 +53,11 @@ def uart_files(
 ) -> dict[str, str]:
     """Return name -> text of UART `number` with rings of these sizes, powers of two up to 256.
 
-    Raises FirmwareError if it cannot make the rate.
+    Raises FirmwareError if it cannot produce the baud rate.
     """
     setting = best_setting(baud, board.clock_hz)
     if setting is None:
-        raise FirmwareError(f"a UART at {board.clock_hz} Hz cannot make {baud} baud: take a higher rate")
+        raise FirmwareError(f"a UART at {board.clock_hz} Hz cannot make {baud} baud: use a higher rate")
     uarts = avr_of(board).uarts
     values = {
         "uart": number,
@@ -76,7 +76,7 @@ def uart_files(
 
 
 def bus_files(board: Board) -> dict[str, str]:
-    """Return name -> text of the master of the I2C bus, whose SCL is never faster than the board says."""
+    """Return name -> text of the I2C bus master, whose SCL is never faster than the board's setting."""
     (sda, scl), wanted_hz = avr_of(board).twi, board.bus.clock_hz
     twbr = max(0, ceil((board.clock_hz - 16 * wanted_hz) / (2 * wanted_hz)))
     scl_hz = board.clock_hz // (16 + 2 * twbr)
@@ -99,7 +99,7 @@ def folder(name: str, board: Board, mode: Mode, files: Mapping[str, str]) -> dic
 
 
 def board_makefile(name: str, board: Board, mode: Mode, files: Collection[str]) -> str:
-    """Return the Makefile of the firmware of the build `name` whose other files are called `files`."""
+    """Return the Makefile for the firmware of the build `name`, whose other files are `files`."""
     does = "scans the switches" if mode == "scan" else "scans the switches and recognises"
     sources = sorted(file for file in files if file.endswith((".c", ".S")))
     return text(

@@ -1,7 +1,7 @@
-"""How a microcontroller is wired to a glove: the tables of `board.toml`, how they are read, and what they must satisfy.
+"""How a microcontroller is wired to a glove: the tables of `board.toml`, reading them and checking them.
 
-Keys are numbered as the board numbers them in its frames: with pins and chips, key k is the build's kept switch k, all
-in one row, levels of taxels left out; in a matrix it is row * columns + column. A board without a key says it has one.
+Keys are numbered as in the board's frames: with pins and chips, key k is the build's kept switch k, all in one row,
+without the levels of taxels; in a matrix it is row * columns + column. A board without keys reports one open key.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,7 +25,7 @@ from .targets import Wired, wired
 from .targets.avr import Avr, best_setting, near_rates
 from .words import Names
 
-# A CD74HC4067: its channels, and the pins that select one.
+# A CD74HC4067: its channels, and the pins that select a channel.
 MUX_CHANNELS, SELECT_PINS = 16, 4
 _USUAL_HZ = 16_000_000
 Microseconds = Annotated[int, Meta(ge=0, le=60_000_000)]
@@ -37,17 +37,17 @@ class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class BoardDebounce(_Table, frozen=True):
-    """Debouncing on the board, as SET_DEBOUNCE would set it; 0: not at all, which leaves it to the host."""
+    """Debouncing on the board, as SET_DEBOUNCE would set it; 0 leaves it to the host."""
 
     press_us: ShortMicroseconds = 0
     release_us: ShortMicroseconds = 0
 
 
 class Matrix(_Table, frozen=True):
-    """A matrix of keys: rows are driven low one at a time, columns are read against the part's pull-ups.
+    """A matrix of keys: rows are driven low one at a time; columns are read with the part's pull-ups.
 
-    switches   names, a list a row, "" where there is no key
-    diodes     whether every key has one, its cathode towards the row
+    switches   names, one list per row, "" where there is no key
+    diodes     whether every key has a diode, its cathode towards the row
     settle_us  from driving a row low to reading the columns
     """
 
@@ -65,13 +65,13 @@ class BoardBus(_Table, frozen=True):
 
 
 class Wifi(_Table, frozen=True):
-    """The host's line is a Wi-Fi: frames are datagrams of UDP, and the board listens at `port`."""
+    """The host line is Wi-Fi: frames are UDP datagrams, and the board listens at `port`."""
 
     port: Annotated[int, Meta(ge=1024, le=65_535)] = 5253
 
 
 class GloveUart(_Table, frozen=True):
-    """A CyberGlove on a UART: `joints` are our names of its sensors in wire order, "" for one not used."""
+    """A CyberGlove on a UART: `joints` are our names of its sensors in wire order, "" for an unused one."""
 
     uart: Annotated[int, Meta(ge=0, le=3)] = 1
     baud: Baud = 115_200
@@ -81,12 +81,12 @@ class GloveUart(_Table, frozen=True):
 
 
 class TaxelInputs(_Table, frozen=True):
-    """Taxels as voltages on the part's converter, straight or behind CD74HC4067 multiplexers.
+    """Taxels as voltages on the part's converter, directly or behind CD74HC4067 multiplexers.
 
     inputs     channels of the converter ("ADC0"): a taxel on each, or the common pin of a multiplexer
-    select     the pins that drive S0 to S3 of all multiplexers together; none: there are no multiplexers
+    select     the pins that drive S0 to S3 of all multiplexers together; empty without multiplexers
     names      the taxel of each channel of the board, "" for none: channel n of multiplexer m is channel 16 m + n
-    settle_us  for so long a channel is left to settle after the multiplexers were switched
+    settle_us  settling time of a channel after the multiplexers were switched
     """
 
     inputs: Annotated[tuple[str, ...], Meta(min_length=1)]
@@ -96,15 +96,15 @@ class TaxelInputs(_Table, frozen=True):
 
     @property
     def per_input(self) -> int:
-        """How many channels an input has."""
+        """The number of channels per input."""
         return MUX_CHANNELS if self.select else 1
 
 
 class Board(_Table, frozen=True):
-    """A microcontroller and what hangs on its pins; one that was loaded has been found sound.
+    """A microcontroller and everything wired to its pins; a loaded board has been checked.
 
-    pins and analog map names of switches and joints to pins ("PD2") and channels ("ADC0"). clock_hz is an AVR's: other
-    parts bring their own.
+    pins and analog map names of switches and joints to pins ("PD2") and channels ("ADC0"). clock_hz applies to AVRs
+    only: the clock of other parts is fixed.
     """
 
     part: str
@@ -127,7 +127,7 @@ class Board(_Table, frozen=True):
 
     @property
     def channels(self) -> int:
-        """How many analog channels it tells the host of."""
+        """The number of analog channels that it reports to the host."""
         return 0 if self.taxels is None else len(self.taxels.names)
 
     @property
@@ -137,7 +137,7 @@ class Board(_Table, frozen=True):
 
     @property
     def avr(self) -> Avr | None:
-        """The same, if it is an AVR, whose registers the firmware sets itself; else Arduino's core does."""
+        """The part if it is an AVR, whose registers the firmware sets itself; None where Arduino's core does."""
         part = self.microcontroller
         return part if isinstance(part, Avr) else None
 
@@ -156,7 +156,7 @@ def keys_of(board: Board, switches: Sequence[Switch]) -> tuple[str, ...]:
 
 
 def rows_and_columns(board: Board, switches: Sequence[str]) -> tuple[int, int]:
-    """Return how many rows and columns of keys the board tells the host of; pins and chips are one row."""
+    """Return the number of rows and columns of keys that the board reports to the host; pins and chips are one row."""
     if board.matrix is not None:
         return len(board.matrix.rows), len(board.matrix.columns)
     return 1, len(switches) or int(board.channels > 0)
@@ -180,19 +180,19 @@ def check_switches(board: Board, switches: Sequence[str]) -> None:
         )
     if not switches and not board.channels:
         raise FirmwareError(
-            "the build keeps no switch, so there is nothing to scan: compile it with --inputs both or switches"
+            "the build keeps no switch, so there is nothing to scan: compile it with --inputs both or --inputs switches"
         )
 
 
 def host_name(board: Board) -> str:
-    """Return what a board calls itself in a Wi-Fi."""
+    """Return the host name of a board on Wi-Fi."""
     return f"thenar-{board.board}"
 
 
 def glove_toml(name: str, board: Board, names: Names, port: str | None = None) -> str:
-    """Return the `glove.toml` for a host that has the board at `port`, the usual one unless given.
+    """Return the `glove.toml` for a host with the board at `port`, by default the usual port.
 
-    A board that debounces is not debounced again.
+    Debouncing is disabled in it if the board debounces.
 
     Raises FirmwareError if the board lacks a switch of the build.
     """
@@ -212,15 +212,15 @@ def glove_toml(name: str, board: Board, names: Names, port: str | None = None) -
 
 
 Fault = tuple[Place, str]
-_TIMER_HZ = 400  # the clock's timer counts periods of 20 ms in eighths of the processor's clock
+_TIMER_HZ = 400  # the timer has periods of 20 ms and counts eighths of the processor's clock
 _KINDS = tuple(kind for kind, chip in expanders().items() if chip.registers)
 _TOLERANCE = 0.025
 
 
 def faults(board: Board) -> Iterator[Fault]:
-    """Yield what is wrong with `board` and where; what comes after a fault may be wrong because of it."""
+    """Yield the faults of `board` and their places; a fault may be the consequence of an earlier one."""
     if board.part not in wired():
-        yield ("part",), f"{board.part!r} is not among its values{nearest(board.part, list(wired()))}"
+        yield ("part",), f"{board.part!r} is not one of its values{nearest(board.part, list(wired()))}"
     yield from _of_clocks(board)
     yield from _of_inputs(board)
     if board.matrix is not None:
@@ -242,42 +242,45 @@ def _of_clocks(board: Board) -> Iterator[Fault]:
     if part is not None and board.clock_hz > part.highest_hz:
         yield ("clock_hz",), f"{part.named} runs at {part.highest_hz} Hz at most"
     if board.clock_hz % _TIMER_HZ:
-        yield ("clock_hz",), f"must be a multiple of {_TIMER_HZ}: the clock of microseconds would not be exact"
+        yield ("clock_hz",), f"must be a multiple of {_TIMER_HZ}: otherwise the microsecond clock would not be exact"
     yield from _of_baud(("baud",), board.baud, board)
     if board.wifi is not None and not board.microcontroller.wireless:
         able = ", ".join(name for name, each in wired().items() if each.wireless)
-        yield ("wifi",), f"{board.microcontroller.named} has no Wi-Fi: {able} have"
+        yield ("wifi",), f"{board.microcontroller.named} has no Wi-Fi: use one of {able}"
     for key in ("state_us", "heartbeat_us"):
         if 0 < getattr(board, key) < board.scan_us:
-            yield (key,), f"must be 0 (none) or at least scan_us, {board.scan_us}: what is sent is what was scanned"
+            yield (key,), f"must be 0 (none) or at least scan_us, {board.scan_us}: every frame sent needs a new scan"
 
 
 def _of_baud(place: Place, baud: int, board: Board) -> Iterator[Fault]:
-    if board.avr is None:  # a fraction divides their clocks
+    if board.avr is None:  # these have fractional baud rate dividers
         return
     clock_hz = board.clock_hz
     setting = best_setting(baud, clock_hz)
     if setting is None or abs(setting.error) > _TOLERANCE:
         rates = ", ".join(map(str, near_rates(baud, clock_hz)))
-        yield place, f"a UART at {clock_hz} Hz cannot make {baud} baud within {_TOLERANCE:.1%}: it can make {rates}"
+        yield place, f"a UART at {clock_hz} Hz cannot make {baud} baud within {_TOLERANCE:.1%}: use one of {rates}"
 
 
 def _of_inputs(board: Board) -> Iterator[Fault]:
     kinds = {"pins": bool(board.pins), "matrix": board.matrix is not None, "chip": bool(board.chips)}
     there: list[Place] = [(kind,) for kind, used in kinds.items() if used]
     if len(there) > 1:
-        yield there[1], f"{spelled(there[0])} is there already: switches hang on pins, a matrix or chips, one of them"
+        yield (
+            there[1],
+            f"{spelled(there[0])} is given too: wire the switches to only one of pins, a matrix and chips",
+        )
     if not there and board.taxels is None:
         yield (), "no switch is wired: add [pins], [matrix] or [[chip]] tables"
     if board.early_exit and not board.chips:
-        yield ("early_exit",), "only chips are read one after another: without [[chip]] there is nothing to save"
+        yield ("early_exit",), "has no effect without [[chip]]: only chips are read one after another; leave it out"
     if board.cyberglove is not None and board.analog:
-        yield ("analog",), "there is a [cyberglove] already: joints come from one of them"
+        yield ("analog",), "[cyberglove] is given too: joints come from only one of them"
 
 
 def _of_matrix(matrix: Matrix) -> Iterator[Fault]:
     if len(matrix.switches) != len(matrix.rows):
-        yield ("matrix", "switches"), f"{len(matrix.switches)} lists for {len(matrix.rows)} rows: one list a row"
+        yield ("matrix", "switches"), f"{len(matrix.switches)} lists for {len(matrix.rows)} rows: one list per row"
     for number, row in enumerate(matrix.switches):
         if len(row) != len(matrix.columns):
             here: Place = ("matrix", "switches", number)
@@ -288,13 +291,16 @@ def _of_chips(board: Board) -> Iterator[Fault]:
     for number, chip in enumerate(board.chips):
         here: Place = ("chip", number)
         if chip.kind in CHIPS and chip.kind not in _KINDS:
-            yield (*here, "kind"), f"the firmware reads no {chip.kind}: it reads {', '.join(_KINDS)}"
+            yield (*here, "kind"), f"the firmware cannot read a {chip.kind}: it reads {', '.join(_KINDS)}"
         if chip.mux is not None:
-            yield (*here, "mux"), "the firmware selects no channels: wire the chip to the bus itself"
+            yield (
+                (*here, "mux"),
+                "the firmware cannot select multiplexer channels: wire the chip to the bus itself",
+            )
     if board.avr is not None and board.chips and board.clock_hz < 16 * board.bus.clock_hz:
         yield ("bus", "clock_hz"), f"must be at most a 16th of the part's clock, {board.clock_hz // 16}"
     if board.avr is not None and board.chips and board.clock_hz > (16 + 2 * 255) * board.bus.clock_hz:
-        yield ("bus", "clock_hz"), f"the part's clock cannot be divided so far: at least {board.clock_hz // 526 + 1}"
+        yield ("bus", "clock_hz"), f"is too low for the part's divider: at least {board.clock_hz // 526 + 1}"
     bus = BusWiring(device="bus", clock_hz=board.bus.clock_hz, chips=board.chips)
     for place, reason in checks.faults(Harness(name="board", buses=(bus,))):
         where = place[2:] if place[2:3] == ("chip",) else ("bus", *place[2:])
@@ -304,11 +310,11 @@ def _of_chips(board: Board) -> Iterator[Fault]:
 def _of_glove(glove: GloveUart, board: Board) -> Iterator[Fault]:
     part = board.microcontroller
     if len(part.uarts) == 1:
-        yield ("cyberglove",), f"{part.named} has one UART, which the host has: take an atmega2560, or [analog]"
+        yield ("cyberglove",), f"{part.named} has one UART, which the host uses: use an atmega2560, or [analog]"
     elif not 0 < glove.uart < len(part.uarts):
         *others, last = map(str, range(1, len(part.uarts)))
         which = "UART 0 is the host's" if glove.uart == 0 else f"{part.named} has no UART {glove.uart}"
-        yield ("cyberglove", "uart"), f"{which}: take {', '.join(others)} or {last}"
+        yield ("cyberglove", "uart"), f"{which}: use {', '.join(others)} or {last}"
     if glove.joints and len(glove.joints) != glove.sensors:
         place: Place = ("cyberglove", "joints")
         yield place, f"{len(glove.joints)} names for {glove.sensors} sensors: name every one, in wire order"
@@ -322,13 +328,16 @@ def _of_analog(board: Board) -> Iterator[Fault]:
             hint = nearest(channel, list(part.analog))
             yield ("analog", joint), f"{part.named} has no channel {channel!r}{hint}"
         if channel in seen:
-            yield ("analog", joint), f"{channel} is that of {seen[channel]} already: a joint has a channel of its own"
+            yield (
+                ("analog", joint),
+                f"{channel} is already used by {seen[channel]}: give each joint its own channel",
+            )
         seen[channel] = joint
 
 
 def _of_taxels(board: Board, taxels: TaxelInputs) -> Iterator[Fault]:
     if len(taxels.select) not in (0, SELECT_PINS):
-        yield ("taxels", "select"), f"{len(taxels.select)} pins: a CD74HC4067 is selected by {SELECT_PINS}, S0 to S3"
+        yield ("taxels", "select"), f"{len(taxels.select)} pins: a CD74HC4067 has {SELECT_PINS} select pins, S0 to S3"
     room = taxels.per_input * len(taxels.inputs)
     if len(taxels.names) > room:
         yield ("taxels", "names"), f"{len(taxels.names)} names for {room} channels"
@@ -338,12 +347,12 @@ def _of_taxels(board: Board, taxels: TaxelInputs) -> Iterator[Fault]:
         if channel not in channels:
             yield here, f"{board.microcontroller.named} has no channel {channel!r}{nearest(channel, list(channels))}"
         if channel in seen:
-            yield here, f"{channel} is {seen[channel]} already: one channel, one input"
+            yield here, f"{channel} is already {seen[channel]}: give each input its own channel"
         seen[channel] = spelled(here)
     rows = () if board.matrix is None else board.matrix.rows
     for number, pin in enumerate(taxels.select):
         if board.avr is not None and pin[:2] in {row[:2] for row in rows}:
-            yield ("taxels", "select", number), f"a row of the matrix is driven on port {pin[1:2]}: take another port"
+            yield ("taxels", "select", number), f"port {pin[1:2]} drives a row of the matrix: use another port"
 
 
 def _of_pins(board: Board) -> Iterator[Fault]:
@@ -353,18 +362,18 @@ def _of_pins(board: Board) -> Iterator[Fault]:
         if pin in part.tied:
             yield place, f"{pin} of {part.named} cannot be used: {part.tied[pin]}"
         elif pin not in part.pins and pin not in taken:
-            yield place, f"{part.named} has no pin {pin!r} that can be used{nearest(pin, part.pins)}"
+            yield place, f"{part.named} has no usable pin {pin!r}{nearest(pin, part.pins)}"
         if pin in taken:
-            yield place, f"{pin} is {taken[pin]} already: use another pin"
-        taken[pin] = f"that of {spelled(place)}"
+            yield place, f"{pin} is already {taken[pin]}: use another pin"
+        taken[pin] = f"the pin of {spelled(place)}"
 
 
 def _held(board: Board, part: Wired) -> dict[str, str]:
-    """Return the pins that are not free, and what they are."""
-    held = dict.fromkeys(part.uarts[0], "a pin of UART 0, the host's,")
+    """Return the pins that are not free, and their uses."""
+    held = dict.fromkeys(part.uarts[0], "a pin of UART 0 (the host's)")
     if board.cyberglove is not None and board.cyberglove.uart < len(part.uarts):
         number = board.cyberglove.uart
-        held |= dict.fromkeys(part.uarts[number], f"a pin of UART {number}, the glove's,")
+        held |= dict.fromkeys(part.uarts[number], f"a pin of UART {number} (the glove's)")
     if board.chips:
         held |= dict(zip(part.twi, ("the bus's SDA", "the bus's SCL"), strict=True))
     return held
@@ -384,13 +393,13 @@ def _used(board: Board) -> Iterator[tuple[Place, str]]:
 
 
 def _of_names(board: Board) -> Iterator[Fault]:
-    """Names must be good; those in TOML keys stand once anyway, and those of chips were seen to."""
+    """Check the names; those in TOML keys are unique anyway, and those of chips have been checked."""
     joints: list[tuple[Place, str]] = [(("analog", name), name) for name in board.analog]
     if board.cyberglove is not None:
         joints += [(("cyberglove", "joints", n), name) for n, name in enumerate(board.cyberglove.joints) if name]
     for place, name in joints:
         if reason := fault(name):
-            yield place, f"{shortened(repr(name))} is no name of a joint: it {reason}"
+            yield place, f"{shortened(repr(name))} is not a valid joint name: it {reason}"
     named: list[tuple[Place, str]] = [(("pins", name), name) for name in board.pins]
     if board.matrix is not None:
         rows = enumerate(board.matrix.switches)
@@ -400,9 +409,9 @@ def _of_names(board: Board) -> Iterator[Fault]:
     seen: dict[str, Place] = {}
     for place, name in named:
         if reason := fault(name):
-            yield place, f"{shortened(repr(name))} is no name of a switch: it {reason}"
+            yield place, f"{shortened(repr(name))} is not a valid switch name: it {reason}"
         if name in seen:
-            yield place, f"switch {name!r} is {spelled(seen[name])} already: a switch has one place"
+            yield place, f"switch {name!r} is already at {spelled(seen[name])}: give each switch one place"
         seen[name] = place
 
 
@@ -412,7 +421,7 @@ def load_board(path: str | Path) -> Board:
 
 
 def parse_board(text: str, name: str = "board.toml") -> Board:
-    """Return the board that `text`, which messages call `name`, is. Raises FirmwareError as `load_board` does."""
+    """Return the board in `text`, which messages call `name`. Raises FirmwareError as `load_board` does."""
     return _board_of(TomlText(name, text, FirmwareError))
 
 

@@ -1,4 +1,4 @@
-"""The firmware of a board but for its classifier and its protocol: what it does in a turn, and its part's layer."""
+"""The firmware of a board without its classifier and its protocol: its main turn, and the layer for its part."""
 
 from collections.abc import Mapping, Sequence
 from math import ceil
@@ -20,39 +20,39 @@ from .segments import segmenter_bytes
 from .targets.base import Mode
 from .words import Names, answers_of
 
-# Cycles of the firmware as libsimavr counts them, rounded up: of a scan whatever it reads, of a key that is read, of a
-# byte on the bus beside its SCL periods, of a reading, of a byte of an ANALOG; and of an answer, of a look-up for it,
-# of a class of a look-up. The interrupts of a converter take less than a tenth.
+# Cycles of the firmware as counted by libsimavr, rounded up: of a scan regardless of inputs, a key, a byte on the bus
+# in addition to its SCL periods, a reading, a byte of an ANALOG frame; and of a prediction, a lookup in it, and a class
+# of a lookup. The interrupts of a converter take less than a tenth.
 _SCAN, _KEY, _BUS_BYTE, _READING, _ANALOG_BYTE = 3000, 60, 110, 600, 80
 _ANSWER, _LOOKUP, _CLASS = 600, 40, 10
-_STATE = 100  # of a tick of segments, for each of their states
-# Parts with a core of Arduino's count as an AVR at 16 MHz, than which none of them is slower; their Wire takes longer.
-_WIRE_US = 200  # of a reading, beside its SCL periods
+_STATE = 100  # per state, of a tick of segments
+# Parts with an Arduino core count as an AVR at 16 MHz; none of them is slower, but their Wire takes longer.
+_WIRE_US = 200  # of a reading, in addition to its SCL periods
 
 
 class Layer(Protocol):
-    """What lies between the portable firmware of a board and its part; each returns name -> text."""
+    """The layer between the portable firmware of a board and its part; each method returns name -> text."""
 
     def base_files(self, board: Board, about: str) -> dict[str, str]:
-        """Return the program that begins and turns, the clock, and the host's line."""
+        """Return the main program, the clock, and the host line."""
 
     def keys_files(self, board: Board, switches: Sequence[str]) -> dict[str, str]:
-        """Return what reads switches on pins or in a matrix."""
+        """Return the files that read switches on pins or in a matrix."""
 
     def bus_files(self, board: Board) -> dict[str, str]:
-        """Return the master of the I2C bus."""
+        """Return the I2C bus master."""
 
     def uart_files(self, board: Board, number: int, baud: int) -> dict[str, str]:
         """Return a UART for a CyberGlove."""
 
     def joints_files(self, name: str, board: Board, joints: Sequence[Calibration]) -> dict[str, str]:
-        """Return what reads joints on the converter."""
+        """Return the files that read joints on the converter."""
 
     def channels_files(self, board: Board) -> dict[str, str]:
-        """Return what reads taxels on the converter; nothing for a board without."""
+        """Return the files that read taxels on the converter; empty for a board without taxels."""
 
     def folder(self, name: str, board: Board, mode: Mode, files: Mapping[str, str]) -> dict[str, str]:
-        """Return the whole folder that is to hold `files`."""
+        """Return the whole folder, which contains `files`."""
 
 
 def _layer(board: Board) -> Layer:
@@ -60,10 +60,10 @@ def _layer(board: Board) -> Layer:
 
 
 def readings(board: Board, switches: Sequence[str], tables: IntegerTables) -> tuple[Port, ...]:
-    """Return which readings of the board's chips show a build's `switches`, in the order in which they are made.
+    """Return the readings of the board's chips that show a build's `switches`, in the order in which they are made.
 
-    Of each chip the fewest; what can change the scores of `tables` most per microsecond comes first. There are none
-    without chips. Raises FirmwareError if the board lacks a switch.
+    Each chip has as few readings as possible; those that can change the scores of `tables` most per microsecond come
+    first. A board without chips has none. Raises FirmwareError if the board lacks a switch.
     """
     check_switches(board, switches)
     return plan_scan(switches, tables, harness_of(board)).ports if board.chips and switches else ()
@@ -75,17 +75,17 @@ def harness_of(board: Board) -> Harness:
 
 
 def switches_of(ports: Sequence[Port]) -> list[list[int]]:
-    """Return the numbers of the build's switches that each reading shows: the ports of an early exit."""
+    """Return the numbers of the build's switches that each reading shows: the ports of the early exit."""
     return [list(port.elements) for port in ports]
 
 
 def exits_early(board: Board, ports: Sequence[Port]) -> bool:
-    """Return whether a scan of the readings `ports` may end before the last: of one there is nothing to leave out."""
+    """Return whether a scan of the readings `ports` may end before the last; a single reading is always made."""
     return board.early_exit and len(ports) > 1
 
 
 def follows_segments(board: Board, names: Names) -> bool:
-    """Return whether a glove on this board follows segments: its build has costs of them, and the part the RAM."""
+    """Return whether a glove on this board follows segments: its build has segment costs, and the part enough RAM."""
     model, ram = names.segments, board.microcontroller.ram
     return model is not None and segmenter_bytes(model) <= ram * _MOST_RAM
 
@@ -93,7 +93,7 @@ def follows_segments(board: Board, names: Names) -> bool:
 def shortest_scan_us(
     board: Board, switches: Sequence[str], tables: IntegerTables, *, recognises: bool, segments: bool = False
 ) -> int:
-    """Return how many microseconds a scan takes at most, with all that is done once a scan, rounded up to 50."""
+    """Return the longest duration of a scan in microseconds, with all work done once per scan, rounded up to 50."""
     ports = readings(board, switches, tables)
     rows, columns = rows_and_columns(board, switches)
     cycles = _SCAN + _KEY * rows * columns
@@ -118,8 +118,8 @@ def shortest_scan_us(
 def config_of(
     board: Board, switches: Sequence[str], tables: IntegerTables, *, recognises: bool = False, segments: bool = False
 ) -> BoardConfig:
-    """Return what the protocol's C is configured with. Raises FirmwareError if the board lacks a switch, has too many
-    keys, or is to scan faster than it can.
+    """Return the configuration of the protocol's C. Raises FirmwareError if the board lacks a switch, has too many
+    keys, or is set to scan faster than it can.
     """
     rows, columns = rows_and_columns(board, switches)
     return BoardConfig(
@@ -139,27 +139,29 @@ def config_of(
     )
 
 
-_MOST_GRASPS = 255  # a grasp is a byte on the line, and 255 says that there is none
-_MOST_RAM = 3 / 8  # of segments; lines, keys and stack need some 900 bytes
+_MOST_GRASPS = 255  # a grasp is a byte on the line, and 255 means none
+_MOST_RAM = 3 / 8  # for segments; lines, keys and stack need some 900 bytes
 _WHOLE_US = 50_000  # between whole scans of a board that sends no heartbeats
 _BYTE = 0xFF
 _NUMBERS_A_LINE = 14
 
 
 def board_files(name: str, names: Names, layout: Layout, board: Board, mode: Mode) -> dict[str, str]:
-    """Return file name -> text of a board's firmware but the classifier's and the protocol's files.
+    """Return file name -> text of a board's firmware without the files of the classifier and of the protocol.
 
-    name  of the build, as its classifier's files are called; a name that words.check_name allows
+    name  of the build, also used for its classifier's files; a name that words.check_name allows
     mode  "scan", or "glove", which also recognises
 
-    `config_of` and `switches_of` say what the protocol's files are to be made with; `whole_folder` takes all. Raises
-    FirmwareError if the board lacks a switch or, for a glove, a joint; if there are more than 255 grasp types to tell
-    of; or if a scan takes longer than scan_us.
+    `config_of` and `switches_of` give the arguments for the protocol's files; `whole_folder` takes all files. Raises
+    FirmwareError if the board lacks a switch or, for a glove, a joint; if there are more than 255 grasp types; or if a
+    scan takes longer than scan_us.
     """
     switches = keys_of(board, names.switches)
     check_switches(board, switches)
     if mode == "glove" and len(answers_of(names)) > _MOST_GRASPS:
-        raise FirmwareError(f"{len(answers_of(names))} grasp types: a board can tell {_MOST_GRASPS} apart")
+        raise FirmwareError(
+            f"{len(answers_of(names))} grasp types: a board can report {_MOST_GRASPS}; compile fewer grasp types"
+        )
     ports = readings(board, switches, layout.tables)
     about = _about_glove(board, names) if mode == "glove" else _about_scanner(board)
     files = {f"{part}.h": portable(f"{part}.h") for part in ("thenar_clock", "thenar_due")}
@@ -224,14 +226,14 @@ def _glove_turn(identifier: str, names: Names, board: Board, joints: bool, early
 
 
 def key_ports(board: Board, switches: Sequence[str]) -> Ports:
-    """Return the bytes of the bitmap of the board's keys, all of them, as ports of a build's `switches`."""
+    """Return all bytes of the bitmap of the board's keys as ports of a build's `switches`."""
     numbers = {name: number for number, name in enumerate(switches)}
     keys = [numbers.get(key, NO_SWITCH) for key in key_names(board, switches)]
     return tuple(tuple(keys[at : at + 8]) for at in range(0, len(keys), 8))
 
 
 def _keys_of_switches(board: Board, switches: Sequence[str]) -> list[str]:
-    """Return, in lines of C, the key of each switch of a matrix; elsewhere key k is switch k."""
+    """Return, as lines of C, the key of each switch of a matrix; with other wirings, key k is switch k."""
     if board.matrix is None:
         return []
     places = {name: key for key, name in enumerate(key_names(board, switches))}
@@ -246,36 +248,36 @@ def _inputs_in_words(board: Board) -> str:
         diodes = "with" if board.matrix.diodes else "without"
         return f"a matrix of {len(board.matrix.rows)} rows and {len(board.matrix.columns)} columns {diodes} diodes"
     if not (board.pins or board.chips):
-        return "none, and the one that the protocol asks for is open"
+        return "no switches (the single key that the protocol requires always reads as open)"
     return "switches on pins" if board.pins else "switches on port expanders"
 
 
 def _about_scanner(board: Board) -> str:
-    reads = f"A scanner board. It reads {_inputs_in_words(board)}, and tells the host of them"
+    reads = f"A scanner board. It reads {_inputs_in_words(board)}, and sends them to the host"
     if board.channels:
         keys = f"{_inputs_in_words(board)}, and " if board.matrix is not None or board.pins or board.chips else ""
-        reads = f"A scanner board. It reads {keys}taxels on the part's converter, and tells the host of them"
+        reads = f"A scanner board. It reads {keys}taxels on the part's converter, and sends them to the host"
     return wrapped(f"{reads} (protocol {2 if board.channels else 1} of thenar's scanner board).", 3)
 
 
 def _about_glove(board: Board, names: Names) -> str:
-    reads = f"A glove that recognises by itself. It reads {_inputs_in_words(board)}"
-    tells = "tells the host of them and of the grasp type (protocol 1 of thenar's scanner board)"
+    reads = f"A glove that recognises grasps on its board. It reads {_inputs_in_words(board)}"
+    tells = "sends them and the grasp type to the host (protocol 1 of thenar's scanner board)"
     follows = f" {said}." if (said := segments_in_words(board, names)) else ""
     return wrapped(f"{reads}, and {tells}.{follows}", 3)
 
 
 def segments_in_words(board: Board, names: Names) -> str:
-    """Return whether a glove on this board follows segments; nothing where its build has no costs of them."""
+    """Return a sentence on whether a glove on this board follows segments; "" where its build has no segment costs."""
     if names.segments is None:
         return ""
     ram = board.microcontroller.ram
     takes = f"{segmenter_bytes(names.segments)} of {ram} bytes of RAM"
     if follows_segments(board, names):
-        return f"It follows segments, in {takes}"
-    return f"Segments are left out: they would take {takes}, and {int(ram * _MOST_RAM)} are for them"
+        return f"It follows segments, which takes {takes}"
+    return f"Segments are left out: they would take {takes}; the limit is {int(ram * _MOST_RAM)}"
 
 
 def whole_folder(name: str, board: Board, mode: Mode, files: Mapping[str, str]) -> dict[str, str]:
-    """Return path -> text of the whole folder of the firmware of the build `name`, whose files are `files`."""
+    """Return path -> text of the whole firmware folder of the build `name`, whose files are `files`."""
     return _layer(board).folder(name, board, mode, files)

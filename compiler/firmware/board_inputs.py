@@ -1,4 +1,4 @@
-"""The files that read a board's inputs on any part: port expanders, a CyberGlove; and what those of parts share."""
+"""The files that read a board's inputs on any part, port expanders and a CyberGlove, and helpers for all parts."""
 
 from collections.abc import Sequence
 from itertools import accumulate, pairwise
@@ -24,7 +24,7 @@ def portable(file: str, /, **values: object) -> str:
 
 
 def wrapped(words: str, indent: int) -> str:
-    """Return what is to stand in a comment of C after `indent` columns, broken into lines of at most 120 of them."""
+    """Return `words` for a C comment after `indent` columns, broken into lines of at most 120 columns."""
     blanks = " " * indent
     return fill(words, 117, initial_indent=blanks, subsequent_indent=blanks, break_on_hyphens=False).lstrip()
 
@@ -37,10 +37,12 @@ Row = dict[str, object]  # of a template's table
 
 
 def line_type(matrix: Matrix) -> tuple[str, str]:
-    """Return the narrowest type of C that has a bit for each column, and how to write a bit of it."""
+    """Return the narrowest C type with a bit for each column, and the expression of a bit of it."""
     width = next((width for width in _LINE if len(matrix.columns) <= width), None)
     if width is None:
-        raise FirmwareError(f"a matrix of {len(matrix.columns)} columns: the firmware reads 32, swap rows and columns")
+        raise FirmwareError(
+            f"a matrix of {len(matrix.columns)} columns: the firmware reads at most 32; swap rows and columns"
+        )
     return _LINE[width]
 
 
@@ -54,18 +56,18 @@ def taxel_rows(taxels: TaxelInputs) -> list[Row]:
 
 
 def channels_header(reference: str) -> str:
-    """Return thenar_channels.h of a converter with such a reference."""
+    """Return thenar_channels.h for a converter with this reference voltage."""
     return portable("thenar_channels.h", reference=reference)
 
 
 def _place_of(inputs: tuple[str, ...], number: int, per_input: int) -> str:
-    """Return where a channel is, in words: "C3 of the multiplexer at ADC0"."""
+    """Return the place of a channel in words: "C3 of the multiplexer at ADC0"."""
     at = inputs[number // per_input]
     return at if per_input == 1 else f"C{number % per_input} of the multiplexer at {at}"
 
 
 def expanders_file(board: Board, ports: Sequence[Port], switches: Sequence[str]) -> str:
-    """Return thenar_expanders.c: the chips that hold a switch of the build, and these readings of them, in order."""
+    """Return thenar_expanders.c: the chips with a switch of the build, and these readings of them, in order."""
     used = sorted({port.chip for port in ports})
     wired = [board.chips[number] for number in used]
     writes = [chip.chip.setup(frozenset(chip.numbered_pins)) for chip in wired]
@@ -123,26 +125,28 @@ _BYTES = range(1, 256)
 
 
 def check_joints(board: Board, joints: Sequence[Calibration], code_bits: int) -> None:
-    """Raise FirmwareError if the board measures no joints, and the build needs some, or in other codes."""
+    """Raise FirmwareError if the build needs joints and the board measures none, or measures other codes."""
     if not joints:
         return
     if code_bits != 8:
         raise FirmwareError(
-            "the build tells codes above 254 apart, which are more than a CyberGlove's bytes or the upper 8 bits of a "
-            "converter: compile recordings of such bytes"
+            "the build distinguishes codes above 254, but a CyberGlove's bytes and the upper 8 bits of a converter end "
+            "at 255: compile recordings of such bytes"
         )
     if board.cyberglove is None and not board.analog:
         raise FirmwareError(
-            f"the build needs {len(joints)} joints, and the board measures none: add [cyberglove] or [analog] to its "
+            f"the build needs {len(joints)} joints, but the board measures none: add [cyberglove] or [analog] to its "
             "board.toml, or compile the build with --inputs switches"
         )
 
 
 def analog_channels(board: Board, joints: Sequence[Calibration]) -> list[str]:
-    """Return the channel of each joint of a build. Raises FirmwareError if the board has none for one of them."""
+    """Return the channel of each joint of a build. Raises FirmwareError if a joint has no channel on the board."""
     lacking = [joint.name for joint in joints if joint.name not in board.analog]
     if lacking:
-        raise FirmwareError(f"[analog] of the board has no channel for {list_names(lacking)}, which the build needs")
+        raise FirmwareError(
+            f"[analog] of the board has no channel for {list_names(lacking)}, which the build needs: add one each"
+        )
     return [board.analog[joint.name] for joint in joints]
 
 
@@ -166,12 +170,12 @@ def glove_file(name: str, glove: GloveUart, joints: Sequence[Calibration]) -> st
 def _place(joint: Calibration, sensors: Sequence[str]) -> int:
     if joint.name not in sensors:
         raise FirmwareError(
-            f"the build needs joint {joint.name!r}, and the CyberGlove has no sensor of that name"
-            f"{nearest(joint.name, sensors)}; name its sensors as the build does: `joints` of [cyberglove]"
+            f"the build needs joint {joint.name!r}, but the CyberGlove has no sensor of that name"
+            f"{nearest(joint.name, sensors)}; use the build's names in `joints` of [cyberglove]"
         )
     if joint.code_a not in _BYTES or joint.code_b not in _BYTES or joint.code_a == joint.code_b:
         raise FirmwareError(
             f"joint {joint.name!r} of the build is coded in {joint.unit!r}, not in a CyberGlove's bytes: compile "
-            "recordings of its bytes, for the firmware has no calibration"
+            "recordings of its bytes, since the firmware has no calibration"
         )
     return list(sensors).index(joint.name)

@@ -1,4 +1,4 @@
-"""The layout that suits a target: the fastest that fits its flash, and what there was to choose from."""
+"""Choosing the layout for a target: the fastest that fits its flash, and the Pareto front of the alternatives."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -32,16 +32,16 @@ from .targets import TARGETS, Target
 Option = tuple[Layout, Cost]
 
 _NOTE_WIDTH = 114
-# avr-gcc makes no larger object.
+# avr-gcc cannot make a larger object.
 _LARGEST_ARRAY = 32767
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Choice:
-    """The layout chosen, what it costs at most, and why it was chosen, in a sentence.
+    """The layout chosen, the most it costs, and the reason, in a sentence.
 
-    frontier holds, from the fastest to the smallest, all layouts than which none is both faster and smaller, whether or
-    not they fit.
+    frontier is the Pareto front of cycles and flash, from the fastest to the smallest, including layouts that do not
+    fit.
     """
 
     layout: Layout
@@ -61,10 +61,10 @@ def choose(
     """Return the layout of `tables` whose classify() is the fastest in at most `flash` bytes, of equally fast ones the
     smallest. Every layout has the same scores, however wide its entries are.
 
-    ports say how the switches come, as in `arrange`.
+    ports are the wiring of the switches, as in `arrange`.
 
-    flash is one of `flash_shares` unless given; entry_bits allows only 8 or 16, else both that are possible.
-    Raises FirmwareError if no layout fits, the tables cannot be laid out, or the part has not as much flash.
+    flash is by default one of `flash_shares`; entry_bits allows only 8 or 16, by default both where possible.
+    Raises FirmwareError if no layout fits, the tables cannot be laid out, or the part has less flash than `flash`.
     """
     if flash is not None and flash > target.flash:
         raise FirmwareError(
@@ -78,16 +78,16 @@ def choose(
                 return Choice(layout, cost, _why(layout, cost, len(options), allowed, target), best)
     smallest = best[-1][1]
     raise FirmwareError(
-        f"the smallest layout for {target.part} takes {smallest.flash} bytes of flash and {smallest.ram} of RAM, "
+        f"the smallest layout for {target.part} takes {smallest.flash} bytes of flash and {smallest.ram} of RAM, but "
         f"{allowed} and {target.ram} are allowed: compile with a higher --prune, fewer --rounds or --table-bits 8, "
-        "or take a larger part"
+        "or use a larger part"
     )
 
 
 def frontier(options: Iterable[Option]) -> tuple[Option, ...]:
-    """Return the options than which none is both faster and smaller, from the fastest to the smallest.
+    """Return the Pareto front of the options in cycles and flash, from the fastest to the smallest.
 
-    Options of several builds may be mixed, such as those of one compiled with 8 and with 16 table bits.
+    Options of several builds may be mixed, for example of one compiled with 8 and with 16 table bits.
     """
     best: list[Option] = []
     for option in sorted(options, key=lambda option: (option[1].cycles, option[1].flash)):
@@ -97,14 +97,14 @@ def frontier(options: Iterable[Option]) -> tuple[Option, ...]:
 
 
 def flash_shares(target: Target) -> tuple[int, int]:
-    """Return the bytes of flash that a classifier may take where nobody says how many: half of it, so that scanning and
-    sending have room; or three quarters, if less will not do; never more than the target's `most_flash`.
+    """Return the default bytes of flash for a classifier: half of the part's, so that scanning and sending have room,
+    then three quarters, if half is too little; never more than the target's `most_flash`.
     """
     return min(target.flash // 2, target.most_flash), min(target.flash * 3 // 4, target.most_flash)
 
 
 def _layouts(tables: IntegerTables, target: Target, ports: Ports | None, entry_bits: int | None) -> Iterator[Layout]:
-    """Yield the layouts that there are. Raises FirmwareError if there is none, saying why not."""
+    """Yield all possible layouts. Raises FirmwareError with the reason if there is none."""
     refused: FirmwareError | None = None
     found = False
     sizes = range(SMALLEST_GROUP, LARGEST_GROUP + 1) if tables.n_switches else [SMALLEST_GROUP]
@@ -114,7 +114,10 @@ def _layouts(tables: IntegerTables, target: Target, ports: Ports | None, entry_b
                 layout = arrange(tables, ports=ports, group_size=size, entry_bits=bits, bins=bins, shared=shared)
                 rows = layout.n_rows * layout.parts.width * len(layout.parts.firsts) * layout.entry_bits // 8
                 if target.avr and rows > _LARGEST_ARRAY:
-                    raise FirmwareError(f"the rows need {rows} bytes, an array of an AVR has {_LARGEST_ARRAY} at most")
+                    raise FirmwareError(
+                        f"the rows need {rows} bytes, but an array of an AVR has at most {_LARGEST_ARRAY}: "
+                        "compile with fewer --rounds"
+                    )
                 found = True
                 yield from (replace(layout, adding=adding) for adding in _addings(target))
         except FirmwareError as reason:
@@ -124,8 +127,8 @@ def _layouts(tables: IntegerTables, target: Target, ports: Ports | None, entry_b
 
 
 def _sharings(tables: IntegerTables, n_groups: int) -> Iterator[tuple[Shared, ...]]:
-    """Yield which joints, and groups of switches, share look-ups: at first none, then each time the two look-ups that
-    together have the fewest rows more than apart.
+    """Yield which joints, and groups of switches, share lookups: at first none, then each time the two lookups whose
+    merging adds the fewest rows.
     """
     sizes = [len(part) for part in np.array_split(np.arange(tables.n_switches), n_groups)] if n_groups else []
     held: list[tuple[int, Shared]] = [(1 << size, (group, ())) for group, size in enumerate(sizes)]
@@ -155,16 +158,16 @@ def _bins(tables: IntegerTables) -> tuple[Bins, ...]:
 
 
 def _addings(target: Target) -> tuple[Adding, ...]:
-    """Where a compiler makes the code, it decides how."""
+    """Return the ways of adding rows; where a compiler makes the code, it decides."""
     return get_args(Adding) if target.avr else ("called",)
 
 
 def features(layout: Layout, target: Target) -> str:
-    """Return in words how `layout` lies in flash, and on an AVR how it is added up."""
+    """Return a description of how `layout` lies in flash, and on an AVR how its rows are added."""
     halves = ", the upper halves of steps" if layout.entry_shift else ""
     parts = [f"{layout.entry_bits}-bit entries{' and sums' if layout.sum_bits == 8 else halves}"]
     if layout.groups:
-        parts.append(f"up to {max(map(len, layout.groups))} switches a look-up")
+        parts.append(f"up to {max(map(len, layout.groups))} switches a lookup")
     if layout.joints:
         parts.append(
             {
@@ -174,7 +177,7 @@ def features(layout: Layout, target: Target) -> str:
             }[layout.bins]
         )
         if (most := max((len(lookup.joints) for lookup in layout.lookups), default=0)) > 1:
-            parts.append(f"up to {most} joints a look-up")
+            parts.append(f"up to {most} joints a lookup")
     if layout.tables.slopes:
         parts.append("codes multiplied")
     if target.avr:
@@ -197,12 +200,12 @@ class Fit:
     choice: Choice
 
     def notes(self, *more: str) -> tuple[str, ...]:
-        """Return lines for an opening comment: what was chosen and why, and what `more` there is to say."""
+        """Return lines for an opening comment: the layout, the reason for it, and the notes `more`."""
         return tuple(line for note in (f"Layout {self.words}.", *more) for line in wrap(note, _NOTE_WIDTH))
 
     @property
     def words(self) -> str:
-        """What was chosen and why, in a sentence."""
+        """The layout and the reason for it, in a sentence."""
         if not self.target.own_layout:
             what = features(self.choice.layout, self.target)
             return f"for {self.target.title}: {what}, as on the smallest part that holds the build"
@@ -210,8 +213,7 @@ class Fit:
 
 
 def fit_for(target: Target, tables: IntegerTables, flash: int | None = None, ports: Ports | None = None) -> Fit:
-    """Return the part that firmware for a target is for, and the layout chosen for it, in `flash` bytes where given;
-    `ports` as in `choose`.
+    """Return the part of a target, and the layout chosen for it, in `flash` bytes where given; `ports` as in `choose`.
 
     Raises FirmwareError if no layout fits.
     """
@@ -222,10 +224,10 @@ def fit_for(target: Target, tables: IntegerTables, flash: int | None = None, por
 
 
 def smallest_fit(tables: IntegerTables, *, kind: str = "", flash: int | None = None, ports: Ports | None = None) -> Fit:
-    """Return the smallest part that holds the tables, of those that builds carry firmware for, or that are of `kind`;
-    in `flash` bytes where given, or in all that the part has if that is less.
+    """Return the smallest part that holds the tables, of those that builds carry firmware for, or those of `kind`;
+    in `flash` bytes where given, or in all of the part's flash if that is less.
 
-    Raises FirmwareError, with what kept them from the largest, if there is none.
+    Raises FirmwareError, with the reason for the largest part, if there is none.
     """
     candidates = [target for target in TARGETS.values() if (target.kind == kind if kind else target.carried)]
     *smaller, largest = sorted(candidates, key=lambda target: target.flash)

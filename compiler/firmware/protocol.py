@@ -139,8 +139,8 @@ def _hurdles(scorer: Scorer, unread: int, grasps: Sequence[str]) -> list[dict[st
     rows: list[dict[str, object]] = []
     for leader, grasp in enumerate(grasps):
         steps = [
-            0 if rival == leader else min(most + (rival < leader), _NEVER)
-            for rival, most in enumerate(scorer.reach(leader, unread))
+            0 if competitor == leader else min(most + (competitor < leader), _NEVER)
+            for competitor, most in enumerate(scorer.reach(leader, unread))
         ]
         rows.append({"leader": grasp, "steps": wrap(", ".join(map(str, steps)), _WIDTH)})
     return rows

@@ -1,1 +1,1 @@
-"""What accuracy costs in time: every choice of switches, joints, tables, scans and decisions on one picture."""
+"""The trade-off of accuracy and time: choices of switches, joints, tables, scans and decisions, and their fronts."""

@@ -1,4 +1,4 @@
-"""Answers found once: functions whose answers are kept, the file that keeps them, and the workers that find them."""
+"""A persistent cache: functions whose results are stored, the file that stores them, and the workers that compute."""
 
 import fcntl
 import os
@@ -22,14 +22,14 @@ from thenar.runtime.recording.writer import AppendedFile
 
 from ..workers import in_workers
 
-# Bytes; a frontier of the largest set answers a few million questions.
+# Bytes; a frontier of the largest set makes a few million calls.
 LARGEST = 1 << 30
-HEADER = b'{"thenar":"store of answers","schema":3}\n'
-# Their questions and answers have another form: none of them can be found again.
+HEADER = b'{"thenar":"store of results","schema":3}\n'
+# Older forms of calls and results, which cannot be looked up any more.
 OLD_HEADERS = (HEADER.replace(b"3}", b"1}"), HEADER.replace(b"3}", b"2}"))
 
-# Where a function runs: on the cluster, if there is one; in workers on this machine, whose tools it asks; in this very
-# process, because it measures this machine, whose name is then part of the question.
+# Where a function runs: on the cluster, if there is one; in workers on this machine, whose tools it uses; in this very
+# process, because it measures this machine, whose name is then part of the cache key.
 Place = Literal["cluster", "machine", "process"]
 Report = Callable[[int, int], None]
 P = ParamSpec("P")
@@ -37,32 +37,32 @@ R = TypeVar("R")
 
 
 class StoreError(ThenarError, OSError):
-    """A store cannot be opened or written to, another run has it, or the file is none."""
+    """A store that cannot be opened or written to, is in use by another run, or is another kind of file."""
 
 
 class Stored(Generic[P, R]):
-    """A function of a module whose answers a `Cache` keeps; see `stored`. Called itself, it answers anew."""
+    """A function of a module whose results a `Cache` stores; see `stored`. A direct call computes a new result."""
 
     def __init__(self, function: Callable[P, R], version: int, where: Place, without: Sequence[str]) -> None:
         update_wrapper(self, function)
         self.function, self.version, self.where, self.without = function, version, where, without
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
-        """Return the answer, found now."""
+        """Compute and return the result."""
         return self.function(*args, **kwargs)
 
     def __reduce__(self) -> str:
-        # Workers find it by its name, as they find any function.
+        # Workers find it by name, like any function.
         return self.function.__qualname__
 
     def call(self, cost: float, /, *args: P.args, **kwargs: P.kwargs) -> "Call[R]":
-        """Return a call to be asked; it is expected to take `cost` seconds of one core."""
+        """Return a call for `Cache.ask`, expected to take `cost` seconds of one core."""
         return Call(self, args, kwargs, cost)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Call(Generic[R]):
-    """A stored function and what it is called with."""
+    """A stored function and its arguments."""
 
     work: Stored[..., R]
     args: tuple[Any, ...]
@@ -70,11 +70,11 @@ class Call(Generic[R]):
     cost: float
 
     def __call__(self) -> R:
-        """Return the answer, found now."""
+        """Compute and return the result."""
         return self.work(*self.args, **self.kwargs)
 
     def question(self, digests: dict[int, str]) -> bytes:
-        """Return all that the answer depends on besides the store's scope: the function's name, version and arguments.
+        """Return everything that determines the result within the store's scope: function name, version and arguments.
 
         digests  of arrays by their ids, while these live: each is digested once
         """
@@ -82,7 +82,7 @@ class Call(Generic[R]):
         def plain(value: Any) -> object:
             if isinstance(value, np.ndarray):
                 return digests.get(id(value)) or digests.setdefault(id(value), _digest(value))
-            return value.identity  # of a class that says what it is; AttributeError for all others
+            return value.identity  # of a class that supports caching; AttributeError for all others
 
         bound = signature(self.work.function).bind(*self.args, **self.kwargs)
         bound.apply_defaults()
@@ -96,43 +96,42 @@ class Call(Generic[R]):
 def stored(
     version: int, *, where: Place = "cluster", without: Sequence[str] = ()
 ) -> Callable[[Callable[P, R]], Stored[P, R]]:
-    """Return a decorator of functions whose answers a `Cache` keeps.
+    """Return a decorator of functions whose results a `Cache` stores.
 
     Parameters
     ----------
     version : int
-        Raised where the function changes what it answers.
+        Raise it when the function's results change.
     where : {"cluster", "machine", "process"}
-        Where it runs at most.
+        The farthest place where it may run.
     without : sequence of str
-        Names of arguments that change no answer.
+        Names of arguments that do not affect the result.
 
     Notes
     -----
-    The function is one of a module, its answer a type that JSON carries without loss. Arguments are what msgspec can
-    encode, arrays, and objects with an `identity` that can be encoded.
+    The function must be one of a module, its result of a type that JSON carries without loss. Arguments must be
+    encodable by msgspec, arrays, or objects with an encodable `identity`.
     """
     return lambda function: Stored(function, version, where, without)
 
 
 class _Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One answer. `crc` is the CRC-32 of key and answer: what a loss of power leaves behind is not taken for one."""
+    """One result. `crc` is the CRC-32 of key and result: it detects lines damaged by a loss of power."""
 
     key: str
     crc: int
-    answer: msgspec.Raw
+    result: msgspec.Raw
 
 
 class Store:
-    """The answers in file `path`, for one run at a time; used as a context manager, or closed.
+    """The results in file `path`, for one run at a time; used as a context manager, or closed.
 
-    scope  all that every answer rests on and no question says, such as the version of thenar. It is part of each
-           question's digest, so that one file may hold answers of several scopes, which never meet.
+    scope  common dependencies of all results, such as the version of thenar. It is part of each key, so that one file
+           may hold results of several scopes, which never mix.
 
-    The file is a header and a line of JSON an answer. What `put` has returned from survives a kill, and a loss of power
-    takes at most the last second (see AppendedFile). A line that is torn or damaged counts as never written; what
-    follows the last good line is cut off on opening. A store of an older form is emptied, and is `renewed`. Raises
-    StoreError.
+    The file is a header and one line of JSON per result. Results survive a kill once `put` has returned; a loss of
+    power costs at most the last second (see AppendedFile). A torn or damaged line is ignored; everything after the last
+    good line is cut off on opening. A store of an older form is emptied, and is `renewed`. Raises StoreError.
     """
 
     def __init__(self, path: Path, scope: str) -> None:
@@ -162,18 +161,18 @@ class Store:
         self.close()
 
     def __len__(self) -> int:
-        """Return the number of answers, of all scopes."""
+        """Return the number of results, of all scopes."""
         return len(self._answers)
 
     def close(self) -> None:
-        """Bring everything to the disk and let other runs have the file. May be called again."""
+        """Write everything to disk and unlock the file for other runs. May be called again."""
         if self._lock >= 0:
             self._file.close()
             os.close(self._lock)
             self._lock = -1
 
     def get(self, question: bytes, kind: type[R]) -> R | None:
-        """Return the answer; None if there is none, or none that reads as `kind`: it is to be found again."""
+        """Return the result, or None if there is none that decodes as `kind`, and it must be computed."""
         data = self._answers.get(self._key(question))
         if data is None:
             return None
@@ -182,9 +181,9 @@ class Store:
         except (ValueError, RecursionError):
             return None
 
-    def put(self, question: bytes, answer: object) -> None:
-        """Append the answer, which replaces an older one. Raises StoreError, for one if the disk is full."""
-        key, data = self._key(question), msgspec.json.encode(answer)
+    def put(self, question: bytes, result: object) -> None:
+        """Append the result, which replaces an older one. Raises StoreError, for example if the disk is full."""
+        key, data = self._key(question), msgspec.json.encode(result)
         line = _Line(key, _crc(key, data), msgspec.Raw(data))
         self._append(msgspec.json.encode(line) + b"\n")
         self._answers[key] = data
@@ -193,14 +192,14 @@ class Store:
         return blake2b(self._scope + b"\0" + question, digest_size=16).hexdigest()
 
     def _read(self, data: bytes) -> int:
-        """Take the answers in `data`; return how many of its bytes are worth keeping."""
+        """Read the results in `data`; return how many of its bytes are valid."""
         if HEADER.startswith(data):
             return 0  # new, or killed while the header was written
         self.renewed = data.startswith(OLD_HEADERS)
         if self.renewed:
             return 0
         if not data.startswith(HEADER):
-            raise StoreError(f"{self._path} is no store of answers, or a newer thenar's: name another file")
+            raise StoreError(f"{self._path} is no store of results, or a newer thenar's: name another file")
         kept = at = len(HEADER)
         for line in data[len(HEADER) :].splitlines(keepends=True):
             at += len(line)
@@ -213,7 +212,7 @@ class Store:
             read = msgspec.json.decode(line, type=_Line)
         except (ValueError, RecursionError):
             return False
-        data = bytes(read.answer)
+        data = bytes(read.result)
         if read.crc != _crc(read.key, data):
             return False
         self._answers[read.key] = data
@@ -222,17 +221,17 @@ class Store:
     def _append(self, data: bytes) -> None:
         if not self._file.append(data):
             raise StoreError(
-                f"{self._file.failure or f'{self._path} is closed'}; its {len(self)} answers are kept: free some space "
-                "and do the same again"
+                f"{self._file.failure or f'{self._path} is closed'}; its {len(self)} results are kept: free some space "
+                "and run this again"
             )
 
 
 class Cache:
-    """Answers from a store at once, the others found in workers and stored as they come; one progress over all stages.
+    """Returns stored results at once, computes the others in workers and stores them; one progress over all stages.
 
-    report   called with what is done and to do, in expected seconds of one core. A stage that begins says what it
-             really has to do; answers that were stored are no effort, so that speed, and the time left, stay true.
-    jobs, cluster  as for in_workers. Answers do not depend on either.
+    report   called with the done and total expected seconds of one core. When a stage begins, its actual cost replaces
+             the estimate; stored results cost nothing, so speed and remaining time stay correct.
+    jobs, cluster  as for in_workers. Results do not depend on either.
     """
 
     def __init__(self, store: Store, report: Report, *, jobs: int = -1, cluster: str | None = None) -> None:
@@ -241,15 +240,15 @@ class Cache:
         self._costs: dict[str, float] = {}
         self._done = 0.0
 
-    def foresee(self, costs: Mapping[str, float]) -> None:
-        """Say what stages that have not begun will cost, as far as can be told."""
+    def expect(self, costs: Mapping[str, float]) -> None:
+        """Set the estimated costs of stages that have not begun."""
         self._costs = {**costs, **self._costs}
 
     def ask(self, stage: str, calls: Sequence[Call[R]]) -> list[R]:
-        """Return the answers in the order of `calls`, all of one function; equal calls are asked once.
+        """Return the results in the order of `calls`, all of one function; equal calls are computed once.
 
-        The dearest calls begin first. Raises StoreError, whatever the function raises, and what in_workers raises: what
-        was found until then is stored.
+        The most expensive calls begin first. Raises StoreError, exceptions of the function, and those of in_workers;
+        results computed until then are stored.
         """
         if not calls:
             self._begin(stage, 0.0)
@@ -261,13 +260,13 @@ class Cache:
         found = {key: known for key in asked if (known := self._store.get(key, kind)) is not None}
         todo = sorted((key for key in asked if key not in found), key=lambda key: -asked[key].cost)
         self._begin(stage, sum(asked[key].cost for key in todo))
-        for number, answer in self._found([asked[key] for key in todo], calls[0].work.where):
+        for number, result in self._found([asked[key] for key in todo], calls[0].work.where):
             key = todo[number]
-            self._store.put(key, answer)
-            # As a later run will read it: an answer that was just found is no different from one that was stored.
+            self._store.put(key, result)
+            # Decode it as a later run would: a new result must not differ from a stored one.
             read = self._store.get(key, kind)
             if read is None:
-                raise TypeError(f"what {asked[key].work.function.__name__} found does not read as {kind} from JSON")
+                raise TypeError(f"the result of {asked[key].work.function.__name__} is no {kind} when read from JSON")
             found[key] = read
             self._add(asked[key].cost)
         return [found[key] for key in questions]
@@ -278,7 +277,7 @@ class Cache:
 
     def _found(self, calls: Sequence[Call[R]], where: Place) -> Iterator[tuple[int, R]]:
         jobs, cluster = (1 if where == "process" else self.jobs), (self._cluster if where == "cluster" else None)
-        return in_workers(_answered, enumerate(calls), jobs, cluster)
+        return in_workers(_computed, enumerate(calls), jobs, cluster)
 
     def _add(self, cost: float) -> None:
         self._done += cost
@@ -286,14 +285,14 @@ class Cache:
         self._report(min(round(self._done), round(total)), round(total))
 
 
-def _answered(numbered: tuple[int, Call[R]]) -> tuple[int, R]:
+def _computed(numbered: tuple[int, Call[R]]) -> tuple[int, R]:
     number, call = numbered
     return number, call()
 
 
 @contextmanager
 def _opened(path: Path) -> Iterator[None]:
-    """Turn what the operating system says of `path` into a StoreError."""
+    """Turn an OSError about `path` into a StoreError."""
     try:
         yield
     except StoreError:

@@ -1,4 +1,4 @@
-"""From finalists to points: every way to build each of them, how each decides, and those that are on a front."""
+"""From finalists to points: all designs of each finalist, their decisions, and those on a front."""
 
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -23,10 +23,10 @@ from .timing.scan_times import ASKING_US, NO_TIME
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Design:
-    """A finalist built in one way: these tables in this layout, their switches read so (None: it reads none).
+    """One design of a finalist: these tables in this layout, and the scan of its switches (None: it reads none).
 
-    record    what reading the joints takes; scan_kind "demand": of frames in which the switches do not decide
-    measured  what classifying takes, simulated or timed; None: it is as the model has it
+    record    time of reading the joints; scan_kind "demand": only in frames in which the switches do not decide
+    measured  time of classifying, simulated or measured; None: the model's estimate
     """
 
     close: Close
@@ -39,22 +39,22 @@ class Design:
 
     @property
     def judged(self) -> Judged:
-        """What these tables recognise, as the points are chosen by it."""
+        """The evaluation of these tables by which points are chosen."""
         return self.close.tables[self.tables.tabled]
 
     @property
     def rate(self) -> float:
-        """The share of it."""
+        """The accuracy of these tables."""
         return self.judged.rate.mean
 
     @property
     def n_switches(self) -> int:
-        """How many switches are read."""
+        """The number of switches that are read."""
         return len(self.close.screened.columns)
 
     @property
     def scan(self) -> Time:
-        """Reading the switches."""
+        """Time of reading the switches."""
         if self.wired is None:
             return Time(0.0, "wire")
         times = self.wired.scan
@@ -63,20 +63,20 @@ class Design:
 
     @property
     def asked(self) -> float:
-        """In which share of the frames the joints are read."""
+        """The share of frames in which the joints are read."""
         return self.wired.scan.asked if self.scan_kind == "demand" and self.wired is not None else 1.0
 
     @property
     def transfer(self) -> Time:
-        """Reading the joints, the mean; on demand with the byte that asks for them."""
+        """Mean time of reading the joints; on demand with the request byte."""
         if self.scan_kind != "demand":
             return self.record
         return Time(self.asked * (self.record.us + ASKING_US), self.record.how)
 
     @property
     def classify(self) -> Time:
-        """Classifying, as often as it is done: a scan that may end early looks at the scores after every port that it
-        reads, the mean over frames as the time of its scan is.
+        """Total time of classifying: a scan that may end early looks at the scores after every port that it reads; as
+        with the scan's time, this is the mean over frames.
         """
         once, looks = self.measured or Time(self.classified.us, self.classified.how), 1.0
         if self.wired is not None and self.scan_kind != "full":
@@ -86,13 +86,13 @@ class Design:
 
     @property
     def frame(self) -> Time:
-        """Reading everything, on lines of their own, and classifying; on demand one after the other."""
+        """Time of reading everything, on separate lines in parallel, and classifying; on demand in sequence."""
         both = self.scan.us + self.transfer.us if self.scan_kind == "demand" else max(self.scan.us, self.transfer.us)
         return Time(both + self.classify.us, self.classify.how)
 
     @property
     def slow_us(self) -> float | None:
-        """What a frame takes in which the joints are read, where that is not every one."""
+        """Time of a frame in which the joints are read, unless they are read in every frame."""
         if self.scan_kind != "demand" or self.wired is None:
             return None
         once = self.measured or Time(self.classified.us, self.classified.how)
@@ -100,7 +100,7 @@ class Design:
 
     @property
     def decisions(self) -> tuple[DecisionKind, ...]:
-        """The decisions that its scans serve."""
+        """The decisions that its scans allow."""
         return tuple(POLICIES) if self.scan_kind == "full" else ("single",)
 
 
@@ -108,15 +108,15 @@ Latencies = Mapping[tuple[Design, DecisionKind], Latency]
 
 
 def designs(close: Close, read: Time = NO_TIME) -> Iterator[Design]:
-    """Yield every way to build a finalist, whose joints take `read`."""
+    """Yield all designs of a finalist, whose joints take `read`."""
     for tables in close.priced:
         for classified in tables.classified:
             if not close.screened.columns:
                 yield Design(close, tables, classified, None, "full", read)
             for wired in tables.wired:
-                # Not where ending early never leaves anything out, as with boards.
+                # Skip early ends that never save anything, as with boards.
                 kinds: list[Scan] = ["full", "early"] if wired.scan.early_us < wired.scan.full_us else ["full"]
-                # Of a CyberGlove; a record that is asked for always is better streamed.
+                # Requests to a CyberGlove: if every frame needs a record, streaming is better.
                 if read.how in ("formula", "measured", "wire") and read.us and wired.scan.asked < 1.0:
                     kinds.append("demand")
                 for kind in kinds:
@@ -124,9 +124,9 @@ def designs(close: Close, read: Time = NO_TIME) -> Iterator[Design]:
 
 
 def best_designs(several: Sequence[Design]) -> tuple[list[Design], list[Design]]:
-    """Return the designs on the front of rate against frame time, and those on that against the number of switches.
+    """Return the designs on the front of accuracy against frame time, and those against the number of switches.
 
-    Of designs that are equal there, the one of fewer chips, fewer ports, less reading and less flash.
+    Of equal designs, take the one with fewer chips, then fewer ports, less reading and less flash.
     """
     times = {design: design.frame.us for design in several}
     cheapest = sorted(several, key=_effort)
@@ -142,10 +142,10 @@ def lucks(
     cuts: Cuts,
     seed: int,
 ) -> dict[Judged, float]:
-    """Return by how much tables on the fronts of frame time and of the number of switches look better than they are.
+    """Return the optimism of the accuracies of tables on the fronts of frame time and of the number of switches.
 
-    A point is the best of all that cost less than the next point of its front: it was picked from these, tables of
-    finalists and placements that were screened alone. Of two fronts the greater luck counts.
+    A point is the best of everything cheaper than the next point of its front: tables of finalists, and placements that
+    were only screened. Of two fronts the greater optimism counts.
     """
     quickest: dict[tuple[Close, Shape], float] = {}
     for design in several:
@@ -169,7 +169,7 @@ def lucks(
     for best, price, cost in zip(fronts, prices, costs, strict=True):
         limits = [*(price(design) for design in best[1:]), np.inf]
         for design, luck in zip(best, draws.luck(np.array(cost), limits), strict=True):
-            # Of a share, where the draws count hits in all repeats.
+            # As a share: the draws count hits in all repeats.
             found[design.judged] = max(luck / most, found.get(design.judged, 0.0))
     return found
 
@@ -180,8 +180,8 @@ def _effort(design: Design) -> tuple[float, ...]:
 
 
 def with_whole_scans(kept: Sequence[Design]) -> list[Design]:
-    """Return the designs, each once, and those whose scans may end early with whole scans as well: other decisions
-    than on single frames need these.
+    """Return the designs, each once, and for those whose scans may end early also their designs with whole scans, which
+    all decisions except single frames need.
     """
     found = {_identity(design): design for design in kept}
     for design in kept:
@@ -203,12 +203,12 @@ def points_of(
     training: Callable[[Candidate], Training],
     joints: Callable[[Candidate], Sequence[str]] = lambda _: (),
 ) -> tuple[Point, ...]:
-    """Return those that are on a front, numbered from the fastest frame on.
+    """Return the points on a front, numbered from the fastest frame on.
 
-    luck   by how much the rate of each is to be corrected
-    names  of what a choice keeps
-    training  how a choice is trained
-    joints    the names of its joints, where they are not all or none
+    luck   the optimism to subtract from each rate
+    names  of the elements of a choice
+    training  of a choice
+    joints    the names of its joints, if not all or none
     """
     fronts = _fronts(several, latencies)
     ordered = sorted(several, key=lambda design: (design.frame.us, design.n_switches))
@@ -242,17 +242,17 @@ def _fronts(several: Sequence[Design], latencies: Latencies) -> dict[tuple[Desig
 
 
 def corrected(rate: Rate, luck: float) -> Rate:
-    """Return the rate of a point that was picked for it. The upper end of its interval stays: how lucky it was is not
-    certain, and models that learn from all rows do a little better than those of the folds.
+    """Return the rate of a selected point, corrected for selection. The upper end of its interval stays: the optimism
+    is an estimate, and models trained on all rows do a little better than those of the folds.
     """
     return replace(rate, mean=max(rate.mean - luck, 0.0), low=max(rate.low - luck, 0.0))
 
 
 def _trained(training: Training) -> dict[str, Any]:
-    """Return what the `Recipe` of a point says of the trainer, but for rounds."""
+    """Return the `Recipe` fields of the trainer, except for rounds."""
     usual = {setting.name: setting.default for setting in TRAINERS.named(training.trainer).settings}
     own = {name: value for name, value in training.settings.items() if value not in (usual[name], None)}
-    # A name that is equal to a default is left out if it is the very same string.
+    # msgspec omits a name that equals the default only if it is the very same string.
     return {"trainer": sys.intern(training.trainer), "max_bins": own.pop("max_bins", None), "settings": own}
 
 
@@ -272,7 +272,7 @@ def _point(
     return Point(
         number=number,
         setting=Recipe(
-            way=choice.way,
+            placement=choice.placement,
             inputs=choice.inputs,
             rounds=tabled.rounds if TRAINERS.named(training.trainer).staged else None,
             width=tabled.shape.width,
@@ -290,7 +290,7 @@ def _point(
         rate=corrected(design.judged.rate, luck),
         luck=luck,
         frames=close.frames.get(tabled),
-        beside=close.beside.get(tabled),
+        other_rate=close.other.get(tabled),
         scan=design.scan,
         transfer=design.transfer,
         classify=design.classify,

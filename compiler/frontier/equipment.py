@@ -1,4 +1,4 @@
-"""What a glove may be built of: the target that classifies, and the wirings that its switches may hang on."""
+"""The hardware options of a glove: the target that classifies, and the possible wirings of its switches."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from .cache import Cache, stored
 from .timing.classify_times import ClassifyModel
 from .timing.python_times import PythonCost
-from .timing.scan_times import NO_RECORDS, Beside, Records, beside_wire
+from .timing.scan_times import NO_RECORDS, Overhead, Records, overhead_of
 from .timing.wirings import Wiring
 
 # Expected seconds.
@@ -15,25 +15,25 @@ _CALIBRATION_S = 3.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Equipment:
-    """The target's model, the wirings worth trying, what a transaction takes beside the wire, and a record."""
+    """The target's model, the candidate wirings, the overhead of a transaction, and the time of a record."""
 
     model: ClassifyModel
     wirings: tuple[Wiring, ...]
-    beside: Beside
+    overhead: Overhead
     records: Records = NO_RECORDS
 
     def fitting(self, names: Sequence[str]) -> tuple[Wiring, ...]:
-        """Return the wirings that have a place for all of these switches; none where there are none to read."""
+        """Return the wirings with a place for all of these switches; none if there are no switches."""
         return tuple(wiring for wiring in self.wirings if wiring.fits(names)) if names else ()
 
 
 @stored(1, where="process")
-def calibrate(target: str) -> tuple[PythonCost | None, Beside]:
-    """Measure here what classifying takes in Python, where that is asked, and a transaction besides the wire."""
-    return ClassifyModel(target).python, beside_wire(target)
+def calibrate(target: str) -> tuple[PythonCost | None, Overhead]:
+    """Measure here, if the target requires it, the time of classifying in Python and the overhead of a transaction."""
+    return ClassifyModel(target).python, overhead_of(target)
 
 
 def equipment_for(target: str, wirings: tuple[Wiring, ...], cache: Cache, records: Records = NO_RECORDS) -> Equipment:
-    """Return what may be built for `target`, measured here once."""
-    ((python, beside),) = cache.ask("calibration", [calibrate.call(_CALIBRATION_S, target)])
-    return Equipment(ClassifyModel(target, python=python), wirings, beside, records)
+    """Return the hardware options for `target`, measured here once."""
+    ((python, overhead),) = cache.ask("calibration", [calibrate.call(_CALIBRATION_S, target)])
+    return Equipment(ClassifyModel(target, python=python), wirings, overhead, records)

@@ -1,4 +1,4 @@
-"""Finalists: which placements are worth a close look, and that look: all rounds and shapes of tables, in all folds."""
+"""Finalists: select the placements worth full evaluation, and evaluate all their rounds and tables in all folds."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,41 +15,41 @@ from .screen import Screened
 from .search import NO_SWITCHES, SHAPES, Candidate, Search, Shape
 from .survey import Cuts, Judged, Survey, Tally
 
-# Of what the best recognises; the least gain that counts on a front of rates that were screened; what is level.
+# Share of the best accuracy; the least gain that counts on a front of screened rates; the threshold of a tie.
 _USEFUL, _STEP, _LEVEL = 0.75, 0.003, 0.005
-# The share of errors below which fewer no longer count: a screening of some hundred rows cannot tell.
+# The share of errors below which differences do not count: too small for a screening of some hundred rows.
 _FEWEST = 0.002
 # Expected seconds of one core: of training twice, and of the layouts of all tables.
 PRICE_S = 3.0
-# The stage that trains finalists in all folds but those of the screening.
+# The stage that trains finalists in all folds except the screening's.
 OTHERS = "finalists, other folds"
-# The share of the rows that more rounds than the paper's have to win in the first repeat.
+# The share of the rows that more rounds than the paper's must win in the first repeat.
 _DEEPER = 0.002
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Close:
-    """A finalist: what it recognises after every stage (by the ensemble) and with each of the tables; by the same
-    tables single frames (none: a trial has one), and trials in the other folds (none: only one subject); what the
-    tables worth building cost; how long choosing its switches took.
+    """A finalist: its evaluation after every stage (by the ensemble) and with each of the tables; with the same tables,
+    its accuracy on single frames (none: a trial has one), and on trials in the other folds (none: only one subject);
+    the costs of the tables worth building; the time of choosing its switches.
     """
 
     screened: Screened
     stages: dict[int, Rate]
     tables: dict[Tabled, Judged]
     frames: dict[Tabled, Rate]
-    beside: dict[Tabled, Rate]
+    other: dict[Tabled, Rate]
     priced: tuple[PricedTables, ...]
     choosing_s: float
 
 
 def finalists(screened: Sequence[Screened], wanted: Sequence[Candidate], most: int) -> tuple[Screened, ...]:
-    """Return at most `most` of `screened`, in their order; `wanted` ones come on top.
+    """Return at most `most` of `screened`, in their order, plus the `wanted` ones.
 
-    They are on a front of rate against frame time or, among the same inputs, against the number of switches, and are
-    shared out evenly among the kinds of inputs. Of a kind first the best, then the smallest that is level with it, then
-    always the one whose share of errors and frame time are least like those of any chosen. Choices of the same inputs
-    and switches count once; those that recognise less than three quarters of what the best does are of no use.
+    They are on a front of accuracy against frame time or, among the same inputs, against the number of switches, and
+    are distributed evenly among the kinds of inputs. Of each kind, take the best, then the smallest that ties with it,
+    then repeatedly the one whose error rate and frame time differ most from all chosen ones. Choices of the same inputs
+    and switches count once; those with less than three quarters of the best accuracy are dropped.
     """
     enough = _USEFUL * max((one.mean for one in screened), default=0.0)
     useful = [one for one in _different(screened) if one.mean >= enough]
@@ -65,7 +65,7 @@ def _kinds(screened: Sequence[Screened]) -> list[Inputs]:
 
 
 def _fronts(screened: Sequence[Screened]) -> list[Screened]:
-    """Return what is on a front, in its order."""
+    """Return the choices on a front, in its order."""
     found = front(screened, lambda one: one.frame_us, lambda one: one.mean, _STEP)
     for kind in _kinds(screened):
         mine = [one for one in screened if one.choice.inputs == kind]
@@ -75,7 +75,7 @@ def _fronts(screened: Sequence[Screened]) -> list[Screened]:
 
 
 def _spread(mine: list[Screened]) -> list[Screened]:
-    """Return all of `mine` in the order in which they are worth a closer look."""
+    """Return all of `mine`, in the order in which they merit full evaluation."""
     if not mine:
         return []
     best = max(mine, key=lambda one: one.mean)
@@ -93,20 +93,20 @@ def _unlike(one: Screened, other: Screened) -> float:
 
 
 def _errors(one: Screened) -> float:
-    """Return how many errors are made, on a scale on which halving them counts the same everywhere."""
+    """Return the error rate on a scale on which halving it is the same distance everywhere."""
     return log(1.0 - one.mean + _FEWEST)
 
 
 def _different(screened: Sequence[Screened]) -> list[Screened]:
     return list(
-        {(replace(one.choice, way=NO_SWITCHES), *sorted(one.columns)): one for one in reversed(screened)}.values()
+        {(replace(one.choice, placement=NO_SWITCHES), *sorted(one.columns)): one for one in reversed(screened)}.values()
     )[::-1]
 
 
 def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...]:
-    """Return the finalists with all that is to be known of them.
+    """Return the finalists with all evaluations.
 
-    All are trained to the last round in the folds of the first repeat; in the others, those that gain nothing by more
+    All are trained to the last round in the folds of the first repeat. In the others, those that gain nothing by more
     rounds than the paper's hundred are trained for these alone.
     """
     cuts, choices = survey.cuts, [one.choice for one in chosen]
@@ -144,17 +144,17 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
 
 
 def papers_tables(search: Search) -> Tabled:
-    """Return which tables stand for the paper's: of its hundred rounds, as wide as need be."""
+    """Return the tables that represent the paper's: of its hundred rounds, at the required width."""
     return Tabled(papers_depth(search).tabled[-1], Shape(16))
 
 
 def papers_depth(search: Search) -> Search:
-    """Return the same search, of no more than the paper's hundred rounds."""
+    """Return the same search, limited to the paper's hundred rounds."""
     return replace(search, rounds=min(100, search.rounds))
 
 
 def depth_of(search: Search, fits: Sequence[Tally], rows: int) -> Search:
-    """Return how far a placement is worth following, by the folds of the first repeat, of `rows` rows."""
+    """Return the search with the rounds worth training, by the folds of the first repeat, of `rows` rows."""
     few = papers_depth(search)
     correct = [
         sum(int.from_bytes(fit.stages[number]).bit_count() for fit in fits) for number in range(len(search.stages))
@@ -164,7 +164,7 @@ def depth_of(search: Search, fits: Sequence[Tally], rows: int) -> Search:
 
 
 def worthwhile(tables: Mapping[Tabled, Judged]) -> tuple[Tabled, ...]:
-    """Return, for each shape, the tables of the fewest rounds that recognise as well as any of that shape."""
+    """Return, for each shape, the tables of the fewest rounds that reach that shape's best accuracy."""
     found = []
     for shape in dict.fromkeys(tabled.shape for tabled in tables):
         mine = {tabled: judged.rate.mean for tabled, judged in tables.items() if tabled.shape == shape}
@@ -176,8 +176,8 @@ def worthwhile(tables: Mapping[Tabled, Judged]) -> tuple[Tabled, ...]:
 def _judged(
     cuts: Cuts, search: Search, fits: Mapping[Fold, Tally]
 ) -> tuple[dict[int, Rate], dict[Tabled, Judged], dict[Tabled, Rate], dict[Tabled, Rate]]:
-    """Return what a finalist recognises, as Close has it: after every stage; with each of the tables, of trials and of
-    frames; and with them in the other folds.
+    """Return a finalist's evaluation as in Close: after every stage; with each of the tables, of trials and of frames;
+    and with them in the other folds.
     """
     places = {
         Tabled(rounds, Shape(*shape)): (row, column)
@@ -199,5 +199,5 @@ def _judged(
         each: cuts.frames({fold: fit.frames[row][column] for fold, fit in fits.items()})
         for each, (row, column) in (places.items() if len(cuts.people) < len(cuts.trials) else ())
     }
-    beside = {} if cuts.beside is None else {each: judged.rate for each, judged in tables(cuts.beside).items()}
-    return stages, tables(cuts.by), frames, beside
+    other = {} if cuts.other is None else {each: judged.rate for each, judged in tables(cuts.other).items()}
+    return stages, tables(cuts.by), frames, other

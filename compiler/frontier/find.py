@@ -1,4 +1,4 @@
-"""A frontier from recordings: everything is screened, what is near the front is looked at closely, and put together."""
+"""Find a frontier from recordings: screen everything, evaluate candidates near the front fully, assemble the result."""
 
 import sys
 from collections.abc import Iterator, Sequence
@@ -38,9 +38,9 @@ from .latency import Pace, latencies
 from .measure import TRIAL_S, measured
 from .moving import Moving
 from .plots import PICTURES, pictures
-from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, Way, frontier_to_bytes
+from .points import SCHEMA, Frontier, FrontierError, Mark, PlacementChoice, Point, Tried, frontier_to_bytes
 from .screen import FEWER_JOINTS, OTHER_TRAINERS, QUICK_PRICE_S, Screened, screen, screen_fewer, screen_others
-from .search import JOINTS, TAXEL_LEVELS, Candidate, Search, available_inputs, curve_ways, ways
+from .search import JOINTS, TAXEL_LEVELS, Candidate, Search, available_inputs, curve_placements, tried_placements
 from .stream import Stream, stream_of
 from .survey import Cuts, Survey, fit_s, path_s, settle_s
 from .timing.scan_times import Records, records_of, scan_times
@@ -54,17 +54,17 @@ _EARLY = (
     "Scans that end early are tried with decisions on single frames: a dwell with a lead reads on for longer, and a "
     "sequential test needs whole scans."
 )
-_RENEWED = f"{STORE_NAME} was an older thenar's, of another form: everything was computed anew"
+_RENEWED = f"{STORE_NAME} had the form of an older thenar: everything was computed again"
 _UNTIMED = (
-    "what reading the joints ({}) takes is not known and is left out of every frame time and latency: give it with "
+    "the time of reading the joints ({}) is unknown and is left out of every frame time and latency: give it with "
     "--joint-us"
 )
-# As it turns out: so many placements come on top of the finalists, for the marks; so many designs of a finalist are on
-# a front; so many of the placements that are tried are different ones; so many layouts are simulated besides.
+# Empirical: number of marked placements in addition to the finalists; of designs of a finalist on a front; the share of
+# distinct placements among those tried; of layouts to simulate in addition.
 _MARKED, _DESIGNS, _DIFFERENT, _CHECKED = 3, 2, 0.8, 30
-# So many times as many placements as there are finalists are screened with the other trainers.
+# Placements to screen with the other trainers, as a multiple of the finalists.
 _WIDER = 3
-# So many placements are tried with fewer joints.
+# Number of placements to try with fewer joints.
 _FEWER = 5
 # Expected seconds of one core to learn what segments cost, and to play a stream.
 _LEARNT_S = 5.0
@@ -72,24 +72,24 @@ _LEARNT_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a point has to satisfy: the best within a time, or the fastest that recognises a share; None: not asked."""
+    """Requirement for a point: the best within a time, or the fastest with an accuracy; None: no selection."""
 
     budget_us: float | None = None
     rate: float | None = None
 
     @property
     def words(self) -> str:
-        """What was asked for, "" for nothing."""
+        """The requirement in words, "" for none."""
         if self.budget_us is not None:
             return f"the best within {self.budget_us:g} us a frame"
         return "" if self.rate is None else f"the fastest that recognises {100 * self.rate:g} %"
 
     def pick(self, points: Sequence[Point]) -> Point | None:
-        """Return the point that suits; None where none does or nothing was asked for."""
+        """Return the selected point, or None."""
         single = [point for point in points if point.setting.decision == "single"]
         if self.budget_us is not None:
             quick = [point for point in single if point.frame.us <= self.budget_us]
-            # As its luck was found: by the rates that the points were chosen by.
+            # By the rates that points were chosen by, for which their luck was estimated.
             return max(quick, key=lambda point: (point.rate.mean + point.luck, -point.frame.us), default=None)
         good = [point for point in single if self.rate is not None and point.rate.mean >= self.rate]
         return min(good, key=lambda point: (point.frame.us, -point.rate.mean), default=None)
@@ -113,37 +113,37 @@ def find_frontier(
     cluster: str | None = None,
     report: Report | None = None,
 ) -> Frontier:
-    """Find what accuracy costs in time: which switches, joints, rounds, tables, wirings and decisions are worth it.
+    """Find the trade-off of accuracy and time: the best switches, joints, rounds, tables, wirings and decisions.
 
-    Every placement is screened by a nested cross-validation; those near the front are looked at closely, priced for
-    the target, and simulated there.
+    Every placement is screened by nested cross-validation; those near the front are fully evaluated, priced for the
+    target, and simulated there.
 
     Parameters
     ----------
     grasp_set : GraspSet
-        Recordings of at least two grasp types; no fold parts a trial. Rows in which nothing is held count in decision
-        latency alone.
+        Recordings of at least two grasp types; no fold splits a trial. Rows in which nothing is held only count in
+        decision latency.
     output : Path, optional
-        Folder for frontier.json, frontier.csv, three pictures, and the store, from which an interrupted run goes on.
-        Without it nothing is written, and nothing is kept.
+        Folder for frontier.json, frontier.csv, three pictures, and the store, from which an interrupted run resumes.
+        By default nothing is written or stored.
     source : str
-        What the recordings are called.
+        Name of the recordings.
     harness : Harness, optional
-        A glove's wiring: it is tried as well, and switches are chosen by what its ports cost.
+        A glove's wiring: it is tried as well, and switches are chosen by the cost of its ports.
     target : str
-        What classifies, one of `thenar.compiler.frontier.targets.TARGETS`.
+        Deployment target, one of `thenar.compiler.frontier.targets.TARGETS`.
     search : Search, optional
-        How much is tried. Rivals that are not installed are left out.
+        Size of the search. Baselines that are not installed are left out.
     wanted : Wanted, optional
         Which point to pick.
     build : Path, optional
-        A build folder, to be marked beside the points.
+        A build folder, to be marked on the pictures.
     joint_us : float, optional
-        What reading all joints takes, in microseconds, where they are not a CyberGlove's. Without it that time is left
-        out of every frame, and a sentence of `skipped` says so.
+        Time of reading all joints, in microseconds, if they are not a CyberGlove's. By default that time is left out
+        of every frame, and a sentence of `skipped` says so.
     record_time : {"formula", "wire"}
-        What a CyberGlove's record takes, where the harness does not have it measured: the vendor's formula, or its
-        bytes on the line alone.
+        The time of a CyberGlove's record, if the harness has no measured one: the vendor's formula, or only its bytes
+        on the line.
     filtered : bool
         Whether the formula is with the box's digital filter on.
     stream : GraspSet, optional
@@ -153,19 +153,19 @@ def find_frontier(
     cluster : str, optional
         Address of a Dask scheduler, whose workers do the work.
     report : callable, optional
-        Called with what is done and to do, in expected seconds of one core.
+        Called with the done and total expected seconds of one core.
 
     Returns
     -------
     Frontier
-        A point's rate is corrected for the luck of the best of many; see `thenar.compiler.evaluation.luck`.
+        A point's rate is corrected for the selection of the best of many; see `thenar.compiler.evaluation.luck`.
 
     Raises
     ------
     FrontierError
-        If the recordings, the build or the stream do not suit, nothing can be built, or the folder holds other things.
+        If the recordings, the build or the stream do not fit, nothing can be built, or the folder holds other things.
     StoreError
-        If another run has the folder, or the disk is full.
+        If another run uses the folder, or the disk is full.
 
     Examples
     --------
@@ -188,21 +188,19 @@ def find_frontier(
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
             played = _stream(survey, stream)
             own = () if build is None else (own_build(build, grasp_set, equipment),)
-        cache.foresee(foreseen(survey))
+        cache.expect(estimated_costs(survey))
         untimed = (_UNTIMED.format(list_names(grasp_set.joint_names)),) if records.how == "unknown" else ()
         renewed = (_RENEWED,) if store.renewed else ()
         found = _found(survey, played, wanted or Wanted(), own, (*renewed, *untimed, *lacking))
         if output is not None:
-            # The store goes into the new folder as the same file, and nobody else may have it meanwhile.
+            # The store moves into the new folder as the same file, and must stay locked meanwhile.
             publish_folder(_documents(found), output, kept_entries, FrontierError)
     return found
 
 
 @contextmanager
 def _taken_back_if_refused(made: Sequence[Path]) -> Iterator[None]:
-    """Take back files and folders that a run has made if what it was asked is refused: it leaves nothing. What came by
-    meanwhile stays.
-    """
+    """Remove files and folders that a run made if its request is refused; files added by others meanwhile stay."""
     try:
         yield
     except (FrontierError, BuildError, HarnessError):
@@ -220,7 +218,7 @@ def _records(
     record_time: RecordTime,
     filtered: bool,
 ) -> Records:
-    """Return what reading the joints takes, by what is known of it."""
+    """Return the time of reading the joints, by the best available source."""
     return records_of(
         grasp_set.joint_names,
         joint_us,
@@ -235,7 +233,7 @@ def _samples(grasp_set: GraspSet) -> Samples:
     """Return the rows of a set in which something is held, checked before any work."""
     n_types = len(np.unique(grasp_set.labels))
     if n_types < 2:
-        raise FrontierError(f"the recordings hold {n_types} grasp type(s): there is nothing to tell apart")
+        raise FrontierError(f"the recordings hold {n_types} grasp type(s): there is nothing to distinguish")
     check_types(n_types, FrontierError)
     # All switches and levels at once are tried as well.
     elements = len(grasp_set.switch_names) + TAXEL_LEVELS[-1] * len(grasp_set.taxel_columns)
@@ -255,11 +253,11 @@ def _wirings(grasp_set: GraspSet, harness: Harness | None, target: str) -> tuple
 
 
 def _installed(search: Search) -> tuple[Search, tuple[str, ...]]:
-    """Return the search without rivals that are not installed, and a sentence on each of these."""
-    missing = [name for name in search.rivals if not METHODS[name].installed]
-    there = tuple(name for name in search.rivals if name not in missing)
+    """Return the search without baselines that are not installed, and a sentence on each of these."""
+    missing = [name for name in search.baselines if not METHODS[name].installed]
+    there = tuple(name for name in search.baselines if name not in missing)
     said = (f"{name} was left out: it needs {METHODS[name].install}, which is not installed" for name in missing)
-    return replace(search, rivals=there), tuple(said)
+    return replace(search, baselines=there), tuple(said)
 
 
 @contextmanager
@@ -288,18 +286,18 @@ def _documents(found: Frontier) -> dict[str, bytes]:
 
 
 def _stream(survey: Survey, given: GraspSet | None) -> Stream:
-    """Return the test rows of the first fold as a stream, or the recordings that are given for it."""
+    """Return the test rows of the first fold as a stream, or the recordings given for it."""
     grasp_set, seed = survey.grasp_set, survey.search.seed
     number = {grasp: label for label, grasp in enumerate(survey.samples.grasps)} | {NONE: -1}
     if given is None:
         labels = np.array([number[grasp] for grasp in grasp_set.grasps.tolist()], np.intp)
-        # The test rows, and those of their movements in which nothing is held.
+        # The test rows, and the rows of their movements in which nothing is held.
         movements, test = grasp_set.movement_ids, np.flatnonzero(~grasp_set.is_none)[survey.cuts.screening[0].test]
         return stream_of(grasp_set, labels, np.flatnonzero(np.isin(movements, movements[test])), seed=seed)
     if given.fingerprint() == grasp_set.fingerprint():
         raise FrontierError(
-            f"the stream is what is trained on, {survey.source}: name other recordings with --stream, or leave it out, "
-            "and rows that are set aside are used"
+            f"the stream equals the training set, {survey.source}: name other recordings with --stream, or leave it "
+            "out to use held-out rows"
         )
     if (given.element_names, given.joints) != (grasp_set.element_names, grasp_set.joints):
         raise FrontierError(f"the stream has other switches, taxels or joints than {survey.source}")
@@ -310,20 +308,20 @@ def _stream(survey: Survey, given: GraspSet | None) -> Stream:
     return stream_of(given, labels, seed=seed)
 
 
-def foreseen(survey: Survey) -> dict[str, float]:
-    """Return the expected seconds of one core of each stage, before any has begun: the time that is left does not grow
-    on the way.
-    """
+def estimated_costs(survey: Survey) -> dict[str, float]:
+    """Estimate each stage's cost in seconds of one core before any has begun, so that the time left never grows."""
     search, cuts, sizes = survey.search, survey.cuts, [len(survey.elements(most)) for most in survey.levels]
     rows, simulated = len(survey.samples.labels), survey.equipment.model.part is not None
     kinds = available_inputs(sizes[-1], survey.n_joints)
     wired = len(kinds) - ("joints" in kinds)
     train, more = ([len(fold.train) for fold in folds] for folds in (cuts.screening, cuts.others))
-    # Once, or for each of the inputs if a method learns from joints.
+    # Once, or for each of the inputs if a method uses joints.
     several = {name: len(sizes) * (wired if METHODS[name].uses_joints else min(wired, 1)) for name in search.methods}
     methods = [name for name, count in several.items() for _ in range(count)]
-    choices = sum(len(ways(name, size)) for name in search.methods for size in sizes) * wired + ("joints" in kinds)
-    rivals = sum(len(curve_ways(name, sizes[-1])) for name in search.rivals)
+    choices = sum(len(tried_placements(name, size)) for name in search.methods for size in sizes) * wired + (
+        "joints" in kinds
+    )
+    baselines = sum(len(curve_placements(name, sizes[-1])) for name in search.baselines)
     trainers = [search.alone(name) for name in search.trainers]
     last, again = min(search.finalists + _MARKED, choices), min(_WIDER * search.finalists, choices)
     few = papers_depth(search)
@@ -338,11 +336,11 @@ def foreseen(survey: Survey) -> dict[str, float]:
 
     return {
         "placements": sum(path_s(name, n) for name in methods for n in (rows, *train)),
-        "rivals": sum(path_s(name, n) for name in search.rivals for n in train) if wired else 0.0,
+        "baselines": sum(path_s(name, n) for name in search.baselines for n in train) if wired else 0.0,
         "settings": settling(trainers[:1], (rows, *train)),
         f"settings{OTHER_TRAINERS}": settling(trainers[1:], (rows, *train)),
         "finalists' settings": settling(trainers, more),
-        "screening": (_DIFFERENT * choices + rivals) * screening(trainers[:1]),
+        "screening": (_DIFFERENT * choices + baselines) * screening(trainers[:1]),
         f"screening{FEWER_JOINTS}": fewer * screening(trainers[:1]),
         f"screening{OTHER_TRAINERS}": again * screening(trainers[1:]),
         "times": _DIFFERENT * choices * QUICK_PRICE_S,
@@ -409,8 +407,8 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
 
 
 def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latencies:
-    """Return the latency of every design with every decision that it serves, by tables of rows that the stream of the
-    set's own test rows does not hold.
+    """Return the latency of every design with every decision that it allows, by tables trained on rows outside the
+    stream of held-out rows.
     """
     fold, grouped = survey.cuts.screening[0], dict[Candidate, list[Design]]()
     moving = Moving.of(survey.grasp_set, fold.train, survey.search.seed)
@@ -447,7 +445,7 @@ def _tried(screened: Sequence[Screened], closes: Sequence[Close], search: Search
     then = [(close.screened, rounds, rate) for close in closes for rounds, rate in close.stages.items()]
     return tuple(
         Tried(
-            one.choice.way,
+            one.choice.placement,
             one.choice.inputs,
             len(one.columns),
             rounds if searches[one.choice.trainer].staged else None,
@@ -472,21 +470,21 @@ _PAPERS = (62.0,)
 def choices_to_mark(
     n_switches: int, n_joints: int, trainer: str = PAPERS_TRAINER, levels: int | None = None
 ) -> dict[Candidate, str]:
-    """Return what to mark, with its name: the paper's placement and all switches, alone and with the joints; with so
-    many levels of each taxel.
+    """Return the choices to mark, with their names: the paper's placement and all switches, alone and with the joints;
+    with `levels` levels of each taxel.
     """
     if not n_switches:
         return {}
-    marked = {Way(PAPERS, prune): f"paper, S = {prune:g}" for prune in _PAPERS}
-    # Whichever method says so, to keep all of them is the same.
-    marked[Way(BEST, float(n_switches))] = f"all of {n_switches}"
-    alone = {Candidate(way, "switches", trainer, levels=levels): name for way, name in marked.items()}
+    marked = {PlacementChoice(PAPERS, prune): f"paper, S = {prune:g}" for prune in _PAPERS}
+    # Keeping all switches is the same by any method.
+    marked[PlacementChoice(BEST, float(n_switches))] = f"all of {n_switches}"
+    alone = {Candidate(choice, "switches", trainer, levels=levels): name for choice, name in marked.items()}
     with_joints = {replace(one, inputs="both"): f"{name}, joints" for one, name in alone.items()}
     return alone | (with_joints if n_joints else {})
 
 
 def marks_of(named: dict[Candidate, str], closes: Sequence[Close], survey: Survey) -> tuple[Mark, ...]:
-    """Return the marks of these choices that were looked at closely, with the paper's rounds and whole scans."""
+    """Return the marks of those choices that were fully evaluated, with the paper's rounds and whole scans."""
     found, tabled = [], papers_tables(survey.search)
     for close in closes:
         screened = close.screened
@@ -499,19 +497,17 @@ def marks_of(named: dict[Candidate, str], closes: Sequence[Close], survey: Surve
 
 
 def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
-    """Return the user's own build as a mark: its rate as it says, its frame in the fastest wiring for its switches.
+    """Return the user's build as a mark: its recorded rate, and its frame in the fastest wiring for its switches.
 
-    Raises FrontierError where it does not say, or is not for these recordings or this equipment.
+    Raises FrontierError if it has no rate, or is not for these recordings or this equipment.
     """
     build = Build.load(folder)
     manifest = build.manifest
     names = [switch.name for switch in manifest.switches]
-    # As the frontier's own rates are.
+    # Comparable with the frontier's rates.
     pooled = [rate for rate in manifest.rates if rate.protocol != "training" and not rate.of.startswith("new")]
     if not pooled:
-        raise FrontierError(
-            f"{folder} does not say what it recognises: compile it with --folds 4, or leave --build out"
-        )
+        raise FrontierError(f"{folder} has no accuracy: compile it with --folds 4, or leave --build out")
     options, fitting = equipment.model.options(build.tables), equipment.fitting(names)
     if not options or (names and not fitting):
         raise FrontierError(f"{folder} cannot be built for {equipment.model.target}: leave --build out, or --target")
@@ -520,7 +516,7 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     above_codes = [0 if switch.threshold is None else switch.threshold.code for switch in manifest.switches]
     bits = above(grasp_set.switches, grasp_set.taxels, tuple(map(Element, sources, above_codes)))
     codes = grasp_set.codes[:, _places(joints, [joint.name for joint in grasp_set.joints], folder)]
-    scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.beside).full_us for wiring in fitting]
+    scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.overhead).full_us for wiring in fitting]
     frame_us = max(min(scans, default=0.0), equipment.records.of(len(joints)).us) + options[0].us
     return Mark(
         f"build {folder.name}", len(names), Rate.counted((pooled[0].correct,), pooled[0].total, of="pooled"), frame_us

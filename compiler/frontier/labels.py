@@ -1,4 +1,4 @@
-"""Labels next to what they name: off what is drawn, and never on each other."""
+"""Place labels next to what they name: off drawn objects, and never on each other."""
 
 import itertools
 import math
@@ -15,20 +15,20 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-# What a label costs, besides its distance in points: for every point of something drawn that it covers ...
+# Costs of a label in addition to its distance in points: for every covered point of a drawn object ...
 MARKER, LINE, FAINT = 60.0, 6.0, 0.5
-# ... for every marker, and for every label, that the line which leads to it crosses ...
+# ... for every marker, and for every label, that its leader line crosses ...
 _MARKER_CROSSED, _LABEL_CROSSED = 150.0, 600.0
-# ... and for covering a label or leaving the picture, which is out of the question.
+# ... and for covering a label or leaving the picture, which must not happen.
 _FORBIDDEN = 1e6
 
 # All lengths are points, 1/72 inch.
 _NEAR = (7.0, 11.0)
 _ANYWHERE = (*_NEAR, 16.0, 23.0, 32.0, 43.0, 56.0, 72.0, 92.0, 116.0, 145.0, 180.0, 220.0, 270.0, 330.0, 400.0)
-_LED_FROM = 16.0  # a label this far away needs a line that leads to it
+_LED_FROM = 16.0  # a label at least this far away needs a leader line
 _APART = 2.0  # kept free around a label
-_BESIDE = 5.0  # a leading line may pass a marker's centre no nearer than this
-_STEP = 2.0  # between the points by which a line is known
+_BESIDE = 5.0  # a leader line keeps this distance from a marker's centre
+_STEP = 2.0  # between the sampled points of a line
 
 _TURNS = np.arange(24) * (math.tau / 24) + 0.5  # first to the right and a little above
 _DIRECTIONS: Floats = np.column_stack((np.cos(_TURNS), np.sin(_TURNS)))
@@ -37,9 +37,9 @@ _ALONG: Floats = np.linspace(0, 1, 40)[:, None]
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """Words for what is at `at`, in data coordinates; where there are several places, for the best of them.
+    """Text for a point at `at`, in data coordinates; of several places, the best one is labelled.
 
-    texts  what to write, dearest first: the last is always written, an earlier one only where there is room for it
+    texts  variants, longest first: the last is always written, an earlier one only if there is room for it
     """
 
     at: tuple[tuple[float, float], ...]
@@ -50,7 +50,7 @@ class Label:
 
 
 class _Place(NamedTuple):
-    """Where a label may go: the centre of its box, for which of its anchors, how far from it, and what that costs."""
+    """A possible place of a label: the centre of its box, the anchor, the distance from it, and the cost."""
 
     anchor: int
     centre: Floats
@@ -61,7 +61,7 @@ class _Place(NamedTuple):
 class Labels:
     """The labels of `axes`, whose limits and scales are final.
 
-    `avoid` and `avoid_line` come before `write`. The same calls give the same places: of equals, the first candidate.
+    Call `avoid` and `avoid_line` before `write`. The same calls give the same places: of equals, the first candidate.
     """
 
     def __init__(self, axes: "Axes") -> None:
@@ -78,7 +78,7 @@ class Labels:
         self._taken: Floats = np.empty((0, 4))  # left, bottom, right, top
 
     def avoid(self, xs: Sequence[float], ys: Sequence[float], weight: float = MARKER) -> None:
-        """Keep labels off these places, in data coordinates, as far as `weight` goes."""
+        """Keep labels off these places, in data coordinates, with this weight."""
         self._avoid(self._on_paper(xs, ys), weight)
 
     def avoid_line(self, xs: Sequence[float], ys: Sequence[float], weight: float = LINE) -> None:
@@ -88,7 +88,7 @@ class Labels:
             self._avoid(start + (end - start) * np.linspace(0, 1, steps)[:, None], weight)
 
     def write(self, *labels: Label) -> None:
-        """Write each label at the best place that is left."""
+        """Write each label at the best remaining place."""
         for label in labels:
             anchors = self._on_paper(*zip(*label.at, strict=True))
             for text in label.texts[:-1]:
@@ -153,7 +153,7 @@ class Labels:
         return costs
 
     def _crossed(self, starts: Floats, centres: Floats) -> Floats:
-        """Return what the lines from `starts` to `centres` cost for the labels and markers that they cross."""
+        """Return the cost of the labels and markers that the lines from `starts` to `centres` cross."""
         x, y = (starts + (centres - starts) * _ALONG[:, None]).T[:, :, :, None]  # (candidates, steps, 1)
         taken, markers = self._taken, self._drawn[self._drawn[:, 2] >= MARKER, :2]
         on_labels = (x > taken[:, 0]) & (x < taken[:, 2]) & (y > taken[:, 1]) & (y < taken[:, 3])

@@ -1,7 +1,7 @@
-"""How long after a hand has arrived in a grasp `thenar run` has decided on it.
+"""Decision latency: the time from a hand's arrival in a grasp until `thenar run` decides on it.
 
-The runtime's own `Decision`, `SequentialTest` and `LiveSegments` decide on a stream. Where many frames in succession
-are alike, a decider does nothing in most of them: they are shown those frames alone in which something can happen.
+The runtime's `Decision`, `SequentialTest` and `LiveSegments` decide on a stream. In most of many equal frames in
+succession a decider does nothing, so it is shown only those frames in which something can happen.
 """
 
 import math
@@ -36,26 +36,26 @@ from .price import Tabled, tables_of
 from .stream import Stream
 
 NOTHING = -1
-# So many frames must be left for it to be worth while to work out how many of them decide nothing.
+# Only with at least this many frames left is it worth computing how many of them decide nothing.
 _WORTHWHILE = 4
 
-# How is decided: by candidates under a policy, or by segments, of a model (None: the usual one).
+# The deciding method: by candidates under a policy, or by segments, of a model (None: the default model).
 Deciding = Policy | SegmentModel | None
-# From a frame's time on, this is decided; None: nothing.
+# The decision from a frame's time on; None: nothing is decided.
 Decided = tuple[int, int | None]
 
 
 class Decider(Protocol):
-    """Sees stretches of equal frames, one after the other."""
+    """Processes stretches of equal frames, one after the other."""
 
     def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
-        """Yield what is decided at the first frame of a stretch, and again whenever it may have changed since."""
+        """Yield the decision at the first frame of a stretch, and again whenever it may have changed since."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stretches:
-    """Frames step_us apart in which nothing changes: stretch i is frames first[i] to first[i + 1] - 1, and its scores
-    are scores[i] (K,); first has an entry more, the number of frames.
+    """Frames step_us apart in stretches without changes: stretch i is frames first[i] to first[i + 1] - 1, and its
+    scores are scores[i] (K,); first has one more entry, the number of frames.
     """
 
     scores: NDArray[np.int32]
@@ -71,13 +71,13 @@ class Stretches:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Decisions:
-    """From frame frames[i] (c,) on class types[i] (c,) is decided on, NOTHING where none is."""
+    """From frame frames[i] (c,) on class types[i] (c,) is decided on; NOTHING means no class."""
 
     frames: NDArray[np.int64]
     types: NDArray[np.intp]
 
     def at(self, frames: NDArray[np.int64]) -> NDArray[np.intp]:
-        """Return what is decided at some frames, none before the first."""
+        """Return the decisions at some frames, none before the first."""
         return self.types[np.searchsorted(self.frames, frames, side="right") - 1]
 
 
@@ -92,8 +92,8 @@ def stretches(scores: NDArray[np.int32], at_us: NDArray[np.int64], step_us: int)
 
 
 def decisions(tables: IntegerTables, frames: Stretches, policy: Deciding) -> Decisions:
-    """Return what `thenar run` decides under `policy` on these frames, each whole and seen once, by both devices at the
-    same time; by segments: which it says are held.
+    """Return the decisions of `thenar run` under `policy` on these frames, each whole and seen once, by both devices at
+    the same time; by segments: the held types.
     """
     decider, scorer = decider_of(tables, policy), Scorer(tables)
     found: list[Decided] = []
@@ -109,7 +109,7 @@ def decisions(tables: IntegerTables, frames: Stretches, policy: Deciding) -> Dec
 
 
 def decider_of(tables: IntegerTables, policy: Deciding) -> Decider:
-    """Return the decider that the live recogniser has under `policy`."""
+    """Return the live recogniser's decider under `policy`."""
     if policy is None or isinstance(policy, SegmentModel):
         return _Segments(tables, policy)
     if policy.error_rate is None:
@@ -119,14 +119,14 @@ def decider_of(tables: IntegerTables, policy: Deciding) -> Decider:
 
 
 class _Segments:
-    """Segments of a model, None: the usual one, with the usual lag. Frames between two ticks change nothing."""
+    """Segments of a model, None: the default, with the default lag. Frames between two ticks change nothing."""
 
     def __init__(self, tables: IntegerTables, model: SegmentModel | None) -> None:
         model = model or SegmentModel.usual(tables.n_classes, has_none=False, scale=tables.scale)
         self._live = LiveSegments(model, [str(number) for number in range(tables.n_classes)], Policy().lag_us or 0)
 
     def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
-        """Yield what is held at the first frame of a stretch, and at each that takes a tick."""
+        """Yield the held type at the first frame of a stretch, and at each frame that takes a tick."""
         place = 0
         while place < len(times):
             found = self._live.update(times[place], standing.lanes)
@@ -135,18 +135,18 @@ class _Segments:
 
 
 class _Hysteresis:
-    """In a stretch a decision changes but once: its candidate takes over, and stands for the rest."""
+    """Within a stretch a decision changes only once: its candidate takes over, and stays for the rest."""
 
     def __init__(self, decision: Decision) -> None:
         self._decision = decision
 
     def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
-        """Yield what is decided at the first frame of a stretch, and at the one with which that changes."""
+        """Yield the decision at the first frame of a stretch, and at the one that changes it."""
         decision = self._decision
         held = decision.update(times[0], standing)
         yield times[0], held
         if held != standing.candidate and self._changes(times[-1], standing):
-            # Rival and support stand still: once the time for a change has come, it has come for good.
+            # Candidate and support are constant: once the time for a change has come, it stays.
             first = bisect_left(times, True, key=lambda time_us: self._changes(time_us, standing))
             yield times[first], decision.update(times[first], standing)
         decision.update(times[-1], standing)
@@ -157,7 +157,7 @@ class _Hysteresis:
 
 
 class _Test(SequentialTest):
-    """A sequential test that tells when it waits, how long it will, and when it begins anew."""
+    """A sequential test that reports when it waits, how long it will, and when it begins again."""
 
     __slots__ = ()
 
@@ -168,12 +168,12 @@ class _Test(SequentialTest):
 
     @property
     def stands_until_us(self) -> int:
-        """The latest time of a frame with which the answer still stands."""
+        """The latest time of a frame with which the decision remains valid."""
         return self._decided_us + self.longest_us
 
     @property
     def goes_on_until_us(self) -> int:
-        """The latest time of a frame that is still of the test under way."""
+        """The latest time of a frame that still belongs to the running test."""
         return self._began_us + self.longest_us
 
     def ended_at(self, time_us: int) -> bool:
@@ -181,9 +181,9 @@ class _Test(SequentialTest):
         return not self._sums and self._counted_us == time_us
 
     def quiet(self, lanes: tuple[int, ...], most: int) -> int:
-        """Return after how many frames of these scores, up to `most`, the test under way is still undecided."""
+        """Return after how many frames of these scores, up to `most`, the running test is still undecided."""
         best = lanes.index(max(lanes))
-        # Only the best of the frames gains on all others; the best of the sums might lead it by enough to end, though.
+        # Only the frames' best class gains on all others, but the best of the sums may lead it by enough to end.
         if not self._sums or max(self._sums) - self._sums[best] >= self.threshold:
             return 0
         wanted = [self.threshold + total - self._sums[best] for total in self._sums]
@@ -195,9 +195,9 @@ class _Test(SequentialTest):
 
 
 class _Tests:
-    """Frames that do not count are left out. Frames that decide nothing are added up at once. Where two tests ended in
-    a stretch with the same answer, each further one would go as the second did; whole numbers of them are left out by
-    setting the clock back: a test knows only how much time has gone.
+    """Frames that do not count are skipped. Frames that decide nothing are added up at once. After two tests in a
+    stretch with the same decision, each further one would repeat the second; whole numbers of them are skipped by
+    setting the clock back: a test only depends on elapsed time.
     """
 
     def __init__(self, test: _Test, scorer: Scorer) -> None:
@@ -205,9 +205,9 @@ class _Tests:
         self._back_us = 0
 
     def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
-        """Yield what is decided at the first frame of a stretch, and again whenever it may have changed since."""
+        """Yield the decision at the first frame of a stretch, and again whenever it may have changed since."""
         place, frames = 0, 1
-        ended: tuple[int, int | None] | None = None  # the last test that ended here, and its answer while it stands
+        ended: tuple[int, int | None] | None = None  # the last test that ended here, and its decision while valid
         while place < len(times):
             held = self._test.update(times[place] - self._back_us, self._summed(standing, frames))
             yield times[place], held
@@ -225,18 +225,18 @@ class _Tests:
             place = after
 
     def _summed(self, standing: Standing, frames: int) -> Standing:
-        """Return what stands for so many equal frames."""
+        """Return the sum of `frames` equal frames."""
         return standing if frames == 1 else Standing(tuple(frames * lane for lane in standing.lanes), self._scorer)
 
     def _leave_out(self, left: range, frames: int) -> int:
-        """Leave out as many tests of so many frames as lie in what is left; return how many frames those have."""
+        """Skip all whole tests of `frames` frames within `left`; return their total number of frames."""
         whole = (len(left) - 1) // frames * frames
         self._back_us += whole * left.step
         return whole
 
     def _next(self, times: range, place: int, standing: Standing) -> tuple[int, int]:
-        """Return the place of the next frame to look at, past the last if it is in a later stretch, and for how many
-        frames that count it stands: itself, and those before it that decide nothing.
+        """Return the position of the next frame to process, past the last if it is in a later stretch, and how many
+        frames it represents: itself, and the counting frames before it that decide nothing.
         """
         if self._test.spacing_us <= times.step and place + _WORTHWHILE >= len(times):
             return place + 1, 1
@@ -249,15 +249,15 @@ class _Tests:
         return (counts + (frames - 1) * apart, frames) if frames > 1 else (counts, 1)
 
     def _expired(self, idle: range) -> int | None:
-        """Return from which of some frames that do not count, or decide nothing, an answer no longer stands."""
+        """Return the first of some idle frames (not counting, or undecided) at which a decision has expired."""
         if not idle or self._test.held is None:
             return None
         gone = max(self._place(idle, self._test.stands_until_us) + 1, 0)
         return idle[gone] if gone < len(idle) else None
 
     def _place(self, times: range, test_us: int, *, up: bool = False) -> int:
-        """Return which of the frames, or of those that would go on before and after them, is the last up to a time of
-        the test's clock; `up`: the first from it on.
+        """Return the position of the last frame up to a time of the test's clock, or with `up` of the first from it on;
+        positions continue beyond the given frames at both ends.
         """
         since_us = test_us + self._back_us - times[0]
         return -(-since_us // times.step) if up else since_us // times.step
@@ -265,7 +265,7 @@ class _Tests:
 
 Times = NDArray[np.int64]
 
-# What `thenar run` does under each. Scans that end early decide alike.
+# The policies of `thenar run`. Scans that end early decide like single frames.
 POLICIES: Mapping[DecisionKind, Policy | None] = MappingProxyType(
     {
         "single": Policy(lead=0.0, dwell_us=0),
@@ -277,10 +277,10 @@ POLICIES: Mapping[DecisionKind, Policy | None] = MappingProxyType(
 
 
 class Pace(Struct, frozen=True):
-    """Tables that answer every `frame_us`, and the ways to decide on what they answer.
+    """Tables that predict every `frame_us`, and the methods that decide on their predictions.
 
-    slow_us  what a frame takes in which the switches do not decide and the joints are read, a share `asked` of all:
-             then frame_us is the mean; None: all frames take as long
+    slow_us  time of a frame in which the switches do not decide and the joints are read, a share `asked` of all; then
+             frame_us is the mean. None: all frames take equally long
     """
 
     tabled: Tabled
@@ -300,11 +300,11 @@ def latencies(
     training: Training,
     moving: Moving | None = None,
 ) -> tuple[tuple[Latency, ...], ...]:
-    """Train on some rows, on the switches `columns` and the joints; return how long a stream keeps one waiting at every
-    pace, for each of its decisions. The stream holds none of the rows.
+    """Train on some rows, on the switches `columns` and the joints; return the latencies on a stream for every pace
+    and each of its decisions. The stream holds none of the rows.
 
-    moving  the same rows with those in which nothing is held: segments are decided on by tables that know these, and
-            at costs learnt from them. None: segments have the usual costs
+    moving  the same rows with those in which nothing is held: segments use tables trained with these rows, and costs
+            learnt from them. None: segments have the default costs
     """
     wanted = tuple(dict.fromkeys(pace.tabled for pace in paces))
     asked = any(pace.slow_us is not None for pace in paces)
@@ -327,7 +327,7 @@ def latencies(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Held:
-    """Grasps (g,): when each was complete, and when no longer, in microseconds of the stream; and its class."""
+    """Grasps (g,): when each was complete, and when it ended, in microseconds of the stream; and its class."""
 
     arrived_us: Times
     ended_us: Times
@@ -337,30 +337,30 @@ class _Held:
 def latency(
     tables: IntegerTables, columns: Sequence[int], stream: Stream, frame_us: float, policy: Deciding
 ) -> Latency:
-    """Return the latency of tables on a stream whose frames follow one another every frame_us, in whole microseconds.
+    """Return the latency of tables on a stream with one frame every frame_us, in integer microseconds.
 
-    columns  the stream's switches that the tables take, in their order; of its joints they take all, or none
+    columns  the tables' switches as columns of the stream, in the tables' order; of its joints they take all, or none
 
-    A frame shows the glove as it was when the frame began; its answer is there when it ends, frame_us later. A grasp's
-    latency is the time from its arrival until the first answer that is its type, and a frame at least: that long where
-    it was the answer already, decided on while the hand was still closing. Grasps without one before they end are
-    missed, and in neither number; if all are, both numbers are how long the longest lasted. The 99th percentile is one
-    of the latencies (nearest rank).
+    A frame shows the glove as it was when the frame began; its prediction is available at its end, frame_us later. A
+    grasp's latency is the time from its arrival until the first prediction of its type, and at least a frame, which is
+    also the latency of a grasp that was decided on while the hand was still closing. Grasps not predicted before they
+    end are missed, and in neither number; if all are, both numbers are the duration of the longest. The 99th percentile
+    is one of the latencies (nearest rank).
 
-    Raises FrontierError where the tables are not for these inputs, the stream has no grasps, or no frame takes a time.
+    Raises FrontierError if the tables are not for these inputs, the stream has no grasps, or a frame takes no time.
     """
     _check(tables, columns, stream, frame_us)
     step_us = max(round(frame_us), 1)
     decided = decided_on(tables, columns, stream, step_us, policy)
     begun_us = stream.at_us - stream.at_us[0]
     held = _Held(begun_us[stream.arrivals], begun_us[stream.ends], stream.types[stream.arrivals])
-    answered_us = (decided.frames + 1) * step_us
-    return _measured(held, *_waits_and_errors(answered_us, decided.types, held), step_us)
+    predicted_us = (decided.frames + 1) * step_us
+    return _measured(held, *_waits_and_errors(predicted_us, decided.types, held), step_us)
 
 
 def latency_on_demand(tables: IntegerTables, columns: Sequence[int], stream: Stream, pace: Pace) -> Latency:
-    """Return the latency, decided on single frames, where each is as long as its state makes it: one that the switches
-    decide is quick, any other waits for the joints.
+    """Return the latency of decisions on single frames whose time depends on the state: short if the switches decide,
+    otherwise longer by the joints.
     """
     assert pace.slow_us is not None
     _check(tables, columns, stream, pace.frame_us)
@@ -371,53 +371,51 @@ def latency_on_demand(tables: IntegerTables, columns: Sequence[int], stream: Str
     winners = integer_scores(tables, bits, codes).argmax(axis=1)
     everything = Undecided(tables, [tuple(range(tables.n_switches))], bits, codes, on_demand=True)
     steps_us = np.where(everything.after(1)[1], quick, slow)
-    answered, types, now = list[int](), list[int](), 0
+    predicted, types, now = list[int](), list[int](), 0
     states = zip(begun_us[1:].tolist(), steps_us.tolist(), winners.tolist(), strict=False)
     for ends_us, step_us, winner in states:
         if now < ends_us:
-            answered.append(now + step_us)
+            predicted.append(now + step_us)
             types.append(winner)
-            # Further frames of the state answer alike; the last may end after it.
+            # Further frames of the state give the same prediction; the last may end after it.
             now += -(-(ends_us - now) // step_us) * step_us
     held = _Held(begun_us[stream.arrivals], begun_us[stream.ends], stream.types[stream.arrivals])
-    return _measured(held, *_waits_and_errors(np.array(answered), np.array(types), held), quick)
+    return _measured(held, *_waits_and_errors(np.array(predicted), np.array(types), held), quick)
 
 
 def decided_on(
     tables: IntegerTables, columns: Sequence[int], stream: Stream, step_us: int, policy: Deciding
 ) -> Decisions:
-    """Return what is decided under `policy` on a stream whose frames begin every step_us, the first
-    with the stream.
-    """
+    """Return the decisions under `policy` on a stream with a frame every step_us, the first at the stream's start."""
     codes = stream.codes[:, : None if tables.n_joints else 0]
     scores = integer_scores(tables, stream.bits[:, list(columns)], codes)
     return decisions(tables, stretches(scores, stream.at_us, step_us), policy)
 
 
-def _waits_and_errors(answered_us: Times, types: NDArray[np.intp], held: _Held) -> tuple[Times, Times]:
-    """Return how long (g,) after arrival each grasp was first answered rightly, -1 where it was not before its end; and
-    how long of what was left of it then (g,) another type was the answer. From answered_us[i] on it is types[i].
+def _waits_and_errors(predicted_us: Times, types: NDArray[np.intp], held: _Held) -> tuple[Times, Times]:
+    """Return how long (g,) after arrival each grasp was first predicted rightly, -1 if not before its end; and for how
+    much of its remaining time (g,) another type was predicted. From predicted_us[i] on types[i] is predicted.
     """
-    standing = np.maximum(np.searchsorted(answered_us, held.arrived_us, side="right") - 1, 0).tolist()
-    beyond = np.searchsorted(answered_us, held.ended_us, side="right").tolist()
+    standing = np.maximum(np.searchsorted(predicted_us, held.arrived_us, side="right") - 1, 0).tolist()
+    beyond = np.searchsorted(predicted_us, held.ended_us, side="right").tolist()
     waits_us, wrong_us = np.full(len(held.types), -1, np.int64), np.zeros(len(held.types), np.int64)
     for grasp, (first, last, right) in enumerate(zip(standing, beyond, held.types.tolist(), strict=True)):
-        answers = types[first:last]
-        found = np.flatnonzero(answers == right)
+        predictions = types[first:last]
+        found = np.flatnonzero(predictions == right)
         if len(found):
-            since_us = np.maximum(answered_us[first + found[0] : last], held.arrived_us[grasp])
+            since_us = np.maximum(predicted_us[first + found[0] : last], held.arrived_us[grasp])
             waits_us[grasp] = since_us[0] - held.arrived_us[grasp]
             lasted_us = np.diff(since_us, append=held.ended_us[grasp])
-            wrong_us[grasp] = lasted_us[~np.isin(answers[found[0] :], (right, NOTHING))].sum()
+            wrong_us[grasp] = lasted_us[~np.isin(predictions[found[0] :], (right, NOTHING))].sum()
     return waits_us, wrong_us
 
 
 def _measured(held: _Held, waits_us: Times, wrong_us: Times, step_us: int) -> Latency:
-    lasted_us, answered = held.ended_us - held.arrived_us, waits_us >= 0
-    found = np.sort(np.maximum(waits_us[answered], step_us))
+    lasted_us, predicted = held.ended_us - held.arrived_us, waits_us >= 0
+    found = np.sort(np.maximum(waits_us[predicted], step_us))
     if not len(found):
         return Latency(float(lasted_us.max()), float(lasted_us.max()), 1.0)
-    left_us = int((lasted_us - waits_us)[answered].sum())
+    left_us = int((lasted_us - waits_us)[predicted].sum())
     return Latency(
         mean_us=int(found.sum()) / len(found),
         p99_us=float(found[math.ceil(0.99 * len(found)) - 1]),
@@ -434,10 +432,10 @@ def _check(tables: IntegerTables, columns: Sequence[int], stream: Stream, frame_
         )
     if any(not 0 <= column < switches for column in columns) or stream.types.max(initial=-1) >= tables.n_classes:
         raise FrontierError(
-            f"a stream of {switches} switches and types up to {stream.types.max(initial=-1)} is not for these switches "
-            f"and {tables.n_classes} types"
+            f"a stream of {switches} switches and types up to {stream.types.max(initial=-1)} does not fit these "
+            f"switches and {tables.n_classes} types"
         )
     if not (math.isfinite(frame_us) and frame_us > 0):
-        raise FrontierError(f"a frame of {frame_us} us: it takes some time")
+        raise FrontierError(f"a frame of {frame_us} us: it must take some time")
     if not len(stream.arrivals):
         raise FrontierError("the stream has no grasp that follows one of another type: there is no latency to measure")

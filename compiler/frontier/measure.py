@@ -1,4 +1,4 @@
-"""What the points themselves take: designs on a front simulated, or timed here, and the model held against that."""
+"""Measure the points' times: simulate or time designs on a front, and validate the model against the results."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,13 +16,13 @@ from .timing.python_times import classify_us
 from .timing.simulated import run_layout
 from .timing.wire_check import check_wire
 
-# Expected seconds: of a trial, of timing all designs in Python, of checks there.
+# Expected seconds: of a trial, of timing all designs in Python, of the model's validation.
 TRIAL_S, _TIMES_S, _CHECK_S = 2.0, 1.0, 5.0
 
 
 @stored(1, where="machine")
 def count_steps(content: bytes, layout: str, model: ClassifyModel) -> float:
-    """Compile a layout of tables and run it; return cycles, or instructions, that the slowest frame took.
+    """Compile a layout of tables and run it; return the cycles, or instructions, of the slowest frame.
 
     Raises FirmwareError.
     """
@@ -35,23 +35,22 @@ def count_steps(content: bytes, layout: str, model: ClassifyModel) -> float:
 
 @stored(1, where="process")
 def time_here(contents: tuple[bytes, ...], yardstick: float) -> tuple[float, ...]:
-    """Let the runtime classify with each of the tables, at the pace that its yardstick says; return microseconds."""
+    """Time the runtime on each of the tables, scaled by its yardstick; return microseconds."""
     return tuple(classify_us([tables_from_bytes(content) for content in contents], yardstick))
 
 
 @stored(1, where="process", without=("jobs",))
 def run_checks(contents: tuple[bytes, ...], model: ClassifyModel, jobs: int) -> tuple[Check, ...]:
-    """Hold a model against what is measured of these tables, in `jobs` processes. Raises FirmwareError."""
+    """Validate a model against measurements of these tables, in `jobs` processes. Raises FirmwareError."""
     return check(model, [tables_from_bytes(content) for content in contents], jobs=jobs)
 
 
 def measured(
     designs: Sequence[Design], equipment: Equipment, cache: Cache
 ) -> tuple[list[Design], tuple[Check, ...], tuple[str, ...]]:
-    """Return the designs with what they take, how far the model is off over these and more, and, in sentences, what
-    could not be done.
+    """Return the designs with their times, the model's errors on these and more, and sentences on missing measurements.
 
-    The simulators of this machine are asked, whatever cluster there is: its workers may have none.
+    Simulators run on this machine even with a cluster, whose workers may have none.
     """
     model, lack = equipment.model, unchecked(equipment.model)
     found, checks = list(designs), tuple[Check, ...]()
@@ -60,7 +59,7 @@ def measured(
         cost = LEAST * TRIAL_S if model.part else _CHECK_S
         (checks,) = cache.ask("checks", [run_checks.call(cost, _contents(designs), model, cache.jobs)])
     wire, without = check_wire()
-    said = (lack, model.note, equipment.beside.what, equipment.records.what, without)
+    said = (lack, model.note, equipment.overhead.what, equipment.records.what, without)
     return found, (*checks, *wire), tuple(sentence for sentence in said if sentence)
 
 

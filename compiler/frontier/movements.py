@@ -15,9 +15,9 @@ Bits = NDArray[np.bool_]
 
 # Fewer frames than these show no movement: a tenth of a second at the rate of a CyberGlove.
 LEAST_FRAMES = 10
-# Neighbouring frames differ by less than this share of what frames half a movement apart differ by.
+# Neighbouring frames differ by less than this share of the difference between frames half a movement apart.
 _ALIKE = 0.5
-# A hold that a contact's bounce interrupts for no more frames than these goes on.
+# A hold continues if a contact's bounce interrupts it for at most these frames.
 _BRIDGED = 2
 
 
@@ -26,7 +26,7 @@ class Movements:
     """m movements: neighbouring rows of one trial, in the order of time.
 
     first, beyond        (m,)  movement i is rows first[i] to beyond[i] - 1
-    complete, released   (m,)  from which row on its grasp is complete, and at which it no longer is (at most beyond[i])
+    complete, released   (m,)  the row from which its grasp is complete, and the one from which it no longer is
     """
 
     first: Rows
@@ -43,22 +43,22 @@ class Movements:
 
 
 def movement_numbers(grasp_set: GraspSet) -> Rows:
-    """Return the number (n,) of the run that each row belongs to: neighbouring rows of one subject, grasp type, object
-    and trial, with those in which nothing is held. Folds of a set of whole movements must not part the rows of a run.
+    """Return the number (n,) of the run of each row: neighbouring rows of one subject, grasp type, object and trial,
+    with those in which nothing is held. Folds of a set of whole movements must not split a run.
     """
-    told: list[NDArray[Any]] = [grasp_set.subjects, grasp_set.grasps, grasp_set.objects, grasp_set.trials]
+    keys: list[NDArray[Any]] = [grasp_set.subjects, grasp_set.grasps, grasp_set.objects, grasp_set.trials]
     if grasp_set.is_none.any():
-        told = [grasp_set.movement_ids]
-    changes = np.logical_or.reduce([column[1:] != column[:-1] for column in told])
+        keys = [grasp_set.movement_ids]
+    changes = np.logical_or.reduce([column[1:] != column[:-1] for column in keys])
     return np.concatenate([np.zeros(min(len(grasp_set), 1), np.intp), np.cumsum(changes, dtype=np.intp)])
 
 
 def holds_movements(grasp_set: GraspSet) -> bool:
     """Return whether the rows of a set are the frames of whole movements.
 
-    They are where most rows lie in runs (movement_numbers) of LEAST_FRAMES rows or more, and where, within these, a row
-    and the next are less than half as different as rows half a run apart, in switches, joints and taxels. So single
-    trials that were recorded without trial numbers, which are as different from the next as from any other, are none.
+    Two conditions hold then. Most rows lie in runs (movement_numbers) of at least LEAST_FRAMES rows. And within these,
+    neighbouring rows are less than half as different as rows half a run apart, in switches, joints and taxels. Single
+    trials recorded without trial numbers are no movements: each differs from the next as much as from any other.
     """
     first, beyond = _runs(grasp_set)
     long = beyond - first >= LEAST_FRAMES
@@ -71,10 +71,10 @@ def holds_movements(grasp_set: GraspSet) -> bool:
 
 
 def movements_of(grasp_set: GraspSet) -> Movements:
-    """Return the movements of a set of whole movements, in its order; runs of fewer than LEAST_FRAMES rows are none.
+    """Return the movements of a set of whole movements, in its order; runs of fewer than LEAST_FRAMES rows are skipped.
 
-    A taxel is closed where it is pressed beyond the threshold that tells most about the grasp type. A grasp is complete
-    while the labels say that it is held; of a set that never says that nothing is, as held_frames finds.
+    A taxel is closed if it is pressed beyond the threshold with most information about the grasp type. A grasp is
+    complete while the labels say that it is held; in a set without labels for nothing held, held_frames decides.
     """
     first, beyond = _runs(grasp_set)
     none = grasp_set.is_none
@@ -90,18 +90,18 @@ def movements_of(grasp_set: GraspSet) -> Movements:
 
 
 def held_frames(switches: Bits, codes: NDArray[np.uint16]) -> tuple[int, int]:
-    """Return from which frame on, and until before which, the grasp of one movement (F, s), (F, j) is complete.
+    """Return the first frame in which the grasp of one movement (F, s), (F, j) is complete, and the first after it.
 
-    It is while as many switches are closed as are for at least a tenth of the movement, and while the joints are near
-    to their median pose in such frames, within twice the median distance (noise); of several such stretches the
-    longest. Where no switch closes the pose is the median of all frames: the hand must have held for at least half of
+    It is complete while at least as many switches are closed as are for a tenth of the movement, and while the joints
+    are near their median pose in such frames, within twice the median distance (noise); of several such stretches the
+    longest. If no switch closes, the pose is the median of all frames: the hand must have held for at least half of
     them.
     """
     closed = switches.sum(axis=1)
     held: Bits = closed >= np.sort(closed)[-max(len(closed) // 10, 1)]
     if codes.shape[1]:
         away = np.abs(codes - np.median(codes[held], axis=0)).mean(axis=1)
-        held &= away <= 2.0 * np.median(away[held]) + 0.5  # half a code: a hand without noise
+        held &= away <= 2.0 * np.median(away[held]) + 0.5  # half a code, for hands without noise
     return _longest(held)
 
 
@@ -121,7 +121,7 @@ def _runs(grasp_set: GraspSet) -> tuple[Rows, Rows]:
 
 
 def _differences(array: Bits | NDArray[np.uint16], spans: list[tuple[int, int]]) -> tuple[float, float]:
-    """Return how different neighbouring rows (n, c) are, and rows half a run apart; means over the runs."""
+    """Return the difference of neighbouring rows (n, c), and of rows half a run apart; means over the runs."""
     near = sum(_difference(array[a:b], 1) for a, b in spans)
     return near, sum(_difference(array[a:b], (b - a) // 2) for a, b in spans)
 

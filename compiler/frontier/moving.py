@@ -1,4 +1,4 @@
-"""Whole movements to learn segments from: tables that know rows of nothing held, and what segments cost with them."""
+"""Train segments on whole movements: tables with a class for nothing held, and the costs of segments with them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,10 +33,10 @@ class Moving:
 
     @classmethod
     def of(cls, grasp_set: GraspSet, held: NDArray[np.intp], seed: int) -> "Moving | None":
-        """Return the movements that some rows in which something is held belong to; None where the set has no streams,
-        or never says that nothing is held.
+        """Return the movements of some rows in which something is held; None if the set has no streams, or no rows in
+        which nothing is held.
 
-        Streams go from one of these movements to the next alone where no other lies in between.
+        A stream goes from one of these movements to the next only if no other lies between them.
         """
         none = grasp_set.is_none
         try:
@@ -61,10 +61,10 @@ class Moving:
         return replace(self, samples=bits_of(self.samples, elements).with_joints(joints))
 
     def segmenting(self, columns: Columns, tables: Sequence[Tabled], training: Training) -> Mapping[Tabled, Segmenting]:
-        """Return, for all of some tables, those of these rows with a class of nothing held, and what segments cost.
+        """Return tables of these rows with a class for nothing held, and the costs of segments, for each of `tables`.
 
-        What is tried for the costs is tried on the scores of two folds of these rows, which part no movement, and no
-        subject where there are several.
+        The costs are selected on the scores of two folds of these rows, which split no movement, and no subject if
+        there are several.
         """
         samples, subjects = self.samples, self.samples.subjects
         if np.ptp(subjects):

@@ -1,4 +1,4 @@
-"""A point of a frontier that is to be built: the options and the wiring that it settles."""
+"""A frontier's point that is to be built: its options and its wiring."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from .timing.wirings import AS_WIRED, BOARD, Wiring
 
 @dataclass(frozen=True, slots=True)
 class Picked:
-    """A frontier, the point of it that is to be built, and the names of the set's joints; see `picked`."""
+    """A frontier, the selected point, and the names of the set's joints; see `picked`."""
 
     frontier: Frontier
     point: Point
@@ -30,14 +30,14 @@ class Picked:
 
     @property
     def options(self) -> dict[str, object]:
-        """The options of `compile_build` that the point settles."""
+        """The options of `compile_build` that the point determines."""
         setting = self.point.setting
         settled: dict[str, object] = {
             "inputs": setting.inputs,
             "width": setting.width,
             "table_bits": setting.table_bits,
             "trainer": setting.trainer,
-            # What is not written is a default, and nothing of it is open any more.
+            # Settings that are not written are defaults, and none is left to choose.
             **{own.name: own.default for own in TRAINERS[setting.trainer].settings},
             **setting.settings,
         }
@@ -51,14 +51,14 @@ class Picked:
             settled["rounds"] = setting.rounds
         if setting.inputs == "joints":
             return settled
-        parameter = "keep" if METHODS[setting.way.method].by_number else "prune"
-        return {**settled, "placement": setting.way.method, parameter: int(setting.way.parameter)}
+        parameter = "keep" if METHODS[setting.placement.method].by_number else "prune"
+        return {**settled, "placement": setting.placement.method, parameter: int(setting.placement.parameter)}
 
     def wired(self, given: Harness | None) -> Harness | Callable[[Sequence[str]], Harness] | None:
-        """Return the wiring to build for, as `compile_build` takes it: the given one where the point is wired so, else
-        a new one of its kind for the switches that are kept.
+        """Return the wiring for `compile_build`: the given one if the point is wired so, else a function that makes a
+        new one of its kind for the kept switches.
 
-        Raises FrontierError where the point is wired as a glove that is not given.
+        Raises FrontierError if the point needs the wiring of a glove that is not given.
         """
         setting = self.point.setting
         if not setting.wiring:
@@ -86,7 +86,7 @@ class Picked:
 
 
 def picked(path: Path, number: int | None, grasp_set: GraspSet) -> Picked:
-    """Return a point of a frontier, checked: it can be built from these recordings.
+    """Return a point of a frontier after checking that it can be built from these recordings.
 
     Parameters
     ----------
@@ -123,17 +123,17 @@ def picked(path: Path, number: int | None, grasp_set: GraspSet) -> Picked:
 
 
 def _check(point: Point, grasp_set: GraspSet, what: str) -> None:
-    """Raise FrontierError where a point cannot be built here: before the training, not after it."""
+    """Raise FrontierError if a point cannot be built here: before the training, not after it."""
     setting = point.setting
     levels = [taxel_and_code(name) or (name, 0) for name in point.switches]
     if not set(grasp_set.element_names).issuperset(name for name, _ in levels):
         raise FrontierError(f"{what} keeps switches that the recordings do not have: run thenar frontier on these")
-    if setting.inputs != "joints" and setting.way.method not in METHODS:
-        raise FrontierError(f"{what} takes a method that is not there: {shortened(repr(setting.way.method))}")
-    least = 1 if setting.inputs != "joints" and METHODS[setting.way.method].by_number else 0
-    if not (setting.way.parameter.is_integer() and setting.way.parameter >= least):
+    if setting.inputs != "joints" and setting.placement.method not in METHODS:
+        raise FrontierError(f"{what} takes a method that is not there: {shortened(repr(setting.placement.method))}")
+    least = 1 if setting.inputs != "joints" and METHODS[setting.placement.method].by_number else 0
+    if not (setting.placement.parameter.is_integer() and setting.placement.parameter >= least):
         raise FrontierError(
-            f"{what} takes {setting.way.parameter} for its method: it is a whole number from {least} on"
+            f"{what} takes {setting.placement.parameter} for its method: it is a whole number from {least} on"
         )
     if setting.trainer not in TRAINERS:
         raise FrontierError(f"{what} takes a trainer that is not there: {shortened(repr(setting.trainer))}")

@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
 FONT = 9.0
 _INK, _GREY, _PALE, _WHITE, _PICKED = map(on_paper, ("ink", "soft", "line", "paper", "picked"))
-# Besides colours, shapes for who sees none.
+# Shapes as well as colours, for the colour-blind.
 _COLOURS: dict[Inputs, str] = {inputs: on_paper(inputs) for inputs in ("switches", "joints", "both")}
 _SHAPES: dict[Inputs, str] = {"switches": "o", "joints": "^", "both": "s"}
 _NAMES: dict[Inputs, str] = {"switches": "switches alone", "joints": "joints alone", "both": "switches and joints"}
-# Our curves are blue, as switches alone are everywhere; dashes distinguish what shares a colour.
-_RIVALS = tuple(on_paper(f"rival-{number}") for number in (1, 2, 3))
+# Our curves are blue, like switches alone everywhere; dashes distinguish curves of one colour.
+_BASELINES = tuple(on_paper(f"baseline-{number}") for number in (1, 2, 3))
 _DASHES: "tuple[Dash, ...]" = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 1.5, 1, 1.5)), (0, (9, 3)))
 # Ids of a point's marker and of the ring around the featured one, in SVG.
 POINT_ID, RING_ID = "point-", "featured"
@@ -39,18 +39,18 @@ _WIDTH, _HEIGHT = 9.0, 5.4  # inches
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.72, 0.18, 0.58, 1.02  # inches around the axes
 _SIZE, _MARK_SIZE, _TRIED_SIZE = 34.0, 52.0, 9.0  # square points
 _LOWEST = 1.0  # microseconds or switches: a logarithmic axis has no 0, and nothing takes less
-_FEW = 16  # switches: curves may leave the picture below the rate of so many
+_FEW = 16  # switches: curves may leave the picture below the rate of this many
 _DECISIONS = {"single": "one frame", "dwell": "dwell", "sequential": "sequential test", "segments": "segments"}
 
 
 @dataclass(frozen=True, slots=True)
 class _Cost:
-    """What a picture shows the accuracy against.
+    """The horizontal axis of a picture.
 
     front       the front whose points are filled and joined by a line called `best`; "": all are filled, none joined
-    of_point, of_mark, of_tried  where each is, across; None: it is not on this picture
-    end         of a line from a point to the right; None: no line
-    words       on a point
+    of_point, of_mark, of_tried  horizontal positions; None: not on this picture
+    end         right end of a line from a point; None: no line
+    words       label of a point
     """
 
     title: str
@@ -70,9 +70,9 @@ class _Cost:
 
 
 _FRAME = _Cost(
-    title="What accuracy costs in time",
+    title="Accuracy against frame time",
     axis="time of a frame: the glove read, the grasp classified",
-    # A frame takes as long whatever is made of its answer: other decisions would lie on the same places.
+    # The frame time does not depend on the decision: points that differ only in it would coincide.
     of_point=lambda point: None if point.fronts == ("latency",) else point.frame.us,
     of_mark=lambda mark: mark.frame_us,
     of_tried=lambda tried: tried.frame_us,
@@ -81,7 +81,7 @@ _FRAME = _Cost(
     words=inputs_of,
 )
 _SWITCHES = _Cost(
-    title="What so many switches recognise",
+    title="Accuracy against the number of switches",
     axis="switches kept",
     of_point=lambda point: float(len(point.switches)) or None,
     of_mark=lambda mark: float(mark.n_switches) or None,
@@ -101,14 +101,14 @@ _LATENCY = _Cost(
 
 
 def _waited(point: Point) -> float | None:
-    """Return the mean latency, a frame at least (older frontiers have less); None where every grasp was missed."""
+    """Return the mean latency, at least a frame (older frontiers have less); None if every grasp was missed."""
     return None if point.latency.missed >= 1 else max(point.latency.mean_us, point.frame.us)
 
 
 def pictures(frontier: Frontier, kind: Literal["svg", "png"], *, letters: bool = False) -> Mapping[str, bytes]:
     """Return "frontier", "switches" and "latency" as files; equal frontiers give equal bytes.
 
-    With `letters`, text in SVG is text and not outlines. Raises PictureError.
+    With `letters`, text in SVG stays text instead of outlines. Raises PictureError.
     """
     with painting(FONT, letters=letters):
         return {name: rendered(draw(frontier), kind) for name, draw in PICTURES.items()}
@@ -155,7 +155,7 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
             )
             axes.scatter([], [], s=2 * _SIZE, facecolor="none", edgecolor=_PICKED, lw=1.6, label="picked")
     _draw_key(axes)
-    # What takes most room first.
+    # Largest labels first.
     said = duration if cost.is_time else lambda _: ""
     labels.write(*(_loud_label(x, point, said(x)) for x, point in points if point is spoken_of))
     labels.write(*names, *(_mark_label(x, mark, said(x), frontier) for x, mark in marks))
@@ -167,7 +167,7 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     return figure
 
 
-# To be called inside `painting`.
+# Call inside `painting`.
 PICTURES: Mapping[str, Callable[[Frontier], "Figure"]] = MappingProxyType(
     {
         name: partial(_draw, cost=cost)
@@ -177,7 +177,7 @@ PICTURES: Mapping[str, Callable[[Frontier], "Figure"]] = MappingProxyType(
 
 
 def _sheet(frontier: Frontier, title: str) -> tuple["Figure", "Axes"]:
-    """Return a figure and its axes with a title, and under it what was recognised, and how that was found."""
+    """Return a figure and its axes with a title, and a subtitle on data and protocol."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(_WIDTH, _HEIGHT), dpi=144, facecolor=_WHITE)
@@ -210,7 +210,7 @@ def _scale_times(axes: "Axes", us: Iterable[float]) -> None:
 
 
 def _round_times(low: float, high: float) -> list[float]:
-    """Return 1, 2 and 5 times powers of ten from low to high; powers alone where there would be too many."""
+    """Return 1, 2 and 5 times powers of ten from low to high; only powers if there would be too many."""
     powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     for steps in ((1, 2, 5), (1,)):
         ticks = [tick for power in powers for step in steps if low <= (tick := step * 10.0**power) <= high]
@@ -230,7 +230,7 @@ def _scale_counts(axes: "Axes", most: int) -> None:
 
 
 def _scale_rates(axes: "Axes", shown: Sequence[Rate], by: str) -> None:
-    """Make the vertical axis one of rates, from the least of `shown` to the greatest, whiskers and all."""
+    """Make the vertical axis one of rates, from the least of `shown` to the greatest, with their whiskers."""
     low = min((rate.low for rate in shown), default=0.0)
     high = max((rate.high for rate in shown), default=1.0)
     room = max(0.06 * (high - low), 0.004)
@@ -241,14 +241,14 @@ def _scale_rates(axes: "Axes", shown: Sequence[Rate], by: str) -> None:
 
 
 def _draw_key(axes: "Axes") -> None:
-    """Explain shapes and lines above the axes: all that has a label."""
+    """Draw the legend of all labelled shapes and lines above the axes."""
     if axes.get_legend_handles_labels()[0]:
         place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.012, 0.995), "ncols": 6, "frameon": False}
         axes.legend(**place, fontsize=FONT, handletextpad=0.35, columnspacing=1.4, handlelength=1.3)
 
 
 def _draw_tried(labels: Labels, tried: Sequence[tuple[float, Tried]]) -> None:
-    """Draw what was screened, faintly."""
+    """Draw the screened placements, faintly."""
     if not tried:
         return
     for inputs, colour in _COLOURS.items():
@@ -260,21 +260,21 @@ def _draw_tried(labels: Labels, tried: Sequence[tuple[float, Tried]]) -> None:
 
 
 def _draw_trainers(labels: Labels, tried: Sequence[tuple[float, Tried]]) -> None:
-    """Draw for each trainer the line of the best that was tried with it, not corrected for luck."""
+    """Draw each trainer's front, not corrected for luck."""
     for number, name in enumerate(dict.fromkeys(each.trainer for _, each in tried)):
         places = [(x, each.rate.mean) for x, each in tried if each.trainer == name]
         best = front(places, lambda place: place[0], lambda place: place[1])
         xs, ys = [*(x for x, _ in best), labels.axes.get_xlim()[1]], [*(y for _, y in best), best[-1][1]]
-        colour, dash = _RIVALS[number % len(_RIVALS)], _DASHES[1 + number % (len(_DASHES) - 1)]
+        colour, dash = _BASELINES[number % len(_BASELINES)], _DASHES[1 + number % (len(_DASHES) - 1)]
         labels.axes.step(xs, ys, where="post", color=colour, lw=1.1, ls=dash, zorder=2, label=f"{shorten(name)}, tried")
         for (x, y), (after, higher) in pairwise(zip(xs, ys, strict=True)):
             labels.avoid_line((x, after, after), (y, y, higher))
 
 
 def _draw_best(labels: Labels, best: Iterable[tuple[float, float]], name: str) -> None:
-    """Draw the line of best points, (cost, rate) each: from each point on its rate is to be had, until a better one.
+    """Draw the line of best points, (cost, rate) each: from each point on its rate is reached, until a better one.
 
-    A point that is best of its kind alone, as of those that decide alike, may lie below it.
+    A point that is only best among those of its decision may lie below it.
     """
     axes, corners = labels.axes, front(list(best), lambda place: place[0], lambda place: place[1], step=0.0)
     if not corners:
@@ -289,7 +289,7 @@ def _draw_best(labels: Labels, best: Iterable[tuple[float, float]], name: str) -
 
 def _draw_points(labels: Labels, points: Sequence[tuple[float, Point]], best: str, kept: str) -> None:
     """Draw points with intervals: those of the front `best` filled, the others hollow; all filled without a front.
-    `kept` is what switches are called.
+    `kept` names the elements, such as "switches".
     """
     hollow = [point for _, point in points if best and best not in point.fronts]
     for inputs, colour in _COLOURS.items():
@@ -313,7 +313,7 @@ def _draw_points(labels: Labels, points: Sequence[tuple[float, Point]], best: st
 
 
 def _draw_ends(labels: Labels, ends: Iterable[tuple[float, float, Point]]) -> None:
-    """Draw lines from the mean to the end of what each point takes."""
+    """Draw lines from each point's mean to its end."""
     for start, end, point in ends:
         level = (point.rate.mean, point.rate.mean)
         colour = _COLOURS[point.setting.inputs]
@@ -342,13 +342,13 @@ def _shown(curves: tuple[Curve, ...]) -> list[Rate]:
 
 
 def _draw_curves(labels: Labels, curves: Sequence[Curve]) -> Iterator[Label]:
-    """Draw ours and the rivals' curves, and yield their names, ours first."""
-    ours, rivals = ([curve for curve in curves if curve.ours == wanted] for wanted in (True, False))
+    """Draw ours and the baselines' curves, and yield their names, ours first."""
+    ours, baselines = ([curve for curve in curves if curve.ours == wanted] for wanted in (True, False))
     for number, curve in enumerate(ours):
         yield from _draw_curve(labels, curve, _COLOURS["switches"], _DASHES[number % len(_DASHES)])
-    for number, curve in enumerate(rivals):
-        turn, colour = divmod(number, len(_RIVALS))
-        yield from _draw_curve(labels, curve, _RIVALS[colour], _DASHES[turn % len(_DASHES)])
+    for number, curve in enumerate(baselines):
+        turn, colour = divmod(number, len(_BASELINES))
+        yield from _draw_curve(labels, curve, _BASELINES[colour], _DASHES[turn % len(_DASHES)])
 
 
 def _draw_curve(labels: Labels, curve: Curve, colour: str, dash: "Dash") -> Iterator[Label]:
@@ -372,7 +372,7 @@ def _loud_label(x: float, point: Point, cost: str) -> Label:
 
 
 def _point_label(x: float, point: Point, words: str) -> Label:
-    """Return the words for a point: where there is little room, its number."""
+    """Return the label of a point, with just its number as the short variant."""
     texts = (f"{point.number}: {words}", str(point.number)) if words else (str(point.number),)
     return Label(((x, point.rate.mean),), texts, _COLOURS[point.setting.inputs])
 

@@ -1,4 +1,4 @@
-"""`frontier.json`: the points that were found, what each costs and recognises, and which points are best."""
+"""`frontier.json`: the points that were found, their costs and accuracies, and the best of them."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Annotated, Literal, TypeVar
@@ -15,13 +15,13 @@ from ..evaluation.rates import Rate
 SCHEMA = 2
 MAX_BYTES = 64 << 20
 
-# measured: wall time on this machine. simulated: cycles of the real firmware in a simulator. wire: arithmetic of clocks
-# and baud rates, held against an emulated bus. model: predicted by a model that was held against measured points.
-# formula: the vendor's, of a single source. given: by the user. unknown: left out of every sum.
+# measured: wall time on this machine. simulated: cycles of the real firmware in a simulator. wire: calculated from
+# clocks and baud rates, validated against an emulated bus. model: predicted by a model validated against measurements.
+# formula: the vendor's, from a single source. given: by the user. unknown: left out of every sum.
 How = Literal["measured", "simulated", "wire", "model", "formula", "given", "unknown"]
 Scan = Literal["full", "early", "demand"]
 DecisionKind = Literal["single", "dwell", "sequential", "segments"]
-# What a rate is of: subjects who are left out, or rows of everybody in random folds of whole trials.
+# The population of a rate: left-out subjects, or rows of all subjects in random folds of whole trials.
 By = Literal["new subject", "pooled"]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 Count = Annotated[int, Meta(ge=0, le=2**53)]
@@ -31,42 +31,42 @@ Amount = Annotated[float, Meta(ge=0.0, le=1e12)]
 _T = TypeVar("_T")
 WIDEST: TableBits = 16
 
-# A point has to recognise so much better than all that are no dearer, a twentieth of a percent: less is the cut's luck.
+# A point must be this much better than all cheaper or equal ones, a twentieth of a percent: less is a fold's noise.
 STEP = 0.0005
 
 
 class FrontierError(ThenarError, ValueError):
-    """A frontier cannot be computed as asked, or a file is none."""
+    """A frontier that cannot be computed as requested, or a file that is none."""
 
 
 class Time(Struct, frozen=True, forbid_unknown_fields=True):
-    """A time in microseconds, and how it came about."""
+    """A time in microseconds, and its source."""
 
     us: Microseconds
     how: How
 
 
-class Way(Struct, frozen=True, forbid_unknown_fields=True):
-    """How switches are chosen: a name of `METHODS`, and its parameter (S, or a number of switches)."""
+class PlacementChoice(Struct, frozen=True, forbid_unknown_fields=True):
+    """A placement method: a name of `METHODS`, and its parameter (S, or a number of switches)."""
 
     method: str
     parameter: Annotated[float, Meta(ge=0.0, le=1e6)]
 
 
 class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """All that a point chose: what `compile --from` needs, and what the runtime is told.
+    """All choices of a point: the input of `compile --from`, and the settings of the runtime.
 
-    rounds      None for a trainer that does not go by rounds
-    width       bits that every sum fits; table_bits: 8 where firmware may store a byte an entry
-    layout      how the tables lie in flash, in words; "" where nothing is laid out (host and pi)
+    rounds      None for a trainer without rounds
+    width       bits that every sum fits; table_bits: 8 if firmware may store a byte per entry
+    layout      of the tables in flash, in words; "" on host and pi, which have none
     wiring      "as wired" (the given glove.toml), "board" (a switch scanner) or a kind of port expander; clock_hz of
-                its bus, or baud of the board's line; 0 where no switch is read
-    trainer     what makes the model, and `settings` of it that are no defaults; the paper's is not written
-    keep_joints  how many joints are read; None: all, where `inputs` has any
-    levels      how many levels of a taxel there were to choose from; None: there are no taxels, or none are read
+                its bus, or baud of the board's line; 0 if no switch is read
+    trainer     of the model, and its `settings` that are not defaults; the paper's is not written
+    keep_joints  number of joints that are read; None: all, if `inputs` has any
+    levels      most levels of a taxel to choose from; None: there are no taxels, or none are read
     """
 
-    way: Way
+    placement: PlacementChoice
     inputs: Inputs
     rounds: Annotated[int, Meta(ge=1, le=10**6)] | None
     width: Annotated[int, Meta(ge=4, le=16)]
@@ -84,10 +84,10 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 
 
 class Latency(Struct, frozen=True, forbid_unknown_fields=True):
-    """From a hand's arrival in a grasp until it is decided on, at least a frame, microseconds over a stream.
+    """Time from a hand's arrival in a grasp until it is decided on, at least a frame, in microseconds over a stream.
 
-    missed  the share of grasps that were never decided on rightly while they lasted: they are in neither number
-    wrong   the share of the time for which grasps were held, decided on once, that another type was decided on
+    missed  the share of grasps without a right decision before their end: they are in neither number
+    wrong   the share of the held time, after the first right decision, in which another type was decided on
     """
 
     mean_us: Microseconds
@@ -97,20 +97,20 @@ class Latency(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One way to build the glove.
+    """A design of the glove.
 
-    number      what `compile --from frontier.json --point` takes
+    number      the argument of `compile --from frontier.json --point`
     switches    names of the kept switches and levels, in the order in which they were chosen from all rows
-    joints      names of the joints that are read, where these are not all or none
-    rate        of new subjects, or pooled: what the point was chosen by, less its luck
-    luck        by how much it looked better, as the best of all that was tried (`evaluation.luck`)
-    frames      the same of single frames, as it came out (None: a trial has one frame)
-    beside      the other of the two, as it came out (None: only one subject)
-    scan        reading the switches (the mean where it ends early); transfer: the joints (on demand, the mean)
-    frame       max(scan, transfer) + classify: the two lie on lines of their own; on demand the sum of all three
+    joints      names of the joints that are read, if not all or none
+    rate        of new subjects, or pooled: the rate by which the point was chosen, corrected for luck
+    luck        the optimism of picking the best of all that was tried (`evaluation.luck`)
+    frames      the rate of single frames, uncorrected (None: a trial has one frame)
+    other_rate  the other of the two, uncorrected (None: only one subject)
+    scan        reading the switches (the mean if it ends early); transfer: the joints (on demand, the mean)
+    frame       max(scan, transfer) + classify: the two use separate lines; on demand the sum of all three
     asked       the share of frames in which the joints are read: below 1 on demand
     flash, ram  bytes of the classifier on its target; of the tables alone on host and pi
-    fronts      on which lines of best points it lies: "frame", "switches", "latency"
+    fronts      the fronts that it is on: "frame", "switches", "latency"
     """
 
     number: int
@@ -119,7 +119,7 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     rate: Rate
     luck: Share
     frames: Rate | None
-    beside: Rate | None
+    other_rate: Rate | None
     scan: Time
     transfer: Time
     classify: Time
@@ -136,11 +136,11 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class Tried(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A placement as it was screened: its rate after so many rounds (None: its trainer does not go by them), in the
-    fastest of its wirings; and its trainer, where that is not the paper's.
+    """A screened placement: its rate after `rounds` rounds (None: its trainer has none), in the fastest of its wirings;
+    and its trainer, if that is not the paper's.
     """
 
-    way: Way
+    placement: PlacementChoice
     inputs: Inputs
     n_switches: Count
     rounds: Count | None
@@ -152,7 +152,7 @@ class Tried(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True)
 
 
 class Curve(Struct, frozen=True, forbid_unknown_fields=True):
-    """Recognition against the number of switches, switches alone: one method; `ours` or a rival."""
+    """Accuracy against the number of switches, switches alone: one method; `ours` or a baseline."""
 
     method: str
     what: str
@@ -162,7 +162,7 @@ class Curve(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Check(Struct, frozen=True, forbid_unknown_fields=True):
-    """A model's predictions beside what was measured: of what, how often, and relative errors."""
+    """A model's predictions compared with measurements: subject and number of measurements, and relative errors."""
 
     what: str
     how: How
@@ -172,7 +172,7 @@ class Check(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Mark(Struct, frozen=True, forbid_unknown_fields=True):
-    """Something to see on the pictures beside the points: the paper's choices, all switches, the user's build."""
+    """A reference mark on the pictures: the paper's choices, all switches, the user's build."""
 
     name: str
     n_switches: Count
@@ -182,12 +182,12 @@ class Mark(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """All that `thenar frontier` found.
+    """The result of `thenar frontier`.
 
-    by       what points are chosen by, and each `rate` is of; a point's `beside` is of the other
-    n_levels  levels of the n_taxels that there were to choose from, at most; they come on top of the switches
-    picked   number of the point that suits the budget or the rate asked for; None where nothing was asked
-    skipped  sentences: what could not be measured here, and what was left out
+    by       the rate by which points are chosen, which is each `rate`; a point's `other_rate` is the other
+    n_levels  most levels of the n_taxels to choose from, in addition to the switches
+    picked   number of the point selected by the given budget or rate; None if neither was given
+    skipped  sentences: measurements that were not possible here, and options that were left out
     """
 
     schema: int
@@ -218,18 +218,18 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     @property
     def trainers(self) -> tuple[str, ...]:
-        """Who trained what was tried."""
+        """The trainers that were tried."""
         return tuple(dict.fromkeys(each.trainer for each in self.tried))
 
     @property
-    def beside(self) -> By | None:
-        """What the other rate of each point is of."""
+    def other(self) -> By | None:
+        """The kind of each point's `other_rate`."""
         if self.subjects < 2:
             return None
         return "pooled" if self.by == "new subject" else "new subject"
 
     def point(self, number: int) -> Point:
-        """Return the point of that number. Raises FrontierError."""
+        """Return the point with that number. Raises FrontierError."""
         for point in self.points:
             if point.number == number:
                 return point
@@ -239,9 +239,9 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 def front(
     items: Sequence[_T], price: Callable[[_T], float], worth: Callable[[_T], float], step: float = STEP
 ) -> list[_T]:
-    """Return the items, from the cheapest up, each of which is worth more, by `step`, than every cheaper one before it.
+    """Return the Pareto front, cheapest first: each item is worth more, by `step`, than every cheaper one before it.
 
-    Of equal price the one that is worth most counts, of equal worth too the first.
+    Of equal prices the item worth most is taken, of equal worth too the first.
     """
     best: list[_T] = []
     for item in sorted(items, key=lambda item: (price(item), -worth(item))):
@@ -260,9 +260,9 @@ def frontier_to_bytes(frontier: Frontier) -> bytes:
 
 
 def frontier_from_bytes(data: bytes, what: str = "frontier.json") -> Frontier:
-    """Return the frontier of a `frontier.json`, which messages call `what`.
+    """Return the frontier of a `frontier.json`; messages refer to it as `what`.
 
-    Raises FrontierError if it is oversized, no such document, of a newer schema, or contradicts itself.
+    Raises FrontierError if it is oversized, no such document, of a newer schema, or inconsistent.
     """
     if len(data) > MAX_BYTES:
         raise FrontierError(f"{what} has {len(data)} bytes, a frontier has at most {MAX_BYTES}")
@@ -270,7 +270,7 @@ def frontier_from_bytes(data: bytes, what: str = "frontier.json") -> Frontier:
     if schema > SCHEMA:
         raise FrontierError(f"{what} has schema {schema}, this thenar reads up to {SCHEMA}: update thenar")
     if schema < SCHEMA:
-        raise FrontierError(f"{what} is an older thenar's, whose rates were of rows: run thenar frontier again")
+        raise FrontierError(f"{what} is from an older thenar, whose rates were of rows: run thenar frontier again")
     frontier = _decode(data, Frontier, what)
     for name in {*frontier.grasps, *(name for point in frontier.points for name in point.switches)}:
         if reason := fault(name):
@@ -281,12 +281,12 @@ def frontier_from_bytes(data: bytes, what: str = "frontier.json") -> Frontier:
 
 
 def _contradictions(frontier: Frontier) -> Iterator[str]:
-    """Yield what cannot all be true, or can be built by nobody."""
+    """Yield inconsistencies, and settings that cannot be built."""
     if [point.number for point in frontier.points] != list(range(1, len(frontier.points) + 1)):
         yield "does not number its points 1, 2, 3 and so on"
     if frontier.picked is not None and not 1 <= frontier.picked <= len(frontier.points):
         yield f"picked point {frontier.picked}, which it does not have"
-    rates = [rate for point in frontier.points for rate in (point.rate, point.frames, point.beside)]
+    rates = [rate for point in frontier.points for rate in (point.rate, point.frames, point.other_rate)]
     rates += [each.rate for each in frontier.tried] + [mark.rate for mark in frontier.marks]
     rates += [rate for curve in frontier.curves for rate in curve.rates]
     if not all(rate is None or 0 <= rate.low <= rate.mean <= rate.high <= 1 for rate in rates):
@@ -299,7 +299,7 @@ def _contradictions(frontier: Frontier) -> Iterator[str]:
 
 
 def _fault(point: Point, frontier: Frontier) -> str:
-    """Return the first contradiction in a point's setting, or nothing."""
+    """Return the first contradiction in a point's setting, or ""."""
     setting = point.setting
     if len(set(point.switches)) < len(point.switches) or len(point.switches) > frontier.n_switches + frontier.n_levels:
         return "keeps a switch twice, or more than there are"

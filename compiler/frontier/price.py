@@ -1,4 +1,4 @@
-"""What a placement costs once it is trained on all rows: its tables, how long they take to read and to classify."""
+"""The price of a placement trained on all rows: its tables, and the times of reading and classifying."""
 
 import time
 from collections.abc import Iterator
@@ -21,19 +21,19 @@ from .search import Shape
 from .timing.classify_times import Classified
 from .timing.scan_times import ScanTimes, scan_times
 
-# Of more rows than this, evenly spaced ones tell how early a scan ends.
+# Of more rows than this, evenly spaced ones determine how early a scan ends.
 _FRAMES = 1000
 
 
 class Tabled(Struct, frozen=True):
-    """Which tables: of the ensemble after so many rounds, cut in this shape."""
+    """Which tables: of the ensemble after `rounds` rounds, cut in this shape."""
 
     rounds: int
     shape: Shape
 
 
 class Wired(Struct, frozen=True):
-    """What reading the switches takes in one wiring, "as wired" or of a new glove, at this clock."""
+    """Time of reading the switches in one wiring, "as wired" or of a new glove, at this clock."""
 
     wiring: str
     clock_hz: int
@@ -41,8 +41,8 @@ class Wired(Struct, frozen=True):
 
 
 class PricedTables(Struct, frozen=True):
-    """Tables with what they cost: `content` is a tables.bin; `wired` is empty where no switch is read; `seconds` is how
-    long it took to train for as many rounds and to make these tables.
+    """Tables with their costs: `content` is a tables.bin; `wired` is empty if no switch is read; `seconds` is the time
+    of training to this round and making these tables.
     """
 
     tabled: Tabled
@@ -52,7 +52,7 @@ class PricedTables(Struct, frozen=True):
     seconds: float
 
     def fastest_us(self, joints_us: float) -> float | None:
-        """Return the least frame time in any wiring, whole scans; None where nothing fits the target."""
+        """Return the least frame time in any wiring, whole scans; None if nothing fits the target."""
         if not self.classified:
             return None
         scan_us = min((wired.scan.full_us for wired in self.wired), default=0.0)
@@ -69,11 +69,11 @@ def price(
     equipment: Equipment,
     held: tuple[Fold, Training] | None,
 ) -> tuple[PricedTables, ...]:
-    """Train on all rows, on the switches `columns`, which have these names, and the joints; see what the tables cost.
+    """Train on all rows, on the switches `columns`, which have these names, and the joints; price the tables.
 
-    held  how early scans end is seen on the test rows of a fold, by tables of its training rows, trained so, as rows
-          that were trained on end them too soon; None: on all rows, and with mean rows for lost inputs, where nobody
-          asks about scans that end early or for each byte of flash
+    held  measures early ends of scans on the test rows of a fold, by tables of its training rows, since training rows
+          end scans too soon; None: on all rows, with mean rows for lost inputs, which is enough if early ends and
+          exact flash sizes do not matter
     """
     rows = np.arange(len(samples.labels))
     made = list(tables_of(samples, rows, columns, tables, training, lost=held is not None))
@@ -102,10 +102,10 @@ def tables_of(
     *,
     lost: bool = False,
 ) -> Iterator[tuple[Tabled, IntegerTables, float]]:
-    """Yield the tables that are asked for, of one training on some rows, and how many seconds each took.
+    """Yield the requested tables of one training on some rows, with the seconds that each took.
 
-    lost  fit what stands in for lost inputs, as in a build: when a scan may end, and how many bytes of flash hold it,
-          hang on that, scores of whole frames do not. Without, it is mean rows
+    lost  fit the substitutes for lost inputs, as in a build: early ends of scans, and the flash size, depend on them,
+          while scores of whole frames do not. Otherwise they are mean rows
     """
     began, most = time.perf_counter(), max(one.rounds for one in tables)
     kept = samples.rows(rows).keeping(columns)
@@ -124,6 +124,6 @@ def _wired(
 ) -> tuple[Wired, ...]:
     bits, codes = frames[:, : len(names)].astype(bool), frames[:, len(names) :]
     return tuple(
-        Wired(wiring.name, wiring.clock_hz, scan_times(names, tables, wiring, bits, codes, equipment.beside))
+        Wired(wiring.name, wiring.clock_hz, scan_times(names, tables, wiring, bits, codes, equipment.overhead))
         for wiring in equipment.fitting(names)
     )

@@ -1,4 +1,4 @@
-"""Screening: every placement at one number of rounds on the folds of one repeat, and in the fastest of its wirings."""
+"""Screening: train every placement once, on the folds of one repeat, and price it in the fastest of its wirings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -7,13 +7,13 @@ from ..placement.methods.base import METHODS
 from ..samples import Columns
 from .points import Curve
 from .price import Tabled, price
-from .search import JOINTS, NO_SWITCHES, Candidate, Shape, available_inputs, curve_ways, ways
+from .search import JOINTS, NO_SWITCHES, Candidate, Shape, available_inputs, curve_placements, tried_placements
 from .survey import Judged, Survey
 
-# How long a frame takes hardly depends on how many rounds and rows there were: tables of few tell it.
+# The frame time hardly depends on the numbers of rounds and rows: tables of few suffice.
 _TABLED = Tabled(12, Shape(16))
 QUICK_PRICE_S = 0.3
-# What stages of trainers but the first are called besides.
+# Suffixes of the stages after the first trainer's.
 OTHER_TRAINERS, FEWER_JOINTS = ", other trainers", ", fewer joints"
 
 
@@ -33,34 +33,39 @@ class Screened:
 
 
 def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
-    """Return how well and how fast every choice is that may be built, with the first trainer; and everybody's curves,
-    rivals' included.
+    """Return the accuracy and frame time of every choice that can be built, with the first trainer; and the curves of
+    all methods, including the baselines.
     """
     search, cuts, sizes = survey.search, survey.cuts, {most: len(survey.elements(most)) for most in survey.levels}
     inputs, first = available_inputs(sizes[survey.levels[-1]], survey.n_joints), search.trainers[0]
-    every = [(way, most) for most, size in sizes.items() for name in search.methods for way in ways(name, size)]
-    choices = [
-        Candidate(way, kind, first, levels=most)
-        for kind in inputs
-        for way, most in (every if kind != "joints" else ((NO_SWITCHES, None),))
+    every = [
+        (choice, most)
+        for most, size in sizes.items()
+        for name in search.methods
+        for choice in tried_placements(name, size)
     ]
-    rivals = [
-        Candidate(way, "switches", first, levels=survey.levels[-1])
-        for name in search.rivals
-        for way in curve_ways(name, sizes[survey.levels[-1]])
+    choices = [
+        Candidate(choice, kind, first, levels=most)
+        for kind in inputs
+        for choice, most in (every if kind != "joints" else ((NO_SWITCHES, None),))
+    ]
+    baselines = [
+        Candidate(choice, "switches", first, levels=survey.levels[-1])
+        for name in search.baselines
+        for choice in curve_placements(name, sizes[survey.levels[-1]])
     ]
     survey.choose("placements", choices, (cuts.everything, *cuts.screening))
-    # A placement that keeps nothing is none.
-    choices = [one for one in choices if one.way == NO_SWITCHES or survey.columns(one, cuts.everything)]
-    survey.choose("rivals", rivals, cuts.screening)
-    rates = _rates(survey, "", choices, rivals)
-    names = dict.fromkeys([*search.methods, *search.rivals])
+    # Drop placements that keep nothing.
+    choices = [one for one in choices if one.placement == NO_SWITCHES or survey.columns(one, cuts.everything)]
+    survey.choose("baselines", baselines, cuts.screening)
+    rates = _rates(survey, "", choices, baselines)
+    names = dict.fromkeys([*search.methods, *search.baselines])
     curves = tuple(_curve(survey, name, rates) for name in names if "switches" in inputs)
     return _screened(survey, "", choices, rates), curves
 
 
 def screen_fewer(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, ...]:
-    """Return how well and how fast those are that are `worth` it, with fewer joints, where these take time."""
+    """Return those `worth` it, screened with fewer joints, if joints take time."""
     cuts, sizes = survey.cuts, [size for size in JOINTS if size < survey.n_joints]
     mine = [one.choice for one in worth if one.choice.joints] if survey.equipment.records.each_us else []
     choices = [replace(choice, keep_joints=size) for choice in mine for size in sizes]
@@ -69,16 +74,16 @@ def screen_fewer(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, .
 
 
 def screen_others(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, ...]:
-    """Return how well and how fast those are that are `worth` it, with each of the other trainers."""
+    """Return those `worth` it, screened with each of the other trainers."""
     choices = [replace(one.choice, trainer=name) for name in survey.search.trainers[1:] for one in worth]
     return _screened(survey, OTHER_TRAINERS, choices, _rates(survey, OTHER_TRAINERS, choices)) if choices else ()
 
 
 def _rates(
-    survey: Survey, stage: str, choices: Sequence[Candidate], rivals: Sequence[Candidate] = ()
+    survey: Survey, stage: str, choices: Sequence[Candidate], baselines: Sequence[Candidate] = ()
 ) -> dict[Candidate, Judged]:
-    """Return the rates of choices and rivals; the rivals, which choose from no more than the folds, settle nothing."""
-    search, cuts, every = survey.search, survey.cuts, [*choices, *rivals]
+    """Return the rates of choices and baselines; baselines choose within the folds only and settle nothing."""
+    search, cuts, every = survey.search, survey.cuts, [*choices, *baselines]
     survey.settle(f"settings{stage}", survey.typical(choices), (cuts.everything, *cuts.screening))
     rounds = {name: search.alone(name).screened for name in search.trainers}
     fits = survey.fit(f"screening{stage}", every, cuts.screening, lambda one: ((rounds[one.trainer],), ()))
@@ -98,7 +103,7 @@ def _screened(
     found = []
     for choice, (priced,) in zip(choices, survey.cache.ask(f"times{stage}", calls), strict=True):
         us = priced.fastest_us(survey.transfer(choice).us)
-        if us is not None and (priced.wired or choice.way == NO_SWITCHES):
+        if us is not None and (priced.wired or choice.placement == NO_SWITCHES):
             found.append(Screened(choice, survey.columns(choice, survey.cuts.everything), rates[choice], us))
     return tuple(found)
 
@@ -107,7 +112,7 @@ def _curve(survey: Survey, name: str, rates: dict[Candidate, Judged]) -> Curve:
     """Return a method's rates by the mean number of switches that it kept in the folds, switches alone."""
     folds, points = survey.cuts.screening, {}
     for choice, judged in rates.items():
-        if (choice.way.method, choice.inputs, choice.levels) == (name, "switches", survey.levels[-1]):
+        if (choice.placement.method, choice.inputs, choice.levels) == (name, "switches", survey.levels[-1]):
             points[sum(len(survey.columns(choice, fold)) for fold in folds) / len(folds)] = judged.rate
     sizes = tuple(sorted(points))
     return Curve(name, METHODS[name].help, METHODS[name].ours, sizes, tuple(points[size] for size in sizes))

@@ -1,4 +1,4 @@
-"""What the frontier tries: placements under which parameters, inputs, rounds, widths, folds."""
+"""The search space of the frontier: placements and their parameters, inputs, rounds, widths, folds."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -9,43 +9,43 @@ from thenar.runtime.manifest import AUTO, PAPERS_TRAINER, Inputs, Options, Table
 from ..placement.elements import LEVELS
 from ..placement.methods.base import METHODS, usual
 from ..trainers.base import TRAINERS, Number, Training, changed
-from .points import FrontierError, Way
+from .points import FrontierError, PlacementChoice
 
-# Rivals are only seen beside ours: a few sizes show their curves.
+# Baselines are only shown for comparison: their curves have few sizes.
 CURVE_SIZES = (4, 8, 16, 33, 66)
 # The placement of inputs without switches.
-NO_SWITCHES = Way("none", 0.0)
-USUAL_RIVALS = ("rfe", "forest", "mrmr", "mutual-information", "random", "sspoc", "qr")
+NO_SWITCHES = PlacementChoice("none", 0.0)
+USUAL_BASELINES = ("rfe", "forest", "mrmr", "mutual-information", "random", "sspoc", "qr")
 ROUNDS = (1, 2, 3, 5, 8, 12, 20, 30, 50, 75, 100, 150, 200, 300)
 
 
 class Shape(NamedTuple):
-    """How integers are cut: no sum needs more than `width` bits; with table_bits 8 no look-up spans more than 255."""
+    """Shape of the integer tables: sums need at most `width` bits; with table_bits 8 no lookup spans more than 255."""
 
     width: int
     table_bits: TableBits = 16
 
 
 SHAPES = (*(Shape(width) for width in (16, 12, 8, 6, 5, 4)), Shape(16, 8))
-# So many levels of each taxel there are to choose from, at most.
+# The numbers of levels of each taxel to choose from, at most.
 TAXEL_LEVELS = (1, 3, LEVELS)
-# So many joints are tried besides all of them.
+# The numbers of joints that are tried in addition to all of them.
 JOINTS = (2, 3, 4, 5, 6, 7, 8, 10, 12, 16)
 # Rounds of whose ensembles integer tables are made, in every shape.
 TABLED = (10, 30, 100)
 
 
-# A method, whether it looks at the joints, and how many levels of a taxel it chooses from.
+# A method, whether it uses the joints, and how many levels of a taxel it chooses from.
 Choosing = tuple[str, bool, int | None]
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A way to choose elements, whether the joints are read besides, who trains, how many joints are kept (None: all),
-    and how many levels of a taxel there are to choose from (None: no taxel is read); inputs "joints" have NO_SWITCHES.
+    """A placement choice, the inputs, the trainer, the number of joints that are kept (None: all), and the most levels
+    of a taxel to choose from (None: no taxel is read); inputs "joints" have NO_SWITCHES.
     """
 
-    way: Way
+    placement: PlacementChoice
     inputs: Inputs
     trainer: str = PAPERS_TRAINER
     keep_joints: int | None = None
@@ -58,53 +58,53 @@ class Candidate:
 
     @property
     def learns_from_joints(self) -> bool:
-        """Whether its switches are chosen by the joints as well."""
-        return self.inputs == "both" and METHODS[self.way.method].uses_joints
+        """Whether the choice of its switches depends on the joints."""
+        return self.inputs == "both" and METHODS[self.placement.method].uses_joints
 
     @property
     def chosen_by(self) -> Choosing:
-        """The method, whether it looks at the joints, and the levels that it chooses from."""
-        return self.way.method, self.learns_from_joints, self.levels
+        """The method, whether it uses the joints, and the levels that it chooses from."""
+        return self.placement.method, self.learns_from_joints, self.levels
 
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """How much is tried.
+    """The size of a search.
 
     Parameters
     ----------
     methods : tuple of str
         Placement methods that points are built from.
-    rivals : tuple of str
-        Placement methods of which only curves are seen beside those.
+    baselines : tuple of str
+        Placement methods that are only shown as curves, for comparison.
     folds, repeats, seed : int
         The stratified folds are cut `repeats` times, with seeds seed, seed + 1, ...
     screening : int
-        Rounds with which every placement is screened, on the folds of the first repeat.
+        Rounds for screening every placement, on the folds of the first repeat.
     rounds : int
-        The most rounds that those on the front are trained for. A trainer without stages has one, and trains once.
+        The most rounds for finalists. A trainer without stages has one, and trains once.
     finalists : int
-        The most placements that are looked at closely.
+        The most placements to evaluate fully.
     by : {"subject", "trial"}, optional
-        Whether points are chosen by subjects who are left out, or by trials of everybody; none given: by subjects where
-        there are several.
+        Whether points are chosen by left-out subjects, or by trials of all subjects; by default by subjects if there
+        are several.
     trainer : str
-        What makes the models; "auto": each of the trainers that take the settings.
+        The trainer of the models; "auto": each of the trainers that take the settings.
     settings : mapping
-        Settings that are given, but for rounds.
+        Given settings, except for rounds.
 
     Raises
     ------
     MemberError
-        For a method or a trainer that is not there.
+        For an unknown method or trainer.
     TrainerError
         For a setting that the trainer does not take.
     FrontierError
-        Where nothing could come of it.
+        If the search would be empty.
     """
 
     methods: tuple[str, ...] = field(default_factory=lambda: usual(ours=True))
-    rivals: tuple[str, ...] = field(default_factory=lambda: usual(ours=False))
+    baselines: tuple[str, ...] = field(default_factory=lambda: usual(ours=False))
     folds: int = 4
     repeats: int = 3
     seed: int = 1
@@ -116,7 +116,7 @@ class Search:
     settings: Mapping[str, Number] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
-        for name in (*self.methods, *self.rivals):
+        for name in (*self.methods, *self.baselines):
             METHODS.named(name)
         if min(self.repeats, self.screening, self.rounds, self.finalists) < 1 or not self.methods:
             raise FrontierError("a frontier needs a method, a repeat, a round and a finalist at least")
@@ -124,7 +124,7 @@ class Search:
 
     @property
     def trainers(self) -> tuple[str, ...]:
-        """Who trains, the paper's trainer first; the other properties are of the first: see `alone`."""
+        """The trainers, the paper's first; the other properties describe the first: see `alone`."""
         if self.trainer != AUTO:
             return (self.trainer,)
         names = dict.fromkeys(each.trainer for each in Training.candidates(self._asked(AUTO)))
@@ -136,12 +136,12 @@ class Search:
 
     @property
     def training(self) -> Training:
-        """The trainer, and values for all its settings, of which those not given are defaults."""
+        """The trainer, and values for all its settings: those given, and defaults."""
         return Training.of(self._asked(self.trainers[0]))
 
     @property
     def candidates(self) -> tuple[Training, ...]:
-        """Every way to train that the settings leave open; rounds are no part of it, where there are stages."""
+        """All trainings that the settings leave open; trainers with stages are not varied by rounds."""
         usual = {"rounds": self.training.settings["rounds"]} if self.staged else {}
         every = Training.candidates(self._asked(self.trainers[0]))
         found = {
@@ -159,12 +159,12 @@ class Search:
 
     @property
     def screened(self) -> int:
-        """The rounds of screening: no more than those on the front are trained for."""
+        """The rounds of screening: at most those of the finalists."""
         return min(self.screening, self.stages[-1])
 
     @property
     def stages(self) -> tuple[int, ...]:
-        """The numbers of rounds whose rates are taken from one training."""
+        """The numbers of rounds that are evaluated in one training."""
         return self._up_to_last(ROUNDS)
 
     @property
@@ -176,14 +176,14 @@ class Search:
         return (*(each for each in rounds if each < self.rounds), self.rounds) if self.staged else (1,)
 
 
-def ways(method: str, n_switches: int) -> tuple[Way, ...]:
-    """Return the placements of a method that are tried among so many switches."""
-    return tuple(Way(method, float(parameter)) for parameter in METHODS[method].ladder(n_switches))
+def tried_placements(method: str, n_switches: int) -> tuple[PlacementChoice, ...]:
+    """Return the placements that a frontier tries with a method among `n_switches` switches."""
+    return tuple(PlacementChoice(method, float(parameter)) for parameter in METHODS[method].ladder(n_switches))
 
 
-def curve_ways(method: str, n_switches: int) -> tuple[Way, ...]:
-    """Return the placements of a rival that its curve goes through."""
-    return tuple(Way(method, float(size)) for size in CURVE_SIZES if size <= n_switches)
+def curve_placements(method: str, n_switches: int) -> tuple[PlacementChoice, ...]:
+    """Return the placements on a baseline's curve."""
+    return tuple(PlacementChoice(method, float(size)) for size in CURVE_SIZES if size <= n_switches)
 
 
 def available_inputs(n_switches: int, n_joints: int) -> tuple[Inputs, ...]:

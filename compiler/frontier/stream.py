@@ -1,18 +1,16 @@
-"""Streams: what a glove delivers while a hand goes from grasp to grasp, recorded or composed of single trials.
+"""Streams: a glove's data while a hand goes from grasp to grasp, recorded or composed of single trials.
 
-Where nobody recorded how a hand goes from grasp to grasp, a stream is composed of single trials.
-What is taken from the recordings: the switches and joints of each grasp while it is held. What is made up: all between.
-The hand lets go: the switches of the grasp open one by one, at times spread evenly over RELEASE_US. It goes to the next
-one: its joints follow a minimum-jerk path (Flash and Hogan 1985, J. Neurosci. 5: 1688) bent half-way towards an open
-hand, most at two thirds of the way (Jeannerod 1984, J. Motor Behav. 16: 235), in TRAVEL_US, told every RECORD_US as a
-CyberGlove would. It grips: the switches of the next grasp close one by one over GRIP_US; with the last one the grasp is
-complete. The times are those of the scene `continuous`. The open hand is, joint by joint, the one that only a twentieth
-of the trials opens further. A taxel is pressed and let go at once, as a switch is; between grasps it reads what it does
-in the twentieth of the trials that press it least.
+Without recordings of transitions, a stream is composed of single trials. The switches and joints of each held grasp
+come from the recordings; everything in between is modelled. When the hand lets go, the switches of the grasp open one
+by one, at times spread evenly over RELEASE_US. During the transition the joints follow a minimum-jerk path (Flash and
+Hogan 1985, J. Neurosci. 5: 1688) that opens the hand, most at two thirds of the path (Jeannerod 1984, J. Motor Behav.
+16: 235), in TRAVEL_US, sampled every RECORD_US as by a CyberGlove. When it grips, the switches of the next grasp close
+one by one over GRIP_US; with the last one the grasp is complete. The times are those of the scene `continuous`. In the
+open hand, each joint has the value that only a twentieth of the trials exceeds. A taxel is pressed and released at
+once, like a switch; between grasps it has its value in the twentieth of the trials that press it least.
 
-What that leaves out: a hand that holds is still, and a trial is one frame, so what a single frame gets wrong stays
-wrong for the whole hold, and no number of frames makes up for it; contacts that bounce; switches that are touched in
-passing.
+The model leaves out movement within a hold: a trial is one frame, so an error in that frame lasts for the whole hold,
+and more frames do not correct it. It also leaves out contact bounce, and switches that are touched in passing.
 """
 
 from dataclasses import dataclass, field, replace
@@ -37,27 +35,27 @@ HOLD_US = (600_000, 1_000_000)
 RECORD_US = 10_000
 _OPENING = 0.5
 _OPEN = 0.05  # share of the trials in which a joint is opened further than in the open hand
-_BUMP = 3.0**9 / 2.0**6  # makes t^6 (1 - t)^3 one at its top, t = 2/3
+_BUMP = 3.0**9 / 2.0**6  # scales the maximum of t^6 (1 - t)^3, at t = 2/3, to one
 _NEVER = np.int64(1) << 60
 
 GRASPS = 300
 PERIOD_US = 10_000
-# The golden section: its multiples, less their whole parts, are spread evenly, however many there are.
+# The golden section: the fractional parts of its multiples are spread evenly, for any number of them.
 _GOLDEN = 0.618034
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stream:
-    """T states of a glove; each lasts until the next, the last is the end and lasts for no time.
+    """T states of a glove; each lasts until the next; the last is the end, of duration 0.
 
     bits      (T, s) bool     every switch of the set
     codes     (T, j) uint16   the joints
     at_us     (T,) int64      when each begins, never falling
     types     (T,) intp       the class of the grasp; -1 while the hand moves
-    arrivals  (g,) intp       the states at which a grasp is complete, if its type is not that of the grasp before: one
-                              that is may be decided on from before, which tells nothing
-    ends      (g,) intp       the states at which these grasps no longer are
-    what      a sentence: what the stream is, and why this one
+    arrivals  (g,) intp       the states at which a grasp is complete, if its type differs from the grasp before: the
+                              same type may still be decided on from before, which measures nothing
+    ends      (g,) intp       the states at which these grasps end
+    what      a sentence: the kind of stream, and the reason for it
     taxels    (T, t) uint16   the taxels
     """
 
@@ -74,13 +72,13 @@ class Stream:
         return len(self.at_us)
 
     def with_elements(self, elements: Elements) -> "Stream":
-        """Return the same stream, whose switches are these elements where it has taxels."""
+        """Return the same stream with these elements as switches, if it has taxels."""
         if not self.taxels.shape[1]:
             return self
         return replace(self, bits=above(self.bits, self.taxels, elements), taxels=self.taxels[:, :0])
 
     def with_joints(self, joints: Columns) -> "Stream":
-        """Return the same stream with the joints `joints` alone, where there are any: who reads none looks at none."""
+        """Return the same stream with only the joints `joints`; without any if it has none."""
         return replace(self, codes=self.codes[:, list(joints)]) if 0 < len(joints) < self.codes.shape[1] else self
 
 
@@ -93,13 +91,13 @@ def stream_of(
     grasps: int = GRASPS,
     period_us: int = PERIOD_US,
 ) -> Stream:
-    """Return a stream of rows of a set: its own movements where it holds whole ones, else one composed of its trials.
+    """Return a stream of rows of a set: of its movements if it holds whole ones, else composed of its trials.
 
-    labels  (n,) the classes of all rows, as the tables number them; -1 where nothing is held
-    rows    those that may be used, the tables' test rows; None: all. Of a set of whole movements only movements all of
-            whose rows are among them are
+    labels  (n,) the classes of all rows, as the tables number them; -1 for nothing held
+    rows    those that may be used, the tables' test rows; None: all. Of a set of whole movements, only movements with
+            all of their rows among them are used
 
-    `what` of the stream says in a sentence which it is, and why. Raises FrontierError where nothing comes of the rows.
+    `what` of the stream describes it in a sentence. Raises FrontierError if no stream can be made of the rows.
     """
     if holds_movements(grasp_set):
         return recorded_stream(grasp_set, labels, rows, grasps=grasps, period_us=period_us)
@@ -127,9 +125,9 @@ def recorded_stream(
 ) -> Stream:
     """Return the movements of a set whose rows are the frames of whole movements, one after the other.
 
-    Rows of a set without times are taken to be `period_us` apart. Between two movements a period and a part of one go
-    by, so that no frame time stays in step with the rows. Where there are more than `grasps` movements, as many of
-    them, evenly spread.
+    Rows of a set without times are taken to be `period_us` apart. Two movements are separated by a period plus a
+    varying fraction, so that no frame time stays in step with the rows. If there are more than `grasps` movements, that
+    many of them are taken, evenly spread.
 
     Raises FrontierError if no movement lies in `rows` as a whole.
     """
@@ -137,9 +135,7 @@ def recorded_stream(
     if rows is not None:
         found = found.pick(_whole(found, rows, len(grasp_set)))
     if not len(found):
-        raise FrontierError(
-            "no whole movement is among the rows that a latency is measured on: cut the folds between movements"
-        )
+        raise FrontierError("no whole movement is among the held-out rows for latency: cut the folds between movements")
     found = found.pick(np.unique(np.linspace(0, len(found) - 1, min(grasps, len(found))).astype(np.intp)))
     apart = "when they were recorded" if grasp_set.times_us.size else f"taken to be {period_us / 1000:g} ms apart"
     what = (
@@ -163,9 +159,9 @@ def composed_stream(
     """Return a stream composed of single trials (n, s), (n, j) of classes `labels` (n,): see this module.
 
     opens_up  (j,) the joints whose codes rise as the hand opens; None: the codes of all fall
-    taxels    (n, t) codes; eases_up (t,): those that rise as the taxel is let go; None: all fall
+    taxels    (n, t) codes; eases_up (t,): those that rise as the taxel is released; None: all fall
 
-    Raises FrontierError for fewer than two grasp types: there is nothing to go from and to.
+    Raises FrontierError for fewer than two grasp types, which have no transitions.
     """
     if len(np.unique(labels)) < 2:
         raise FrontierError("a latency is measured between grasps of different types, and the rows are of one")
@@ -204,7 +200,7 @@ def stream_from(
     what: str,
     taxels: Codes | None = None,
 ) -> Stream:
-    """Return the stream of states that end at end_us; all grasps (g,), classes `grasps`, are told, in order."""
+    """Return the stream of states that end at end_us, given all grasps (g,), classes `grasps`, in order."""
     types = np.full(len(at_us) + 1, -1, np.intp)
     for arrival, end, grasp in zip(arrivals.tolist(), ends.tolist(), grasps.tolist(), strict=True):
         types[arrival:end] = grasp
@@ -254,7 +250,7 @@ def _laid_out(grasp_set: GraspSet, labels: Rows, movements: Movements, period_us
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Leg:
-    """The way from one grasp to the next, and its hold: states (t,), of which number `arrival` is the first of it."""
+    """The transition from one grasp to the next, and its hold: states (t,), of which `arrival` begins the hold."""
 
     contacts: Codes
     codes: Codes
@@ -263,7 +259,7 @@ class _Leg:
 
 
 def _order(labels: Rows, grasps: int, random: np.random.Generator) -> list[int]:
-    """Return which trials are held one after the other; every trial once before any comes again."""
+    """Return the sequence of held trials; every trial occurs once before any is repeated."""
     chosen: list[int] = []
     waiting: list[int] = []
     while len(chosen) < grasps:
@@ -276,7 +272,7 @@ def _order(labels: Rows, grasps: int, random: np.random.Generator) -> list[int]:
 
 
 def _open_hand(codes: Codes, opens_up: Bits | None) -> NDArray[np.float64]:
-    """Return what joints or taxels (n, c) read while nothing is held; opens_up: see composed_stream."""
+    """Return the values of joints or taxels (n, c) while nothing is held; opens_up: see composed_stream."""
     if not len(codes):
         return np.zeros(codes.shape[1])
     rising = np.sort(codes, axis=0)
@@ -313,7 +309,7 @@ def _legs(
 
 
 def _path(start: NDArray[np.float64], end: NDArray[np.float64], opened: NDArray[np.float64]) -> Codes:
-    """Return the codes (TRAVEL_US / RECORD_US + 1, j) on the way, both ends among them."""
+    """Return the codes (TRAVEL_US / RECORD_US + 1, j) along the path, including both ends."""
     t = np.arange(TRAVEL_US // RECORD_US + 1)[:, np.newaxis] / (TRAVEL_US // RECORD_US)
     cubed, left = t * t * t, 1.0 - t
     straight = start + (end - start) * (cubed * (10.0 - t * (15.0 - 6.0 * t)))
@@ -322,9 +318,7 @@ def _path(start: NDArray[np.float64], end: NDArray[np.float64], opened: NDArray[
 
 
 def _changes(leaves_us: int, open_us: Times, close_us: Times, path: Codes) -> tuple[Times, Codes]:
-    """Return the times at which something changes, from where the hand begins to let go up to the last, and the joints
-    then.
-    """
+    """Return the times of all changes from the beginning of the release to the last, and the joints at these times."""
     starts_us = leaves_us + RELEASE_US
     records_us = starts_us + RECORD_US * np.arange(len(path)) if path.shape[1] else np.array([starts_us + TRAVEL_US])
     changes = np.concatenate([[leaves_us], open_us[open_us > -_NEVER], records_us, close_us[close_us < _NEVER]])

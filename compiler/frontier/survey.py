@@ -28,29 +28,29 @@ from .equipment import Equipment
 from .points import By, Time
 from .search import NO_SWITCHES, SHAPES, TAXEL_LEVELS, Candidate, Choosing, Search, Shape
 
-# Expected seconds of one core, for so many rows: they only say how the time that is left is told.
+# Expected seconds of one core for this many rows: only used to estimate the time left.
 _ROWS = 3000
 _ROUND_S, _WHOLE_S, _TABLE_S = 0.004, 0.4, 0.03
 _RANK_S = 3.0
 
 
-# Settings are chosen on the placement that keeps about as many switches as the paper's.
+# Settings are selected on the placement whose number of switches is nearest to the paper's.
 _TYPICAL = 33
-# What a frame takes is seen on tables of so many rows.
+# Rows for the tables that frame times are measured on.
 _FEW_ROWS = 1000
 
 
-# After which rounds models are tested, and of which of them tables are made.
+# The rounds after which models are tested, and those after which tables are made.
 Depth = tuple[tuple[int, ...], tuple[int, ...]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cuts:
-    """The folds of a set, which keep every trial whole, and how rows (n,) make m trials.
+    """The folds of a set, which keep every trial whole, and the trials of its rows (n,).
 
-    repeats   stratified folds, which rate points "pooled"; of each seed, or of the first where others choose points
-    subjects  folds whose subjects are new to them; none where there is one subject
-    by        which of these points are chosen by
+    repeats   stratified folds for "pooled" rates; of each seed, or only of the first if points are chosen by subjects
+    subjects  folds that leave out a subject each; none if there is one subject
+    by        the folds by which points are chosen
     trials    (n,) the trial of each row, 0 to m - 1; people (m,) the subject of each trial
     """
 
@@ -63,14 +63,12 @@ class Cuts:
 
     @classmethod
     def of(cls, samples: Samples, search: Search) -> "Cuts":
-        """Return the folds that a search asks for. Raises EvaluationError if there is too little to cut."""
+        """Return the folds for a search. Raises EvaluationError if there is too little to cut."""
         trials = np.unique(samples.trials, return_inverse=True)[1]
         people = samples.subjects[np.unique(trials, return_index=True)[1]]
         several = len(np.unique(people)) > 1
         if search.by == "subject" and not several:
-            raise EvaluationError(
-                "leaving a subject out needs two or more subjects: ask for trials in place of subjects"
-            )
+            raise EvaluationError("leaving a subject out needs two or more subjects: choose by trials instead")
         rows = np.arange(len(trials))
         by_subject = (search.by or "subject") == "subject" and several
         seeds = range(search.seed, search.seed + (1 if by_subject else search.repeats))
@@ -84,19 +82,19 @@ class Cuts:
         )
 
     def folds(self, by: By) -> tuple[tuple[Fold, ...], ...]:
-        """Return the folds of each repeat that such a rate is of."""
+        """Return the folds of each repeat for this kind of rate."""
         return (self.subjects,) if by == "new subject" else self.repeats
 
     @property
-    def beside(self) -> By | None:
-        """The other rate, if there are several subjects."""
+    def other(self) -> By | None:
+        """The kind of the other rate, if there are several subjects."""
         if not self.subjects:
             return None
         return "pooled" if self.by == "new subject" else "new subject"
 
     @property
     def screening(self) -> tuple[Fold, ...]:
-        """The first repeat of those by which points are chosen."""
+        """The first repeat of the folds by which points are chosen."""
         return self.folds(self.by)[0]
 
     @property
@@ -106,7 +104,7 @@ class Cuts:
         return tuple(fold for fold in every if fold not in self.screening)
 
     def judged(self, by: By, packed: Mapping[Fold, bytes]) -> "Judged":
-        """Return the rate of that name, by the packed bits of each fold's trials, of the repeats that are there."""
+        """Return the rate of this kind, given the packed bits of each fold's trials, over the available repeats."""
         repeats = [folds for folds in self.folds(by) if packed.keys() >= set(folds)]
         hits = np.zeros((len(repeats), len(self.people)), np.intp)
         for own, folds in zip(hits, repeats, strict=True):
@@ -131,7 +129,7 @@ class Cuts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """A rate of trials, and in how many of `repeats` each trial (m,) was recognised."""
+    """A rate of trials, and in how many of `repeats` each trial (m,) was predicted rightly."""
 
     rate: Rate
     hits: NDArray[np.intp]
@@ -139,17 +137,17 @@ class Judged:
 
 
 class Ladder(Struct, frozen=True):
-    """The placements of a method, one for each parameter, and how long they took together."""
+    """The placements of a method, one for each parameter, and their total time."""
 
     columns: tuple[Columns, ...]
     seconds: float
 
 
 class Tally(Struct, frozen=True):
-    """Which trials of a fold were recognised, by their numbers, eight to the byte.
+    """Correctly predicted trials of a fold, by their numbers, eight to the byte.
 
     stages  after every stage           tables  by the tables of each shape after each tabled stage (stages x shapes)
-    frames  the same tables' test rows, one by one; "" where each row is a trial of its own
+    frames  the same tables' test rows, one by one; "" if each row is a separate trial
     """
 
     stages: tuple[bytes, ...]
@@ -159,10 +157,10 @@ class Tally(Struct, frozen=True):
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """Rows, what is tried on them, and of what a glove may be built; placements and fits that were asked for are known.
+    """Rows, the search, and the hardware options of the glove; with requested placements and fits, each computed once.
 
-    source  what the recordings are called
-    ports   what switches and taxels cost to read on the whole glove, None where that is not known
+    source  name of the recordings
+    ports   costs of reading switches and taxels on the whole glove, None if unknown
     """
 
     grasp_set: GraspSet
@@ -182,11 +180,11 @@ class Survey:
 
     @property
     def levels(self) -> tuple[int | None, ...]:
-        """How many levels of a taxel are tried; None alone where there are no taxels."""
+        """The numbers of levels of a taxel that are tried; only None if there are no taxels."""
         return TAXEL_LEVELS if self.samples.taxels.shape[1] else (None,)
 
     def elements(self, levels: int | None, fold: Fold | None = None) -> Elements:
-        """Return what there is to choose from, by the training rows of `fold`, None: by all rows."""
+        """Return the elements to choose from, by the training rows of `fold`, or by all rows."""
         if levels is None:
             return tuple(map(Element, range(self.samples.n_switches)))
         key = levels, fold or self.cuts.everything
@@ -195,7 +193,7 @@ class Survey:
         return self._elements[key]
 
     def names(self, choice: Candidate) -> tuple[str, ...]:
-        """Return the names of what a choice keeps by all rows."""
+        """Return the names of the elements that a choice keeps by all rows."""
         elements, columns = self.elements(choice.levels), self.columns(choice, self.cuts.everything)
         return names_of(self.grasp_set, tuple(elements[column] for column in columns))
 
@@ -205,18 +203,18 @@ class Survey:
         return int(self.samples.codes.shape[1])
 
     def transfer(self, choice: Candidate) -> Time:
-        """Return what reading the joints of a choice takes."""
+        """Return the time of reading the joints of a choice."""
         return self.equipment.records.of(len(self.joints(choice, self.cuts.everything)))
 
     def joints(self, choice: Candidate, fold: Fold) -> Columns:
         """Return the joints of a choice, ascending, once chosen from the training rows of `fold`."""
         if choice.keep_joints is None or not choice.joints:
             return tuple(range(self.n_joints)) if choice.joints else ()
-        order = self._joints[choice.chosen_by, choice.way.parameter, fold]
+        order = self._joints[choice.chosen_by, choice.placement.parameter, fold]
         return tuple(sorted(order[: choice.keep_joints]))
 
     def some_joints(self, choice: Candidate) -> tuple[str, ...]:
-        """Return the names of the joints of a choice from all rows, where they are some of several."""
+        """Return the names of the joints of a choice from all rows, if not all are kept."""
         names = self.grasp_set.joint_names
         return () if choice.keep_joints is None else tuple(names[n] for n in self.joints(choice, self.cuts.everything))
 
@@ -226,8 +224,8 @@ class Survey:
         return some if choice.keep_joints is None else some.with_joints(self.joints(choice, fold))
 
     def inputs(self, joints: bool, levels: int | None, fold: Fold, *, few: bool = False) -> Samples:
-        """Return all rows, or a few of them, with the joints or without; their switches are the elements that there
-        are to choose from by the training rows of `fold`.
+        """Return all rows, or a few of them, with the joints or without; their switches are the elements to choose
+        from, by the training rows of `fold`.
         """
         key = joints, levels, self.cuts.everything if levels is None else fold, few
         if key not in self._inputs:
@@ -241,7 +239,7 @@ class Survey:
         return self._inputs[key]
 
     def training(self, choice: Candidate, fold: Fold | None = None) -> Training:
-        """Return how a choice is trained on the training rows of a fold, None: on all rows; once settled."""
+        """Return the training of a choice on the training rows of a fold, or on all rows; call `settle` first."""
         fold = fold or self.cuts.everything
         return (
             self._trainings.get((choice.trainer, choice.inputs, fold))
@@ -249,7 +247,7 @@ class Survey:
         )
 
     def typical(self, choices: Iterable[Candidate]) -> list[Candidate]:
-        """Return, for each trainer and kind of inputs whose settings are open, the choice that settles them."""
+        """Return, for each trainer and kind of inputs with open settings, the choice that selects them."""
         alike: dict[tuple[str, Inputs], list[Candidate]] = {}
         for choice in choices:
             if len(self.search.alone(choice.trainer).candidates) > 1:
@@ -258,8 +256,8 @@ class Survey:
         return [min(mine, key=lambda one: abs(kept[one] - _TYPICAL)) for mine in alike.values()]
 
     def settle(self, stage: str, typical: Sequence[Candidate], folds: Sequence[Fold]) -> None:
-        """Have the settings that are open chosen from the training rows of these folds, as `compile` chooses them: by
-        typical choices, once for all of the same trainer and inputs.
+        """Select open settings on the training rows of these folds, as `compile` does: by typical choices, once for all
+        of the same trainer and inputs.
         """
         places = [(choice, fold) for choice in typical for fold in folds]
         calls = [
@@ -278,11 +276,11 @@ class Survey:
             self._trainings[choice.trainer, choice.inputs, fold] = Training.chosen(fitting)
 
     def choose(self, stage: str, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
-        """Have the switches and levels of all choices chosen from the training rows of these folds."""
+        """Choose the switches and levels of all choices from the training rows of these folds."""
         asked: dict[Choosing, dict[float, None]] = {}
         for choice in choices:
-            if choice.way != NO_SWITCHES:
-                asked.setdefault(choice.chosen_by, {})[choice.way.parameter] = None
+            if choice.placement != NO_SWITCHES:
+                asked.setdefault(choice.chosen_by, {})[choice.placement.parameter] = None
         places = [(key, fold) for key in asked for fold in folds]
         calls = [
             choose_path.call(
@@ -304,8 +302,8 @@ class Survey:
                 self._seconds[key] = path.seconds
 
     def choose_joints(self, stage: str, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
-        """Have the joints ranked beside the switches of those choices that keep only some, by rows of these folds."""
-        alike = {(one.chosen_by, one.way.parameter): one for one in choices if one.keep_joints is not None}
+        """Rank the joints, given the switches, for choices that keep only some, by the training rows of these folds."""
+        alike = {(one.chosen_by, one.placement.parameter): one for one in choices if one.keep_joints is not None}
         places = [(key, fold) for key in alike for fold in folds]
         calls = [
             rank_joints.call(_RANK_S, self.inputs(True, key[0][2], fold), fold.train, self.columns(alike[key], fold))
@@ -315,11 +313,13 @@ class Survey:
             self._joints[(*key, fold)] = order
 
     def columns(self, choice: Candidate, fold: Fold) -> Columns:
-        """Return the switches of a choice, once chosen, from the training rows of `fold`."""
-        return () if choice.way == NO_SWITCHES else self._columns[choice.chosen_by, choice.way.parameter, fold]
+        """Return the switches of a choice from the training rows of `fold`; call `choose` first."""
+        return (
+            () if choice.placement == NO_SWITCHES else self._columns[choice.chosen_by, choice.placement.parameter, fold]
+        )
 
     def choosing_s(self, choice: Candidate) -> float:
-        """Return how long it took to choose the switches of a choice from all rows."""
+        """Return the time of choosing the switches of a choice from all rows."""
         return self._seconds.get(choice.chosen_by, 0.0)
 
     def fit(
@@ -329,7 +329,7 @@ class Survey:
         folds: Sequence[Fold],
         depth: Callable[[Candidate], Depth],
     ) -> dict[tuple[Candidate, Fold], Tally]:
-        """Return what came of every choice in every fold, followed as far as `depth` says."""
+        """Return the tallies of every choice in every fold, trained to its `depth`."""
         places = [(choice, fold) for choice in choices for fold in folds]
         calls = [
             fit_stages.call(
@@ -357,7 +357,7 @@ def settle_s(search: Search, rows: int) -> float:
 
 
 def fit_s(search: Search, depth: Depth, rows: int) -> float:
-    """Return the expected seconds of a training of so many rows with tests, with all tables made and tested."""
+    """Return the expected seconds of a training on `rows` rows with tests, with all tables made and tested."""
     (*_, last), tabled = depth
     return (last * (_ROUND_S if search.staged else _WHOLE_S) + len(tabled) * len(SHAPES) * _TABLE_S) * rows / _ROWS
 
@@ -375,7 +375,7 @@ def choose_path(
 
 @stored(1)
 def rank_joints(samples: Samples, rows: Rows, columns: Columns) -> Columns:
-    """Return the joints by how much they are missed beside these switches, in some rows."""
+    """Return the joints in the order of their value in addition to these switches, in some rows."""
     return joint_order(samples.rows(rows).keeping(columns))
 
 
@@ -383,7 +383,7 @@ def rank_joints(samples: Samples, rows: Rows, columns: Columns) -> Columns:
 def choose_settings(
     samples: Samples, rows: Rows, columns: Columns, candidates: tuple[Training, ...], seed: int, by_subject: bool
 ) -> Fitting:
-    """Choose among ways to train by inner folds of some rows, on the switches `columns` and the joints."""
+    """Select settings by inner folds of some rows, on the switches `columns` and the joints."""
     learning = samples.rows(rows).keeping(columns)
     return choose_training(learning, candidates, seed=seed, groups=learning.subjects if by_subject else None)
 
@@ -400,7 +400,7 @@ def fit_stages(
 ) -> Tally:
     """Train once on a fold's training rows, on the switches `columns` and the joints; test at every stage.
 
-    Rows of a placement without a switch that varies get the most frequent type.
+    Rows get the most frequent type if a placement has no switch that varies.
     """
     kept = samples.keeping(columns)
     train, test = kept.rows(fold.train), kept.rows(fold.test)
@@ -410,23 +410,23 @@ def fit_stages(
         return Tally((trials,) * len(stages), *(((each,) * len(shapes),) * len(tabled) for each in (trials, frames)))
     rounds = (*stages, *tabled)
     models = dict(zip(rounds, training.stages(train, rounds), strict=True))
-    answers = (winners(model_scores(models[stage], test.switches, test.codes)) for stage in stages)
-    by_stage = tuple(_packed(answer, test)[0] for answer in answers)
+    predictions = (winners(model_scores(models[stage], test.switches, test.codes)) for stage in stages)
+    by_stage = tuple(_packed(predicted, test)[0] for predicted in predictions)
     scores = [collapse(models[stage], kept.n_switches) for stage in tabled]
-    told = [[_packed(_answered(each, shape, train, test), test) for shape in shapes] for each in scores]
-    return Tally(by_stage, *(tuple(tuple(each[which] for each in row) for row in told) for which in (0, 1)))
+    found = [[_packed(_predicted(each, shape, train, test), test) for shape in shapes] for each in scores]
+    return Tally(by_stage, *(tuple(tuple(each[which] for each in row) for row in found) for which in (0, 1)))
 
 
-def _answered(scores: ScoreTables, shape: Shape, train: Samples, test: Samples) -> Rows:
-    # The rows trained on have a say in what stands in for lost inputs, which nothing here looks at; in scores only
-    # where entries are narrow.
+def _predicted(scores: ScoreTables, shape: Shape, train: Samples, test: Samples) -> Rows:
+    # Training rows determine the substitutes for lost inputs, which are not used here; they affect scores only if
+    # entries are narrow.
     seen = train if shape.table_bits < 16 else train.rows(np.arange(1))
     tables = quantise(scores, seen.switches, seen.codes, shape.width, shape.table_bits)
     return np.asarray(integer_scores(tables, test.switches, test.codes).argmax(axis=1))
 
 
-def _packed(answers: Rows, test: Samples) -> tuple[bytes, bytes]:
-    """Return which trials, in the order of their numbers, and which rows were recognised; see Tally."""
+def _packed(predictions: Rows, test: Samples) -> tuple[bytes, bytes]:
+    """Return which trials, in the order of their numbers, and which rows were predicted rightly; see Tally."""
     _, first, trials = np.unique(test.trials, return_index=True, return_inverse=True)
-    right = np.packbits(decided(answers[None], trials)[0] == test.labels[first]).tobytes()
-    return right, np.packbits(answers == test.labels).tobytes() if len(first) < len(trials) else b""
+    right = np.packbits(decided(predictions[None], trials)[0] == test.labels[first]).tobytes()
+    return right, np.packbits(predictions == test.labels).tobytes() if len(first) < len(trials) else b""

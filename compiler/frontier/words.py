@@ -1,4 +1,4 @@
-"""A frontier in words: how its points are named, the sentence that sums it up, and `frontier.csv`."""
+"""A frontier in words: names of its points, the sentence that sums it up, and `frontier.csv`."""
 
 import csv
 import io
@@ -19,10 +19,10 @@ COLUMNS = (
         "frames",
         "frames_low",
         "frames_high",
-        "beside_of",
-        "beside",
-        "beside_low",
-        "beside_high",
+        "other_rate_of",
+        "other_rate",
+        "other_rate_low",
+        "other_rate_high",
         "scan_us",
         "scan_how",
         "transfer_us",
@@ -32,15 +32,15 @@ COLUMNS = (
     *("flash", "ram", "ports", "chips", "compile_s", "switches", "asked", "joints"),
 )
 
-# They follow only where a point's trainer, or a setting of it, is not the default.
+# Only written if a point's trainer, or one of its settings, is not the default.
 TRAINER_COLUMNS = ("trainer", "settings")
 
 _LONGEST = 40  # letters of a name on a picture
-_SPARED = 0.005  # what a rate may lack and still count as level: half a point
+_SPARED = 0.005  # rates within half a point count as equal
 
 
 def inputs_of(point: Point) -> str:
-    """Return what a point reads: "33 switches", "joints alone", "8 switches + joints"."""
+    """Return a point's inputs in words: "33 switches", "joints alone", "8 switches + joints"."""
     if point.setting.inputs == "joints":
         return f"{counted(len(point.joints), 'joint')} alone" if point.joints else "joints alone"
     joints = [counted(len(point.joints), "joint") if point.joints else "joints"]
@@ -59,20 +59,20 @@ def _kinds(point: Point) -> tuple[int, int, int]:
 
 
 def elements_of(frontier: Frontier) -> str:
-    """Return how what is kept is called: switches, levels, or both elements."""
+    """Return the name of the kept elements: switches, levels, or, for both, elements."""
     if not frontier.n_taxels:
         return "switches"
     return "elements" if frontier.n_switches else "levels"
 
 
 def counted_elements(frontier: Frontier, count: int) -> str:
-    """Return so many of them: "33 switches", "1 level"."""
+    """Return a number of elements in words: "33 switches", "1 level"."""
     several = elements_of(frontier)
     return counted(count, several.removesuffix("es" if several == "switches" else "s"), several)
 
 
 def shorten(name: str) -> str:
-    """Return a name that has room on a picture: one line of at most 40 letters, all of which XML knows."""
+    """Return a name that fits on a picture: one line of at most 40 letters, all valid in XML."""
     line = printable(" ".join(name.split()))
     return line if len(line) <= _LONGEST else f"{line[: _LONGEST - 3]}..."
 
@@ -80,23 +80,23 @@ def shorten(name: str) -> str:
 def way_of(setting: Recipe) -> str:
     """Return how switches were chosen: "id3 62", "id3 62, 3 levels"."""
     levels = "" if setting.levels is None else f", {counted(setting.levels, 'level')}"
-    return f"{setting.way.method} {setting.way.parameter:g}{levels}"
+    return f"{setting.placement.method} {setting.placement.parameter:g}{levels}"
 
 
 def training_of(setting: Recipe) -> str:
-    """Return how the model was made, the paper's trainer unnamed: "100 rounds", "naive-bayes, joint-bins 5"."""
+    """Return the training in words, without the paper's trainer: "100 rounds", "naive-bayes, joint-bins 5"."""
     name = () if setting.trainer == PAPERS_TRAINER else (setting.trainer,)
     rounds = () if setting.rounds is None else (counted(setting.rounds, "round"),)
     return ", ".join((*name, *rounds, *_settings(setting)))
 
 
 def trainer_of(setting: Recipe) -> str:
-    """Return trainer and settings, the paper's named as well: "logitboost, 100 rounds"."""
+    """Return trainer and settings, including the paper's trainer: "logitboost, 100 rounds"."""
     return f"{setting.trainer}, {training_of(setting)}" if setting.trainer == PAPERS_TRAINER else training_of(setting)
 
 
 def is_usual(setting: Recipe) -> bool:
-    """Return whether rounds and bins say all of how the model was made."""
+    """Return whether rounds and bins fully describe the training."""
     return setting.trainer == PAPERS_TRAINER and not setting.settings
 
 
@@ -105,7 +105,7 @@ def _settings(setting: Recipe) -> list[str]:
 
 
 def wiring_of(setting: Recipe) -> str:
-    """Return wiring and clock: "mcp23017 400 kHz", "board 1 Mbaud"; nothing where no switch is read."""
+    """Return wiring and clock: "mcp23017 400 kHz", "board 1 Mbaud"; "" if no switch is read."""
     if not setting.clock_hz:
         return ""
     unit = "baud" if setting.wiring == "board" else "Hz"
@@ -116,7 +116,7 @@ def wiring_of(setting: Recipe) -> str:
 
 
 def featured(frontier: Frontier) -> Point | None:
-    """Return the point to speak of, or None: the picked one; else the fastest within half a point of recognition of the
+    """Return the featured point, or None: the picked one; else the fastest whose accuracy is within half a point of the
     mark of most switches, the first of equals; else the best.
     """
     if frontier.picked is not None:
@@ -129,7 +129,7 @@ def featured(frontier: Frontier) -> Point | None:
 
 
 def summary(frontier: Frontier) -> str:
-    """Return switches, time and accuracy of the featured point, against the marks, in a sentence."""
+    """Return switches, time and accuracy of the featured point, compared with the marks, in a sentence."""
     point = featured(frontier)
     if point is None:
         return f"Of {frontier.combinations:,} combinations none is a point of the frontier."
@@ -149,7 +149,7 @@ LUCK = (
 
 
 def folds_of(frontier: Frontier) -> str:
-    """Return how the rates came about by which points are chosen: "new subject: each of 3 subjects left out"."""
+    """Return the protocol of the rates by which points are chosen: "new subject: each of 3 subjects left out"."""
     if frontier.by == "new subject":
         return f"New subject, trials: the {counted(frontier.subjects, 'subject')} left out in turn"
     repeats = counted(frontier.repeats, "repeat")
@@ -157,7 +157,7 @@ def folds_of(frontier: Frontier) -> str:
 
 
 def luck_of(point: Point) -> str:
-    """Return by how much the rate of a point was corrected, and why, in a sentence without a full stop; perhaps ""."""
+    """Return the correction of a point's rate, with the reason, in a sentence without a full stop; or ""."""
     if round(100 * point.luck, 1) == 0:
         return ""
     return (
@@ -167,14 +167,14 @@ def luck_of(point: Point) -> str:
 
 
 def rates_of(frontier: Frontier) -> dict[str, Callable[[Point], Rate | None]]:
-    """Return the rates of a point by what they are of, the one by which points are chosen first; of trials, if not of
-    frames.
+    """Return the kinds of rates of a point with their getters, first the one by which points are chosen; of trials
+    unless the kind says frames.
     """
     found: dict[str, Callable[[Point], Rate | None]] = {frontier.by: lambda point: point.rate}
     if any(point.frames is not None for point in frontier.points):
         found[f"{frontier.by}, frames"] = lambda point: point.frames
-    if frontier.beside is not None:
-        found[frontier.beside] = lambda point: point.beside
+    if frontier.other is not None:
+        found[frontier.other] = lambda point: point.other_rate
     return found
 
 
@@ -197,9 +197,9 @@ def _mark(mark: Mark, frontier: Frontier) -> str:
 def csv_bytes(frontier: Frontier) -> bytes:
     """Return `frontier.csv`: UTF-8, a line of COLUMNS, perhaps with TRAINER_COLUMNS, and a line for each point.
 
-    Rates are in 0..1, times in microseconds (compile_s: seconds); `frames` and `beside` are empty where there are none.
-    `fronts`, `switches` and `settings` are lists in their cell, parted by semicolons; what holds a semicolon or a quote
-    is quoted as CSV quotes.
+    Rates are in 0..1, times in microseconds (compile_s: seconds); `frames` and `other_rate` may be empty.
+    `fronts`, `switches` and `settings` are lists within a cell, separated by semicolons; names with a semicolon or a
+    quote are quoted as in CSV.
     """
     file = io.StringIO(newline="")
     rows = csv.writer(file, lineterminator="\n")
@@ -215,9 +215,9 @@ def csv_bytes(frontier: Frontier) -> bytes:
 def _values(point: Point) -> Iterator[object]:
     setting, latency = point.setting, point.latency
     yield from (point.number, _list(point.fronts), len(point.switches), setting.inputs)
-    yield from (setting.way.method, setting.way.parameter, setting.rounds, setting.width, setting.layout)
+    yield from (setting.placement.method, setting.placement.parameter, setting.rounds, setting.width, setting.layout)
     yield from (setting.wiring, setting.clock_hz, setting.scan, setting.decision)
-    yield from (*_rate(point.rate), point.luck, *_rate(point.frames), *_rate(point.beside))
+    yield from (*_rate(point.rate), point.luck, *_rate(point.frames), *_rate(point.other_rate))
     for time in (point.scan, point.transfer, point.classify, point.frame):
         yield from _time(time)
     yield from (latency.mean_us, latency.p99_us, latency.missed, latency.wrong)

@@ -1,1 +1,1 @@
-"""The reduced glove, ready to build: where its switches lie, how they are wired, what to buy, what to expect."""
+"""The reduced glove, ready to build: switch positions, wiring, materials, and expected performance."""

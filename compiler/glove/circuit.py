@@ -1,7 +1,7 @@
-"""The circuit of a glove, components and nets, and what to buy for it.
+"""The circuit of a glove (components and nets), and its bill of materials.
 
-Switches, the connectors of their bundles, scanner boards and diodes; and the expanders with what they need: supply,
-address, reset, the pull-ups of each bus, muxes, and the host's plugs.
+It has switches, the connectors of their bundles, scanner boards and diodes; and expanders with their supply, address,
+reset, bus pull-ups, muxes, and the host's plugs.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,17 +25,17 @@ _TYPES = {
     **{"ALERT": "open_collector", "DOUT": "tri_state", cd74hc4067.COMMON: "passive"},
 }
 _SPI = {"CLK": "SCLK", "DIN": "MOSI", "DOUT": "MISO"}
-_ESTIMATE = "an estimate: straight ways and a quarter more, and 40 mm for the ends"
+_ESTIMATE = "an estimate: the straight distance and a quarter more, plus 40 mm for the ends"
 _STRANDED = "stranded wire, AWG 30 or thinner, flexible"
 
 
 _DECOUPLING = capacitor("100n", "one close to each supply pin")
-_BULK = capacitor("10u", "where the host's plug comes in")
+_BULK = capacitor("10u", "at the host's plug")
 _RESET_PULL = resistor("10k", "holds RESET high")
 
 
 def _add_expanders(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End], harness: Harness) -> None:
-    """Put in the expanders `units` and the muxes that they are behind, each bus with its plug and pull-ups."""
+    """Add the expanders `units` and the muxes in front of them, and a plug and pull-ups for each bus."""
     for unit in units:
         _add_expander(circuit, unit, [end for end in ends if end.unit == unit])
     for bus in dict.fromkeys(unit.bus for unit in units):
@@ -61,7 +61,7 @@ def _add_expander(circuit: Circuit, unit: Unit, ends: Sequence[End]) -> None:
 
 
 def _ground_unused(circuit: Circuit, unit: Unit, package: Package, pins: Sequence[str], ends: Sequence[End]) -> None:
-    """Ground the inputs that nothing hangs on: one that floats draws current, or disturbs its neighbours."""
+    """Ground unconnected inputs: a floating one draws current, or disturbs its neighbours."""
     used = {end.pin for end in ends}
     for pin in pins:
         if pin not in used:
@@ -69,7 +69,7 @@ def _ground_unused(circuit: Circuit, unit: Unit, package: Package, pins: Sequenc
 
 
 def _add_spi(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End]) -> None:
-    """Put in the converters on SPI, and a plug for each bus with a select line for each of them."""
+    """Add the converters on SPI, and a plug for each bus with a select line for each of them."""
     lines: dict[str, list[str]] = {}
     for unit in units:
         if not isinstance(unit.wiring, SpiWiring):
@@ -92,7 +92,7 @@ def _add_spi(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End]) -> No
 
 
 def _add_multiplexers(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End]) -> None:
-    """Put in the multiplexers of boards: a board selects one channel of all its own, and reads their commons."""
+    """Add the multiplexers of boards: a board selects the same channel on all of them, and reads their commons."""
     package = cd74hc4067.PACKAGE
     inputs = tuple(f"I{channel}" for channel in range(cd74hc4067.CHANNELS))
     for unit in units:
@@ -106,7 +106,7 @@ def _add_multiplexers(circuit: Circuit, units: Sequence[Unit], ends: Sequence[En
 
 
 def _add_power(circuit: Circuit, ref: str, package: Package, above: int, bus: tuple[str, str]) -> None:
-    """Connect supply, ground, reset and address of a chip on a bus, so far above its lowest one."""
+    """Connect supply, ground, reset and address of a chip on a bus, `above` its lowest address."""
     nets = {"low": GROUND, "high": SUPPLY, "SDA": bus[0], "SCL": bus[1]}
     for number, name in enumerate(package.pins, start=1):
         if name in GROUND_PINS:
@@ -145,14 +145,14 @@ def _add_plug(circuit: Circuit, bus: int, clock_hz: int) -> None:
 
 
 def _wires(bus: int, mux: MuxChannel | None) -> tuple[str, str]:
-    """Return the nets of a bus, or of a channel behind it."""
+    """Return the nets of a bus, or of a mux channel of it."""
     where = f"{bus}" if mux is None else f"{bus}_{mux.address:02X}_{mux.channel}"
     return f"SDA{where}", f"SCL{where}"
 
 
 def _pull_up(clock_hz: int) -> Kind:
-    """Return a pull-up of the bus that rises 150 pF and more in the time that its speed allows (UM10204)."""
-    note = "leave it out where the host has its own"
+    """Return a bus pull-up with which 150 pF and more rise in the time that the speed allows (UM10204)."""
+    note = "leave it out if the host has its own"
     if clock_hz <= 100_000:
         return resistor("4k7", note)
     if clock_hz <= 400_000:
@@ -188,18 +188,18 @@ _BUTTON = Kind(
     two_pins(("1", "2")),
     part=PUSH_BUTTON,
     maker="Panasonic",
-    note="light touch switch, 4.9 x 4.9 x 1.5 mm; that its operating force is 1.0 N is not confirmed by a data sheet",
+    note="light touch switch, 4.9 x 4.9 x 1.5 mm; its operating force of 1.0 N is not confirmed by a data sheet",
 )
 _OWN_SWITCH = Kind(
-    "switch or pad of your own",
+    "your own switch or pad",
     "Switch",
     "SW_SPST",
     "",
     two_pins(("1", "2")),
-    note="a contact between its two wires; a pad that is recorded as a voltage needs a comparator at its threshold",
+    note="a contact between its two wires; a pad recorded as a voltage needs a comparator at its threshold",
 )
 _PAD = Kind(
-    "force sensing pad of your own",
+    "your own force sensing pad",
     "Device",
     "R_Variable",
     "",
@@ -212,12 +212,12 @@ _DIODE = Kind(
     "D_Schottky",
     "Diode_SMD:D_SOD-323_HandSoldering",
     (("1", "K", "passive"), ("2", "A", "passive")),
-    note="such as a BAT54 of this package; at 5 V a 1N4148 will do",
+    note="such as a BAT54 of this package; at 5 V a 1N4148 is sufficient",
 )
-# What wins against a chip's own pull-ups of 40 uA and more, and what pulls an input that has nothing of its own.
-_PULL_DOWN = resistor("4k7", "pulls an input down, against the chip's own pull-up")
-_DIVIDER = resistor("10k", "lower half of a pad's divider: as much as the pad has at the force that matters most")
-_PULL_UP = resistor("10k", "pulls up an input of a chip that has no pull-ups")
+# Pull-downs win against a chip's own pull-ups of 40 uA and more; pull-ups are for inputs that have none.
+_PULL_DOWN = resistor("4k7", "pulls an input down against the chip's own pull-up")
+_DIVIDER = resistor("10k", "lower half of a pad's divider: equal to the pad's resistance at the most important force")
+_PULL_UP = resistor("10k", "pulls up an input of a chip without pull-ups")
 
 
 def glove_circuit(
@@ -225,7 +225,7 @@ def glove_circuit(
 ) -> Circuit:
     """Return the circuit in which switch n of the build is SWn and reaches its `end` through its bundle's connector.
 
-    part_number is of the switches; "" where it is not known.
+    part_number is that of the switches; "" if unknown.
     """
     circuit = Circuit()
     kind = _BUTTON if part_number == PUSH_BUTTON else replace(_OWN_SWITCH, part=part_number)
@@ -258,7 +258,7 @@ def _add_connectors(circuit: Circuit, wires: Sequence[Wire]) -> None:
 
 
 def _add_board(circuit: Circuit, ref: str, ends: Sequence[End], multiplexers: Sequence[Unit]) -> None:
-    """Put in a scanner board: a pin for every pin of its own that a kept switch or a multiplexer needs, and ground."""
+    """Add a scanner board, with ground and every pin that a kept switch or a multiplexer needs."""
     signals = {end.pad: end.pin for end in ends}
     lines = [f"{ref}_{pin}" for pin in cd74hc4067.SELECTS] if multiplexers else []
     lines += [f"{ref}_{cd74hc4067.COMMON}{unit.bus}" for unit in multiplexers]
@@ -298,15 +298,15 @@ def _add_pull(circuit: Circuit, end: End, net: str) -> None:
 
 
 def _units(ends: Sequence[End]) -> list[Unit]:
-    """Return what reads switches: the boards, then the expanders, by their numbers."""
+    """Return the readers of switches: the boards, then the expanders, by number."""
     return sorted({end.unit.ref: end.unit for end in ends}.values(), key=lambda unit: (unit.ref[0], int(unit.ref[1:])))
 
 
 class BillLine(Struct, frozen=True):
-    """A line of the bill: `part` is an orderable part number of `maker`, empty unless it is known.
+    """A line of the bill: `part` is an orderable part number of `maker`, empty if unknown.
 
-    sure is False where part or footprint is not confirmed twice: compare with the data sheet before ordering.
-    quantity counts pieces, or metres where `unit` is "m".
+    sure is False if part or footprint is not confirmed twice: compare with the data sheet before ordering.
+    quantity counts pieces, or metres if `unit` is "m".
     """
 
     quantity: float
@@ -321,7 +321,7 @@ class BillLine(Struct, frozen=True):
 
 
 def bill_of(circuit: Circuit, wires: Sequence[Wire]) -> tuple[BillLine, ...]:
-    """Return the bill of a glove's circuit and of the wires in it."""
+    """Return the bill of materials for a glove's circuit and its wires."""
     groups: dict[Kind, list[str]] = {}
     for component in circuit.components:
         groups.setdefault(component.kind, []).append(component.ref)

@@ -1,4 +1,4 @@
-"""The files of a spec: what a person needs to cut, sew, solder and run the reduced glove; and their folder."""
+"""The files of a spec, for cutting, sewing, soldering and running the reduced glove, and their folder."""
 
 import io
 import uuid
@@ -37,7 +37,7 @@ _SVG_COLOURS = {
     "scale": "#000",
 }
 _STROKE_MM = 0.2
-# The height of capitals in Helvetica and its kin, as a share of the size of the type.
+# The height of capitals in Helvetica and similar fonts, as a share of the font size.
 _CAPITALS = 0.72
 # AutoCAD's colour numbers: black or white, blue, grey, red.
 _DXF_COLOURS = {"outline": 7, "strips": 5, "creases": 8, "holes": 1, "names": 8, "scale": 7}
@@ -96,7 +96,7 @@ def _add_text(group: ET.Element, text: Text, height_mm: float) -> None:
 
 
 def dxf_of(pattern: Pattern) -> bytes:
-    """Return the DXF of AutoCAD 2000 in millimetres, which cutters and CAD programs read."""
+    """Return the DXF (AutoCAD 2000, millimetres), which cutters and CAD programs read."""
     from ezdxf.filemanagement import new
     from ezdxf.units import MM
 
@@ -128,7 +128,7 @@ def _add_to_dxf(space: "Modelspace", shape: Shape) -> None:
 
 @contextmanager
 def _undated() -> Iterator[None]:
-    """Keep dates and random identifiers out of what ezdxf writes."""
+    """Keep dates and random identifiers out of the output of ezdxf."""
     from ezdxf._options import options
 
     before = options.write_fixed_meta_data_for_testing
@@ -140,12 +140,12 @@ def _undated() -> Iterator[None]:
 
 
 _VERSION = "E"
-# Any constant will do: identifiers must only be the same whenever the same component is written.
+# An arbitrary constant: identifiers must only be the same whenever the same component is written.
 _NAMESPACE = uuid.UUID("5e1f3c0a-7f7a-5d0b-9a53-4d6f0b7c2e61")
 
 
 def netlist_of(circuit: Circuit, title: str) -> bytes:
-    """Return the netlist. What is off the board is in it, and KiCad is told to leave it out of the layout.
+    """Return the netlist. It includes components off the board, marked so that KiCad leaves them out of the layout.
 
     It holds no date and no path: the same circuit gives the same bytes.
     """
@@ -185,7 +185,7 @@ def _component(component: Component) -> Iterator[str]:
 
 
 def _symbols(circuit: Circuit) -> list[Kind]:
-    """Return one sort of component for each symbol."""
+    """Return one kind of component for each symbol."""
     return list({(c.kind.library, c.kind.symbol): c.kind for c in circuit.components}.values())
 
 
@@ -214,7 +214,7 @@ def _quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-# All that a spec may hold.
+# All files that a spec may contain.
 NAMES = frozenset(
     {
         *("README.txt", "bom.csv", "glove.net", "glove.toml", "spec.json", "switches.csv", "wiring.csv"),
@@ -239,7 +239,7 @@ def spec_files(
 
 
 def files_of(spec: GloveSpec) -> Mapping[str, bytes]:
-    """Return name -> content of a spec's files: no pattern to cut where nobody knows where the switches lie."""
+    """Return name -> content of a spec's files; without a cutting pattern if the switch positions are unknown."""
     summary = spec.summary
     files = {
         "README.txt": readme_of(summary).encode(),
@@ -256,18 +256,18 @@ def files_of(spec: GloveSpec) -> Mapping[str, bytes]:
 
 
 def check_output(folder: Path) -> None:
-    """Raise SpecError unless a spec may be put there: a new or empty folder, or one that holds a spec."""
+    """Raise SpecError unless a spec may be written there: a new or empty folder, or one that holds a spec."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     check_folder(folder, users_files, SpecError)
 
 
 def write_spec(files: Mapping[str, bytes], folder: Path) -> None:
-    """Write the files of a spec as `folder`, in place of an older spec. Raises SpecError as `check_output` does."""
+    """Write the files of a spec as `folder`, replacing an older spec. Raises SpecError as `check_output` does."""
     publish_folder(files, folder, users_files, SpecError)
 
 
 def users_files(folder: Path) -> list[str]:
-    """Return the user's entries of the folder of a spec. Raises SpecError if it holds no spec."""
+    """Return the user's entries in the folder of a spec. Raises SpecError if it holds no spec."""
     if any(folder.iterdir()) and not (folder / _MARK).is_file():
-        raise SpecError(f"{folder} is there already and is no spec: name another folder")
+        raise SpecError(f"{folder} exists already and is not a spec: name another folder")
     return [path for path in entries(folder) if path not in NAMES]

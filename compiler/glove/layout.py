@@ -1,4 +1,4 @@
-"""Where the kept switches lie on the hand, at which pin or key their wires end, and the bundles that lead there."""
+"""The positions of the kept switches on the hand, the pin or key of each wire, and the bundles in between."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,14 +15,14 @@ from thenar.runtime.scanning.ports import levels_of
 
 from ..hand import HandShape
 
-# The switch of Murakami et al.'s glove, and its disc that the hand's skin meets.
+# The switch of Murakami et al.'s glove, and its disc that touches the skin.
 PUSH_BUTTON, CONTACT_MM = "EVQPLDA15", 3.2
 _SIDES = {-1: "left side", 0: "palm side", 1: "right side"}
 GROUND, SUPPLY = "GND", "VCC"
-# The resistor colour code from 1 to 9; black is the return's.
+# The resistor colour code from 1 to 9; black is the return.
 COLOURS = ("brown", "red", "orange", "yellow", "green", "blue", "violet", "grey", "white")
 _RETURN = "black"
-# Estimates: a wire's way is so much longer than straight, and so much of it is needed at its ends and at each switch.
+# Estimates: the factor on the straight distance, and the extra length at the ends and at each switch.
 _DETOUR, _ENDS_MM, _SPLICE_MM, _STEP_MM = 1.25, 40.0, 10.0, 5
 _LONGEST_HEADER = 40
 Place = tuple[float, float]
@@ -31,9 +31,9 @@ Place = tuple[float, float]
 class PlacedSwitch(Struct, frozen=True):
     """A switch of the reduced glove, or a taxel with all its levels: number n is SWn everywhere.
 
-    part is the digit, or "palm"; side, where on it, left and right as drawn: the palm up, the thumb right. x_mm counts
-    to the thumb's side and y_mm to the fingertips on the flat pattern, from the middle of the wrist's crease. All None
-    where nobody knows where the glove's switches lie.
+    part is the digit, or "palm"; side is its side, left and right as drawn: palm up, thumb right. x_mm counts towards
+    the thumb and y_mm towards the fingertips on the flat pattern, from the middle of the wrist's crease. All are None
+    if the positions of the glove's switches are unknown.
     """
 
     number: int
@@ -45,7 +45,7 @@ class PlacedSwitch(Struct, frozen=True):
 
 
 def place_switches(names: Sequence[str], hand: HandShape | None) -> tuple[PlacedSwitch, ...]:
-    """Return the switches called `names`, all of which `hand`, if given, knows; millimetres with one decimal."""
+    """Return the switches called `names`, all known to `hand` if given; millimetres with one decimal."""
     if hand is None:
         return tuple(PlacedSwitch(number, name) for number, name in enumerate(names, start=1))
     return tuple(
@@ -62,12 +62,12 @@ def place_switches(names: Sequence[str], hand: HandShape | None) -> tuple[Placed
 
 
 def hole_mm(hand: HandShape) -> float:
-    """Return how broad the hole for a switch is: the push button's disc, or all of a switch whose breadth is known."""
+    """Return the diameter of a switch's hole: the push button's disc, or the whole switch if its width is known."""
     return CONTACT_MM if hand.part_number == PUSH_BUTTON or not hand.body_mm else hand.body_mm
 
 
 def crowded(switches: Sequence[PlacedSwitch], body_mm: float) -> list[tuple[int, int, float]]:
-    """Return pairs of switches whose middles are nearer than a switch's body is broad, and how near, mm."""
+    """Return pairs of switches whose centres are closer than the width of a switch, with their distance in mm."""
     places = np.array([(each.x_mm, each.y_mm) for each in switches if each.x_mm is not None]).reshape(-1, 2)
     apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
     first, second = np.nonzero(np.triu(apart < body_mm, k=1))
@@ -76,11 +76,11 @@ def crowded(switches: Sequence[PlacedSwitch], body_mm: float) -> list[tuple[int,
 
 @dataclass(frozen=True, slots=True)
 class BoardPins:
-    """How a scanner board reaches its keys, as its `board.toml` says: key k is read at the pin signals[k].
+    """The connections of a scanner board's keys, from its `board.toml`: key k is read at the pin signals[k].
 
-    lows[k] is the pin that is driven low to read it, the row of a matrix; "" where the switch goes to ground. With
-    `diodes` there is one to every switch, its cathode towards the row. A board that reads its keys from expanders has
-    their `bus` instead. channels are the pins of its converter, each for a taxel, or with `selects` for a multiplexer.
+    lows[k] is the pin that is driven low to read it, the row of a matrix; "" if the switch goes to ground. With
+    `diodes` every switch has one, with its cathode towards the row. A board that reads its keys from expanders has
+    their `bus` instead. channels are the pins of its converter, one per taxel, or with `selects` one per multiplexer.
     """
 
     signals: tuple[str, ...] = ()
@@ -93,9 +93,10 @@ class BoardPins:
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """What reads switches: a chip of a harness, or, without `wiring`, a scanner board, or the multiplexer of a `board`.
+    """A reader of switches: a chip of a harness, or, without `wiring`, a scanner board, or the multiplexer of a
+    `board`.
 
-    ref is its designator in the netlist; place, how messages and tables call it.
+    ref is its designator in the netlist; place, its name in messages and tables.
     """
 
     ref: str
@@ -108,7 +109,7 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """Where a switch, by its number in the build, ends: pin is a name, pad the number that the netlist gives it.
+    """The end of a switch's wire: pin is a name, pad its number in the netlist.
 
     other is the net of its other contact: ground, supply, or a row of the board's matrix. A taxel is the upper half of
     a divider.
@@ -123,8 +124,9 @@ class End:
 
 
 def as_soldered(harness: Harness, boards: Sequence[BoardPins | None]) -> Harness:
-    """Return the harness with the buses of its boards as its own, and without the keys that are read through them; a
-    stream is sent by a board.
+    """Return the harness with the buses of its boards as direct buses, and without the keys that are read through them.
+
+    A stream counts as sent by a board.
     """
     behind = {number: board.bus for number, board in enumerate(boards) if board is not None and board.bus is not None}
     scanners = tuple(
@@ -139,17 +141,18 @@ def as_soldered(harness: Harness, boards: Sequence[BoardPins | None]) -> Harness
 
 
 def elements_of(harness: Harness, names: Sequence[str]) -> tuple[str, ...]:
-    """Return what is to be placed and wired of a build's switches and levels of these names: of a taxel its name, once,
-    at the place of its first level.
+    """Return the elements to place and wire for a build's switches and levels of these names.
+
+    A taxel occurs once, under its own name, at the place of its first level.
     """
     taxels = {number: taxel for taxel, pairs in levels_of(harness, names).items() for _, number in pairs}
     return tuple(dict.fromkeys(taxels.get(number, name) for number, name in enumerate(names)))
 
 
 def ends_of(harness: Harness, names: Sequence[str], boards: Sequence[BoardPins | None] = ()) -> tuple[End, ...]:
-    """Return the ends of the switches called `names`, in their order; each is wired once in the harness.
+    """Return the ends of the switches called `names`, in order; each is wired once in the harness.
 
-    boards[n] says what is known of the pins of scanner n; nothing, where it is None or left out.
+    boards[n] describes the pins of scanner n; None or a missing entry means that they are unknown.
     """
     numbers, chips = {name: number for number, name in enumerate(names)}, count(1)
     found = [*_of_chips(harness, numbers, chips), *_of_boards(harness, numbers, boards, chips)]
@@ -174,7 +177,7 @@ def _of_chips(harness: Harness, numbers: Mapping[str, int], used: Iterator[int])
 def _of_multiplexers(
     scanner: ScannerWiring, board: str, numbers: Mapping[str, int], used: Iterator[int]
 ) -> Iterator[End]:
-    """Yield the ends of a board's taxels at its multiplexers, of which those without a kept taxel are left out."""
+    """Yield the ends of a board's taxels at its multiplexers; multiplexers without a kept taxel are left out."""
     kept = [(channel, numbers[name]) for channel, name in enumerate(scanner.taxels) if name in numbers]
     units: dict[int, Unit] = {}
     for channel, switch in kept:
@@ -212,9 +215,8 @@ def _of_boards(
 class Wire(Struct, frozen=True):
     """A wire from switches to the wrist: through pin `pin` of connector `connector` to `net`.
 
-    switches are the numbers of those on it: one where it carries a signal, all that share it where it is a return.
-    unit and input say which pin or key reads it, and are empty for a return. length_mm is an estimate, None where
-    nobody knows the places.
+    switches are the numbers of those on it: one for a signal, all that share it for a return. unit and input say which
+    pin or key reads it, and are empty for a return. length_mm is an estimate, None if the positions are unknown.
     """
 
     bundle: str
@@ -231,7 +233,7 @@ class Wire(Struct, frozen=True):
 def wires_of(switches: Sequence[PlacedSwitch], ends: Sequence[End], hand: HandShape | None) -> tuple[Wire, ...]:
     """Return all wires, bundle by bundle: the signals in the switches' order, then the returns chip by chip.
 
-    A bundle holds a digit's wires; one unit's, where the places are not known.
+    A bundle holds the wires of one digit; or those of one unit, if the positions are unknown.
     """
     home = None if hand is None else hand.wrist
     bundles: dict[str, list[End]] = {}
@@ -249,14 +251,14 @@ def wires_of(switches: Sequence[PlacedSwitch], ends: Sequence[End], hand: HandSh
 
 
 def marked(colour: str, times: int) -> str:
-    """Return a colour's name for its second, third ... use in a bundle."""
+    """Return a colour's name for its first, second, third ... use in a bundle."""
     return colour if not times else f"{colour}, {times} mark{'s' if times > 1 else ''}"
 
 
 def net_of(end: End, switch: PlacedSwitch) -> str:
-    """Return the net of a switch's contact 1: its own, or its column's in a matrix without diodes.
+    """Return the net of a switch's contact 1: a separate one, or its column's in a matrix without diodes.
 
-    The stroke keeps it apart from GND and VCC, whatever a switch is called.
+    The stroke distinguishes it from GND and VCC, whatever a switch is called.
     """
     shared = end.unit.wiring is None and end.other != GROUND and not end.unit.diodes and not end.taxel
     return f"{end.unit.ref}_{end.pin}" if shared else f"/{switch.name}"
@@ -293,7 +295,7 @@ def _returns(bundle: str, ends: Sequence[End], switches: Sequence[PlacedSwitch],
 
 
 def _length(group: Sequence[PlacedSwitch], home: Place | None) -> int | None:
-    """Return the estimated length of a wire from the wrist through all of `group`, the nearest first; mm."""
+    """Return the estimated length in mm of a wire from the wrist through all of `group`, the nearest first."""
     if home is None:
         return None
     stops = [(switch.x_mm or 0.0, switch.y_mm or 0.0) for switch in group]

@@ -1,4 +1,4 @@
-"""What a spec tells people: the lists of switches, wires and materials as CSV, and README.txt."""
+"""The lists of a spec: switches, wires and materials as CSV, and README.txt."""
 
 import csv
 import io
@@ -15,7 +15,7 @@ _WIDTH = 100
 
 
 def switches_csv(summary: SpecSummary) -> bytes:
-    """Return the switches with their places on the hand, and what reads each."""
+    """Return the switches with their positions on the hand and their readers."""
     pins = {
         switch: (reader, pin)
         for reader in summary.readers
@@ -32,7 +32,7 @@ def switches_csv(summary: SpecSummary) -> bytes:
 
 
 def wiring_csv(summary: SpecSummary) -> bytes:
-    """Return every wire from the switches to the connectors at the wrist, and on to what reads it."""
+    """Return every wire from the switches to the connectors at the wrist, and on to its reader."""
     return _csv(
         ("bundle", "connector", "pin", "colour", "length_mm", "switches", "contact", "net", "read_by", "input"),
         (
@@ -68,38 +68,38 @@ def _csv(header: Sequence[str], rows: Iterable[Row]) -> bytes:
 
 
 def readme_of(summary: SpecSummary) -> str:
-    """Return the text."""
+    """Return the text of README.txt."""
     parts = [f"{summary.glove}: a glove of {len(summary.switches)} switches", *_building(summary)]
     parts += ["What to expect", *expectations(summary.expected)]
     doubts = [f"{m.part or m.what}: {m.note}" for m in summary.materials if not m.sure]
-    parts += ["To heed", *_advice(), *summary.remarks, *doubts]
-    headings = {parts[0], "To cut and sew", "To wire", "To solder", "To run", "What to expect", "To heed"}
+    parts += ["Please note", *_advice(), *summary.remarks, *doubts]
+    headings = {parts[0], "To cut and sew", "To wire", "To solder", "To run", "What to expect", "Please note"}
     return "\n".join(_laid_out(part, part in headings) for part in parts)
 
 
 def expectations(expected: Expected) -> Iterator[str]:
-    """Yield sentences on times and recognition."""
+    """Yield sentences on times and accuracy."""
     if expected.transactions:
-        full = "" if expected.full_us == expected.scan_us else f"; for all that is wired, {expected.full_us:.1f} us"
+        full = "" if expected.full_us == expected.scan_us else f"; for all wired switches, {expected.full_us:.1f} us"
         yield (
             f"A whole scan takes {expected.scan_us:.1f} us on the wire, in {expected.transactions} "
-            f"transaction{'s' if expected.transactions > 1 else ''}{full}. What the computer adds to each of them, "
-            "thenar doctor measures."
+            f"transaction{'s' if expected.transactions > 1 else ''}{full}. thenar doctor measures what the "
+            "computer adds to each of them."
         )
     for us in expected.boards_us:
-        yield f"A scanner board's keys, and the taxels kept of it, take {us:.0f} us to convert and to send."
+        yield f"A scanner board's keys and kept taxels take {us:.0f} us to convert and send."
     if expected.glove_us is not None:
         yield (
             f"The CyberGlove sends a record of {expected.sensors} sensors every {expected.glove_us:.0f} us at best, by "
-            "the vendor's formula or as glove.toml has it measured."
+            "the vendor's formula or as measured in glove.toml."
         )
     for rate in sorted(expected.rates, key=lambda rate: rate.protocol == "training"):
-        yield f"Recognised, {rate}."
+        yield f"Accuracy, {rate}."
     for each in expected.detection:
         if each.held.protocol != "training":
             yield f"Nothing held, {each}."
     for sentence in () if expected.faults is None else expected.faults.sentences:
-        yield f"At worst, of the rows trained on: {sentence}."
+        yield f"At worst, on the training rows: {sentence}."
 
 
 def _building(summary: SpecSummary) -> Iterator[str]:
@@ -109,21 +109,22 @@ def _building(summary: SpecSummary) -> Iterator[str]:
     yield "To wire"
     yield (
         "wiring.csv: a bundle of wires for each digit, and in it a wire for contact 1 of every switch and a common "
-        "return for contact 2, from switch to switch. Colours count the wires of a bundle; marks tell a colour's "
-        "second use from its first. Lengths are estimates: a straight way to the wrist and a quarter more."
+        "return for contact 2, from switch to switch. Colours count the wires of a bundle; marks distinguish a "
+        "colour's second use from its first. Lengths are estimates: the straight distance to the wrist and a "
+        "quarter more."
     )
     yield "To solder"
     yield (
         "bom.csv: what to buy. glove.net: the circuit for the board at the wrist; in KiCad's board editor, File, "
         "Import, Netlist. The switches are in it with their connections and are left off the board. A part number "
-        "stands only where it is known."
+        "is given only where it is known."
     )
     for reader in summary.readers:
         yield f"{reader.ref}: {reader.place}, {len(reader.switches)} switches."
     yield "To run"
     yield (
         "glove.toml: the wiring as thenar run, record, emulate and doctor read it. Device files and ports are the "
-        "lines to look at. spec.json: all of this for machines."
+        "lines to check. spec.json: all of this for machines."
     )
 
 
@@ -134,7 +135,7 @@ def _cutting(summary: SpecSummary) -> Iterator[str]:
             f"cutting.svg and cutting.dxf are the glove of your layout, {printed} Layers: outline, holes (one for each "
             "switch), names, scale."
         )
-        yield "switches.csv: every switch with its place, as in your layout, and the pin it is on."
+        yield "switches.csv: every switch with its position, as in your layout, and its pin."
         return
     yield (
         f"cutting.svg and cutting.dxf are the right hand of {summary.hand_length_mm:g} mm length laid flat, the palm "
@@ -143,10 +144,10 @@ def _cutting(summary: SpecSummary) -> Iterator[str]:
     )
     yield (
         "The pattern is a map: lengths along the digits are true; the digits are spread and the palm is broader "
-        "than the hand, so that the strips find room. Fit the cloth to the hand, and place the switches by the "
-        "joints' creases."
+        "than the hand, to leave room for the strips. Fit the cloth to the hand, and place the switches by the "
+        "creases of the joints."
     )
-    yield "switches.csv: every switch with its place, counted from the middle of the wrist, and the pin it is on."
+    yield "switches.csv: every switch with its position, measured from the middle of the wrist, and its pin."
 
 
 def _advice() -> Iterator[str]:

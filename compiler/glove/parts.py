@@ -1,4 +1,4 @@
-"""A circuit as data: components of some kinds, the nets between their pins, and the kinds that every circuit has."""
+"""A circuit as data: components and their kinds, the nets between their pins, and the kinds that every circuit uses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A sort of component: what KiCad calls it, and what to buy.
+    """A kind of component: its name in KiCad, and the part to buy.
 
     pins holds (number, name, KiCad's electrical type) triples. part and maker are empty unless an orderable part number
-    is known; sure says whether everything here is confirmed twice, and note what is not, or what to heed.
+    is known; sure says whether everything here is confirmed twice, and note what is not, or what to watch for.
     """
 
     value: str
@@ -43,7 +43,7 @@ class Terminal:
 
 @dataclass(slots=True)
 class Circuit:
-    """Components in the order in which they were put in, nets by name; built up piece by piece, then only read."""
+    """Components in order of insertion, nets by name; built up piece by piece, then only read."""
 
     components: list[Component] = field(default_factory=list)
     nets: dict[str, list[Terminal]] = field(default_factory=dict)
@@ -63,7 +63,7 @@ class Circuit:
         self.nets.setdefault(net, []).append(Terminal(ref, pin))
 
     def between(self, letter: str, kind: Kind, first: str, second: str) -> str:
-        """Add a component of two pins, the first pin on net `first`; return its designator."""
+        """Add a component with two pins, the first on net `first`; return its designator."""
         ref = self.next(letter, kind)
         for net, (pin, _, _) in zip((first, second), kind.pins, strict=True):
             self.join(net, ref, pin)

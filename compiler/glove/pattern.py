@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..hand import HandShape
 from .layout import PlacedSwitch, hole_mm
 
-# What most printers leave white at an edge.
+# The margin that most printers leave white.
 MARGIN_MM = 5.0
 _A4_MM = (210.0, 297.0)
 _SHEETS = (("A4", *_A4_MM), ("A3", 297.0, 420.0), ("A2", 420.0, 594.0), ("A1", 594.0, 841.0), ("A0", 841.0, 1189.0))
@@ -27,7 +27,7 @@ _TICK_MM = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A sheet; `name` is empty where no common one is large enough."""
+    """A sheet; `name` is empty if no common one is large enough."""
 
     name: str
     width_mm: float
@@ -44,7 +44,7 @@ class Page:
 
 
 def page_for(width_mm: float, height_mm: float) -> Page:
-    """Return the smallest sheet that holds a drawing of this size, and a margin around it, upright or lying."""
+    """Return the smallest sheet, upright or landscape, that holds a drawing of this size with a margin."""
     wide, high = width_mm + 2 * MARGIN_MM, height_mm + 2 * MARGIN_MM
     for name, short, long in _SHEETS:
         for across, up in ((short, long), (long, short)):
@@ -78,7 +78,7 @@ class Circle:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A line of text of capitals `height` mm high: (x, y) is where it begins, its middle if `centred`."""
+    """A line of text with capitals `height` mm high: (x, y) is its start, or its middle if `centred`."""
 
     layer: str
     x: float

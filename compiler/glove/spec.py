@@ -1,4 +1,4 @@
-"""All that a spec says of a reduced glove, decided once: files and tables only write it down."""
+"""The content of a spec for a reduced glove, decided once; files and tables only write it down."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -36,19 +36,19 @@ from .pattern import Pattern, pattern_of
 
 
 class SpecError(ThenarError, ValueError):
-    """There is no glove to describe, or not with this wiring."""
+    """There is no glove to describe, or it does not match the wiring."""
 
 
 class Expected(Struct, frozen=True):
-    """Times by the wire's arithmetic, microseconds: what the computer adds to every transaction is not in them.
+    """Times calculated from bus arithmetic, in microseconds, without the computer's overhead per transaction.
 
-    scan_us      of all kept switches on expanders, in `transactions` transactions, selections of muxes included
-    full_us      of all switches that are wired to expanders, kept or not
-    boards_us    of a full bitmap of each scanner board, and of its kept taxels' conversions and codes
-    glove_us     between records of the CyberGlove, of as many `sensors` as the build has joints; None where it has none
-    rates        the recognition that was measured when the build was compiled
-    faults       what the worst faults leave of the rows trained on; None in specs of older builds
-    detection    how surely it was said whether something is held
+    scan_us      scan of all kept switches on expanders, in `transactions` transactions, mux selections included
+    full_us      scan of all switches that are wired to expanders, kept or not
+    boards_us    a full bitmap of each scanner board, with its kept taxels' conversions and codes
+    glove_us     between records of the CyberGlove with `sensors` sensors, the build's joints; None without joints
+    rates        the accuracy measured when the build was compiled
+    faults       the accuracy on the training rows under the worst faults; None in specs of older builds
+    detection    the detection rates of nothing held
     """
 
     transactions: int
@@ -63,7 +63,7 @@ class Expected(Struct, frozen=True):
 
 
 def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected:
-    """Return what to expect of a build's switches in a harness, read whole by `scan`."""
+    """Return the expected times and rates of a build's switches in a harness, with a complete scan by `scan`."""
     time = scan_us(scan, harness)
     glove = harness.cyberglove if manifest.joints else None
     return Expected(
@@ -84,7 +84,7 @@ def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected
 
 
 class SwitchReader(Struct, frozen=True):
-    """What reads switches, by its designator: an expander or a board, and the numbers of the switches on its pins."""
+    """A reader of switches by its designator: an expander or a board, and the numbers of the switches on its pins."""
 
     ref: str
     place: str
@@ -93,7 +93,7 @@ class SwitchReader(Struct, frozen=True):
 
 
 class SpecSummary(Struct, frozen=True):
-    """A spec as values: what `spec.json` holds. `remarks` are sentences for whoever builds the glove."""
+    """A spec as values: the content of `spec.json`. `remarks` are sentences for whoever builds the glove."""
 
     glove: str
     proposed: bool
@@ -109,7 +109,7 @@ class SpecSummary(Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GloveSpec:
-    """A reduced glove: its summary, and what is drawn, connected and loaded. No pattern: nobody knows the places."""
+    """A reduced glove: its summary, drawing, circuit and firmware. pattern is None if the positions are unknown."""
 
     summary: SpecSummary
     harness: Harness
@@ -125,11 +125,11 @@ def glove_spec(
     hand: HandShape | None = None,
     boards: Sequence[BoardPins | None] = (),
 ) -> GloveSpec:
-    """Return the spec of a build's glove, wired as `harness` says; without one, as one is proposed for it.
+    """Return the spec of a build's glove, wired with `harness`; without one, a wiring is proposed.
 
-    scan is the build's scan map, where it has one; hand, the hand that knows its switches. boards[n], where given, says
-    what its keys are wired to. Raises SpecError if the build keeps no switch, or has a scan map and no
-    harness is given; HarnessError if the harness lacks a kept switch, or is not the scan map's.
+    scan is the build's scan map, if it has one; hand, the hand that has positions for its switches. boards[n], if
+    given, says what its keys are wired to. Raises SpecError if the build keeps no switch, or has a scan map but no
+    harness is given; HarnessError if the harness lacks a kept switch, or does not match the scan map.
     """
     if not manifest.switches:
         raise SpecError("the build keeps no switch, so there is no glove to build: compile it with --inputs both")
@@ -164,7 +164,7 @@ def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) 
     names = [switch.name for switch in manifest.switches]
     if harness is None:
         if scan is not None:
-            raise SpecError("the build was compiled for a wiring of its own: name its glove.toml with --glove")
+            raise SpecError("the build was compiled for a specific wiring: name its glove.toml with --glove")
         return propose_harness(names, cyberglove=propose_cyberglove([joint.name for joint in manifest.joints]))
     names = wired_names(harness, manifest.switches)
     if scan is not None:
@@ -178,7 +178,7 @@ def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) 
 
 
 def _portable(harness: Harness) -> Harness:
-    """Return the harness with the name alone of its calibration: the file belongs beside the spec's glove.toml."""
+    """Return the harness with its calibration as a bare file name: the file belongs next to the spec's glove.toml."""
 
     def named(path: str | None) -> str | None:
         return (path or "").replace("\\", "/").rsplit("/", 1)[-1] or None
@@ -192,7 +192,7 @@ def _portable(harness: Harness) -> Harness:
 
 
 def _of_boards(boards: Sequence[BoardPins | None]) -> Iterator[str]:
-    """Yield where the multiplexers of each board go, as far as it is known."""
+    """Yield where the multiplexers of each board go, if known."""
     for number, pins in enumerate(boards, start=1):
         if pins is not None and pins.selects:
             yield (
@@ -221,13 +221,13 @@ def _remarks(
     """Yield sentences for whoever builds the glove."""
     if hand is None:
         yield (
-            "where this glove's switches lie is not known (--layout names a drawing): there is no pattern to cut, and "
-            "lengths of wire are left out"
+            "the positions of this glove's switches are unknown (--layout names a drawing): there is no cutting "
+            "pattern, and wire lengths are left out"
         )
     else:
         for first, second, apart in crowded(switches, hand.body_mm):
             yield (
-                f"SW{first} and SW{second} are {apart} mm apart and their bodies {hand.body_mm:g} mm broad: move one "
+                f"SW{first} and SW{second} are {apart} mm apart and their bodies {hand.body_mm:g} mm wide: move one "
                 "of them aside"
             )
     numbers = {switch.name: switch.number for switch in switches}
@@ -235,7 +235,7 @@ def _remarks(
     for name, switch in zip(wired_names(harness, manifest.switches), manifest.switches, strict=True):
         if switch.threshold is not None and name in numbers:
             yield (
-                f"SW{numbers[name]} is of the taxel {switch.source}: set its comparator to "
+                f"SW{numbers[name]} is a level of the taxel {switch.source}: set its comparator to "
                 f"{switch.threshold.value:g} {switch.threshold.taxel.unit}; it is {switch.closed}"
             )
         elif switch.threshold is not None:

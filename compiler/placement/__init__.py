@@ -1,1 +1,1 @@
-"""Which switches to keep: ID3 with pruning, as the paper does it, and rivals to hold beside it."""
+"""Which switches to keep: ID3 with pruning, as the paper does it, and baselines to compare it with."""

@@ -1,8 +1,8 @@
-"""What a placement must obey: switches and taxels to keep or to leave out, distances, numbers and the time of a scan.
+"""Constraints on a placement: inputs to keep or leave out, distances, counts and the scan time.
 
-All but what must be kept can only be broken by adding: so whatever order a method puts elements in, those that must be
-kept are taken first, and then each that breaks nothing. A method that does not rank looks again without what it may
-not have.
+Except for the inputs to keep, a constraint is only ever broken by adding an element. So, in whatever order a method
+ranks elements, those that must be kept are taken first, and then each that breaks no constraint. A method that does not
+rank runs again without the elements that it may not take.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,18 +28,18 @@ Places = Mapping[str, tuple[float, float]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """What is asked of a placement, by the names of switches, taxels and joints.
+    """Constraints on a placement, by the names of switches, taxels and joints.
 
-    keep, never  what must be kept, and what must not
-    apart_mm     no two that are kept may be nearer to each other, by their `places` (mm); levels of a taxel may
-    taxels       the most taxels that may be kept, with however many levels
-    budget_us    the most that reading the ports of what is kept may take, and a record of the kept joints meanwhile
-    records_us   what a record of one, of two, ... of the joints takes; empty where that is not known, nor limited then
+    keep, never  inputs that must be kept, and inputs that must not
+    apart_mm     the least distance between two kept inputs, by their `places` (mm); levels of one taxel are exempt
+    taxels       the most taxels to keep, with any number of levels
+    budget_us    the most time for reading the ports of the kept inputs, and for a record of the kept joints meanwhile
+    records_us   time of a record of one, of two, ... of the joints; empty if unknown, and then not limited
     names        of all switches, `n_switches`, and then of the taxels
     joints       names of the joints
-    places       where switches and taxels lie on the hand, where that is known
+    places       known positions of switches and taxels on the hand
 
-    Raises PlacementError for a name that is not there, and where these contradict each other.
+    Raises PlacementError for an unknown name, and for constraints that contradict each other.
     """
 
     names: tuple[str, ...]
@@ -58,14 +58,14 @@ class Limits:
             if name not in (every := (*self.names, *self.joints)):
                 raise PlacementError(f"there is no input {name!r} to keep or to leave out{nearest(name, every)}")
         if self.apart_mm and (lost := [name for name in self.names if name not in self.places]):
-            raise PlacementError(f"--apart-mm: where {list_names(lost)} lie is not known: --layout takes your glove")
+            raise PlacementError(f"--apart-mm: the position of {list_names(lost)} is unknown: give --layout your glove")
         if both := [name for name in self.keep if name in self.never]:
             raise PlacementError(f"--keep-these and --never both name {list_names(both)}: take it out of one of them")
         for at, name in enumerate(self.keep):
             for other in self.keep[:at] if self.apart_mm and name in self.names else ():
                 if other in self.names and self._apart(name, other) < self.apart_mm:
                     raise PlacementError(
-                        f"--keep-these {other},{name} are {self._apart(name, other):.1f} mm apart, --apart-mm asks for "
+                        f"--keep-these {other},{name} are {self._apart(name, other):.1f} mm apart, --apart-mm requires "
                         f"{self.apart_mm:g}: drop one of them, or allow less"
                     )
 
@@ -73,7 +73,7 @@ class Limits:
     def of(
         cls, options: Options, grasp_set: GraspSet, places: Places, glove: GloveWiring | None = None
     ) -> "Limits | None":
-        """Return what the options of a build ask of a set's elements and joints; None where they ask nothing."""
+        """Return the constraints that a build's options put on a set's elements and joints, or None."""
         asked = (options.keep_these, options.never, options.apart_mm, options.at_most_taxels, options.budget_us)
         if not any(each is not None and each != () for each in asked):
             return None
@@ -91,12 +91,12 @@ class Limits:
         )
 
     def on(self, elements: Elements, ports: PortCosts | None) -> "Bound":
-        """Return the limits on these elements, where `ports` says what reading them costs.
+        """Return the constraints on these elements; `ports` holds the costs of reading them.
 
-        Raises PlacementError where they cannot be obeyed.
+        Raises PlacementError if they cannot be met.
         """
         if self.budget_us is not None and ports is None and elements:
-            raise PlacementError("--budget-us needs to know what reading the glove costs: name its --glove")
+            raise PlacementError("--budget-us needs the cost of reading the glove: name its --glove")
         own = [self.names[element.column] for element in elements]
         if lost := [name for name in self.keep if name in self.names and name not in own]:
             raise PlacementError(f"--keep-these names {list_names(lost)}, and --inputs leaves that out")
@@ -116,7 +116,7 @@ class Limits:
     def on_joints(self, most: int | None) -> tuple[Columns, Columns, int]:
         """Return the joints to keep in any case, those not to keep, and how many to keep at most.
 
-        Raises PlacementError for more to keep than `most`, or than there is time for.
+        Raises PlacementError if more joints must be kept than `most`, or than the budget allows.
         """
         keep, never = (
             tuple(joint for joint, name in enumerate(self.joints) if name in asked) for asked in (self.keep, self.never)
@@ -148,11 +148,11 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bound:
-    """Limits on s elements, by their numbers.
+    """Constraints on s elements, by their numbers.
 
-    groups  of each of which one element must be kept: a switch, or the levels of a taxel
-    never   (s,) what must not be kept; near (s, s): of which two not both may be
-    taxel   (s,) the taxel of a level, -1 of a switch; ports: what reading the elements costs
+    groups  element groups, a switch or the levels of a taxel; one element of each must be kept
+    never   (s,) elements that must not be kept; near (s, s): pairs that must not both be kept
+    taxel   (s,) the taxel of a level, -1 for a switch; ports: the cost of reading the elements
     """
 
     limits: Limits
@@ -163,7 +163,7 @@ class Bound:
     ports: PortCosts | None
 
     def addable(self, kept: Sequence[int]) -> Bits:
-        """Return (s,) which elements may be kept besides these."""
+        """Return a mask (s,) of the elements that may be added to these."""
         chosen = list(kept)
         free = ~self.never & ~self.near[:, chosen].any(axis=1)
         free[chosen] = False
@@ -179,21 +179,21 @@ class Bound:
 
     @property
     def _times(self) -> list[int]:
-        """Whole nanoseconds of each port, so that sums are exact."""
+        """Nanoseconds of each port, as integers, so that sums are exact."""
         return [_ns(us) for us in self.ports.us] if self.ports is not None else []
 
     def holds(self, kept: Sequence[int]) -> bool:
-        """Return whether these elements obey: each breaks nothing with those before it, and none is lacking."""
+        """Return whether these elements meet all constraints when added in this order."""
         return self.whole(kept) and all(self.addable(kept[:place])[one] for place, one in enumerate(kept))
 
     def whole(self, kept: Sequence[int]) -> bool:
-        """Return whether all that must be kept is among these elements."""
+        """Return whether all elements that must be kept are among these."""
         return all(not set(group).isdisjoint(kept) for group in self.groups)
 
     def rows(self, among: NDArray[np.intp]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the limits as rows (r, v + extra) and bounds (r,) of an integer program: rows @ (x, y) <= bounds.
+        """Return the constraints as rows (r, v + extra) and bounds (r,) of an integer program: rows @ (x, y) <= bounds.
 
-        x says which of the v elements `among` are kept; y which taxels are, and which ports are read.
+        x says which of the v elements `among` are kept; y which taxels are kept and which ports are read.
         """
         v, (at, place) = len(among), ({int(one): at for at, one in enumerate(among)}, self.taxel[among])
         taxels = np.unique(place[place >= 0]) if self.limits.taxels is not None else np.zeros(0, np.intp)
@@ -221,7 +221,7 @@ class Bound:
         return rows, np.array([most for _, most in found])
 
     def check(self) -> None:
-        """Raise PlacementError where what must be kept breaks a limit."""
+        """Raise PlacementError if the elements that must be kept break a constraint."""
         limits, kept = self.limits, self.required(())
         if limits.taxels is not None and len(set(self.taxel[kept].tolist()) - {-1}) > limits.taxels:
             raise PlacementError(
@@ -244,7 +244,7 @@ class Bound:
         return [min(group, key=lambda one: (rank.get(one, len(rank)), one)) for group in self.groups]
 
     def obeyed(self, order: Columns, most: float) -> Columns:
-        """Return at most so many of `order`, and what must be kept: each that breaks nothing with those before it."""
+        """Return at most `most` of `order`, required elements first, skipping each that would break a constraint."""
         kept = self.required(order)
         if len(kept) > most:
             raise PlacementError(f"--keep-these names {len(kept)}, --keep allows {most:g}: name fewer, or keep more")
@@ -255,7 +255,7 @@ class Bound:
         return tuple(sorted(kept, key=lambda one: rank.get(one, len(rank))))
 
     def without(self, samples: Samples, columns: Sequence[int] = ()) -> Samples:
-        """Return the rows with what must not be kept, and `columns`, always open: no method keeps what never varies."""
+        """Return rows in which excluded elements and `columns` are always open: methods never keep constant inputs."""
         switches = samples.switches & ~self.never
         switches[:, list(columns)] = False
         return replace(samples, switches=switches)

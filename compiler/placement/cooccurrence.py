@@ -1,4 +1,4 @@
-"""What one bit tells about the class, alone or given another bit: from counts, comparable exactly.
+"""Information of one bit about the class, alone or given another bit: from counts, exactly comparable.
 
 n * I(class; a | b) is, with f(n) = n ln n and the counts n_cab of class c and values of a and b,
 
@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from .exact import Counts, Floats, compare, error_bound, n_log_n
 
-# Of the numbers (classes, bits) that are looked at together: their tables and logarithms take some 40 MiB.
+# (Class, bit) pairs that are processed together: their tables and logarithms take some 40 MiB.
 _BLOCK = 1 << 18
 
 
@@ -18,7 +18,7 @@ class Cooccurrence:
     """Counts of all pairs of bits X (n, d) bool in each of n_classes classes `labels` (n,)."""
 
     def __init__(self, X: npt.NDArray[np.bool_], labels: npt.NDArray[np.intp], n_classes: int) -> None:
-        # Pairs are counted when they are asked for: all of them would be K d^2 numbers.
+        # Count pairs on demand: all of them would be K d^2 numbers.
         self._packed, self._starts = _by_class(X, labels, n_classes)
         self._ones = self._count(self._packed)
         self._totals = np.bincount(labels, minlength=n_classes)
@@ -34,7 +34,7 @@ class Cooccurrence:
         return np.concatenate([_information(self._tables(given, slice(start, start + step))) for start in starts])
 
     def kinds(self) -> tuple[list[int], npt.NDArray[np.intp]]:
-        """Return a bit of each kind, those of a kind having equal counts in every class, and each bit's kind (d,)."""
+        """Return one bit of each kind (bits with equal counts in every class), and each bit's kind (d,)."""
         _, first, kind = np.unique(self._ones, axis=1, return_index=True, return_inverse=True)
         return first.tolist(), kind.ravel()
 
@@ -59,7 +59,7 @@ class Cooccurrence:
         return pairs.reshape(*ones.shape, 2, 2)
 
     def _count(self, packed: npt.NDArray[np.uint8]) -> Counts:
-        """Return the ones of each class (K, d) in `packed` (d, bytes)."""
+        """Return the number of ones of each class (K, d) in `packed` (d, bytes)."""
         ones = np.bitwise_count(packed)
         return np.ascontiguousarray(np.add.reduceat(ones, self._starts, axis=1, dtype=np.int64).T)
 
@@ -67,9 +67,9 @@ class Cooccurrence:
 def _by_class(
     X: npt.NDArray[np.bool_], labels: npt.NDArray[np.intp], n_classes: int
 ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.intp]]:
-    """Return X (n, d) by column, packed (d, bytes), the rows of a class side by side, and each class's first byte.
+    """Return X (n, d) by column, packed (d, bytes) with the rows of each class adjacent, and each class's first byte.
 
-    Each class begins a byte of its own, and has one even without rows.
+    Each class begins at a byte boundary and has at least one byte, even without rows.
     """
     sizes = np.maximum(-(-np.bincount(labels, minlength=n_classes) // 8), 1)
     starts = np.cumsum(sizes) - sizes
@@ -81,7 +81,7 @@ def _by_class(
 
 
 def _parts(tables: Counts) -> tuple[Counts, Counts, Counts, Counts]:
-    """Return the counts of the four sums, each of four axes: class, bit, its value, value of what is given."""
+    """Return the counts of the four sums, each of four axes: class, bit, its value, value of the given bit."""
     return (
         tables,
         tables.sum(axis=0, keepdims=True),

@@ -1,9 +1,9 @@
-"""How often each class meets each value of each input at a node: all that information gain asks for.
+"""Count how often each class occurs with each value of each input at a node; information gain needs nothing else.
 
-Inputs are packed several in one byte, as mixed-radix digits, so that a node's counts need few passes. Eight bits make
-one digit, five three-valued inputs make one, and so on. An input of more than NARROW values is a digit of its own
-("wide"). An input's value at a row is then (digit // weight) % radix: a code, the rank of the value. Of every input
-only the values from the second on are counted, the cells; what is left of the class has the first value.
+Several inputs are packed in one byte, as mixed-radix digits, so that a node's counts need few passes. Eight bits make
+one digit, five three-valued inputs make one, and so on. An input of more than NARROW values has a digit to itself
+("wide"). An input's value at a row is then (digit // weight) % radix: a code, the rank of the value. Only the values
+from the second on are counted, as cells; the rest of each class has the first value.
 """
 
 from collections.abc import Iterator
@@ -18,13 +18,13 @@ from .inputs import PlacementError
 
 NARROW = 16
 _DIGIT = 256
-# Rows that are packed together, rows up to which they are written out, and rows that are counted together.
+# Rows packed together, the most rows to expand into lanes, and rows counted together.
 _PACKED, _FEW, _BLOCK = 16384, 1500, 65536
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """One input inside a byte: the digit's number, and value code = (digit // weight) % radix."""
+    """Location of one input within a byte: the digit's number, and value code = (digit // weight) % radix."""
 
     digit: int
     weight: int
@@ -33,11 +33,11 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Digits:
-    """Inputs of n rows, packed.
+    """Packed inputs of n rows.
 
     packed   (n_digits, n) uint8, the digits of the narrow inputs
     wide     one (n,) array of codes for each wide input
-    places   where each narrow input is, digit by digit
+    places   location of each narrow input, digit by digit
     columns  the number of each input, narrow ones in the order of `places`, then the wide ones; constant ones are
              left out, unless X holds bits only
     values   for each of `columns`, its values in ascending order
@@ -68,7 +68,7 @@ class Digits:
 
     @classmethod
     def from_packed_bits(cls, bits: npt.NDArray[np.uint8], n_inputs: int) -> "Digits":
-        """Take rows that are packed already: bits = np.packbits(X, axis=1, bitorder="little") of n_inputs columns."""
+        """Wrap rows that are already packed: bits = np.packbits(X, axis=1, bitorder="little") of n_inputs columns."""
         if bits.dtype != np.uint8 or bits.ndim != 2 or bits.shape[1] != -(-n_inputs // 8):
             raise PlacementError(f"{n_inputs} bits a row are (n, {-(-n_inputs // 8)}) uint8, not {bits.shape}")
         return _digits_of_bits(np.ascontiguousarray(bits.T), n_inputs)
@@ -107,7 +107,7 @@ def _codes(column: npt.NDArray[Any], values: npt.NDArray[Any]) -> npt.NDArray[An
 
 
 def _places(radices: list[int]) -> list[Place]:
-    """Fill digit after digit, as long as the product of the radices fits a byte."""
+    """Fill each digit while the product of its radices fits a byte."""
     places: list[Place] = []
     digit, weight = 0, 1
     for radix in radices:
@@ -119,7 +119,7 @@ def _places(radices: list[int]) -> list[Place]:
 
 
 class Counter:
-    """Counts cells at nodes: sets of rows of `digits` (n rows) with class numbers `labels` (n,) below n_classes.
+    """Counts cells at nodes: subsets of the rows of `digits` (n rows) with class numbers `labels` (n,) below n_classes.
 
     starts   (n_columns,) the first cell of each of digits.columns
     """
@@ -138,14 +138,14 @@ class Counter:
         self._wide_sizes = sizes[len(digits.places) :]
 
     def count(self, rows: npt.NDArray[np.intp]) -> Counts:
-        """Return the cells of the node that holds `rows`: (n_classes, n_cells)."""
+        """Return the cells (n_classes, n_cells) of the node that holds `rows`."""
         lanes = self._count_few(rows) if len(rows) <= _FEW else self._count_many(rows)
         flat = lanes.transpose(1, 0, 2).reshape(self.n_classes, -1)
         narrow = flat[:, self._lane_of_cell].astype(np.int64)
         return np.concatenate([narrow, *self._count_wide(rows)], axis=1) if self.digits.wide else narrow
 
     def _count_few(self, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.float32]:
-        """Write every row's lanes out and sum them class by class; float32 holds counts below 2^24 exactly."""
+        """Expand every row into lanes and sum them per class; float32 holds counts below 2^24 exactly."""
         digits = self.digits.packed.take(rows, axis=1)
         written = self._lanes.take(digits + self._offsets, axis=0)
         member = (self.labels.take(rows) == self._classes).astype(np.float32)
@@ -153,7 +153,7 @@ class Counter:
         return sums
 
     def _count_many(self, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.float64]:
-        """Count whole digits class by class, then share each digit's count out to its lanes."""
+        """Count whole digits per class, then distribute each digit's count to its lanes."""
         base = self.labels.take(rows).astype(np.intp) * _DIGIT
         sums = np.empty((len(self.digits.packed), self.n_classes, self._lanes_of_digit.shape[2]))
         for digit, lanes, total in zip(self.digits.packed, self._lanes_of_digit, sums, strict=True):
@@ -175,7 +175,7 @@ class Counter:
 def _lanes(digits: Digits) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.intp]]:
     """Return tables (n_digits, 256, lanes) with a 1 where a digit holds a cell's value, and each narrow cell's lane.
 
-    Lanes are numbered through all digits; every digit has as many as the one with most cells.
+    Lanes are numbered through all digits; every digit has as many lanes as the largest one needs.
     """
     places = np.array([(p.digit, p.weight, p.radix) for p in digits.places], dtype=np.intp).reshape(-1, 3)
     sizes = places[:, 2] - 1
@@ -185,7 +185,7 @@ def _lanes(digits: Digits) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.intp
     width = int(used.max(initial=0))
     lane = np.arange(len(digit)) - (np.cumsum(used) - used)[digit]
     tables = np.zeros((len(digits.packed), _DIGIT, width), dtype=np.float32)
-    # Cells that lie alike in their digits are written together: of bits, every eighth.
+    # Write cells at the same offset in their digits together: for bits, every eighth.
     cells = np.lexsort((code, radix, weight))
     kinds, counts = np.unique(np.stack([weight, radix, code])[:, cells], axis=1, return_counts=True)
     every = np.arange(_DIGIT)

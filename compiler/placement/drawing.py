@@ -1,4 +1,4 @@
-"""Placements as pictures: the tree of ID3, and how well many subjects are served."""
+"""Pictures of placements: the tree of ID3, and the accuracy that a population of subjects reaches."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,7 +9,7 @@ from thenar.runtime.files import write_atomically
 from ..pictures import on_paper, painting, rendered
 from .inputs import PlacementError
 from .placement import Aim, Placement, Standard
-from .tree import Node, Tree, answer_to, names_for, sizes_of
+from .tree import Node, Tree, edge_label, names_for, sizes_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,16 +21,16 @@ _FONT_SIZE = 7
 
 BETTERED: dict[Aim, str] = {
     "plain": "as chosen",
-    "mean": "bettered for the mean",
-    "worst tenth": "bettered for the worst tenth",
+    "mean": "refined for the mean",
+    "worst tenth": "refined for the worst tenth",
 }
 
 
 def draw_placement(placement: Placement, path: Path) -> None:
-    """Write a picture to `path`, .svg or .png: of ID3 its tree, of many subjects how they are served.
+    """Write a picture to `path`, .svg or .png: the tree of ID3, or the accuracy of a population's subjects.
 
-    The tree has decisions with switch and gain, and leaves with grasp type and rows. Raises PictureError for another
-    kind of file or without matplotlib, PlacementError where there is neither a tree nor a study.
+    The tree shows decisions with switch and gain, and leaves with grasp type and rows. Raises PictureError for another
+    kind of file or without matplotlib, PlacementError if there is neither a tree nor a study.
     """
     if placement.tree is not None:
         draw_tree(placement.tree, path, placement.all_names, placement.grasps)
@@ -43,11 +43,11 @@ def draw_placement(placement: Placement, path: Path) -> None:
 def draw_tree(tree: Tree, path: Path, names: Sequence[str] = (), class_names: Sequence[str] = ()) -> None:
     """Write the picture of `tree` to `path`, .svg or .png: decisions with input and gain, leaves with class and rows.
 
-    It is an icicle: a line for each node from the root on, and its children set in below it. The same tree gives the
-    same bytes. Raises PictureError for another kind of file or without matplotlib.
+    The tree is drawn as an icicle: one line per node, from the root down, with children indented. The same tree gives
+    the same bytes. Raises PictureError for another kind of file or without matplotlib.
     """
     names, class_names = names_for(tree, names, class_names)
-    labels = [answer_to(tree, number) + _label(node, names, class_names) for number, node in enumerate(tree.nodes)]
+    labels = [edge_label(tree, number) + _label(node, names, class_names) for number, node in enumerate(tree.nodes)]
     right = max(
         _LETTER_INCHES * len(label) + _STEP_INCHES * (depth + 1)
         for label, depth in zip(labels, tree.depths, strict=True)
@@ -61,11 +61,9 @@ def draw_tree(tree: Tree, path: Path, names: Sequence[str] = (), class_names: Se
         axes = figure.add_axes((0, 0, 1, 1))
         axes.set(xlim=(0, width), ylim=(lines, 0))
         axes.axis("off")
-        for place, (words, leaf) in enumerate(
-            (("switch? gain in bits", False), ("grasp type, rows of it / all", True))
-        ):
+        for place, (words, leaf) in enumerate((("switch? gain in bits", False), ("grasp type, its rows / all", True))):
             _draw_box(axes, (place * _KEY_INCHES, 0.2, _KEY_INCHES - _STEP_INCHES, 1), words, leaf=leaf)
-        axes.text(2 * _KEY_INCHES, 0.7, "open, closed: the answer that leads there", va="center_baseline")
+        axes.text(2 * _KEY_INCHES, 0.7, "open, closed: the switch state that leads there", va="center_baseline")
         boxes = zip(tree.nodes, tree.depths, sizes_of(tree), labels, strict=True)
         for line, (node, depth, size, label) in enumerate(boxes, _KEY_LINES):
             left = _STEP_INCHES * depth
@@ -90,7 +88,7 @@ def _draw_box(axes: "Axes", box: tuple[float, float, float, float], label: str, 
 
 
 def draw_study(study: Standard, path: Path) -> None:
-    """Draw recognition of held-out subjects against the number of subjects learnt from. Raises PictureError."""
+    """Draw the accuracy of held-out subjects against the number of training subjects. Raises PictureError."""
     with painting(font_size=10):
         from matplotlib.figure import Figure
 
@@ -101,7 +99,7 @@ def draw_study(study: Standard, path: Path) -> None:
 
 
 def _draw_study(axes: "Axes", study: Standard) -> None:
-    """Draw a pair of lines for every aim: the mean and the worst tenth."""
+    """Draw two lines for every aim: the mean and the worst tenth."""
     for (aim, words), colour in zip(BETTERED.items(), map(on_paper, ("soft", "switches", "both")), strict=True):
         points = [point for point in study.curve if point.aim == aim]
         sizes = [point.subjects for point in points]
@@ -113,7 +111,7 @@ def _draw_study(axes: "Axes", study: Standard) -> None:
     sizes = sorted({point.subjects for point in study.curve})
     axes.set_xticks(sizes, [str(size) for size in sizes])
     axes.minorticks_off()
-    axes.set_xlabel("subjects learnt from")
-    axes.set_ylabel(f"recognition of {study.held_out} other subjects, %")
+    axes.set_xlabel("training subjects")
+    axes.set_ylabel(f"accuracy on {study.held_out} other subjects, %")
     axes.set_title(f"{len(study.columns)} switches for everybody")
     axes.grid(visible=True, alpha=0.3)

@@ -1,16 +1,16 @@
-"""What a placement chooses from: switches, and levels of taxels. Each is one bit, set at codes above a threshold.
+"""Elements that a placement chooses from: switches, and levels of taxels. Each is one bit, set above a threshold.
 
-Candidate levels of a taxel are found as C4.5 splits a number, again and again: of all thresholds between codes that
-occur, the one is taken that tells most about the grasp type; then, of the intervals that it leaves, the one whose own
-best threshold tells most is split next. Comparisons are exact; of equal thresholds the lowest is taken. A threshold
-lies midway between the two codes. Splitting ends after `most` levels, or where nothing more is told.
+Candidate levels of a taxel are found by splitting as C4.5 splits a number. First, of all thresholds between codes that
+occur, take the one with the most information about the grasp type. Then, of the resulting intervals, split the one
+whose best threshold has the most. Comparisons are exact; of equal thresholds the lowest is taken. A threshold lies
+midway between the two codes. Splitting ends after `most` levels, or when no threshold adds information.
 
 No level lies in the noise of a taxel at rest, where a bit would flicker: codes up to a fence count as rest. The fence
 is four deviations from the median of the rows at rest. The deviation is that of the quartile away from the press, so
-rows that press do no harm; of the other quartile where noise is cut off, as at 0. Rows at rest are those of the grasp
-type with the nearest fence of its own, and of all types whose median lies within that one. A taxel rests at that end of
-its codes that the median row is nearer to, of both the lower. A fence past the middle is none: nobody knows whether
-such a taxel rests at all.
+rows with a press do no harm; if noise is cut off there, as at 0, it is that of the other quartile. Rows at rest are
+those of the grasp type with the nearest fence, and of all types whose median lies within that fence. A taxel rests at
+the end of its code range that the median row is nearer to, or at the lower end if both are equally near. A fence past
+the middle is ignored: such a taxel may never be at rest.
 """
 
 from dataclasses import replace
@@ -27,14 +27,14 @@ from .exact import Counts
 from .gain import NodeCounts, best_position, first_of_most_gain, gain_bits
 from .ports import PortCosts
 
-# Normal noise passes the fence in one row of 40,000: six times the quartile. Of fewer rows a type has no fence.
+# Normal noise passes the fence in one row of 40,000: six times the quartile. A type with fewer rows has no fence.
 _QUARTILES, _FEWEST = 6, 8
 # Candidates of one taxel. iCub's, 5 x 4 folds, all of them: 1 level 83.5 %, 3 95.2, 5 96.7, 8 98.1.
 LEVELS = 7
 
 
 class Element(NamedTuple):
-    """A bit: whether the code of a column exceeds `code`. The columns are the switches, then the taxels; of a switch,
+    """A bit: whether the code of a column exceeds `code`. The columns are the switches, then the taxels; for a switch,
     which is 0 or 1, the code is 0.
     """
 
@@ -46,9 +46,7 @@ Elements = tuple[Element, ...]
 
 
 def elements_of(samples: Samples, most: int | None = None) -> Elements:
-    """Return what there is to choose from in these rows: every switch, then of each taxel at least one level and at
-    most `most`, in the order of their codes.
-    """
+    """Return the elements of these rows: every switch, then 1 to `most` levels of each taxel, in the order of codes."""
     levels = (
         Element(column, code)
         for column, codes in enumerate(samples.taxels.T, samples.n_switches)
@@ -58,12 +56,13 @@ def elements_of(samples: Samples, most: int | None = None) -> Elements:
 
 
 def taxel_levels(codes: NDArray[np.uint16], labels: NDArray[np.intp], n_classes: int, most: int) -> tuple[int, ...]:
-    """Return the thresholds, ascending, of codes (n,) in rows of classes `labels` (n,): each is the largest code below
-    which the bit is not set. At most `most`, and at least one.
+    """Return 1 to `most` ascending thresholds of codes (n,) in rows of classes `labels` (n,).
+
+    Each is the largest code at which the bit is not set.
     """
     values, place = np.unique(_above_rest(codes, labels, n_classes), return_inverse=True)
     if len(values) == 1:
-        # Nothing is known of what else there may be.
+        # Codes that never occurred cannot be judged.
         return (int(values[0]),)
     counts = np.zeros((n_classes, len(values)), np.int64)
     np.add.at(counts, (labels, place), 1)
@@ -79,7 +78,7 @@ def taxel_levels(codes: NDArray[np.uint16], labels: NDArray[np.intp], n_classes:
 
 
 def _above_rest(codes: NDArray[np.uint16], labels: NDArray[np.intp], n_classes: int) -> NDArray[np.int64]:
-    """Return the codes (n,), of which those in the noise of rest are the fence."""
+    """Return the codes (n,), with those in the noise of rest replaced by the fence."""
     wide = codes.astype(np.int64)
     least, median, largest = np.sort(wide)[[0, (len(wide) - 1) // 2, -1]].tolist()
     sign = 1 if median - least <= largest - median else -1
@@ -99,8 +98,8 @@ def _fence(ascending: NDArray[np.int64]) -> int:
 
 
 class _Split(NamedTuple):
-    """The best threshold of an interval: it parts the values `start` to `stop` - 1 before value `at`, which makes the
-    counts `table` (K, 2).
+    """The best threshold of an interval: it splits the values `start` to `stop` - 1 before value `at`, with the
+    resulting counts `table` (K, 2).
     """
 
     start: int
@@ -139,13 +138,13 @@ def columns_of(elements: Elements) -> Columns:
 
 
 def names_of(grasp_set: GraspSet, elements: Elements) -> tuple[str, ...]:
-    """Return the names: a switch's own; of a level, the taxel's with the code, as in "pad3>118"."""
+    """Return the names: a switch's name; for a level, the taxel's name and the code, as in "pad3>118"."""
     names, n_switches = grasp_set.element_names, len(grasp_set.switch_names)
     return tuple(names[column] if column < n_switches else level_name(names[column], code) for column, code in elements)
 
 
 def ports_of(ports: PortCosts, elements: Elements) -> PortCosts:
-    """Return what reading the elements costs, where `ports` are those of the columns: levels of one taxel share its
+    """Return the costs of reading the elements, given the `ports` of the columns; levels of one taxel share its
     conversion.
     """
     return PortCosts(tuple(ports.port_of[element.column] for element in elements), ports.us)

@@ -1,8 +1,8 @@
-"""Comparisons of what counts tell, without doubt: by floating point where it is sure, exactly where it is not.
+"""Exact comparisons of information from counts: in floating point where it suffices, in integers otherwise.
 
-Entropy and information of n rows, times n, are sums of f(m) = m ln m over whole numbers m, counts, some of them added
-and some subtracted. Two such sums that floating point cannot tell apart are compared by their signs as whole multiples
-of logarithms.
+Entropy and information of n rows, times n, are sums of f(m) = m ln m over integer counts m, some of them added and some
+subtracted. If floating point cannot separate two such sums, they are compared by their signs as integer multiples of
+logarithms.
 """
 
 from collections import Counter
@@ -28,7 +28,7 @@ def n_log_n(counts: NDArray[Any], ln: Callable[[Floats], Floats] = np.log) -> Fl
 
 
 def error_bound(n: int, terms: int, times: int) -> float:
-    """Bound the error of a floating-point sum of f over so many counts, whose absolute values add up to times * f(n).
+    """Bound the error of a floating-point sum of f over `terms` counts, whose absolute values add up to times * f(n).
 
     A term f(m) is off by 16 relative units of 2^-53 at most: the logarithm by 4 ulp, which are 8 units, and the product
     by half of one, which is 1 unit. The 7 units left cover a division of the sum by a cost, and the comparison. The sum
@@ -39,31 +39,31 @@ def error_bound(n: int, terms: int, times: int) -> float:
 
 
 def first_best(plus: Counts, minus: Counts, costs: Counts | None = None) -> int:
-    """Return the first of some candidates whose value no other's exceeds, exactly.
+    """Return the first candidate of maximum value, compared exactly.
 
-    The value of a candidate is the sum of f over its row of `plus` (candidates, p), less that over its row of `minus`
-    (candidates, q), over its cost: a whole number > 0 (None: all cost the same). Values must be at least 0, and costs
-    must not descend, wherever they differ.
+    A candidate's value is the sum of f over its row of `plus` (candidates, p), less that over its row of `minus`
+    (candidates, q), divided by its cost: an integer > 0 (None: all cost the same). Values must be at least 0; costs
+    that differ must ascend.
     """
-    # f(0) = f(1) = 0. Candidates of the same counts tie, or the first of them is the cheapest.
+    # f(0) = f(1) = 0. Among candidates of the same counts, the first is the cheapest.
     parts = (np.where(part > 1, part, 0) for part in (plus, minus))
     terms = np.concatenate([np.sort(part, axis=1) for part in parts], axis=1)
     prices = [1] * len(terms) if costs is None else costs.tolist()
-    best, rivals = 0, np.arange(len(terms))
+    best, others = 0, np.arange(len(terms))
     while True:
-        rivals = rivals[(terms[rivals] != terms[rivals[0]]).any(axis=1)]
-        if not len(rivals):
+        others = others[(terms[others] != terms[others[0]]).any(axis=1)]
+        if not len(others):
             return best
-        rival = int(rivals[0])
-        if compare(plus[rival], minus[rival], plus[best], minus[best], prices[best], prices[rival]) > 0:
-            best = rival
+        other = int(others[0])
+        if compare(plus[other], minus[other], plus[best], minus[best], prices[best], prices[other]) > 0:
+            best = other
 
 
 def compare(
     plus: Counts, minus: Counts, other_plus: Counts, other_minus: Counts, times: int = 1, other_times: int = 1
 ) -> int:
-    """Return the sign of times * (f(plus) - f(minus)) - other_times * (f(other_plus) - f(other_minus)), exactly, where
-    f of counts is the sum over them.
+    """Return the exact sign of times * (f(plus) - f(minus)) - other_times * (f(other_plus) - f(other_minus)), where f
+    of counts is the sum over them.
     """
     difference: Counter[int] = Counter()
     for counts, factor in ((plus, times), (minus, -times), (other_plus, -other_times), (other_minus, other_times)):
@@ -73,15 +73,15 @@ def compare(
 
 
 def sign_of_f_sum(coefficients: Mapping[int, int]) -> int:
-    """Return the sign of the sum over n of coefficients[n] * f(n), f(n) = n ln n, f(0) = 0: of sums over counts."""
+    """Return the sign of the sum over n of coefficients[n] * f(n), with f(n) = n ln n and f(0) = 0."""
     return sign_of_log_sum({n: n * times for n, times in coefficients.items() if n})
 
 
 def sign_of_log_sum(multiples: Mapping[int, int]) -> int:
-    """Return the sign, -1, 0 or 1, of the sum over m of multiples[m] * ln m, for whole m >= 1.
+    """Return the sign, -1, 0 or 1, of the sum over m of multiples[m] * ln m, for integers m >= 1.
 
     The sum is zero exactly if the product of all m ** multiples[m] is 1, which the exponents over a base of pairwise
-    coprime numbers tell. If it is not zero, decimal arithmetic of rising precision comes to an end with its sign.
+    coprime numbers decide. Otherwise decimal arithmetic of rising precision finds the sign after finitely many steps.
     """
     terms = {m: times for m, times in multiples.items() if times and m > 1}
     if not terms or _product_is_one(terms):
@@ -100,7 +100,7 @@ def _product_is_one(terms: Mapping[int, int]) -> bool:
 
 
 def _coprime_base(numbers: list[int]) -> list[int]:
-    """Return pairwise coprime numbers > 1, of whose powers each of `numbers` is a product."""
+    """Return pairwise coprime numbers > 1 such that each of `numbers` is a product of their powers."""
     base: list[int] = []
     todo = list(numbers)
     while todo:
@@ -126,7 +126,7 @@ def _multiplicity(number: int, factor: int) -> int:
 
 
 def _log_sum(terms: Mapping[int, int], digits: int) -> tuple[Decimal, Decimal]:
-    """Return the sum in decimal arithmetic and a bound of its error.
+    """Return the sum in decimal arithmetic and a bound on its error.
 
     Logarithm, product and each addition are correctly rounded: at most (number of terms + 2) errors of relative size
     10^(1 - digits), each of at most the sum of the terms' absolute values; twice that covers their products.

@@ -1,11 +1,11 @@
-"""Information gain: the input that has the most of it, or the most for its cost, exactly, and how much that is.
+"""Information gain: find the input with the most gain, or the most gain per cost, exactly, and compute that gain.
 
 With f(n) = n ln n, counts n_vc of class c at value v, n_v and n_c their sums and n the number of rows,
 
     n * gain = f(n) - sum over c of f(n_c) + sum over v of [ sum over c of f(n_vc) - f(n_v) ]
 
-in which only the sum over v, the score, depends on the input. Where floating point cannot separate two inputs, whole
-numbers can (`exact`).
+in which only the sum over v, the score, depends on the input. If floating point cannot separate two inputs, integer
+arithmetic does (`exact`).
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from .exact import Counts, Floats, compare, error_bound, first_best, n_log_n
 
 @dataclass(frozen=True, slots=True)
 class NodeCounts:
-    """The counts of one node: of K classes, and of its inputs' values but the first of each.
+    """The counts of one node: of K classes, and of all values of its inputs except the first.
 
     totals  (K,) rows of each class
     cells   (K, n_cells) rows of each class at each value
@@ -46,7 +46,7 @@ class NodeCounts:
         return table
 
     def tables(self, positions: npt.NDArray[np.intp]) -> Counts:
-        """Return the tables (n_positions, K, most values of any) of several inputs, filled up with zeros."""
+        """Return the tables (n_positions, K, most values of any) of several inputs, padded with zeros."""
         stops = np.append(self.starts[1:], self.cells.shape[1])
         sizes = stops[positions] - self.starts[positions]
         offsets = np.arange(sizes.max())
@@ -76,7 +76,7 @@ def best_position(node: NodeCounts, columns: npt.NDArray[np.intp]) -> int | None
 def best_per_cost(node: NodeCounts, costs: Counts) -> int | None:
     """Return the number of the switch of largest gain / cost at `node` of bits, None if none varies there.
 
-    costs (d,), whole, > 0. Of equal switches the cheapest wins, then the lowest number.
+    costs (d,) are integers > 0. Of equal switches the cheapest wins, then the lowest number.
     """
     scores, varies = _scores(node)
     varying = np.flatnonzero(varies)
@@ -85,7 +85,7 @@ def best_per_cost(node: NodeCounts, costs: Counts) -> int | None:
     n, classes = int(node.totals.sum()), len(node.totals)
     own = float(n_log_n(np.array(n)) - n_log_n(node.totals).sum())
     gains = (scores[varying] + own) / costs[varying]
-    # Of two values: 3 (K + 1) terms, whose absolute values are f(n) in sum over the classes, values, both, and rows.
+    # Two values: 3 (K + 1) terms, whose absolute values are f(n) in sum over the classes, values, both, and rows.
     slack = error_bound(n, 3 * (classes + 1), 4) / costs[varying]
     close = varying[gains + slack >= (gains - slack).max()]
     close = close[np.lexsort((close, costs[close]))]
@@ -93,8 +93,9 @@ def best_per_cost(node: NodeCounts, costs: Counts) -> int | None:
 
 
 def first_of_most_gain(tables: Counts, costs: Counts | None = None) -> int:
-    """Return the first of several tables (m, K, values), of the rows of any nodes, whose n * gain (over its cost, which
-    must not descend) no other's exceeds, exactly.
+    """Return the first of the tables (m, K, values) with the largest n * gain, or n * gain / cost, compared exactly.
+
+    The tables may be of any nodes. Costs must not descend.
     """
     plus = np.column_stack([tables.reshape(len(tables), -1), tables.sum(axis=(1, 2))])
     minus = np.column_stack([tables.sum(axis=1), tables.sum(axis=2)])
@@ -115,22 +116,23 @@ def _scores(node: NodeCounts) -> tuple[Floats, npt.NDArray[np.bool_]]:
 
 
 def _score_bound(node: NodeCounts) -> float:
-    """Bound the error of a score: of K + 1 terms for each value, whose absolute values are 2 f(n) in sum, since the sum
-    over v of f(n_v) is at most f(n). No input has more values than all cells leave to it.
+    """Bound the error of a score: it has K + 1 terms for each value, whose absolute values are 2 f(n) in sum, since the
+    sum over v of f(n_v) is at most f(n). An input has at most the values that all cells leave to it.
     """
     most_values = node.cells.shape[1] - len(node.starts) + 2
     return error_bound(int(node.totals.sum()), (len(node.totals) + 1) * most_values, 2)
 
 
 def compare_scores(one: npt.NDArray[Any], other: npt.NDArray[Any]) -> int:
-    """Return the sign of score(one) - score(other), exactly; tables (K, n_values) of whole counts."""
+    """Return the exact sign of score(one) - score(other); tables (K, n_values) of integer counts."""
     return compare(one, one.sum(axis=0), other, other.sum(axis=0))
 
 
 def gain_bits(table: Counts) -> float:
-    """Return the information gain, in bits, of an input with `table` (K, n_values); exactly 0.0 where it is zero.
+    """Return the information gain, in bits, of an input with `table` (K, n_values); exactly 0.0 if it is zero.
 
-    The same bits on every machine: logarithms are evaluated by IEEE operations of one order, and `fsum` rounds once.
+    The result has the same bits on every machine: logarithms use IEEE operations in a fixed order, and `fsum` rounds
+    once.
     """
     totals, sizes = table.sum(axis=1).tolist(), table.sum(axis=0).tolist()
     n: int = sum(totals)
@@ -143,7 +145,7 @@ def gain_bits(table: Counts) -> float:
         return 0.0
     terms = [_n_log_n(m) for row in counts for m in row] + [_n_log_n(n)]
     terms += [-_n_log_n(m) for m in totals + sizes]
-    # However small, it is not zero.
+    # A gain that is not zero must not round to zero.
     return max(fsum(terms) / (n * LN_2), float_info.min)
 
 

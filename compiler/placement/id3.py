@@ -1,4 +1,4 @@
-"""ID3 as the paper's steps 1 to 6 have it, pruned by S, with ties of gain decided exactly."""
+"""ID3 by the paper's steps 1 to 6, pruned by S, with ties of gain decided exactly."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -17,7 +17,7 @@ Rows = npt.NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True)
 class _Subset:
-    """The subset C of a node to be made: its rows, class totals (K,), and its cells if they are known already."""
+    """The subset C of a node to be made: its rows, class totals (K,), and its cells if they are already known."""
 
     rows: Rows
     totals: Counts
@@ -28,14 +28,14 @@ def grow_id3(X: npt.ArrayLike | Digits, y: npt.ArrayLike, min_samples: int = 0) 
     """Grow the paper's tree.
 
     A node is terminal if its rows have one label, are fewer than `min_samples`, or agree in every input; it then
-    answers with the majority, of equal ones with the lowest class. An input that is constant at a node is never chosen;
-    of equal gains, exactly compared, the lowest number is. If no input gains anything the rule holds: the
+    predicts the majority class, of equal ones the lowest. An input that is constant at a node is never chosen; of
+    equal gains, exactly compared, the lowest number wins. If no input has a gain, the same rule holds: the
     lowest-numbered one that varies is chosen, and the node's gain is 0.
 
     Parameters
     ----------
     X : array-like, shape (n, d)
-        Bool or whole numbers >= 0, of any number of values an input; or `Digits` packed before.
+        Bool or integers >= 0, with any number of values per input; or packed `Digits`.
     y : array-like, shape (n,)
         Labels that can be sorted.
     min_samples : int
@@ -44,12 +44,12 @@ def grow_id3(X: npt.ArrayLike | Digits, y: npt.ArrayLike, min_samples: int = 0) 
     Returns
     -------
     Tree
-        Its `inputs` are the columns that it looks at, in the order in which they come; `gains` are in bits.
+        Its `inputs` are the columns that it tests, in preorder; `gains` are in bits.
 
     Raises
     ------
     PlacementError
-        With row and column, if X or y are not such data.
+        If X or y are not such data; the message names row and column.
 
     Examples
     --------
@@ -73,7 +73,7 @@ class _Growth:
         self.root = _Subset(np.arange(digits.n_rows), np.bincount(labels, minlength=n_classes))
 
     def nodes(self) -> list[Node]:
-        """Return the nodes in preorder. A stack of subsets stands in for recursion: trees may be deep."""
+        """Return the nodes in preorder. A stack replaces recursion: trees may be deep."""
         nodes, waiting = [], [self.root]
         while waiting:
             node, children = self._make(waiting.pop())
@@ -113,7 +113,7 @@ class _Growth:
         return self._with_known_cells(counted.cells, children)
 
     def _with_known_cells(self, cells: Counts, children: list[_Subset]) -> list[_Subset]:
-        """Of two children, count the smaller one only: the other has what is left of the parent's `cells`."""
+        """Count the smaller of two children only; the larger gets the remainder of the parent's `cells`."""
         if len(children) != 2:
             return children
         small, large = (0, 1) if len(children[0].rows) <= len(children[1].rows) else (1, 0)

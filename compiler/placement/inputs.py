@@ -1,4 +1,4 @@
-"""Checks of what the user hands over to a placement: a matrix of inputs and one label for each of its rows."""
+"""Checks of the user's data for a placement: a matrix of inputs and one label for each of its rows."""
 
 import math
 from typing import Any
@@ -14,9 +14,9 @@ class PlacementError(ThenarError, ValueError):
 
 
 def check_matrix(X: npt.ArrayLike) -> npt.NDArray[Any]:
-    """Return X (n, d) as an array of bool or int, all values >= 0; whole floats are taken as ints.
+    """Return X (n, d) as an array of bool or int, all values >= 0; floats with integer values become ints.
 
-    Raises PlacementError that names row and column of the first entry that is not such a number.
+    Raises PlacementError that names row and column of the first other entry.
     """
     matrix = np.asarray(X)
     if matrix.ndim != 2:
@@ -39,7 +39,7 @@ def _refuse(bad: npt.NDArray[np.bool_], matrix: npt.NDArray[Any]) -> None:
 
 
 def check_bits(X: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-    """Return X (n, d) as bool; raise PlacementError that names the first entry which is neither 0 nor 1."""
+    """Return X (n, d) as bool; raise PlacementError that names the first entry that is neither 0 nor 1."""
     matrix = check_matrix(X)
     if matrix.dtype != np.bool_:
         _refuse_wide(matrix)
@@ -62,7 +62,7 @@ def check_labels(y: npt.ArrayLike, n_rows: int) -> tuple[npt.NDArray[Any], npt.N
     if labels.shape != (n_rows,):
         raise PlacementError(f"y has shape {labels.shape}, one label for each of the {n_rows} rows of X is needed")
     if not n_rows:
-        raise PlacementError("there are no rows: a placement is learnt from at least one labelled grasp")
+        raise PlacementError("there are no rows: a placement needs at least one labelled grasp")
     if (strange := _not_finite(labels)).any():
         row = int(strange.argmax())
         raise PlacementError(f"y is {labels[row]} in row {row}: every row needs a label")

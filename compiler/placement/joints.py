@@ -1,8 +1,8 @@
-"""Which joints to keep, given the kept switches: every sensor takes time to digitise and to send.
+"""Select the joints to keep, given the kept switches: every sensor takes time to digitise and to send.
 
-Backward elimination: the joint that is missed least goes, again and again, from score tables of the switches and of
-the joints' levels, fitted whole (`logistic`). CANDIDATES are those without which the loss rises least at once; of these
-the one goes without which it is least after TRIAL_STEPS more steps, of equal ones the lowest number.
+Backward elimination on score tables of the switches and the joints' levels, fitted jointly (`logistic`): repeatedly
+drop the joint whose removal raises the loss least. CANDIDATES joints have the smallest immediate increase; each is
+refitted for TRIAL_STEPS more steps, and the one with the lowest loss is dropped, of equal ones the lowest number.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ MOST_ROWS, CANDIDATES = 2048, 4
 
 
 def joint_order(samples: Samples) -> Columns:
-    """Return the joints that vary, the last one to go first, given all the switches of these rows."""
+    """Return the varying joints, most important first (the last one dropped), given all the switches of these rows."""
     rows = sampled(samples, MOST_ROWS)
     levels = [thermometer(rows.codes[:, [joint]]) for joint in range(rows.codes.shape[1])]
     left = [joint for joint, bits in enumerate(levels) if len(bits)]
@@ -39,10 +39,9 @@ def joint_order(samples: Samples) -> Columns:
 
 
 def kept_joints(samples: Samples, most: int | None, limits: Limits | None = None) -> Columns:
-    """Return at most `most` joints to keep, given the switches of these rows, ascending, as many as `limits` leave
-    where None is given.
+    """Return at most `most` joints to keep, ascending, given the switches of these rows; None: all that `limits` allow.
 
-    Raises PlacementError where the limits name more joints to keep.
+    Raises PlacementError if the limits require more joints.
     """
     every: Columns = tuple(range(samples.codes.shape[1]))
     if not every:

@@ -1,13 +1,13 @@
-"""The score tables that boosting heads for, fitted whole: multinomial logistic regression on bits, with a ridge.
+"""The score tables that boosting converges to, fitted jointly: multinomial logistic regression on bits, with a ridge.
 
-Boosted stumps on bits are a row of scores for each bit, added where it is set; boosting goes there a column a round and
-stops early. Here all rows are fitted at once, to the minimum over W (c + 1, K) of
+Boosted stumps on bits are a row of scores for each bit, added where it is set; boosting approaches them one column a
+round and stops early. Here all rows are fitted at once, to the minimum over W (c + 1, K) of
 
     sum over frames of -ln P(class) + RIDGE / 2 * (sum of squares of the bits' rows),    F = W' [bits; 1]
 
-so that what a row is worth does not hang on the order of rounds. Fitted by L-BFGS (Nocedal and Wright, Numerical
-Optimization, 2nd ed., algorithm 7.4); rows and residuals are put on grids on which matrix products are exact, so that
-the fit has the same bits on every machine.
+so the value of a row does not depend on the order of rounds. The fit uses L-BFGS (Nocedal and Wright, Numerical
+Optimization, 2nd ed., algorithm 7.4). Rows and residuals are put on grids on which matrix products are exact, so the
+fit has the same bits on every machine.
 """
 
 from copy import copy
@@ -21,14 +21,14 @@ from .exact import Floats
 
 RIDGE = 1.0
 _MEMORY = 6
-# Rows are multiples of 2^-28: below 2^24 in sum, every sum of them is exact.
+# Rows are multiples of 2^-28, below 2^24 in sum, so every sum of them is exact.
 _ROW_BITS = 28
-_ENOUGH = 1e-4  # of the slope that Armijo's rule wants to see
+_ENOUGH = 1e-4  # of the slope, for Armijo's rule
 _MOST_HALVINGS = 12
 
 
 class Logistic:
-    """A fit to `bits` (c, n) and `labels` (n,), that goes on from where it stands, with or without all its columns.
+    """A fit to `bits` (c, n) and `labels` (n,) that can be continued, with or without all its columns.
 
     rows         (c + 1, K) on the grid, the last one the bias
     probability  (K, n) P of every class in every frame, at `rows`
@@ -44,13 +44,13 @@ class Logistic:
         self._stand(np.zeros((len(self._inputs), n_classes)))
 
     def improve(self, iterations: int) -> None:
-        """Take up to `iterations` steps of L-BFGS; fewer where no step makes the loss smaller."""
+        """Take up to `iterations` steps of L-BFGS; stop when no step lowers the loss."""
         for _ in range(iterations):
             if not self._step():
                 return
 
     def without(self, columns: list[int]) -> "Logistic":
-        """Return the fit without some columns; the bias takes the means of their rows."""
+        """Return the fit without some columns; the bias absorbs the means of their rows."""
         rest = copy(self)
         rest._inputs = np.delete(self._inputs, columns, axis=0)
         rest._pairs = [(np.delete(s, columns, axis=0), np.delete(y, columns, axis=0)) for s, y in self._pairs]
@@ -92,7 +92,7 @@ class Logistic:
             self._pairs = [*self._pairs, (moved, turned)][-_MEMORY:]
 
     def _direction(self) -> Floats:
-        """Return minus the gradient times the inverse Hessian that the pairs of steps and turns tell of."""
+        """Return minus the gradient times the inverse Hessian estimated from past steps and gradient changes."""
         q = self._gradient.copy()
         pairs = [(s, y, dot(s, y)) for s, y in self._pairs]
         pairs = [pair for pair in pairs if pair[2] > 0]
@@ -108,6 +108,6 @@ class Logistic:
 
 
 def _rounded(values: Floats, bits: int) -> Floats:
-    """Return the nearest multiples of 2^-bits."""
+    """Round to the nearest multiples of 2^-bits."""
     rounded: Floats = np.rint(values * 2.0**bits) * 2.0**-bits
     return rounded

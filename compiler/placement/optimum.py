@@ -1,14 +1,15 @@
-"""How far a placement of m switches is from the best there is: a bounded search.
+"""A bounded search for the best placement of m switches, and the gap between it and a given placement.
 
 The objective is the number of pairs of grasps of different types that look alike, equal in every kept switch: no
-classifier tells these apart. It says nothing of what a given classifier makes of the rest; but unlike a recognition
-rate it can be bounded over all subsets of m switches. Every switch that is added tells fewer new pairs apart than it
-would have before (the number told apart is submodular), so for every set S, be it good or bad, and every T
+classifier can distinguish them. It does not predict a given classifier's accuracy; but unlike accuracy it can be
+bounded over all subsets of m switches. The number of distinguished pairs is submodular: the more switches there are,
+the fewer new pairs another one distinguishes. So for every set S, good or bad, and every T
 
     alike(T) >= alike(S) - sum over a in T of gain(a | S)         (Nemhauser, Wolsey, Math. Programming 14, 1978)
 
-One such line for each of many S makes an integer program in one variable a switch, whose optimum is a bound; its answer
-is a subset that is evaluated, and gives the next lines. Where bound and best subset meet, the subset is proved best.
+One such cut for each of many S makes an integer program with one variable per switch, whose optimum is a bound. Its
+solution is a subset, which is evaluated and gives the next cuts. When bound and best subset meet, the subset is proved
+best.
 """
 
 import math
@@ -28,9 +29,9 @@ from .inputs import PlacementError
 
 Numbers = NDArray[np.intp]
 
-# The program is scaled so that a thousandth of all pairs is 1; HiGHS holds constraints to 1e-6 of that.
+# The program is scaled so that a thousandth of all pairs is 1; HiGHS satisfies constraints to 1e-6 of that.
 _UNIT, _SLACK = 1000.0, 1e-5
-# Nodes of branch and bound for one program. What is cut off there still has a bound; a clock would not be repeatable.
+# Branch-and-bound nodes for one program. The remaining nodes still have a bound; a time limit would not be repeatable.
 _NODES = 1000
 
 
@@ -38,10 +39,10 @@ _NODES = 1000
 class Subset:
     """The best subset of m switches that was found, as numbers of pairs of rows of different types that look alike.
 
-    columns  in the order of what they bring, the next best one first
-    pairs    pairs there are
+    columns  in greedy order, the most informative one first
+    pairs    all pairs
     alike    pairs that look alike in `columns`
-    least    no subset of so many switches leaves fewer
+    least    lower bound on the pairs alike in any subset of this size
     nodes    integer programs that were solved
     """
 
@@ -68,12 +69,12 @@ def best_subset(
 ) -> Subset:
     """Return the best subset of m switches that `rounds` integer programs find, and a bound on all others.
 
-    With `limits` that is of all subsets of at most m switches that obey them, as there may be none of m.
+    With `limits` the subsets are those of at most m switches that obey them, as none of m may.
 
-    starts    placements of at most m switches to start from besides the greedy one: the answer is no worse than they
+    starts    placements of at most m switches to start from, in addition to the greedy one: the result is no worse
     on_round  is called with (done, rounds) after every integer program
 
-    The objective is that of this module. Raises PlacementError if m or rounds is negative.
+    The module's docstring has the objective. Raises PlacementError if m or rounds is negative.
     """
     if m < 0 or rounds < 0:
         raise PlacementError(f"m = {m} and rounds = {rounds} must be at least 0")
@@ -95,11 +96,11 @@ def best_subset(
 class Pairs:
     """The pairs of rows of different grasp types, and how many of them look alike in some of the switches.
 
-    Two rows look alike in some switches if they are equal in every one of these. All counts are exact whole numbers.
-    Joints are not looked at.
+    Two rows look alike in some switches if they are equal in every one of these. All counts are exact integers.
+    Joints are ignored.
 
-    total      pairs there are
-    varying    (v,) numbers of the switches that ever change
+    total      all pairs
+    varying    (v,) numbers of the switches that are not constant
     """
 
     def __init__(self, samples: Samples) -> None:
@@ -107,7 +108,7 @@ class Pairs:
         self.varying: Numbers = np.flatnonzero(bits.any(axis=0) & ~bits.all(axis=0))
         packed = np.packbits(bits[:, self.varying], axis=1)
         kinds = _numbered(packed) * samples.n_classes + samples.labels
-        # Rows of one type that are alike in everything are one row that counts so often.
+        # Identical rows of one type become one row with a multiplicity.
         _, first, counts = np.unique(kinds, return_index=True, return_counts=True)
         self._bits, self._labels, self._counts = bits[first], samples.labels[first], counts.astype(np.float64)
         self._n_classes = samples.n_classes
@@ -119,20 +120,20 @@ class Pairs:
         return (_squares(np.bincount(groups, self._counts)) - _squares(np.bincount(cells, self._counts))) // 2
 
     def gains(self, columns: Columns) -> Counts:
-        """Return (s,) how many of the pairs alike in `columns` each further switch, alone, tells apart."""
+        """Return (s,) how many of the pairs alike in `columns` each further switch, alone, distinguishes."""
         groups, cells = self._cut(columns)
         mixed = np.bincount(groups, self._counts)[groups] > np.bincount(cells, self._counts)[cells]
         left = self._halves(groups, mixed) - self._halves(cells, mixed)
         return np.asarray(self.alike(columns) - left // 2, dtype=np.int64)
 
     def _cut(self, columns: Columns) -> tuple[Numbers, Numbers]:
-        """Return the number of every row's group (rows alike in `columns`), and of its cell (those of its type)."""
+        """Return each row's group (rows alike in `columns`) and cell (the group's rows of one type), as numbers."""
         groups = _numbered(np.packbits(self._bits[:, list(columns)], axis=1))
         cells = np.unique(groups * self._n_classes + self._labels, return_inverse=True)[1]
         return groups, cells
 
     def _halves(self, parts: Numbers, rows: NDArray[np.bool_]) -> Counts:
-        """Return for every switch (s,) the sum, over the two halves into which it cuts each part, of size squared."""
+        """Return for every switch (s,) the sum of squared sizes of the two halves into which it splits each part."""
         from scipy.sparse import csr_matrix
 
         numbers = np.unique(parts[rows], return_inverse=True)[1]
@@ -158,11 +159,11 @@ def _squares(sizes: NDArray[np.generic]) -> int:
 def filled(
     pairs: Pairs, columns: Columns, m: int, limits: Bound | None = None, among: Columns | None = None
 ) -> Columns:
-    """Return `columns` and, after them, what tells most further pairs apart, one by one, until there are m.
+    """Extend `columns` greedily, each time by the switch that distinguishes most further pairs, until there are m.
 
-    With `limits` there may be fewer: what breaks none of them is taken as long as it tells any pairs apart.
+    With `limits` there may be fewer: a switch is taken if it breaks none of them and distinguishes at least one pair.
 
-    among  what may be taken (None: every switch that varies); it must hold enough. Ties go to the lowest number.
+    among  candidates (None: every switch that varies); there must be enough. Ties go to the lowest number.
     """
     allowed = pairs.varying if among is None else np.array(sorted(among), dtype=np.intp)
     while len(columns) < m:
@@ -177,9 +178,9 @@ def filled(
 
 
 def swapped(pairs: Pairs, columns: Columns, limits: Bound | None = None) -> Columns:
-    """Return `columns` after exchanging one for a better one, over and over, until no exchange leaves fewer alike.
+    """Return `columns` after exchanging switches one by one, until no exchange leaves fewer pairs alike.
 
-    With `limits`, what must be kept stays.
+    With `limits`, switches that must be kept stay.
     """
     least = pairs.alike(columns)
     place = tried = 0
@@ -195,9 +196,9 @@ def swapped(pairs: Pairs, columns: Columns, limits: Bound | None = None) -> Colu
 
 
 class Bounding:
-    """Lines  alike(T) >= alike - sum over a in T of gains[a]  that hold for every T of m of the `varying` switches.
+    """Cuts  alike(T) >= alike - sum over a in T of gains[a]  that hold for every T of m of the `varying` switches.
 
-    With limits, T are the sets of at most m switches that obey them, and `varying` holds what must be kept as well.
+    With limits, T are the sets of at most m switches that obey them, and `varying` includes those that must be kept.
     """
 
     def __init__(self, varying: NDArray[np.intp], total: int, m: int, limits: Bound | None = None) -> None:
@@ -206,19 +207,19 @@ class Bounding:
         self._alike: list[float] = []
 
     def add(self, alike: int, gains: Counts) -> None:
-        """Take one line: of a set that leaves `alike` pairs, of which each switch (s,) tells gains[a] apart."""
+        """Add the cut of a set that leaves `alike` pairs, of which each switch (s,) distinguishes gains[a]."""
         self._gains.append(gains[self._varying] * (_UNIT / self._total))
         self._alike.append(alike * (_UNIT / self._total))
 
     def solve(self) -> tuple[int, Columns]:
-        """Return how many pairs are alike at least in any m switches, and m switches for which the lines allow least.
+        """Return a lower bound on the pairs alike in any m switches, and the m switches that minimise the cuts.
 
-        The second is empty if none was found among the nodes that are looked at.
+        The switches are empty if the node limit is reached before any are found.
         """
         from scipy.optimize import Bounds, LinearConstraint, milp
 
         v = len(self._varying)
-        # Besides a variable a switch and the bound there is one for each taxel and port that limits count.
+        # One variable per switch, one for the bound, and one for each taxel and port that the limits count.
         rows, most = (np.zeros((0, v)), np.zeros(0)) if self._limits is None else self._limits.rows(self._varying)
         extra = rows.shape[1] - v
         lines = np.column_stack([np.array(self._gains), np.zeros((len(self._gains), extra)), np.ones(len(self._gains))])
@@ -247,10 +248,10 @@ class Bounding:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Let nothing onto stdout: HiGHS writes there from C, now and then, whatever it is told."""
+    """Redirect stdout: HiGHS prints there from C even when silenced."""
     sys.stdout.flush()
     kept = os.dup(1)
-    with open(os.devnull, "wb") as nothing:  # noqa: PTH123 - no path of ours
+    with open(os.devnull, "wb") as nothing:  # noqa: PTH123 - a device, not a file of the user
         os.dup2(nothing.fileno(), 1)
     try:
         yield
@@ -261,7 +262,7 @@ def _silent() -> Iterator[None]:
 
 @dataclass(slots=True)
 class _Search:
-    """The best subset of m so far, which leaves `alike` pairs alike, and `least`, below which none can get."""
+    """The best subset of m so far, which leaves `alike` pairs alike, and `least`, a lower bound for all."""
 
     pairs: Pairs
     m: int
@@ -284,11 +285,11 @@ class _Search:
 
     @property
     def open(self) -> bool:
-        """Whether anything is left to look for: not proved yet, and the last integer program told something new."""
+        """Whether to go on: not proved yet, and the last integer program gave a new subset."""
         return self.least < self.alike and not self.stuck
 
     def offer(self, columns: Columns) -> bool:
-        """Take a subset of m, and the lines it gives; return whether it was a new one."""
+        """Evaluate a subset of m and add its cuts; return whether it was new."""
         if frozenset(columns) in self._seen:
             return False
         self._seen.add(frozenset(columns))
@@ -299,7 +300,7 @@ class _Search:
         return True
 
     def step(self) -> None:
-        """Solve one integer program, and evaluate its answer."""
+        """Solve one integer program, and evaluate its solution."""
         least, columns = self.bounding.solve()
         self.least = min(max(self.least, least), self.alike)
         if self.limits is not None and not self.limits.holds(columns):
@@ -308,7 +309,7 @@ class _Search:
 
 
 def _parts(columns: Columns) -> Iterator[Columns]:
-    """Yield the sets whose lines are of use about `columns`: itself, all but one of it, and its beginnings."""
+    """Yield the sets whose cuts are useful near `columns`: itself, all but one of it, and its prefixes."""
     yield columns
     for place in range(len(columns)):
         yield columns[:place] + columns[place + 1 :]

@@ -1,4 +1,4 @@
-"""The placement: which switches of a set of grasps a method keeps, in its order, and how it came out."""
+"""The placement: which switches of a set of grasps a method keeps, in its order, and with which result."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,14 +29,14 @@ from .robust import most_robust
 from .tree import Tree
 
 Progress = Callable[[int, int], None]
-# What a placement for many subjects is bettered for: nothing, the mean over subjects, or those that are served worst.
+# What a placement for many subjects is refined for: nothing, the mean over subjects, or the worst tenth of them.
 Aim = Literal["plain", "mean", "worst tenth"]
 
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """The columns that a method keeps, in its order; what each brought, in bits: to the tree of the paper's ID3, which
-    is None where another method chose, and alone otherwise.
+    """The columns that a method keeps, in its order, and their gains in bits: in the tree of the paper's ID3, or each
+    column's alone for another method, which has no tree.
     """
 
     columns: Columns
@@ -55,9 +55,9 @@ def choose(
 ) -> Chosen:
     """Choose switches of `samples` by a method of `METHODS`, whose parameter is S or a number of switches.
 
-    `ports` are the costs for methods that heed them, `limits` are obeyed by all methods; `robust` looks for the
-    placement whose worst lost switch costs least. Raises MemberError for a method that is not there, PlacementError
-    where it cannot choose.
+    `ports` are the costs for methods that use them, `limits` hold for all methods; `robust` looks for the placement
+    that loses least with its worst lost switch. Raises MemberError for an unknown method, PlacementError if it cannot
+    choose.
     """
     tree, columns = None, Columns()
     if method == PAPERS:
@@ -90,16 +90,15 @@ def _picked(
 
 
 def information_alone(samples: Samples, columns: Columns) -> tuple[float, ...]:
-    """Return the information (bits) on the grasp type that each of the switches `columns` holds alone."""
+    """Return the information (bits) about the grasp type in each of the switches `columns` alone."""
     counts = Cooccurrence(samples.switches, samples.labels, samples.n_classes)
     alone = counts.information() / (len(samples.labels) * LN_2)
     return tuple(float(alone[column]) for column in columns)
 
 
 class Kept(msgspec.Struct, frozen=True, omit_defaults=True):
-    """One element that is kept: its number in the set, where switches come first, and its name; of ID3 also the bits
-    it brought, and the share of the grasp types' entropy that it and those before it brought together; of a level, the
-    code of its taxel that it is set above.
+    """A kept element: its number in the set, where switches come first, and its name; for ID3 also its gain in bits,
+    and the cumulative share of the grasp types' entropy; for a level, the taxel's code above which it is set.
     """
 
     number: int
@@ -110,8 +109,8 @@ class Kept(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Exactly(msgspec.Struct, frozen=True):
-    """Pairs of rows of different grasp types that look alike: in the placement, in the best subset of as many switches
-    that was found, and the least that any such subset leaves. proved: the best found is the best there is.
+    """Pairs of rows of different grasp types that look alike: in the placement, in the best subset of equal size that
+    was found, and a lower bound for all such subsets. proved: the best found is optimal.
     """
 
     pairs: int
@@ -123,8 +122,8 @@ class Exactly(msgspec.Struct, frozen=True):
 
 
 class Served(msgspec.Struct, frozen=True):
-    """Recognition rates, 0..1, of subjects that nothing was learnt from: the mean over them, the mean of the tenth of
-    them (at least one) with the lowest rates, and the lowest.
+    """Accuracies, 0..1, of held-out subjects: the mean over them, the mean of the tenth (at least one) with the lowest
+    accuracies, and the lowest.
     """
 
     mean: float
@@ -133,13 +132,13 @@ class Served(msgspec.Struct, frozen=True):
 
     @property
     def worth(self) -> float:
-        """What standard placements are compared by: the mean and the worst tenth, in equal parts."""
+        """The criterion for standard placements: the mean and the worst tenth, in equal parts."""
         return (self.mean + self.worst_tenth) / 2
 
 
 class CurvePoint(msgspec.Struct, frozen=True):
-    """Held-out subjects, recognised with the placement and the classifier that so many other subjects gave: means over
-    the draws of these, one aim.
+    """Accuracy of held-out subjects, with placement and classifier trained on `subjects` others: means over the draws
+    of these, for one aim.
     """
 
     subjects: int
@@ -148,12 +147,12 @@ class CurvePoint(msgspec.Struct, frozen=True):
 
 
 class Standard(msgspec.Struct, frozen=True):
-    """How a placement for many subjects was found, and how well it serves them.
+    """How a placement for many subjects was found, and the accuracies that it reaches.
 
-    elements  learnt from all subjects with `aim`, in the order of the method
-    aim       what did best among the subjects learnt from, the first of equal ones: `tried` says by how much
-    held_out  subjects that the curve is measured on; subjects: all there are
-    rows      that were learnt from for the placement
+    elements  trained on all subjects with `aim`, in the order of the method
+    aim       the best one among the training subjects, the first of equal ones; `tried` has all
+    held_out  subjects that the curve is measured on; subjects: all in the set
+    rows      training rows of the placement
     """
 
     elements: Elements
@@ -175,11 +174,11 @@ class Standard(msgspec.Struct, frozen=True):
 class Placement:
     """The kept switches of a set, and how they were found.
 
-    parameter  S, or how many switches to keep at most; joints: whether the joints had a say
-    kept_joints  the names of the kept joints, where some were to be chosen; n_levels: how many elements are levels
-    all_names  the names of all elements there were: switches, and levels of taxels; grasps: the types that occur, which
-               the tree's classes index
-    tree       of the paper's ID3; exact: how far from the best, if that was asked for; study: of many subjects
+    parameter  S, or how many switches to keep at most; joints: whether the method used the joints
+    kept_joints  the names of the kept joints, if some were to be chosen; n_levels: how many elements are levels
+    all_names  the names of all elements: switches, and levels of taxels; grasps: the types that occur, which the
+               tree's classes index
+    tree       of the paper's ID3; exact: the gap to the optimum, if requested; study: of many subjects
     """
 
     method: str
@@ -203,7 +202,7 @@ class Placement:
 
     @property
     def n_switches(self) -> int:
-        """The number of elements there were to choose from."""
+        """The number of elements that the method chose from."""
         return len(self.all_names)
 
     @property
@@ -213,18 +212,18 @@ class Placement:
 
     @property
     def gain_bits(self) -> float:
-        """What all switches brought to the tree together."""
+        """The total gain of all switches in the tree."""
         return sum(kept.gain_bits or 0.0 for kept in self.switches)
 
     @property
     def entropy_bits(self) -> float:
-        """What there is to know: the entropy of the tree's grasp types."""
+        """The entropy of the tree's grasp types."""
         return 0.0 if self.tree is None else entropy_bits(list(self.tree.nodes[0].counts))
 
     def document(self) -> dict[str, Any]:
-        """Return what `thenar place` writes as JSON.
+        """Return the JSON document of `thenar place`.
 
-        zero_gain_nodes are decisions at which no switch gains anything alone: the lowest-numbered that varies is asked;
+        zero_gain_nodes are decisions at which no switch gains anything alone: the lowest-numbered that varies is used;
         undecided_leaves are those of several grasp types whose rows agree in every switch.
         """
         found = {
@@ -275,7 +274,7 @@ def place(
     Parameters
     ----------
     grasp_set : GraspSet
-        What is learnt from, the rows in which nothing is held left out. A tie between grasp types goes to the first of
+        The training rows; rows in which nothing is held are left out. A tie between grasp types goes to the first of
         them in the taxonomy.
     parameter : float
         The paper's S (rows below which a node decides nothing), or how many switches to keep at most, as the method
@@ -283,9 +282,9 @@ def place(
     method : str
         A name in `METHODS`.
     joints : bool
-        Choose what helps most where the joints are read as well. Only elimination looks at them.
+        Choose the switches that help most in addition to the joints. Only elimination uses the joints.
     ports : PortCosts or None
-        What reading each switch and taxel costs, for methods that heed it; None: all cost the same.
+        Costs of reading each switch and taxel, for methods that use them; None: all cost the same.
     exact : bool
         Also search for the best subset of as many switches.
     on_round : callable or None
@@ -295,9 +294,9 @@ def place(
     keep_joints : int, optional
         How many joints to keep, in addition to the kept switches; None: joints are not chosen.
     limits : Limits, optional
-        What the placement must obey.
+        Constraints on the placement.
     robust : bool
-        Choose the placement whose worst lost switch costs least.
+        Choose the placement that loses least with its worst lost switch.
 
     Raises
     ------
@@ -342,8 +341,8 @@ def place(
 
 
 def place_by_subject(grasp_set: GraspSet, prune: int, on_done: Progress) -> list[tuple[str, Placement]]:
-    """Return the paper's placement from the rows of each subject, by name, and from all rows "pooled" if they are of
-    several; `on_done(done, all)` is called before each of them.
+    """Return the paper's placement from the rows of each subject, by name, and from all rows, "pooled", if there are
+    several subjects; `on_done(done, all)` is called before each of them.
     """
     grasp_set = grasp_set.without_none()
     subjects = np.unique(grasp_set.subjects).tolist()
@@ -362,13 +361,13 @@ def samples_of(grasp_set: GraspSet, *, joints: bool) -> Samples:
     if not grasp_set.element_names:
         raise PlacementError("the set has no switches to place: it holds joints only")
     if not len(grasp_set):
-        raise PlacementError("there are no rows: a placement is learnt from at least one labelled grasp")
+        raise PlacementError("there are no rows: a placement needs at least one labelled grasp")
     check_types(len(np.unique(grasp_set.labels)), PlacementError)
     return Samples.of(grasp_set, "both" if joints else "switches")
 
 
 def kept_of(grasp_set: GraspSet, elements: Elements, columns: Columns) -> tuple[Kept, ...]:
-    """Return elements, by their places among all, with their names."""
+    """Return the elements at `columns`, with their names."""
     kept, n_switches = tuple(elements[column] for column in columns), len(grasp_set.switch_names)
     return tuple(
         Kept(one.column, name, above=None if one.column < n_switches else one.code)
@@ -378,7 +377,7 @@ def kept_of(grasp_set: GraspSet, elements: Elements, columns: Columns) -> tuple[
 
 def _joints_kept(grasp_set: GraspSet, samples: Samples, most: int, limits: Limits | None) -> tuple[str, ...]:
     if not grasp_set.joints:
-        raise PlacementError("the set has no joints to keep some of: leave --keep-joints out")
+        raise PlacementError("the set has no joints to choose from: leave --keep-joints out")
     return tuple(grasp_set.joint_names[joint] for joint in kept_joints(samples, most, limits))
 
 

@@ -1,15 +1,13 @@
-"""A standard placement: one for many subjects, those it serves worst included, and how many subjects it takes.
+"""A standard placement: one for many subjects, its accuracy for the worst-served tenth, and the subjects it needs.
 
-Placements are learnt from some subjects and recognise others, who are never learnt from. Three are held beside each
-other: as a method chooses them, and bettered for the mean over subjects or for the worst-served tenth. Which of the
-three is taken is decided among the subjects that are learnt from, on a fifth of them that is kept aside, by the mean
-and the worst tenth in equal parts.
+Placements are trained on some subjects and tested on others. Three are compared: as a method chooses them, and refined
+for the mean over subjects or for the worst-served tenth. The choice among the three is made within the training
+subjects, on a fifth of them that is held out, by the mean and the worst tenth in equal parts.
 
-What a method chooses last, and what it would choose next, it can hardly tell apart from the rows it looks at: another
-draw of rows chooses others. So these are exchanged, one by one, as long as half of the subjects then recognise the
-other half better: on the mean over subjects, or over the tenth that is served worst. Weights in place of exchanges
-(the worst-served tenth counted more, every subject by how badly it is served) gained no more than another draw of rows
-did.
+A method can hardly distinguish its last choices from the next candidates: another draw of rows ranks them differently.
+So these are exchanged, one by one, as long as the model of one half of the subjects then reaches a higher accuracy on
+the other half: on the mean over subjects, or on the worst tenth. Weights instead of exchanges (more weight for the
+worst tenth, or for every subject by its error) gained no more than another draw of rows did.
 """
 
 from dataclasses import dataclass, field, replace
@@ -35,22 +33,22 @@ LEAST_SUBJECTS = 8
 WORST_SHARE = 0.1
 _HELD_OUT = 0.2
 _SIZES = (2, 5, 10, 20, 40, 80, 160)
-# So many of the switches chosen last, and of those chosen next, may change places, in so many exchanges at most.
+# Numbers of last choices and next candidates that may be exchanged, and of exchanges, at most.
 REACH, EXCHANGES = 4, 2
-# With fewer subjects nothing is exchanged: the worst tenth is a handful, and with 10 to 40 of the 200 what exchanges
-# won within them was lost on others more often than not.
+# With fewer subjects nothing is exchanged: the worst tenth is then a handful, and with 10 to 40 of the 200 subjects,
+# gains of exchanges within them were more often than not losses on others.
 ENOUGH_SUBJECTS = 80
 _ASKED_OF_EACH = 50
 
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What a study of a crowd takes.
+    """Parameters of a study of a population.
 
     keep     switches to keep; method: one of `METHODS` whose parameter is a number of switches
-    rows     at most so many are learnt from to place, equally many of every subject; a classifier learns from all
-    rounds   of LogitBoost that judges a placement
-    repeats  other draws of subjects for every point of the learning curve
+    rows     most rows to place with, equally many of every subject; classifiers are trained on all rows
+    rounds   of LogitBoost that evaluates a placement
+    repeats  draws of subjects for every point of the learning curve
     """
 
     keep: int
@@ -62,19 +60,19 @@ class Asked:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Crowd:
-    """Rows of many subjects: `samples` of n rows, and whose each row is, subjects (n,) intp."""
+class Population:
+    """Rows of many subjects: `samples` of n rows, and the subject of each row, subjects (n,) intp."""
 
     samples: Samples
     subjects: Numbers
 
-    def of(self, subjects: Numbers) -> "Crowd":
+    def of(self, subjects: Numbers) -> "Population":
         """Return the rows of some subjects."""
         return self._part(np.flatnonzero(np.isin(self.subjects, subjects)))
 
-    def drawn(self, rows: int, seed: int) -> "Crowd":
-        """Return about so many rows, about equally many of every subject, all frames of trials that are drawn with
-        `seed`; all rows where there are no more.
+    def drawn(self, rows: int, seed: int) -> "Population":
+        """Return about `rows` rows, about equally many of every subject, in whole trials drawn with `seed`; all rows
+        if there are no more.
         """
         there = np.unique(self.subjects)
         if rows >= len(self.subjects):
@@ -85,21 +83,21 @@ class Crowd:
         return self._part(np.flatnonzero(np.isin(self.samples.trials, np.concatenate(list(own)))))
 
     def _trials_of(self, subject: int, rows: int, random: np.random.Generator) -> Numbers:
-        """Return the numbers of random trials of a subject: one, or as many as have at most so many rows."""
+        """Return random trials of a subject, by number: one, or as many as have at most `rows` rows."""
         trials, frames = np.unique(self.samples.trials[self.subjects == subject], return_counts=True)
         order = random.permutation(len(trials))
         return np.asarray(trials[order[: max(int(np.searchsorted(np.cumsum(frames[order]), rows, "right")), 1)]])
 
-    def _part(self, rows: Numbers) -> "Crowd":
+    def _part(self, rows: Numbers) -> "Population":
         return replace(self, samples=self.samples.rows(rows), subjects=self.subjects[rows])
 
 
-def rates(learnt: Crowd, asked: Crowd, elements: Elements, rounds: int) -> NDArray[np.float64]:
-    """Return the share of trials of every subject of `asked` that are recognised, in the order of their numbers.
+def rates(learnt: Population, asked: Population, elements: Elements, rounds: int) -> NDArray[np.float64]:
+    """Return the accuracy, by trials, of every subject of `asked`, in the order of their numbers.
 
-    LogitBoost of so many rounds learns the elements, and the joints if there are any, from `learnt`.
+    LogitBoost of `rounds` rounds is trained on the elements, and any joints, of `learnt`.
     """
-    samples, others = (bits_of(crowd.samples, elements) for crowd in (learnt, asked))
+    samples, others = (bits_of(population.samples, elements) for population in (learnt, asked))
     stumps, _ = boost(samples.inputs, samples.labels, samples.n_classes, rounds=rounds)
     _, first, trial = np.unique(asked.samples.trials, return_index=True, return_inverse=True)
     found = decided(winners(stumps.scores(others.inputs))[np.newaxis], trial)[0]
@@ -109,7 +107,7 @@ def rates(learnt: Crowd, asked: Crowd, elements: Elements, rounds: int) -> NDArr
 
 
 def served(rates: NDArray[np.float64]) -> Served:
-    """Return how the subjects of these rates (n,) are served."""
+    """Return the mean, worst tenth and lowest of these accuracies (n,) of subjects."""
     ordered = np.sort(rates)
     worst = ordered[: max(round(WORST_SHARE * len(ordered)), 1)]
     return Served(float(rates.mean()), float(worst.mean()), float(ordered[0]))
@@ -117,32 +115,33 @@ def served(rates: NDArray[np.float64]) -> Served:
 
 @dataclass(slots=True)
 class Refining:
-    """The placement `kept` of a method, the elements `spare` that it would choose next, and how subjects of `crowd` are
-    served by what is tried: LogitBoost of `rounds` rounds learns from `rows` rows.
+    """Refine a placement: exchange elements of `kept`, a method's choice, for `spare`, those that it ranks next.
+
+    LogitBoost of `rounds` rounds, trained on `rows` rows of `population`, judges each exchange.
     """
 
-    crowd: Crowd
+    population: Population
     kept: Elements
     spare: Elements
     rows: int
     rounds: int
     seed: int
-    _halves: tuple[tuple[Crowd, Crowd], ...] = field(init=False)
+    _halves: tuple[tuple[Population, Population], ...] = field(init=False)
     _known: dict[frozenset[Element], NDArray[np.float64]] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
-        people = np.random.default_rng([self.seed, 2]).permutation(np.unique(self.crowd.subjects))
-        one, other = self.crowd.of(people[::2]), self.crowd.of(people[1::2])
+        people = np.random.default_rng([self.seed, 2]).permutation(np.unique(self.population.subjects))
+        one, other = self.population.of(people[::2]), self.population.of(people[1::2])
         learnt = [half.drawn(self.rows // 2, self.seed) for half in (one, other)]
         asked = [half.drawn(_ASKED_OF_EACH * len(np.unique(half.subjects)), self.seed) for half in (other, one)]
         self._halves = tuple(zip(learnt, asked, strict=True))
 
     def best(self, aim: Aim) -> Elements:
-        """Return the placement as the method chose it ("plain"), or after the exchanges that serve `aim` best.
+        """Return the method's placement ("plain"), or the placement after the exchanges that improve `aim` most.
 
-        Nothing is exchanged without a gain, nor with fewer than ENOUGH_SUBJECTS.
+        No exchange is made without a gain, nor with fewer than ENOUGH_SUBJECTS.
         """
-        if aim == "plain" or len(np.unique(self.crowd.subjects)) < ENOUGH_SUBJECTS:
+        if aim == "plain" or len(np.unique(self.population.subjects)) < ENOUGH_SUBJECTS:
             return self.kept
         elements = self.kept
         for _ in range(EXCHANGES):
@@ -174,9 +173,9 @@ class Refining:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Task:
-    """Learn from some subjects of a crowd, recognise others."""
+    """Train on some subjects of a population, test on others."""
 
-    crowd: Crowd
+    population: Population
     learnt: Numbers
     asked: Numbers
     take: Asked
@@ -184,7 +183,7 @@ class _Task:
     place: int
 
 
-def place_for_crowd(
+def place_for_population(
     grasp_set: GraspSet,
     keep: int,
     *,
@@ -193,14 +192,14 @@ def place_for_crowd(
     jobs: int = -1,
     on_done: Progress | None = None,
 ) -> Placement:
-    """Choose at most `keep` switches for all subjects of a set; the placement's `study` says whom they serve how well.
+    """Choose at most `keep` switches for all subjects of a set; the placement's `study` has their accuracies.
 
-    Raises PlacementError as `place` does, and for fewer than eight subjects; MemberError where there is no such method.
+    Raises PlacementError as `place` does, and for fewer than eight subjects; MemberError for an unknown method.
     """
     fingerprint, grasp_set = grasp_set.fingerprint(), grasp_set.without_none()
     samples = samples_of(grasp_set, joints=joints)
-    crowd = Crowd(samples, np.unique(grasp_set.subjects, return_inverse=True)[1])
-    study = standard_placement(crowd, Asked(keep, method), jobs, on_done)
+    population = Population(samples, np.unique(grasp_set.subjects, return_inverse=True)[1])
+    study = standard_placement(population, Asked(keep, method), jobs, on_done)
     return Placement(
         method=method,
         parameter=float(keep),
@@ -215,50 +214,50 @@ def place_for_crowd(
     )
 
 
-def standard_placement(crowd: Crowd, take: Asked, jobs: int = 1, on_done: Progress | None = None) -> Standard:
-    """Return one placement for all subjects of `crowd`, and the rate against the number of subjects learnt from.
+def standard_placement(population: Population, take: Asked, jobs: int = 1, on_done: Progress | None = None) -> Standard:
+    """Return one placement for all subjects of `population`, and the accuracy against the number of training subjects.
 
-    `on_done(done, all)` is called after every piece of work. The same arguments give the same answer, whatever `jobs`.
+    `on_done(done, all)` is called after every task. The same arguments give the same result, whatever `jobs`.
     Raises PlacementError for fewer than eight subjects, and for a method that takes no number of switches.
     """
     if not METHODS.named(take.method).by_number:
         raise PlacementError(f"{take.method} takes S: a standard placement takes a method of a number of switches")
-    people = np.unique(crowd.subjects)
+    people = np.unique(population.subjects)
     if len(people) < LEAST_SUBJECTS:
         raise PlacementError(
-            f"the set has {len(people)} subject(s): a standard placement is learnt from at least {LEAST_SUBJECTS}"
+            f"the set has {len(people)} subject(s): a standard placement needs at least {LEAST_SUBJECTS}"
         )
     people = np.random.default_rng(take.seed).permutation(people)
     asked, learnt = _apart(people)
-    tasks = [_trial(crowd, learnt, take), *_curve(crowd, learnt, asked, take)]
+    tasks = [_trial(population, learnt, take), *_curve(population, learnt, asked, take)]
     found: dict[int, tuple[Served, ...]] = {}
-    for done, (place, answer) in enumerate(in_workers(_work, tasks, jobs), 1):
-        found[place] = answer
+    for done, (place, result) in enumerate(in_workers(_work, tasks, jobs), 1):
+        found[place] = result
         if on_done is not None:
             on_done(done, len(tasks) + 1)
     points = _points(tasks, found)
     tried, curve = points[: len(AIMS)], points[len(AIMS) :]
     aim = max(tried, key=lambda point: point.served.worth).aim
-    elements = _refining(crowd, take, take.seed).best(aim)
+    elements = _refining(population, take, take.seed).best(aim)
     if on_done is not None:
         on_done(len(tasks) + 1, len(tasks) + 1)
-    rows = len(crowd.drawn(take.rows, take.seed).subjects)
+    rows = len(population.drawn(take.rows, take.seed).subjects)
     return Standard(elements, take.method, aim, len(people), len(asked), rows, tried, curve)
 
 
 def _apart(people: Numbers) -> tuple[Numbers, Numbers]:
-    """Return a fifth of the people, to be recognised, and the others, to learn from."""
+    """Return a fifth of the people, to test on, and the others, to train on."""
     held_out = max(round(_HELD_OUT * len(people)), 1)
     return people[:held_out], people[held_out:]
 
 
-def _trial(crowd: Crowd, learnt: Numbers, take: Asked) -> _Task:
-    """Return the task that the aims are compared by, within the people learnt from."""
+def _trial(population: Population, learnt: Numbers, take: Asked) -> _Task:
+    """Return the task that compares the aims, within the training subjects."""
     asked, rest = _apart(learnt)
-    return _Task(crowd.of(learnt), rest, asked, take, take.seed, 0)
+    return _Task(population.of(learnt), rest, asked, take, take.seed, 0)
 
 
-def _curve(crowd: Crowd, learnt: Numbers, asked: Numbers, take: Asked) -> list[_Task]:
+def _curve(population: Population, learnt: Numbers, asked: Numbers, take: Asked) -> list[_Task]:
     """Return the tasks of the learning curve: numbers of subjects, draws of them."""
     sizes = [*(size for size in _SIZES if size < len(learnt)), len(learnt)]
     tasks: list[_Task] = []
@@ -266,27 +265,27 @@ def _curve(crowd: Crowd, learnt: Numbers, asked: Numbers, take: Asked) -> list[_
         draws = take.repeats if size < len(learnt) else 1
         for seed in range(take.seed, take.seed + draws):
             some = np.random.default_rng([seed, size]).permutation(learnt)[:size]
-            tasks.append(_Task(crowd.of(np.append(some, asked)), some, asked, take, seed, len(tasks) + 1))
+            tasks.append(_Task(population.of(np.append(some, asked)), some, asked, take, seed, len(tasks) + 1))
     return tasks
 
 
 def _work(task: _Task) -> tuple[int, tuple[Served, ...]]:
-    """Return the task's place, and how the people asked are served for each aim."""
-    learnt, asked = task.crowd.of(task.learnt), task.crowd.of(task.asked)
+    """Return the task's number, and the accuracies of the test subjects for each aim."""
+    learnt, asked = task.population.of(task.learnt), task.population.of(task.asked)
     refining = _refining(learnt, task.take, task.seed)
     placements = [refining.best(aim) for aim in AIMS]
     found = {elements: served(rates(learnt, asked, elements, task.take.rounds)) for elements in placements}
     return task.place, tuple(found[elements] for elements in placements)
 
 
-def _refining(crowd: Crowd, take: Asked, seed: int) -> Refining:
-    """Return the method's placement, from rows drawn evenly over the subjects, ready to be bettered."""
-    samples = crowd.drawn(take.rows, seed).samples
+def _refining(population: Population, take: Asked, seed: int) -> Refining:
+    """Return the method's placement, from rows drawn evenly over the subjects, ready for refinement."""
+    samples = population.drawn(take.rows, seed).samples
     elements = elements_of(samples)
     choose = METHODS.named(take.method).chooser(bits_of(samples, elements))
     kept, more = (tuple(elements[column] for column in choose(size)) for size in (take.keep, take.keep + REACH))
     spare = tuple(element for element in more if element not in kept)
-    return Refining(crowd, kept, spare, take.rows, take.rounds, seed)
+    return Refining(population, kept, spare, take.rows, take.rounds, seed)
 
 
 def _points(tasks: list[_Task], found: dict[int, tuple[Served, ...]]) -> tuple[CurvePoint, ...]:

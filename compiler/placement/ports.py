@@ -1,4 +1,4 @@
-"""What reading switches costs: port by port, on the glove that grasps are recorded with."""
+"""Costs of reading switches, port by port, on the glove that grasps are recorded with."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ from .inputs import PlacementError
 
 @dataclass(frozen=True, slots=True)
 class PortCosts:
-    """Scan time port by port: reading port p takes us[p] once, however many of its switches are kept.
+    """Scan time by port: reading port p takes us[p] once, however many of its switches are kept.
 
     port_of  (s,) the port of every switch, an index of `us`
     us       (ports,) microseconds, >= 0
 
-    Raises PlacementError where a switch is on a port that is not there, or a time is negative or not finite.
+    Raises PlacementError if a switch is on an unknown port, or a time is negative or not finite.
     """
 
     port_of: tuple[int, ...]
@@ -33,13 +33,13 @@ class PortCosts:
 
     def __post_init__(self) -> None:
         if any(not 0 <= port < len(self.us) for port in self.port_of):
-            raise PlacementError(f"every switch must be on one of the {len(self.us)} ports whose times are given")
+            raise PlacementError(f"every switch must be on one of the {len(self.us)} ports with a given time")
         if any(not 0 <= us < float("inf") for us in self.us):
             raise PlacementError("the time that reading a port takes must be finite and at least 0 us")
 
     def shares(self, kept: Iterable[int]) -> NDArray[np.float64]:
-        """Return, for every switch of `kept`, its port's time shared out over those of `kept` on it, over the mean time
-        of a port; 0 where no port takes any time.
+        """Return each kept switch's share of its port's time, split evenly among the port's kept switches, as a
+        multiple of the mean time of a port; 0 if no port takes any time.
         """
         on = np.array([self.port_of[column] for column in kept], dtype=np.intp)
         us = np.array(self.us)
@@ -50,7 +50,7 @@ class PortCosts:
     def marginal_costs(self, kept: Iterable[int]) -> NDArray[np.int64]:
         """Return, for every switch, sum of all ports' times + number of ports * time that it adds to `kept`.
 
-        Whole nanoseconds, so that comparisons are exact; all 1 where no port takes any time.
+        Integer nanoseconds, so that comparisons are exact; all 1 if no port takes any time.
         """
         times = np.array([round(us * 1000) for us in self.us], dtype=np.int64)
         if not times.any():
@@ -62,10 +62,10 @@ class PortCosts:
 
 
 def ports_of_whole_glove(harness: Harness | None, names: Sequence[str], taxels: int = 0) -> PortCosts | None:
-    """Return what the ports cost that all switches `names`, of which the last so many are taxels, hang on: in
-    `harness`, or where there is none, on as few MCP23017 and converters as will do, in the order of the names.
+    """Return the costs of the ports with all switches `names`, the last `taxels` of which are taxels: in `harness`, or
+    without one, on as few MCP23017 and converters as suffice, in the order of the names.
 
-    None where a harness lacks switches, as that of a reduced glove does, or there is no room for so many.
+    None if a harness lacks switches, as that of a reduced glove does, or if they do not fit.
     """
     if not names or (harness is not None and unwired(harness, names)):
         return None
@@ -77,9 +77,9 @@ def ports_of_whole_glove(harness: Harness | None, names: Sequence[str], taxels: 
 
 
 def record_times_us(joints: Sequence[str], glove: GloveWiring | None = None) -> tuple[float, ...]:
-    """Return what a CyberGlove's record of one, of two, ... and of all of these joints takes; () of other joints.
+    """Return the times of a CyberGlove's records of one, of two, ... and of all of these joints; () for other joints.
 
-    It is the record of `glove`, whose mask may let all sensors through, or of one at 115200 baud.
+    The record is that of `glove`, whose mask may let all sensors through, or of one at 115200 baud.
     """
     own = glove is not None and set(joints) <= set(glove.joints)
     sensors = glove.all_sensors if glove is not None and own else sensors_with(joints)
@@ -90,12 +90,12 @@ def record_times_us(joints: Sequence[str], glove: GloveWiring | None = None) -> 
 
 
 def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
-    """Return what reading each port costs where all switches `names` hang on the ports of a whole scan.
+    """Return the cost of reading each port, with all switches `names` on the ports of a whole scan.
 
-    A selection of a mux's channel is shared evenly by the ports that need it. A port is charged as a whole even if a
-    shorter reading would show the one switch that is kept. A board's keys are one port, since it always sends them all.
-    Each of its taxels is one: its conversion, its bytes, and its share of the frame around all of theirs. Raises
-    HarnessError if a switch is wired to nothing.
+    The cost of selecting a mux channel is shared evenly by the ports that need it. A port is charged as a whole even if
+    a shorter read would return the one kept switch. A board's keys are one port, since it always sends them all. Each
+    of its taxels is one: its conversion, its bytes, and its share of the frame overhead. Raises HarnessError if a
+    switch is not wired.
     """
     scan = whole_scan(harness, names)
     costs = Costs(scan.ports, harness)
@@ -125,9 +125,9 @@ def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
 
 
 def _shares(unit: Unit, costs: Costs) -> Iterator[tuple[int, float]]:
-    """Yield each port of a unit with its own time and its share of what the whole unit takes beyond those."""
+    """Yield each port of a unit with its own time and its share of the unit's common time."""
     ports = ports_in(unit)
-    # After all ports but itself, a port of a shared channel costs itself alone.
+    # Read after all other ports, a port of a shared channel costs only its own time.
     everything = sum(1 << port for port in ports)
     alone = [costs.after(everything, port) for port in ports]
     beyond = (costs.of(unit) - sum(alone)) / len(ports)

@@ -1,9 +1,9 @@
 """The placement whose worst single lost switch costs least.
 
-A method that looks at rows in which some switches are lost keeps others that can stand in for them. How many should be
-lost depends on the rows and on how many switches are kept; so several shares are tried, none among them, and judged on
-halves of the trials that were not trained on: of the placements that recognise about as much as the best does, the one
-is taken that recognises most where its worst switch is lost.
+A method trained on rows in which some switches are lost also keeps switches that can stand in for them. The best share
+of lost switches depends on the rows and on how many switches are kept. So several shares are tried, including none, and
+evaluated by cross-validation on halves of the trials. Of the placements about as accurate as the best, the one with the
+highest accuracy under its worst lost switch is taken.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,14 +16,14 @@ from ..samples import Columns, Samples
 from ..tables.faults import count_faults
 from ..tables.quantise import quantise
 
-# Of the switches, so many are lost in each row that a method looks at; what a placement may cost without a fault.
+# Shares of the switches that are lost in each training row; the accuracy that a placement may cost without a fault.
 SHARES = (0.05, 0.1, 0.2)
 MOST_LOSS = 0.01
 _PENALTY = 1.0
 
 
 def spread(samples: Samples, share: float) -> Samples:
-    """Return the rows with this share of the switches lost in each: what another row has is in their place."""
+    """Return the rows with this share of the switches lost in each, replaced by another row's values."""
     n, switches = len(samples.labels), samples.switches.copy()
     random = np.random.default_rng([n, round(1000 * share)])
     for column in switches.T:
@@ -33,7 +33,7 @@ def spread(samples: Samples, share: float) -> Samples:
 
 
 def most_robust(samples: Samples, choose: Callable[[Samples], Columns]) -> Columns:
-    """Return the placement of `choose` on these rows, or on rows with lost switches where that is the more robust."""
+    """Return the placement of `choose` on these rows, or on rows with lost switches if that is more robust."""
     plain = choose(samples)
     tried = [plain, *(choose(spread(samples, share))[: len(plain)] for share in SHARES)]
     tried = list(dict.fromkeys(tried))
@@ -45,8 +45,8 @@ def most_robust(samples: Samples, choose: Callable[[Samples], Columns]) -> Colum
 
 
 def _left(samples: Samples, columns: Sequence[int]) -> tuple[int, int]:
-    """Return how many trials the switches `columns`, and the joints, recognise in halves that were not trained on; and
-    how many where the worst switch is lost.
+    """Return how many trials the switches `columns`, and the joints, predict rightly in held-out halves; and how many
+    with the worst switch lost.
     """
     _, first, trial = np.unique(samples.trials, return_index=True, return_inverse=True)
     # Every other trial of each class.

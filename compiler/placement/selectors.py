@@ -27,37 +27,36 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
     method : str, default="elimination"
         A name in `thenar.compiler.METHODS`; `thenar place --help` lists them.
     n_switches : int, default=20
-        How many switches to keep at most. Fewer are kept where fewer vary, or help. Ignored by methods that take the
-        paper's S.
+        The most switches to keep. Fewer are kept if fewer vary, or help. Ignored by methods that take the paper's S.
     min_samples : int, default=0
         The paper's S: a node of the tree with fewer rows decides nothing. Ignored by methods that take a number of
         switches.
     ports : PortCosts or None, default=None
-        What reading each port costs, in microseconds, for methods that heed it; None: all switches cost the same.
+        Costs of reading each port, in microseconds, for methods that use them; None: all switches cost the same.
     limits : Limits or None, default=None
-        What the placement must obey; its names are those of the columns of X, all of them switches.
+        Constraints on the placement; its names are those of the columns of X, all of them switches.
     binarize : float or None, default=0.0
-        A switch counts as closed where its input exceeds this number, as in scikit-learn's `BernoulliNB`. Of bits, the
-        default changes nothing. None refuses whatever is not a bit already.
+        A switch counts as closed if its input exceeds this number, as in scikit-learn's `BernoulliNB`. For bits, the
+        default changes nothing. None rejects any input that is not a bit.
 
     Attributes
     ----------
     order_ : ndarray of int, shape (n_kept,)
         The kept columns, in the order in which the method chose them; `get_support` and `transform` keep that of X.
     gains_ : ndarray of float, shape (n_kept,)
-        The information on the class that each of `order_` brought, in bits: to the tree of ID3, alone in all others.
+        The information about the class of each of `order_`, in bits: its gain in the tree for ID3, otherwise alone.
     classes_ : ndarray, shape (n_classes,)
         The labels, in ascending order.
     n_features_in_ : int
         The number of columns of X.
     feature_names_in_ : ndarray of str, shape (n_features_in_,)
-        The names of the columns, where X is a data frame.
+        The names of the columns, if X is a data frame.
 
     Raises
     ------
     ValueError
-        In `fit`, if X or y cannot be used; as MemberError if there is no such method, and as PlacementError if it
-        cannot choose here, or a number is negative.
+        In `fit`, if X or y cannot be used; a MemberError for an unknown method, a PlacementError if it cannot choose
+        here, or if a number is negative.
 
     See Also
     --------
@@ -90,12 +89,12 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
         self.limits = limits
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Choose the switches that tell the labels apart.
+        """Choose the switches that distinguish the labels.
 
         Parameters
         ----------
         X : array-like, shape (n_samples, n_features)
-            A column for each switch: bits, or numbers that `binarize` makes bits of.
+            A column for each switch: bits, or numbers that `binarize` turns into bits.
         y : array-like, shape (n_samples,)
             The grasp type of each row.
 
@@ -148,7 +147,7 @@ class ID3Selector(SwitchSelector):
     min_samples : int, default=0
         The paper's S: a node with fewer rows decides nothing, and fewer switches are kept; 0 does not prune.
     binarize : float or None, default=0.0
-        A switch counts as closed where its input exceeds this number; None refuses whatever is not a bit already.
+        A switch counts as closed if its input exceeds this number; None rejects any input that is not a bit.
         (`grow_id3` takes inputs of more than two values.)
 
     Attributes
@@ -156,7 +155,7 @@ class ID3Selector(SwitchSelector):
     tree_ : Tree
         The tree. Its classes are `classes_`' numbers; `tree_.text(names)` prints it.
     order_, gains_, classes_, n_features_in_, feature_names_in_
-        As of `SwitchSelector`; the gains are what the switches brought to the tree, and add up.
+        As in `SwitchSelector`; the gains are those in the tree, and add up.
 
     See Also
     --------
@@ -181,6 +180,6 @@ class ID3Selector(SwitchSelector):
         super().__init__(PAPERS, min_samples=min_samples, binarize=binarize)
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Grow the tree of bits X (n_samples, n_features) and labels y (n_samples,), and keep what it asks for."""
+        """Grow the tree of bits X (n_samples, n_features) and labels y (n_samples,), and keep the inputs it tests."""
         self.tree_ = self._choose(X, y, PAPERS, self.min_samples)
         return self

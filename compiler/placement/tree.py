@@ -1,7 +1,7 @@
-"""A grown decision tree: predicts, prints, goes to JSON and back.
+"""A grown decision tree: predicts, prints, and converts to JSON and back.
 
-Nodes stand in preorder: a node, then its children's subtrees in the order of their values. That order and the number
-of values of each node are all that is needed to know the children.
+Nodes are in preorder: a node, then its children's subtrees in the order of their values. That order and each node's
+number of values determine the children.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,8 +20,8 @@ Label = bool | int | float | str
 
 
 class Node(msgspec.Struct, frozen=True):
-    """One node: `counts` of its rows by class; a decision node also has the number of its `input`, what that input
-    gains there in bits, and the `values` it takes there, ascending, a child for each.
+    """One node: `counts` of its rows by class; a decision node also has the number of its `input`, the input's gain
+    there in bits, and the `values` it takes there, ascending, with a child for each.
     """
 
     counts: tuple[int, ...]
@@ -36,12 +36,12 @@ class Node(msgspec.Struct, frozen=True):
 
     @property
     def majority(self) -> int:
-        """Class number of most rows; the lowest of them if several have most."""
+        """Class number of most rows; of several, the lowest."""
         return self.counts.index(max(self.counts))
 
     @property
     def gains_nothing(self) -> bool:
-        """Whether this is a decision at which no input gains anything by itself."""
+        """Whether this is a decision at which no input has a gain alone."""
         return self.input is not None and self.gain == 0
 
     @property
@@ -97,7 +97,7 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
 
     @property
     def gains(self) -> tuple[float, ...]:
-        """What each of `inputs` brought, in bits: the sum over its nodes of |C| / n * gain."""
+        """Each input's gain, in bits: the sum over its nodes of |C| / n * gain."""
         return tuple(self._gain_of_input.values())
 
     @cached_property
@@ -111,26 +111,26 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
 
     @property
     def depth(self) -> int:
-        """Largest number of decisions on a way from the root to a leaf."""
+        """Largest number of decisions on a path from the root to a leaf."""
         return max(self.depths)
 
     @property
     def n_leaves(self) -> int:
-        """Number of nodes that decide nothing further."""
+        """Number of leaves."""
         return sum(node.input is None for node in self.nodes)
 
     @property
     def n_zero_gain(self) -> int:
-        """Number of decision nodes at which no input gains anything by itself, as in XOR."""
+        """Number of decision nodes at which no input has a gain alone, as in XOR."""
         return sum(node.gains_nothing for node in self.nodes)
 
     @property
     def n_undecided(self) -> int:
-        """Number of leaves of several classes whose rows agree in every input; pruned ones are none of them."""
+        """Number of leaves of several classes whose rows agree in every input; pruned leaves do not count."""
         return sum(node.is_mixed_leaf and node.size >= self.min_samples for node in self.nodes)
 
     def remarks(self, what: str = "input") -> Iterator[str]:
-        """Yield what should not pass in silence: decisions without a gain, and leaves that nothing tells apart."""
+        """Yield warnings: decisions without a gain, and leaves that no input can split."""
         if self.n_zero_gain:
             yield (
                 f"at {counted(self.n_zero_gain, 'node')} no {what} gains anything alone, "
@@ -141,23 +141,23 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
             yield f"at {leaves} rows of several classes agree in every {what}"
 
     def predict(self, X: npt.ArrayLike) -> npt.NDArray[Any]:
-        """Return the label (n,) of each row of X (n, n_inputs); a value not met in growing gets the node's majority."""
+        """Return the label (n,) of each row of X (n, n_inputs); an unseen value gets the node's majority."""
         matrix = check_matrix(X)
         if matrix.shape[1] != self.n_inputs:
             raise PlacementError(f"X has {matrix.shape[1]} inputs, the tree was grown on {self.n_inputs}")
-        answers = np.zeros(len(matrix), dtype=np.intp)
+        labels = np.zeros(len(matrix), dtype=np.intp)
         rows_of = {0: np.arange(len(matrix))}
         for number, node in enumerate(self.nodes):
             rows = rows_of.pop(number, None)
             if rows is None:
                 continue
-            answers[rows] = node.majority
+            labels[rows] = node.majority
             if node.input is not None:
                 rows_of |= _share_out(rows, matrix[rows, node.input], node.values, self.children[number])
-        return np.array(self.classes)[answers]
+        return np.array(self.classes)[labels]
 
     def text(self, names: Sequence[str] = (), class_names: Sequence[str] = ()) -> str:
-        """Return the tree for people, a line a node; names default to x0, x1 ... and `classes`."""
+        """Return the tree as text, one line per node; names default to x0, x1 ... and `classes`."""
         return _tree_text(self, names, class_names)
 
     def to_json(self) -> bytes:
@@ -166,7 +166,7 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
 
     @classmethod
     def from_json(cls, document: bytes | str) -> "Tree":
-        """Return the tree of `to_json`; raise PlacementError if the document is not one, or the tree is not sound."""
+        """Return the tree of `to_json`; raise PlacementError if the document is not one, or the tree is invalid."""
         try:
             return msgspec.json.decode(document, type=cls)
         except (ValueError, RecursionError) as wrong:
@@ -181,7 +181,7 @@ def _share_out(
 
 
 def _check_tree(tree: Tree) -> None:
-    """Raise PlacementError, with the number of the node, if `tree` is not sound."""
+    """Raise PlacementError, with the number of the node, if `tree` is invalid."""
     if not tree.nodes or not tree.classes:
         raise PlacementError("a tree has at least one node and one class")
     waiting = 1
@@ -202,7 +202,7 @@ def _check_node(tree: Tree, number: int, node: Node) -> None:
     if (node.input is None) != (len(node.values) < 2) or (node.input is None and (node.values or node.gain)):
         raise PlacementError(f"node {number} is neither a leaf nor a decision between two values or more")
     if node.input is not None and not 0 <= node.input < tree.n_inputs:
-        raise PlacementError(f"node {number} asks for input {node.input}, there are {tree.n_inputs}")
+        raise PlacementError(f"node {number} tests input {node.input}, there are {tree.n_inputs}")
     if not node.gain >= 0 or any(a >= b for a, b in pairwise((-1, *node.values))):
         raise PlacementError(f"node {number} has a negative gain, or values that do not ascend from 0")
 
@@ -211,7 +211,7 @@ def _tree_text(tree: Tree, names: Sequence[str], class_names: Sequence[str]) -> 
     """Return the text of Tree.text; raise PlacementError if there are names, but not one for each."""
     names, class_names = names_for(tree, names, class_names)
     lines = []
-    # Number of the node, what stands before its own line, and before its children's.
+    # The node's number, and the prefixes of its line and of its children's lines.
     waiting = [(0, "", "")]
     while waiting:
         number, lead, below = waiting.pop()
@@ -224,27 +224,27 @@ def _tree_text(tree: Tree, names: Sequence[str], class_names: Sequence[str]) -> 
 
 
 def sizes_of(tree: Tree, deepest: int | None = None) -> list[int]:
-    """Return how many nodes each node's subtree has, itself among them; of those on the levels up to `deepest`."""
+    """Return the size of each node's subtree, the node included; only of nodes down to level `deepest`."""
     sizes = [int(deepest is None or depth <= deepest) for depth in tree.depths]
     for number in reversed(range(1, len(tree.nodes))):
         sizes[tree.parents[number]] += sizes[number]
     return sizes
 
 
-_ANSWERS = {0: "open", 1: "closed"}
+_STATES = {0: "open", 1: "closed"}
 
 
-def answer_to(tree: Tree, number: int) -> str:
-    """Return "open: " or "closed: ", or the value of an input of more values, that leads to a node; "" at the root."""
+def edge_label(tree: Tree, number: int) -> str:
+    """Return "open: " or "closed: ", or an input's value, on the edge that leads to a node; "" at the root."""
     parent = tree.parents[number]
     if parent < 0:
         return ""
     value = tree.nodes[parent].values[tree.children[parent].index(number)]
-    return f"{_ANSWERS.get(value, str(value))}: "
+    return f"{_STATES.get(value, str(value))}: "
 
 
 def names_for(tree: Tree, names: Sequence[str], class_names: Sequence[str]) -> tuple[Sequence[str], Sequence[str]]:
-    """Return a name for each input and each class, those given or their numbers and labels."""
+    """Return a name for each input and each class: those given, or numbers and labels."""
     names = names or [f"x{number}" for number in range(tree.n_inputs)]
     class_names = class_names or [str(label) for label in tree.classes]
     if len(names) != tree.n_inputs or len(class_names) != len(tree.classes):

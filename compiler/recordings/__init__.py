@@ -1,1 +1,1 @@
-"""Labelled grasps: the set, its file, and the ways in and out. Needs only the base dependencies."""
+"""Labelled grasps: the set, its file format, imports and exports. Needs only the base dependencies."""

@@ -1,8 +1,8 @@
 """Arrays in npz files: sealed ones with a JSON header, as the payload of our own files, and users' tables.
 
 No array is allocated before its claimed size is checked. Our own npz is an uncompressed zip of .npy members, the header
-among them as bytes. Uncompressed, so that the same content gives the same bytes whatever zlib is installed, and so that
-no file can ask for more memory than it is long.
+among them as bytes. It is uncompressed so that the same content gives the same bytes with every version of zlib, and so
+that no file can claim more memory than its length.
 """
 
 import io
@@ -28,7 +28,7 @@ from .errors import COLUMNS, LARGEST, ROWS, TableError, unpacked
 
 _MAGIC = b"\x93NUMPY"
 _LARGEST = 10_000  # bytes
-# Every length ends in a comma or at the bracket: where neither follows, no other way to cut the digits is tried.
+# Every length ends in a comma or at the bracket: otherwise no other way to split the digits is tried.
 _HEAD = re.compile(
     r"\{'descr': '([^']{1,40})', 'fortran_order': (True|False), "
     r"'shape': \(((?:[0-9]{1,18}+(?:, ?|(?=\))))*+)\), ?\}\s*"
@@ -38,7 +38,7 @@ _PLAIN = re.compile(r"[<>|=]?[biufSU][0-9]{1,9}")
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What an array is: its type, shape and order, and how many bytes it has, of which `length` are this head's."""
+    """The header of an array: its type, shape and order, and its size in bytes, of which `length` are the header's."""
 
     dtype: np.dtype[np.generic]
     shape: tuple[int, ...]
@@ -51,13 +51,13 @@ class Head:
         return self.dtype.itemsize * math.prod(self.shape)
 
     def array(self, data: "memoryview | NDArray[np.uint8]") -> NDArray[np.generic]:
-        """Return the array in its bytes, of which there must be `size`."""
+        """Return the array stored in `data`, which must have `size` bytes."""
         flat: NDArray[np.generic] = np.frombuffer(data, self.dtype)
         return flat.reshape(self.shape, order="F" if self.fortran else "C")
 
 
 def read_head(file: BinaryIO) -> Head:
-    """Read the head of an array of numbers or text. Raises ValueError with the reason where it is none."""
+    """Read the header of an array of numbers or text. Raises ValueError with the reason if there is none."""
     opening = file.read(8)
     if opening[:6] != _MAGIC or opening[6:] not in (b"\1\0", b"\2\0", b"\3\0"):
         raise ValueError("it does not begin as a .npy file does")
@@ -82,7 +82,7 @@ def read_head(file: BinaryIO) -> Head:
 
 AnyArray = NDArray[np.generic]
 
-# What zipfile answers bad bytes with.
+# What zipfile raises for invalid bytes.
 UNREADABLE = (
     zipfile.BadZipFile,
     zlib.error,
@@ -103,7 +103,7 @@ def pack(header: bytes, arrays: Mapping[str, AnyArray]) -> bytes:
         for name, array in {_HEADER: np.frombuffer(header, np.uint8), **arrays}.items():
             content = io.BytesIO()
             npy.write_array(content, np.ascontiguousarray(array), version=(1, 0), allow_pickle=False)
-            # A ZipInfo made by hand is dated 1980-01-01; the default would be now.
+            # A ZipInfo created by hand is dated 1980-01-01; the default would be now.
             members.writestr(zipfile.ZipInfo(f"{name}.npy"), content.getvalue())
     return file.getvalue()
 
@@ -119,14 +119,14 @@ def unpack(payload: bytes, what: str = "payload") -> tuple[bytes, dict[str, AnyA
             infos = members.infolist()
             if packed := [info.filename for info in infos if info.compress_type != zipfile.ZIP_STORED]:
                 raise SealError(f"array {packed[0]} is compressed")
-            # Entries of a zip may share their bytes: read one by one they would take any multiple of the file.
+            # Entries of a zip may share bytes: read separately, they could take any multiple of the file's size.
             if sum(info.file_size for info in infos) > len(payload):
                 raise SealError(f"{what} holds arrays that overlap")
             arrays = {info.filename.removesuffix(".npy"): _read(members, info) for info in infos}
             if len(arrays) != len(infos):
                 raise SealError(f"{what} holds an array twice")
     except UNREADABLE as reason:
-        raise SealError(f"{what} holds no arrays that can be read: {reason}") from reason
+        raise SealError(f"{what} holds no readable arrays: {reason}") from reason
     header = arrays.pop(_HEADER, None)
     if header is None or header.dtype != np.uint8:
         raise SealError(f"{what} holds no header")
@@ -151,9 +151,9 @@ _CHUNK = 1 << 20
 
 
 def read_arrays(path: Path) -> dict[str, AnyArray]:
-    """Return column by name: a 1-D array is one, a 2-D array X gives X.0, X.1 and on; numbers, or text as str.
+    """Return column by name: a 1-D array is one column, a 2-D array X gives X.0, X.1 ...; numbers, or text as str.
 
-    Raises TableError with the reason, OSError as the operating system gives it.
+    Raises TableError with the reason, and OSError from the operating system.
     """
     with open_file(path, TableError) as file:
         try:
@@ -212,10 +212,10 @@ def _array(members: zipfile.ZipFile, info: zipfile.ZipInfo) -> AnyArray:
             head = read_head(file)  # type: ignore[arg-type]
             _check_shape(head)
             if head.length + head.size != info.file_size:
-                raise TableError(f"it is of other length than its shape {head.shape} takes")
+                raise TableError(f"its length does not match its shape {head.shape}")
         except ValueError as reason:
             raise TableError(f"array {_shown(info)}: {reason}") from reason
-        # Claimed, not yet taken: pages of it become memory as they are filled.
+        # Only reserved: its pages take memory as they are filled.
         data = np.empty(head.size, np.uint8)
         got = 0
         while got < head.size:
@@ -249,7 +249,7 @@ def _text(what: str, array: AnyArray) -> AnyArray:
     if array.dtype.kind == "U" and array.size:
         points = array.ravel(order="K").view(np.dtype(np.uint32).newbyteorder(array.dtype.byteorder))
         if points.max() >= _CODE_POINTS:
-            raise TableError(f"array {what} holds characters that there are not")
+            raise TableError(f"array {what} holds invalid characters")
     return array
 
 

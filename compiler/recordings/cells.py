@@ -1,4 +1,4 @@
-"""The cells of a column as numbers, bits, codes and names; which of them are missing, and which are wrong."""
+"""The cells of a column as numbers, bits, codes and names, and which of them are missing or invalid."""
 
 import math
 import re
@@ -39,7 +39,7 @@ class Parsed(Generic[Value]):
 
 
 def numbers(column: Column, decimal: str = ".") -> Parsed[np.float64]:
-    """Read `column` as finite numbers with the sign `decimal` before their fractions.
+    """Read `column` as finite numbers with the decimal sign `decimal`.
 
     Missing: empty, ?, NA, N/A, NaN, null, none; wrong: anything else, and infinity.
     """
@@ -85,11 +85,11 @@ def times(column: Column, decimal: str = ".") -> Parsed[np.float64]:
 
 
 def names(column: Column, cells: bool = False, size: int = 0) -> Parsed[np.str_]:
-    """Read `column` as names without outer blanks; missing: empty and ?, wrong: by the rule of names. With `cells` they
-    are written as cells of a spreadsheet.
+    """Read `column` as names without outer blanks; missing: empty and ?, wrong: invalid names.
 
-    Numbers are names too, but for NaN, which is missing, and infinity, which is wrong. Whole ones read as such: 3, not
-    3.0. Raises RecordingError where the names are too long for so many rows of a file of `size` bytes.
+    With `cells` they are written as cells of a spreadsheet. Numbers are names too, except NaN, which is missing, and
+    infinity, which is wrong. Integers are written without decimals: 3, not 3.0. Raises RecordingError if the names are
+    too long for the number of rows of a file of `size` bytes.
     """
     missing, wrong = (np.zeros(len(column), np.bool_) for _ in range(2))
     found: list[NDArray[np.str_]] = []
@@ -107,7 +107,7 @@ def names(column: Column, cells: bool = False, size: int = 0) -> Parsed[np.str_]
 
 
 def _names(column: Column, cells: bool) -> Iterator[tuple[list[str], set[str]]]:
-    """Yield the names in a column, piece by piece, and those of the piece that are wrong."""
+    """Yield the names in a column, piece by piece, with the wrong ones of each piece."""
     if isinstance(column, np.ndarray) and column.dtype.kind != "U":
         values = _floats(column)
         for start in range(0, len(values), _PIECE):
@@ -116,23 +116,23 @@ def _names(column: Column, cells: bool) -> Iterator[tuple[list[str], set[str]]]:
         return
     for piece in pieces(column):
         texts = [text_of(cell.strip()) if cells else cell.strip() for cell in piece]
-        # Looked up as str: an array of them would lose NULs at their ends.
+        # Looked up as str: an array would lose NULs at the ends.
         yield texts, {text for text in {*texts} - MISSING_NAMES if fault(text)}
 
 
 def _name_of_number(number: float) -> str:
     if math.isnan(number):
         return ""
-    # Adding zero makes -0.0 the 0.0 that it equals.
+    # Adding zero turns -0.0 into 0.0.
     return np.format_float_positional(number + 0.0, trim="-")
 
 
-# "1.000" is a thousand where a comma is the decimal sign: so it is wrong, not one.
+# "1.000" means a thousand where a comma is the decimal sign: so it is wrong, not one.
 _COMMA = str.maketrans({",": ".", ".": "_"})
 
 
 def _parsed(column: Column, words: dict[str, float], decimal: str) -> Parsed[np.float64]:
-    """Return the cells as floats, NaN where one is missing or wrong; `words` are read besides numbers."""
+    """Return the cells as floats, NaN if missing or wrong; `words` are read in addition to numbers."""
     if isinstance(column, np.ndarray) and column.dtype.kind != "U":
         values = _floats(column)
         missing = np.isnan(values)
@@ -149,14 +149,14 @@ def _parsed(column: Column, words: dict[str, float], decimal: str) -> Parsed[np.
 
 
 def _floats(column: AnyArray) -> NDArray[np.float64]:
-    # A number too large for a double becomes infinite, and is refused with its row.
+    # A number too large for a double becomes infinite, and is rejected with its row.
     with np.errstate(over="ignore"):
         return column.astype(np.float64)
 
 
 def _numbers(cells: list[str], words: dict[str, float]) -> NDArray[np.float64]:
     try:
-        # All at once is several times faster; float() would read 1_000 as a thousand.
+        # Convert all at once, which is several times faster; float() would read 1_000 as a thousand.
         values = np.array(cells, dtype=np.float64)
         return values if not any("_" in cell for cell in cells) else _one_by_one(cells, words)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Values into codes: on a calibration or a grid, what that costs, and which grid keeps what the values tell."""
+"""Convert values to codes on a calibration or a grid, measure the loss, and find a grid without loss."""
 
 import math
 from collections.abc import Iterable
@@ -15,12 +15,12 @@ from .errors import TableError, list_rows
 from .graspset import CODES, LARGEST_VALUE, Joint
 from .summary import Finding
 
-# Where the second point of a grid's straight line lies: so far out that its step is the grid to a bit or two.
+# The second point of a grid's straight line: so far out that its step equals the grid within a bit or two.
 _FAR = 1000
 
 
 class CodingCost(msgspec.Struct, frozen=True):
-    """What coding one joint lost: errors in `unit`, distinct values before and after."""
+    """The loss from coding one joint: errors in `unit`, distinct values before and after."""
 
     joint: str
     unit: str
@@ -37,7 +37,7 @@ def code_joint(
     """Return the codes (n,) of one column of finite `values` (n,), their calibration, and their cost.
 
     Raises TableError naming the first of `rows` whose code lies outside 0..65535; RecordingError if the calibration is
-    no straight line.
+    not a straight line.
     """
     if isinstance(entry, TaxelColumns) and not entry.is_coded:
         whole = bool((values == np.rint(values)).all()) and values.min() >= 0 and values.max() < CODES
@@ -74,7 +74,7 @@ def _joint(name: str, entry: JointColumns, least: float) -> Joint:
     if entry.is_counts:
         return Joint(name, entry.unit, 0, 0.0, 1, 1.0)
     steps = least / entry.step
-    # Where the grid cannot be counted, no Joint will have it either.
+    # If the grid is too fine to count, a Joint cannot have it either.
     floor = math.floor(steps) * entry.step if math.isfinite(steps) else least
     origin = floor if entry.origin is None else entry.origin
     return Joint(name, entry.unit, 0, origin, _FAR, origin + _FAR * entry.step)
@@ -86,18 +86,18 @@ def _over_range(joint: Joint, bits: int) -> Joint:
     return Joint(joint.name, joint.unit, 0, least, top, most)
 
 
-# Codes between the ends of values that share a decimal place; those between the 1st and 99th percentiles of others.
+# The most codes for values that share a decimal place; the fewest between the 1st and 99th percentiles of others.
 _OWN_STEPS, _STEPS = 20_000, 1000
-# Joints of more values than the one that are left with fewer codes than the other have lost what they tell.
+# Joints with more values than the first number and fewer codes than the second have lost information.
 _MANY, _FEW = 20, 10
 
 
 def sound_grid(values: NDArray[np.float64]) -> float:
     """Return a grid for finite `values`.
 
-    It is the decimal place that all of them end at, where that takes no more than 20,000 codes; otherwise 1, 2 or 5
-    times a power of ten: the widest with a thousand steps between the 1st and 99th percentiles, unless the rest of the
-    values would then have no codes.
+    It is the last decimal place of the values, if that takes at most 20,000 codes; otherwise 1, 2 or 5 times a power of
+    ten: the widest with a thousand steps between the 1st and 99th percentiles, unless the other values would then have
+    no codes.
     """
     least, largest = float(values.min()), float(values.max())
     span, far = largest - least, max(abs(least), abs(largest))
@@ -121,13 +121,13 @@ def _round_down(number: float) -> float:
 
 
 def _round_up(number: float) -> float:
-    """Return the least of 1, 2 and 5 times a power of ten that is not below `number`."""
+    """Return the smallest of 1, 2 and 5 times a power of ten that is not below `number`."""
     exponent = math.floor(math.log10(number) + 1e-9)
     return next(step for factor in (1, 2, 5, 10) if (step := float(f"{factor}e{exponent}")) >= number * (1 - 1e-9))
 
 
 def coarse(coded: Iterable[tuple[CodingCost, NDArray[np.float64]]]) -> list[Finding]:
-    """Return a finding about the joints that coding left few of many values, given their costs and values."""
+    """Return a finding about the joints that lost most of their distinct values, given costs and values."""
     lost = [
         (cost, sound_grid(values))
         for cost, values in coded

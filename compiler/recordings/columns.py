@@ -1,4 +1,4 @@
-"""`columns.toml`: which column of a table is the label, the subject, a switch, a joint, and how they are read."""
+"""`columns.toml`: the role of each column of a table (label, subject, switch, joint ...), and how to read it."""
 
 import codecs
 import glob
@@ -21,11 +21,11 @@ from thenar.runtime.toml_struct import convert
 from .errors import ColumnsError
 
 DEFAULT_GRID = 0.5
-# Codecs of Python that are no encodings of files.
+# Codecs of Python that are not text encodings.
 _NO_ENCODINGS = {"idna", "punycode", "undefined", "unicode_escape", "raw_unicode_escape", "mbcs", "oem"}
-# A name whose every letter is escaped is three times as long.
+# A name in which every letter is escaped is three times as long.
 LONGEST_GLOB = 3 * LONGEST_NAME
-# Globs times columns: some seconds.
+# The limit on globs times columns: some seconds.
 COMPARISONS = 20_000_000
 
 
@@ -39,11 +39,11 @@ class Calibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
 
 
 class JointColumns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Joint columns that are coded alike.
+    """Joint columns with the same coding.
 
-    codes = true: the table holds integer codes 0..65535, with a `calibration` or without. Otherwise it holds values in
-    `unit`: coded by `calibration`, or on a `grid` that starts at `origin` (default: the column's least value, rounded
-    down to the grid).
+    codes = true: the table holds integer codes 0..65535, with or without a `calibration`. Otherwise it holds values in
+    `unit`: coded by `calibration`, or on a `grid` that starts at `origin` (default: the column's smallest value,
+    rounded down to the grid).
     """
 
     columns: tuple[str, ...]
@@ -73,11 +73,12 @@ class JointColumns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
 
 
 class TaxelColumns(JointColumns, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
-    """Analog columns. They are kept as codes, as joints are, and a placement chooses their levels: threshold "learnt".
-    With another threshold, a number or "otsu", which is found column by column, they become switches, closed above it.
+    """Analog columns. With threshold "learnt" they are kept as codes, like joints, and a placement chooses their
+    levels.
 
-    Where nothing is said of the codes, whole numbers are taken as they are, and others are put on a sound grid. `bits`
-    states counts of a converter of so many bits: the ends of its range become the two points of the calibration.
+    With another threshold, a number or "otsu" (computed per column), they become switches that close above it. Without
+    settings for the codes, integers are used as they are, and other numbers are put on a suitable grid. `bits` means
+    counts of a converter with this many bits: the ends of its range become the two points of the calibration.
     """
 
     threshold: float | Literal["otsu", "learnt"] = "learnt"
@@ -100,7 +101,7 @@ class TaxelColumns(JointColumns, frozen=True, forbid_unknown_fields=True, omit_d
 
     @property
     def is_coded(self) -> bool:
-        """Whether it is said how the columns become codes."""
+        """Whether the coding of the columns is given."""
         return self.is_counts or not (self.grid is None and self.origin is None and self.calibration is None)
 
 
@@ -108,7 +109,7 @@ TimeUnit = Literal["s", "ms", "us", "ns"]
 
 
 class TextFormat(NamedTuple):
-    """How a table of text is written: `delimiter` None is the suffix's, a tab in .tsv and a comma elsewhere."""
+    """The format of a text table: `delimiter` None means the default, a tab for .tsv and a comma otherwise."""
 
     delimiter: str | None = None
     decimal: str = "."
@@ -123,10 +124,10 @@ PLAIN = TextFormat()
 class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A columns.toml, key by key. Lists of inputs hold globs (`*`, `?`, `[...]`); other keys hold columns by name.
 
-    A label, subject, object, session or trial may be spread over several columns: what they say together counts.
-    `frames` says how trials are told apart otherwise: "independent" states that each row is one; after "restart" one
-    begins where `time` does not rise, or another label, subject, object or session comes. Labels in `none` mean that
-    nothing is held, as "none" always does; with "" among them, so does an empty cell.
+    A label, subject, object, session or trial may be spread over several columns, whose values are combined. Otherwise
+    `frames` defines the trials: "independent" makes each row one; with "restart" a trial begins where `time` does not
+    increase, or the label, subject, object or session changes. Labels in `none` mean that nothing is held, as "none"
+    always does; with "" among them, so does an empty cell.
     """
 
     label: str | tuple[str, ...]
@@ -162,29 +163,29 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
         if not _is_encoding(self.encoding):
             raise ValueError(f"`encoding` must be one that Python knows, not {shortened(repr(self.encoding))}")
         if self.frames == "restart" and self.trial is not None:
-            raise ValueError("`frames` = 'restart' takes no `trial`")
+            raise ValueError("`frames` = 'restart' excludes `trial`")
         if self.time_unit is not None and self.time is None:
-            raise ValueError("`time_unit` is that of `time`, which names no column")
+            raise ValueError("`time_unit` is given without `time`")
         if isinstance(self.taxonomy, dict) and len(self.taxonomy) != 1:
             raise ValueError("`taxonomy` as a table holds one name and its list of types")
         if not self.parts("label"):
             raise ValueError("`label` must name a column")
 
     def parts(self, key: str) -> tuple[str, ...]:
-        """The columns that a key of names holds."""
+        """The columns named by this key."""
         value: str | tuple[str, ...] | None = getattr(self, key)
         return (value,) if isinstance(value, str) else value or ()
 
     @property
     def text(self) -> TextFormat:
-        """How the table is written."""
+        """The format of the table."""
         return TextFormat(self.delimiter, self.decimal, self.encoding, self.quote, self.header)
 
 
 def _is_encoding(name: str) -> bool:
     try:
         known = codecs.lookup(name).name not in _NO_ENCODINGS
-        # Codecs from bytes to bytes refuse to decode.
+        # Codecs from bytes to bytes cannot decode.
         return known and bool(b"  ".decode(name, "replace"))
     except (LookupError, ValueError, TypeError):
         return False
@@ -192,7 +193,7 @@ def _is_encoding(name: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The columns of one table, by what they are; taxels and joints with the entry that says how to read each."""
+    """The columns of one table by role; taxels and joints with the entry that says how to read them."""
 
     switches: tuple[str, ...]
     taxels: tuple[tuple[str, TaxelColumns], ...]
@@ -201,7 +202,7 @@ class Selection:
 
     @property
     def coded(self) -> tuple[tuple[str, JointColumns], ...]:
-        """The columns that become codes: the joints, then the taxels that stay analog."""
+        """The columns that become codes: the joints, then the analog taxels."""
         return (*self.joints, *self.learnt)
 
 
@@ -211,14 +212,14 @@ def read_columns(path: Path) -> Columns:
     return convert(source, (), source.tables(), Columns)
 
 
-# The keys that name columns which are no inputs.
+# The keys that name columns other than inputs.
 KEYS = ("label", "subject", "object", "session", "trial", "time")
 
 
 def select(columns: Columns, names: Sequence[str]) -> Selection:
-    """Find the columns that `columns` speaks of among a table's `names`.
+    """Find the columns that `columns` refers to among a table's `names`.
 
-    Raises ColumnsError if a column is missing, used twice, a glob matches nothing, or nothing is an input.
+    Raises ColumnsError if a column is missing or used twice, a glob matches nothing, or there are no inputs.
     """
     there = set(names)
     for key in KEYS:
@@ -231,7 +232,7 @@ def select(columns: Columns, names: Sequence[str]) -> Selection:
         *(entry.columns for entry in columns.joints),
     ]
     _check_globs([pattern for patterns in lists for pattern in patterns], names)
-    # One match more than there are columns, and some column is matched twice.
+    # One match more than there are columns means that some column is matched twice.
     found = list(islice(_matched(columns, names), len(names) + 1))
     used = Counter([*(name for key in KEYS for name in columns.parts(key)), *(name for name, _ in found)])
     if twice := [name for name, times in used.items() if times > 1]:
@@ -250,7 +251,7 @@ def select(columns: Columns, names: Sequence[str]) -> Selection:
 
 
 def _check_globs(globs: Sequence[str], names: Sequence[str]) -> None:
-    """Raise ColumnsError where finding the columns of so many globs, or of such long ones, would take too long."""
+    """Raise ColumnsError if there are too many globs, or too long ones, to match in reasonable time."""
     longest = max(globs, key=len, default="")
     if len(longest) > LONGEST_GLOB:
         raise ColumnsError(f"the glob {shortened(repr(longest))} has more than {LONGEST_GLOB} characters: shorten it")
@@ -261,7 +262,7 @@ def _check_globs(globs: Sequence[str], names: Sequence[str]) -> None:
 
 
 def _matched(columns: Columns, names: Sequence[str]) -> Iterator[tuple[str, JointColumns | None]]:
-    """Yield each column that a glob finds, with the entry of the taxel or joint that it is, None for a switch."""
+    """Yield each matched column, with its taxel or joint entry, None for a switch."""
     there = frozenset(names)
     for pattern in columns.switches:
         yield from ((name, None) for name in _matches("switches", pattern, names, there))

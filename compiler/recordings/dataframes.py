@@ -1,4 +1,4 @@
-"""A pandas DataFrame into a `GraspSet`; the way back is in export.py."""
+"""Convert a pandas DataFrame to a `GraspSet`; export.py has the other direction."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,7 +32,7 @@ def from_dataframe(frame: "pd.DataFrame", columns: Columns | str | Path | None =
 
 
 def _said(frame: "pd.DataFrame") -> Columns | None:
-    """Return what a frame says of its columns itself."""
+    """Return the columns that a frame describes in its attributes."""
     text = frame.attrs.get(COLUMNS_TOML)
     if not isinstance(text, str):
         return None
@@ -48,9 +48,9 @@ def _proposed(table: Table) -> Columns:
 
 
 def table_of(frame: "pd.DataFrame") -> Table:
-    """Return the table in a DataFrame, whose rows count from 0, as `iloc` counts them. Its index is left out.
+    """Return the table in a DataFrame, with rows counted from 0, as in `iloc`. The index is ignored.
 
-    Raises TableError where it has no rows, or columns of one name.
+    Raises TableError if it has no rows, or duplicate column names.
     """
     if not len(frame):
         raise TableError(f"{_WHAT} has no rows")
@@ -61,7 +61,7 @@ def table_of(frame: "pd.DataFrame") -> Table:
 
 
 def _column(series: "pd.Series", name: str) -> Column:
-    """Return numbers and bits as float64, NaN where one is missing, and all else as text, empty where it is missing."""
+    """Return numbers and bits as float64, NaN if missing, and everything else as text, empty if missing."""
     from pandas.api.types import is_complex_dtype, is_numeric_dtype
 
     if is_complex_dtype(series):

@@ -1,4 +1,4 @@
-"""What can be wrong with recordings: errors, the limits of a file that is read, and what names must be.
+"""Errors in recordings, the size limits of files, and the rules for names.
 
 Within the limits, reading a file of n bytes takes at most 200 MB + 20 n of memory.
 """
@@ -13,7 +13,7 @@ from thenar.runtime.names import LONGEST_NAME, SHOWN, fault, list_names, shorten
 
 
 class RecordingError(ThenarError, ValueError):
-    """A set of grasps contradicts itself, or a label is not in its taxonomy."""
+    """A set of grasps is inconsistent, or a label is not in its taxonomy."""
 
 
 class TableError(ThenarError, ValueError):
@@ -25,26 +25,26 @@ class ColumnsError(ThenarError, ValueError):
 
 
 LARGEST = 1_000_000_000  # bytes of a table, also when it is unpacked
-# Bytes that a packed table may unpack to: a constant, and a number for each byte of its file.
+# Bytes that a packed table may unpack to: a constant, plus a multiple of its file size.
 UNPACKED = 6_000_000
 UNPACKED_EACH = 1
 LONGEST_LINE = 16_000_000  # characters
 ROWS = 1_000_000
 COLUMNS = 100_000
 TYPES = 100_000  # grasp types, and values that an ARFF lists
-# Bytes that the names of grasp types, subjects or objects may take as an array, at four a character: a constant,
-# and a number for each byte of their file.
+# Bytes that the names of grasp types, subjects or objects may take as an array, four per character: a constant, plus a
+# multiple of their file size.
 NAMES = 10_000_000
 NAMES_EACH = 2
 
 
 def unpacked(size: int) -> int:
-    """Return how many bytes a packed table in a file of `size` bytes may unpack to."""
+    """Return the number of bytes that a packed table in a file of `size` bytes may unpack to."""
     return min(LARGEST, UNPACKED + UNPACKED_EACH * size)
 
 
 def check_names(what: str, names: Iterable[str]) -> None:
-    """Raise RecordingError unless `names` are distinct, and good by the one rule for names, `fault`."""
+    """Raise RecordingError unless `names` are distinct and valid by the rules of `fault`."""
     seen: set[str] = set()
     for name in names:
         if reason := fault(name):
@@ -55,15 +55,15 @@ def check_names(what: str, names: Iterable[str]) -> None:
 
 
 def check_simulated(text: str) -> None:
-    """Raise RecordingError unless `text`, which says what simulated a set and contains its name, is good or empty."""
+    """Raise RecordingError unless `text`, the origin of a simulated set including its name, is valid or empty."""
     if text and (reason := fault(text, 2 * LONGEST_NAME)):
         raise RecordingError(f"simulated {shortened(repr(text))} {reason}")
 
 
 def check_room(rows: int, longest: int, size: int) -> None:
-    """Raise RecordingError where names of `longest` characters at most, one a row, need too much memory.
+    """Raise RecordingError if names of at most `longest` characters, one per row, need too much memory.
 
-    An array of text gives every row the room of the longest. `size` is how many bytes their file has.
+    An array of text gives every row the space of the longest. `size` is the size of their file in bytes.
     """
     if 4 * rows * longest > NAMES + NAMES_EACH * size:
         raise RecordingError(f"a name of {longest} characters is too long in a table of {rows} rows: shorten it")

@@ -1,4 +1,4 @@
-"""A `GraspSet` as a table for other programs, and the columns.toml that reads it back."""
+"""Export a `GraspSet` as a table for other programs, with the columns.toml that imports it again."""
 
 import csv
 import glob
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Heads(NamedTuple):
-    """What the columns that are no inputs are called in an exported table."""
+    """The names of the columns other than inputs in an exported table."""
 
     label: str
     subject: str
@@ -38,16 +38,17 @@ class Heads(NamedTuple):
 
 
 def heads_of(grasp_set: GraspSet) -> Heads:
-    """Return "grasp", "subject", "object", "session", "trial", "time_us", with an underline where an input has that
-    name.
+    """Return "grasp", "subject", "object", "session", "trial", "time_us", with an underscore appended where an input
+    has that name.
     """
     taken = {*grasp_set.element_names, *grasp_set.joint_names}
     return Heads(*(_free(name, taken) for name in ("grasp", "subject", "object", "session", "trial", "time_us")))
 
 
 def meta_of(grasp_set: GraspSet) -> dict[str, NDArray[np.generic]]:
-    """Return the columns of a table that are neither inputs nor the label, by their keys in a columns.toml; a session
-    only where the set has several, a time where it is known.
+    """Return the columns other than inputs and label, by their keys in a columns.toml.
+
+    There is a session only if the set has several, and a time only if it is known.
     """
     found = {key: getattr(grasp_set, f"{key}s" if key != "time" else "times_us") for key in Heads._fields[1:]}
     absent = {"time"} if not grasp_set.times_us.size else set()
@@ -56,12 +57,12 @@ def meta_of(grasp_set: GraspSet) -> dict[str, NDArray[np.generic]]:
 
 
 def types_of(grasp_set: GraspSet) -> tuple[str, ...]:
-    """Return the grasp types that there may be, and "none", last, where it occurs."""
+    """Return the grasp types of the taxonomy, followed by "none" if it occurs."""
     return grasp_set.taxonomy.names if grasp_set.is_none.any() else grasp_set.taxonomy.types
 
 
 def columns_of(grasp_set: GraspSet, codes: bool = False) -> str:
-    """Return the text of the columns.toml that makes the set again of its exported table; `codes` as in `export`."""
+    """Return the text of the columns.toml that imports the exported table again; `codes` as in `export`."""
     heads, taxonomy = heads_of(grasp_set), grasp_set.taxonomy
     lines = [f"label = {_text(heads.label)}"]
     lines += [f"{key} = {_text(getattr(heads, key))}" for key in meta_of(grasp_set)]
@@ -84,7 +85,7 @@ def columns_of(grasp_set: GraspSet, codes: bool = False) -> str:
 
 
 def _entry(joints: list[Joint], codes: bool) -> list[str]:
-    """Return the entry of joints, or of taxels, that are calibrated alike."""
+    """Return the entry of joints, or of taxels, with the same calibration."""
     joint = joints[0]
     points = {key: getattr(joint, key) for key in ("code_a", "value_a", "code_b", "value_b")}
     calibration = ", ".join(f"{key} = {number!r}" for key, number in points.items())
@@ -97,7 +98,7 @@ def _entry(joints: list[Joint], codes: bool) -> list[str]:
 
 
 def _alike(joints: Iterable[Joint]) -> Iterable[list[Joint]]:
-    """Group neighbours of one calibration; the order of the joints is the order of the codes, so only neighbours."""
+    """Group neighbours with the same calibration; only neighbours, since their order is the order of the codes."""
     return (list(group) for _, group in groupby(joints, key=lambda joint: replace(joint, name="any")))
 
 
@@ -108,7 +109,7 @@ def _free(name: str, taken: set[str]) -> str:
 
 
 def _text(text: str) -> str:
-    # JSON's escapes are TOML's.
+    # JSON's escapes are valid in TOML.
     return json.dumps(text, ensure_ascii=False)
 
 
@@ -120,21 +121,21 @@ def _globs(names: Iterable[str]) -> str:
     return _list(map(glob.escape, names))
 
 
-# The formats that a set is exported in.
+# The formats of an export.
 SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".arff", ".parquet")
-# Under which a DataFrame keeps, in its `attrs`, the text of the columns.toml that makes it a set again.
+# The key in a DataFrame's `attrs` for the text of the columns.toml that makes it a set again.
 COLUMNS_TOML = "thenar"
-# What Weka reads without quotes; everything else it writes in quotes itself.
+# Names that Weka reads without quotes; it quotes all others.
 _BARE = re.compile(r"[A-Za-z0-9_.+-]+")
 
 
 def export(
     grasp_set: GraspSet, path: Path, codes: bool = False, meta: bool = False, columns: Path | None = None
 ) -> None:
-    """Write `grasp_set` to a file of one of SUFFIXES, whole or not at all; joints as values, or as `codes`.
+    """Write `grasp_set` to a file with one of SUFFIXES, completely or not at all; joints as values, or as `codes`.
 
-    An ARFF holds subject, object, session and trial only with `meta` or `columns`. To `columns` goes the columns.toml
-    that imports the table again. Raises TableError for any other suffix.
+    An ARFF holds subject, object, session and trial only with `meta` or `columns`. `columns` is the file for the
+    columns.toml that imports the table again. Raises TableError for any other suffix.
     """
     name = path.name.lower()
     if name.endswith(".arff"):
@@ -154,7 +155,7 @@ def export(
 def to_csv(grasp_set: GraspSet, codes: bool = False, delimiter: str = ",") -> str:
     """Return grasp type, subject, object, trial, time, switches and joints as CSV with one header row.
 
-    A name that a spreadsheet would take for a formula has an apostrophe before it, which importing takes away.
+    A name that a spreadsheet would read as a formula gets an apostrophe in front, which the import removes.
     """
     file, heads, meta = io.StringIO(), heads_of(grasp_set), meta_of(grasp_set)
     writer = csv.writer(file, delimiter=delimiter, lineterminator="\n")
@@ -214,7 +215,7 @@ def _coded(grasp_set: GraspSet) -> Iterable[tuple[Joint, NDArray[np.uint16]]]:
 
 
 def _values(joint: Joint, codes: list[int]) -> list[str]:
-    # Twelve digits tell any two codes of a Joint apart, and hide the last bits of the arithmetic.
+    # Twelve digits distinguish any two codes of a Joint, and hide the last bits of the arithmetic.
     return [f"{value:.12g}" for value in joint.value(codes).tolist()]
 
 
@@ -223,5 +224,5 @@ def _nominal(names: Iterable[str]) -> str:
 
 
 def _quote(name: str) -> str:
-    """Return `name` as ARFF writes it: quoted as Weka quotes, when it must be."""
+    """Return `name` as ARFF writes it, quoted like Weka if necessary."""
     return name if _BARE.fullmatch(name) else "'" + re.sub(r"([\\'\"%])", r"\\\1", name) + "'"

@@ -1,8 +1,8 @@
-"""Tables of other programs: spreadsheets, Parquet, HDF5 and MATLAB files, read by the libraries that know them.
+"""Tables of other programs: spreadsheets, Parquet, HDF5 and MATLAB files, read by their libraries.
 
-They are read in a process whose memory and processor time are limited, and come back as npz: so a file that claims a
-terabyte, or that makes a library crash, ends in a sentence. Nothing is
-unpickled; links out of the file are not followed.
+They are read in a process with limits on memory and processor time, and returned as npz: so a file that claims a
+terabyte, or that crashes a library, ends in an error message. Nothing is unpickled; links to other files are not
+followed.
 """
 
 import os
@@ -25,18 +25,18 @@ from thenar.runtime.names import list_names, shortened
 from .arrays import AnyArray, read_arrays
 from .errors import COLUMNS, LARGEST, ROWS, TableError
 
-# Bytes of memory that reading may take beyond what the libraries have: a constant, and a number for each byte read.
+# Bytes of memory that reading may take in addition to the libraries: a constant, and a factor per byte of the file.
 MEMORY, MEMORY_EACH = 600_000_000, 20
-# Seconds of processor time: a constant, and bytes that a second more may take.
+# Seconds of processor time: a constant, and the number of bytes that add a second.
 CPU_S, CPU_BYTES = 60, 200_000
-# What the child ends with where it says why a file is refused.
+# The exit code of the child if its output says why a file is rejected.
 _REFUSED = 3
 
 Columns = dict[str, AnyArray]
 
 
 def read_foreign(path: Path) -> tuple[Columns, NDArray[np.int64]]:
-    """Return the columns of a table of another program, text or numbers, and its rows' numbers as the user sees them.
+    """Return the columns of a foreign table, text or numbers, and the numbers of its rows as the user sees them.
 
     Raises TableError with the reason.
     """
@@ -118,7 +118,7 @@ def _hdf5(path: Path) -> tuple[Columns, Sequence[int]]:
 
 
 def _dataset(file: Any, item: Any, matlab: bool) -> AnyArray | None:
-    """Return a dataset's content if it is numbers, text, records of them, or cells of MATLAB's with text."""
+    """Return a dataset's content if it is numbers, text, records of them, or a MATLAB cell array with text."""
     import h5py
 
     _check(max(item.shape) if matlab else item.shape[0], min(item.shape) if matlab else 1)
@@ -136,7 +136,7 @@ def _dataset(file: Any, item: Any, matlab: bool) -> AnyArray | None:
 
 
 def _letters(codes: Any) -> str:
-    """Return text of MATLAB's, an array of UTF-16."""
+    """Return a MATLAB text, an array of UTF-16."""
     return bytes(np.asarray(codes, "<u2").ravel(order="F").tobytes()).decode("utf-16-le").rstrip()
 
 
@@ -159,11 +159,9 @@ def _matlab(path: Path) -> tuple[Columns, Sequence[int]]:
 
 
 def _fields(name: str, value: Any) -> Iterator[tuple[str, AnyArray]]:
-    """Yield the columns in a variable of MATLAB's: an array, a cell array, or a structure of them."""
+    """Yield the columns in a MATLAB variable: an array, a cell array, or a structure of them."""
     if not isinstance(value, np.ndarray):
-        raise TableError(
-            f"variable {shortened(repr(name))} is no array: save the columns of a table as arrays of their own"
-        )
+        raise TableError(f"variable {shortened(repr(name))} is not an array: save each column of a table as an array")
     if value.dtype.names and value.size == 1:
         for field in value.dtype.names:
             yield from _fields(field, value.ravel()[0][field])
@@ -179,7 +177,7 @@ def _cell(value: Any) -> object:
 
 
 def _even(found: Mapping[str, AnyArray]) -> tuple[Columns, Sequence[int]]:
-    """Return the arrays as columns; those of one element are left out where others have more."""
+    """Return the arrays as columns; those with one element are left out if others have more."""
     columns: Columns = {}
     for name, array in found.items():
         if array.dtype.names:
@@ -192,7 +190,7 @@ def _even(found: Mapping[str, AnyArray]) -> tuple[Columns, Sequence[int]]:
     if len(lengths) > 1:
         del lengths[1]
     if len(lengths) > 1:
-        raise TableError(f"its arrays have {list_names(list(map(str, sorted(lengths))))} rows, no table")
+        raise TableError(f"its arrays have unequal lengths, {list_names(list(map(str, sorted(lengths))))}")
     rows = next(iter(lengths), 0)
     made: Columns = {}
     for name, column in columns.items():
@@ -202,7 +200,7 @@ def _even(found: Mapping[str, AnyArray]) -> tuple[Columns, Sequence[int]]:
 
 
 def _columns(name: str, array: AnyArray) -> Columns:
-    """Return an array as columns by its own name, or by its name and their numbers."""
+    """Return an array as columns called by its name, or by its name and a number."""
     if array.dtype.kind == "V" or array.ndim > 2:
         return {}
     if array.dtype.kind == "S":
@@ -213,7 +211,7 @@ def _columns(name: str, array: AnyArray) -> Columns:
 
 
 def _array(cells: list[Any]) -> AnyArray:
-    """Return cells as numbers, NaN where one is empty, or as text."""
+    """Return cells as numbers, with NaN for empty ones, or as text."""
     if all(cell is None or cell == "" or isinstance(cell, (int, float)) for cell in cells):
         return np.array([np.nan if cell is None or cell == "" else cell for cell in cells], np.float64)
     if cells and all(isinstance(cell, (list, tuple)) for cell in cells):
@@ -242,7 +240,7 @@ def _check(rows: int, columns: int) -> None:
         raise TableError(f"it has more than {ROWS} rows or {COLUMNS} columns, the most that are read of a table")
 
 
-# By suffix: what is read, the package for it, and how.
+# By suffix: the kind of file, its package, and its reader.
 READERS: dict[str, tuple[str, str, Callable[[Path], tuple[Columns, Sequence[int]]]]] = {
     **dict.fromkeys((".xlsx", ".xls", ".ods"), ("a spreadsheet", "python_calamine", _spreadsheet)),
     ".parquet": ("Parquet", "pyarrow.parquet", _parquet),
@@ -252,7 +250,7 @@ READERS: dict[str, tuple[str, str, Callable[[Path], tuple[Columns, Sequence[int]
 
 
 def _limit(size: int) -> None:
-    """Let this process take so much memory more than it has, and so much time."""
+    """Limit the additional memory and the processor time of this process."""
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_S + size // CPU_BYTES,) * 2)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     status = Path("/proc/self/statm")
@@ -283,7 +281,7 @@ def main(source: str, target: str) -> int:
     except MemoryError:
         print(f"it needs more than {MEMORY} bytes of memory: save it as CSV")
     except Exception as reason:
-        # Whatever a library raises about bytes that it cannot read.
+        # Whatever a library raises for bytes that it cannot read.
         why = " ".join(str(reason).split()) or type(reason).__name__
         print(f"cannot be read as {what}: {shortened(why, 300)}")
     else:
@@ -292,7 +290,7 @@ def main(source: str, target: str) -> int:
 
 
 if __name__ == "__main__":
-    # Without what Python does at its end: a library that was interrupted half-way may crash there.
+    # Skip Python's shutdown: a library that was interrupted half-way may crash there.
     code = main(*sys.argv[1:])
     sys.stdout.flush()
     os._exit(code)

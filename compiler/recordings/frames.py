@@ -1,4 +1,4 @@
-"""Frames that are counted as trials: found by how alike rows are that follow each other."""
+"""Detect frames that are counted as trials, by the similarity of consecutive rows."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +10,10 @@ from .trials import groups
 
 Rows = NDArray[np.intp]
 
-# A frame is less than this share as far from the next as from a row further away: repetitions seldom are, even where
-# they come in blocks of one hand or one action.
+# A frame's distance to the next is below this share of its distance to a row further away. For repetitions this is
+# rare, even if they come in blocks of one hand or one action.
 _ALIKE = 0.25
-# So much more often than by chance ...
+# This many times more often than by chance ...
 _EXCESS = 0.25
 # ... and by this many standard errors, so that few rows are no evidence.
 _ERRORS = 3.0
@@ -21,14 +21,14 @@ _SEED = 1
 
 
 def check_trials(grasp_set: GraspSet, error: type[ThenarError]) -> None:
-    """Raise `error`, with the remedies, if rows that count as trials of their own look like frames of fewer trials.
+    """Raise `error`, with the remedies, if rows that count as separate trials look like frames of fewer trials.
 
-    Does nothing where the set states that its rows are independent.
+    Does nothing if the set states that its rows are independent.
     """
     if not grasp_set.independent and (found := looks_like_frames(grasp_set)):
         raise error(
-            f"{found}: a rate of them would be too high, and its interval too narrow. Name the column that numbers the "
-            'trials (trial = "..." in columns.toml) and import again; or, if each row is a trial of its own, state it '
+            f"{found}: their accuracy would be too high, and its interval too narrow. Name the column that numbers the "
+            'trials (trial = "..." in columns.toml) and import again; or, if each row is a separate trial, state it '
             '(frames = "independent")'
         )
 
@@ -36,12 +36,12 @@ def check_trials(grasp_set: GraspSet, error: type[ThenarError]) -> None:
 def looks_like_frames(grasp_set: GraspSet) -> str | None:
     """Return why rows that count as several trials look like the frames of fewer, or None if they do not.
 
-    Rows of one subject, grasp type, object and session are compared in their order, without their trial numbers; of
-    neighbouring rows of one trial the middle one. Frames of a trial differ far less from the next than from rows a
-    third of the group away or more; repetitions do so by chance, and drift makes them do so a little more often.
-    Chance is taken from two rows that both are far away. Frames whose noise is about as large as what differs between
-    trials are not found, nor is a single trial of each group; but copies are, where joints differ between groups and
-    nothing simulated them. Rows in which nothing is held are not looked at: no rate counts them.
+    Rows of one subject, grasp type, object and session are compared in order, ignoring their trial numbers; for
+    neighbouring rows of one trial only the middle one. Frames of a trial differ far less from the next than from rows a
+    third of the group away or more. For repetitions this happens by chance, and slightly more often with drift; chance
+    is estimated from two rows that are both far away. Not detected are frames whose noise is as large as the difference
+    between trials, and a single trial per group; but copies are, if joints differ between groups and the set is not
+    simulated. Rows in which nothing is held are ignored: no rate counts them.
     """
     grasp_set = grasp_set.without_none()
     order, group = _units(grasp_set)
@@ -49,7 +49,7 @@ def looks_like_frames(grasp_set: GraspSet) -> str | None:
     starts = np.cumsum(sizes) - sizes
     place = np.arange(len(order)) - np.repeat(starts, sizes)
     size = np.repeat(sizes, sizes)
-    # A scene without noise repeats itself, and numbers its repetitions rightly.
+    # A scene without noise repeats itself, and its repetitions are numbered correctly.
     if not grasp_set.simulated and (reason := _copies(grasp_set, order, place, starts)):
         return reason
     this = np.flatnonzero((place + 1 < size) & (size >= 4))
@@ -79,7 +79,7 @@ def _units(grasp_set: GraspSet) -> tuple[Rows, Rows]:
 
 
 def _copies(grasp_set: GraspSet, order: Rows, place: Rows, starts: Rows) -> str | None:
-    """Return why rows look like copies, if most equal the row before, and hardly any group begins as another does."""
+    """Return why rows look like copies, if most equal the previous row while groups rarely start with the same row."""
     if not grasp_set.joints or len(starts) < 3:
         return None
     rows = np.hstack([grasp_set.codes, grasp_set.switches])[order]
@@ -94,7 +94,7 @@ def _copies(grasp_set: GraspSet, order: Rows, place: Rows, starts: Rows) -> str 
 
 
 def _far(place: Rows, size: Rows, random: np.random.Generator) -> Rows:
-    """Return how far away (m,) a row is, drawn from those of the group a third of it away or more, at least two."""
+    """Return a row offset (m,) for each row, drawn from those of the group a third of it away or more, at least two."""
     least = np.maximum(2, -(-size // 3))
     before, after = np.maximum(place - least + 1, 0), np.maximum(size - place - least, 0)
     drawn = random.integers(0, before + after)
@@ -103,7 +103,7 @@ def _far(place: Rows, size: Rows, random: np.random.Generator) -> Rows:
 
 
 def _distances(grasp_set: GraspSet, rows: Rows, others: list[Rows]) -> list[NDArray[np.float64]]:
-    """Return how far rows (m,) are from others: switches as a whole, and each joint, in units of the second's mean."""
+    """Return the distances of rows (m,) to others, by all switches and each joint, in units of the second's mean."""
     bits, codes = grasp_set.switches, grasp_set.codes.astype(np.int32)
     switches = [np.count_nonzero(bits[rows] != bits[other], axis=1)[:, np.newaxis] for other in others]
     joints = [np.abs(codes[rows] - codes[other]) for other in others]

@@ -1,4 +1,4 @@
-"""`GraspSet`: labelled grasps, as everything else in the compiler takes them, and their `.grasps` file.
+"""`GraspSet`: labelled grasps, the input of the rest of the compiler, and their `.grasps` file.
 
 The file is a sealed npz (arrays.py) of a JSON header and these arrays:
 
@@ -41,29 +41,29 @@ if TYPE_CHECKING:
     from .columns import Columns
 
 CODES = 65536
-# So far from the ends of the doubles that spans and margins of values stay finite, and that steps keep all their bits.
+# Far enough from the limits of doubles that spans and margins of values stay finite, and steps keep all their bits.
 LARGEST_VALUE = 1e300
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """One joint of the glove: its name, and what its integer codes mean, by two points of a straight line.
+    """One joint of the glove: its name, and the meaning of its integer codes, as two points of a straight line.
 
-    Codes are what is trained on and recognised; values are for people.
+    Models are trained on codes; values are for people.
 
     Parameters
     ----------
     name, unit : str
-        Of the joint, and of its values, such as "deg".
+        The name of the joint, and the unit of its values, such as "deg".
     code_a, code_b : int
-        Two different codes of 0 to 65535.
+        Two different codes from 0 to 65535.
     value_a, value_b : float
         Their values, within +-1e300.
 
     Raises
     ------
     RecordingError
-        If the two points are no line, or if neighbouring codes would be closer than a billionth of the largest value.
+        If the points do not define a line, or neighbouring codes would be closer than a billionth of the largest value.
 
     Examples
     --------
@@ -91,12 +91,12 @@ class Joint:
         if not (largest <= LARGEST_VALUE and abs(self.step) > max(1e-9 * largest, 1 / LARGEST_VALUE)):
             raise RecordingError(
                 f"joint {self.name} is calibrated to {self.value_a} and {self.value_b} {self.unit}: "
-                "its codes cannot be told apart; take a coarser grid or points further apart"
+                "its codes cannot be distinguished; take a coarser grid or points further apart"
             )
 
     @property
     def step(self) -> float:
-        """What one code is worth, in `unit`; negative when values fall as codes rise."""
+        """The value of one code step, in `unit`; negative if values fall as codes rise."""
         return (self.value_b - self.value_a) / (self.code_b - self.code_a)
 
     def value(self, code: ArrayLike) -> NDArray[np.float64]:
@@ -104,14 +104,14 @@ class Joint:
         return self.value_a + (np.asarray(code, dtype=np.float64) - self.code_a) * self.step
 
     def code(self, value: ArrayLike) -> NDArray[np.float64]:
-        """Return the nearest codes of `value`, as whole floats that may lie outside 0..65535 (infinitely far)."""
+        """Return the nearest codes to `value`, as whole floats that may lie outside 0..65535 (even infinite)."""
         with np.errstate(over="ignore"):
             return np.rint(self.code_a + (np.asarray(value, dtype=np.float64) - self.value_a) / self.step)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GraspSet:
-    """n recorded grasps of s switches and j joints; arrays are checked, and cannot be written to.
+    """n recorded grasps with s switches and j joints; arrays are validated and read-only.
 
     Parameters
     ----------
@@ -122,45 +122,45 @@ class GraspSet:
     codes : (n, j) array of uint16
         The joints' integer codes.
     joints : tuple of Joint
-        The codes' names, and what they mean in degrees or another unit.
+        The names of the codes, and their meaning in degrees or another unit.
     grasps : (n,) array of str
-        The grasp type of each row, which the taxonomy holds, or "none" where nothing is held.
+        The grasp type of each row, a type of the taxonomy, or "none" if nothing is held.
     taxonomy : Taxonomy
-        The grasp types that there may be, in their order.
+        All possible grasp types, in order.
     subjects, objects : (n,) arrays of str
-        Who grasped, and what.
+        Who grasped which object.
     trials : (n,) array of int64
         The number of the repetition. Rows of one subject, grasp type, object, session and number are the frames of one
         trial.
     simulated : str, optional
-        What simulated them; empty: they were recorded.
+        The simulator that produced them; empty: they were recorded.
     sessions : (n,) array of str, optional
-        Between which the glove was taken off; none given: one session, "1".
+        Sessions, between which the glove was taken off. None: a single session, "1".
     independent : bool
-        Whether whoever recorded the rows states that each is a trial of its own, whatever its number is.
+        Whether the rows are stated to be separate trials, whatever their numbers.
     taxels : (n, t) array of uint16, optional
-        The codes of analog columns of which training makes switches, by a threshold that it learns.
+        The codes of analog columns that training turns into switches, with learned thresholds.
     taxel_columns : tuple of Joint
-        Their names, and what their codes mean.
+        Their names, and the meaning of their codes.
     times_us : (n,) array of int64, optional
-        When each row was recorded, in microseconds on a clock of its subject and session; none given: it is not known.
+        The time of each row, in microseconds on a clock of its subject and session. None: unknown.
 
     Attributes
     ----------
     labels : (n,) array of intp
-        The place of each grasp in `taxonomy.types`, and the number of types where nothing is held.
+        The index of each grasp in `taxonomy.types`, and the number of types if nothing is held.
     is_none : (n,) array of bool
         Where nothing is held.
     trial_ids : (n,) array of intp
         The trial of each row, numbered from 0 in the order of first appearance.
     movement_ids : (n,) array of intp
-        The movement of each row: its trial, with the rows before and after it in which nothing is held. No fold parts
+        The movement of each row: its trial, with the rows before and after it in which nothing is held. No fold splits
         the rows of a movement.
 
     Raises
     ------
     RecordingError
-        The message names the array and the row that does not fit.
+        With a message that names the invalid array and row.
 
     Examples
     --------
@@ -223,7 +223,7 @@ class GraspSet:
         self.labels.setflags(write=False)
 
     def _freeze(self, name: str, dtype: type[np.generic], shape: tuple[int, ...]) -> None:
-        """Replace array `name` by its read-only copy; a read-only array is taken as it is."""
+        """Replace array `name` by its read-only copy; a read-only array is used without a copy."""
         given = np.asarray(getattr(self, name))
         if given.shape != shape:
             raise RecordingError(f"{name} has shape {given.shape}, not {shape}")
@@ -260,7 +260,7 @@ class GraspSet:
         return f"GraspSet: {what}, {who}" + (f"\nsimulated: {shortened(self.simulated)}" if self.simulated else "")
 
     def _repr_html_(self) -> str:
-        """Return it as a notebook shows it: the line, and rows and trials of each grasp type."""
+        """Return the representation in a notebook: the line, and rows and trials of each grasp type."""
         first = np.unique(self.trial_ids, return_index=True)[1]
         counts = (
             np.bincount(labels, minlength=len(self.taxonomy.names)) for labels in (self.labels[first], self.labels)
@@ -302,8 +302,9 @@ class GraspSet:
 
     @property
     def movement_ids(self) -> NDArray[np.intp]:
-        """The movement of each row: a trial, with the rows of its number, subject, object and session in which nothing
-        is held; of several trials the one before, or the first.
+        """The movement of each row: a trial, and the rows of its number, subject, object and session without a grasp.
+
+        Such rows belong to the trial before them, or to the first.
         """
         trials, none = self.trial_ids, self.is_none
         if not none.any() or self.independent:
@@ -321,11 +322,11 @@ class GraspSet:
         return groups(joined)
 
     def without_none(self) -> "GraspSet":
-        """Return the set of the rows in which something is held."""
+        """Return the set of the rows with a grasp."""
         return self.rows(~self.is_none) if self.is_none.any() else self
 
     def rows(self, index: ArrayLike) -> "GraspSet":
-        """Return the set of the rows that `index` picks (numbers or a mask of n), in that order."""
+        """Return the set of the rows selected by `index` (numbers or a mask of n), in that order."""
         pick = np.asarray(index)
         pick = pick if pick.size else pick.astype(np.intp)
         return GraspSet(
@@ -347,7 +348,7 @@ class GraspSet:
         )
 
     def fingerprint(self) -> str:
-        """Return the SHA-256 of the content, in hex: equal for equal sets, whatever file or machine they come from."""
+        """Return the SHA-256 of the content, in hex: equal for equal sets, independent of file and machine."""
         names = (self.switch_names, self.joints, self.taxonomy)
         texts = [array.tolist() for array in (self.grasps, self.subjects, self.objects)]
         digest = hashlib.sha256(msgspec.json.encode((len(self), names, texts)))
@@ -366,15 +367,15 @@ class GraspSet:
 
     @property
     def _format(self) -> int:
-        """The format of its file: 2 where there are sessions, taxels, times or rows in which nothing is held, or rows
-        that are stated to be independent.
+        """The format of its file: 2 with sessions, taxels, times, rows in which nothing is held, or rows that are
+        stated to be independent.
         """
         several = (self.sessions != "1").any() or self.times_us.size > 0 or self.is_none.any()
         return 1 + bool(self.independent or self.taxel_columns or several)
 
     @classmethod
     def from_dataframe(cls, frame: "pd.DataFrame", columns: "Columns | str | Path | None" = None) -> "GraspSet":
-        """Return the set in a DataFrame of one row a frame; its index is left out.
+        """Return the set in a DataFrame with one row per frame; its index is ignored.
 
         Parameters
         ----------
@@ -382,13 +383,14 @@ class GraspSet:
             Any dtypes: switches are bool, or 0 and 1; joints are numbers; names are text, numbers or categories. NaN,
             None and NA are missing values.
         columns : Columns, str or Path, optional
-            What the columns are: `thenar.compiler.Columns`, or the path of a columns.toml. A frame of `to_dataframe`
-            says so itself, in its `attrs`; of any other it is found as `thenar import` finds it, from names and values.
+            The roles of the columns: `thenar.compiler.Columns`, or the path of a columns.toml. A frame from
+            `to_dataframe` has them in its `attrs`; for any other they are guessed from names and values, as by `thenar
+            import`.
 
         Raises
         ------
         TableError, ColumnsError, RecordingError
-            As an import of the same table: the message names the rows, as `iloc` counts them, and the columns.
+            As for an import of the same table; the message names rows, as counted by `iloc`, and columns.
 
         Examples
         --------
@@ -398,12 +400,12 @@ class GraspSet:
         >>> GraspSet.from_dataframe(frame, Columns(label="grasp", switches=("thumb",), trial="n"))
         GraspSet: 2 grasps of 2 types (own), 1 switches, 0 joints, 1 subjects, 1 objects
         """
-        # The modules that read and write tables make sets, and so import this one.
+        # Imported late: the modules that read and write tables import this one.
         found: GraspSet = import_module(".dataframes", __package__).from_dataframe(frame, columns)
         return found
 
     def to_dataframe(self, codes: bool = False) -> "pd.DataFrame":
-        """Return the set as a pandas DataFrame, from which `from_dataframe` makes the same set.
+        """Return the set as a pandas DataFrame, from which `from_dataframe` restores the same set.
 
         Parameters
         ----------
@@ -413,12 +415,11 @@ class GraspSet:
         Returns
         -------
         pandas.DataFrame
-            One row a frame: "grasp" (a category of the taxonomy's types, in their order, and of "none" where it
-            occurs), "subject" and "object" (str), "session" (str; only where there are several), "trial" (int64),
-            "time_us" (int64; where it is known), the switches (bool), taxels and joints, in the set's order. Where an
-            input has one of these names, the column has an underline behind it.
-            `attrs["thenar"]` is the text of a columns.toml: roles, calibrations, taxonomy, what simulated the grasps.
-            Parquet keeps it.
+            One row per frame: "grasp" (a category of the taxonomy's types, in order, and "none" if it occurs),
+            "subject" and "object" (str), "session" (str; only if there are several), "trial" (int64), "time_us" (int64;
+            if known), the switches (bool), taxels and joints, in the set's order. If an input has one of these names,
+            an underscore is appended to the column. `attrs["thenar"]` is the text of a columns.toml: roles,
+            calibrations, taxonomy, and the simulator of the grasps. Parquet keeps it.
 
         Examples
         --------
@@ -429,16 +430,18 @@ class GraspSet:
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a `.grasps` file; raises SealError with the reason if it is foreign, cut, altered, too new or wrong."""
+        """Read a `.grasps` file; raises SealError with the reason if it is foreign, truncated, altered, newer or
+        invalid.
+        """
         name = Path(path).name
         _, payload = unseal(read_file(Path(path), LARGEST, SealError), KIND, VERSION, name)
         try:
             return _unpack(cls, len(payload), *unpack(payload, name))
         except (RecordingError, msgspec.DecodeError, ValueError) as reason:
-            raise SealError(f"{name} contradicts itself: {reason}") from reason
+            raise SealError(f"{name} is inconsistent: {reason}") from reason
 
     def save(self, path: str | Path) -> None:
-        """Write a `.grasps` file, whole or not at all; the same set gives the same bytes."""
+        """Write a `.grasps` file, completely or not at all; the same set gives the same bytes."""
         write_atomically(Path(path), self.encoded())
 
     def encoded(self) -> bytes:
@@ -448,7 +451,7 @@ class GraspSet:
 
 KIND = b"THNRGRSP"
 VERSION = 2
-# Rows, columns and grasp types of a set.
+# The most rows, columns and grasp types of a set.
 MOST = 10_000_000
 
 _DTYPES = {"switches": "u1", "codes": "<u2", "taxels": "<u2", "trials": "<i8", "times": "<i8"}
@@ -510,7 +513,7 @@ def _unpack(cls: type[AnyGraspSet], size: int, header_bytes: bytes, arrays: dict
     check_json(header_bytes)
     header = msgspec.json.decode(header_bytes, type=_Header)
     _check_arrays(header, arrays)
-    # Viewed and frozen, so that the set takes it without a copy.
+    # Read-only views, which the set uses without a copy.
     switches = np.unpackbits(arrays["switches"].astype(np.uint8, copy=False), axis=1, count=len(header.switches)).view(
         np.bool_
     )

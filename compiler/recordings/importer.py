@@ -1,4 +1,4 @@
-"""A table and its columns.toml into a `GraspSet`, and a report of what was found, and what coding cost, on the way."""
+"""Import a table and its columns.toml as a `GraspSet`, with a report on the content and on coding losses."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -29,8 +29,9 @@ from .trials import Frames, fill, groups, in_runs, in_time, numbered, otsu, rest
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """What a table holds for a GraspSet: n rows by the numbers the user knows; (n, j) values or codes of the joints;
-    `time` in the table's unit, 0 throughout where it has none.
+    """The content of a table: n rows with the numbers that the user sees; values or codes (n, j) of the joints.
+
+    `time` is in the table's unit, 0 throughout if there is none.
     """
 
     rows: NDArray[np.int64]
@@ -44,18 +45,16 @@ class Readings:
     joints: NDArray[np.float64]
 
     def kept(self, pick: NDArray[np.bool_] | NDArray[np.intp]) -> "Readings":
-        """Return the rows that `pick`, a mask or numbers, takes; arrays of two dimensions are overwritten."""
+        """Return the rows selected by `pick`, a mask or indices; two-dimensional arrays are overwritten."""
         return Readings(**{name: _kept(getattr(self, name), pick) for name in self.__slots__})
 
     def trial_ids(self) -> NDArray[np.intp]:
-        """Return a number (n,) for each row: that of its trial."""
+        """Return the trial number (n,) of each row."""
         return groups(self.labels, self.subjects, self.objects, self.sessions, self.trials)
 
 
 class Read(NamedTuple):
-    """What was read of a table: `times_us`, none where it does not tell; `warnings` of what is odd, `notes` on what was
-    made of it.
-    """
+    """The result of reading a table: `times_us`, None if unknown; `warnings` about oddities, `notes` on conversions."""
 
     readings: Readings
     times_us: NDArray[np.int64]
@@ -64,10 +63,10 @@ class Read(NamedTuple):
 
 
 def read_cells(table: Table, columns: Columns, selection: Selection) -> Read:
-    """Return what `table` holds.
+    """Read the cells of `table`.
 
-    Columns that the user does not name are "1" throughout. Raises TableError naming the first wrong or missing cells
-    and their number.
+    Columns that are not named are "1" throughout. Raises TableError naming the first wrong or missing cells and their
+    number.
     """
     reader = _Reader(table, columns)
     notes: list[str] = []
@@ -111,9 +110,9 @@ def read_cells(table: Table, columns: Columns, selection: Selection) -> Read:
 
 
 def _micros(what: str, columns: Columns, time: NDArray[np.float64], notes: list[str]) -> float:
-    """Return how many microseconds the unit of `time` has, 0.0 where there is no time, or its unit is not known.
+    """Return the number of microseconds in the unit of `time`, 0.0 if there is no time or its unit is unknown.
 
-    Raises TableError where a time is too large.
+    Raises TableError if a time is too large.
     """
     if columns.time is None:
         return 0.0
@@ -129,7 +128,7 @@ def _micros(what: str, columns: Columns, time: NDArray[np.float64], notes: list[
 
 
 def nothing_held(columns: Columns, labels: NDArray[np.str_]) -> NDArray[np.bool_]:
-    """Return which rows (n,) have a label that means, by itself or by `columns`, that nothing is held."""
+    """Return which rows (n,) have a label that means, in general or by `columns`, that nothing is held."""
     types = next(iter(columns.taxonomy.values())) if isinstance(columns.taxonomy, dict) else columns.taxonomy
     meant = {*map(plain, columns.parts("none")), *((NONE,) if isinstance(types, str) or NONE not in types else ())}
     found, where = np.unique(labels, return_inverse=True)
@@ -138,8 +137,10 @@ def nothing_held(columns: Columns, labels: NDArray[np.str_]) -> NDArray[np.bool_
 
 
 def _lend(readings: Readings, none: NDArray[np.bool_], columns: Columns, reader: "_Reader") -> None:
-    """Let cells be empty that say nothing where nothing is held: of the label, if that means none, and of the object,
-    session and trial, which are those of the next row, or the last, in which something is.
+    """Allow cells to be empty in rows in which nothing is held.
+
+    This applies to the label, if an empty one means none, and to object, session and trial, which are taken from the
+    next row in which something is held, or the last.
     """
     if "" in columns.parts("none"):
         reader.excuse(columns.parts("label"), none)
@@ -154,8 +155,9 @@ def _lend(readings: Readings, none: NDArray[np.bool_], columns: Columns, reader:
 
 
 def _runs(readings: Readings, none: NDArray[np.bool_], timeless: bool) -> NDArray[np.int64]:
-    """Return the number (n,) of each row's trial, which begins where time does not rise or anything else changes; rows
-    in which nothing is held have the number of the trial that they lead to.
+    """Return the trial number (n,) of each row; a trial starts where time does not increase or anything else changes.
+
+    Rows in which nothing is held have the number of the trial that follows.
     """
     time = np.arange(len(none), dtype=np.float64) if timeless else readings.time
     number = restarts(readings.trial_ids(), time)
@@ -166,11 +168,11 @@ def _runs(readings: Readings, none: NDArray[np.bool_], timeless: bool) -> NDArra
     return np.unique(number + np.append(leads, False)[number - 1], return_inverse=True)[1] + 1
 
 
-# Read into place, and in columns, so that a large table is in memory only once.
+# Read directly into the result, and by columns, so that a large table is in memory only once.
 
 
 def _switches(reader: "_Reader", selection: Selection, notes: list[str]) -> NDArray[np.bool_]:
-    """Return the switches, those behind thresholds last."""
+    """Return the switches, with those made by thresholds last."""
     names = [*selection.switches, *selection.taxels]
     switches = np.empty((len(reader.table.rows), len(names)), np.bool_, order="F")
     for number, name in enumerate(selection.switches):
@@ -187,7 +189,7 @@ def _switches(reader: "_Reader", selection: Selection, notes: list[str]) -> NDAr
 
 
 def _joints(reader: "_Reader", selection: Selection) -> NDArray[np.float64]:
-    """Return what becomes codes: the joints, then the taxels that stay analog."""
+    """Return the columns that become codes: the joints, then the analog taxels."""
     joints = np.empty((len(reader.table.rows), len(selection.coded)), order="F")
     for number, (name, entry) in enumerate(selection.coded):
         parse, expected = (codes, "codes 0..65535") if entry.is_counts else (numbers, "finite numbers")
@@ -196,18 +198,18 @@ def _joints(reader: "_Reader", selection: Selection) -> NDArray[np.float64]:
 
 
 def _check_told(what: str, trial_ids: NDArray[np.intp]) -> None:
-    """Raise ColumnsError where rows may be frames of one trial, and nothing says whether they are."""
+    """Raise ColumnsError if rows may be frames of one trial, and nothing says whether they are."""
     shared = np.bincount(trial_ids)[trial_ids] > 1
     if shared.any():
         raise ColumnsError(
             f"{what}: {int(shared.sum())} rows share subject, grasp type, object and session with others, and nothing "
             "says which of them are frames of one trial: name the column that does (`trial = ...`, or a list of them), "
-            'or state that each row is a trial of its own (`frames = "independent"`)'
+            'or state that each row is a separate trial (`frames = "independent"`)'
         )
 
 
 def _kept(array: NDArray[Value], pick: NDArray[np.bool_] | NDArray[np.intp]) -> NDArray[Value]:
-    """Return the rows of a 1-D or 2-D `array` that `pick` takes; the array itself where a mask takes all."""
+    """Return the rows of a 1-D or 2-D `array` selected by `pick`; the array itself if a mask selects all."""
     if pick.dtype == np.bool_ and pick.all():
         return array
     if array.ndim == 1:
@@ -219,7 +221,7 @@ def _kept(array: NDArray[Value], pick: NDArray[np.bool_] | NDArray[np.intp]) -> 
 
 
 def _dropped(readings: Readings, keep: NDArray[np.bool_], missing: dict[str, NDArray[np.bool_]]) -> list[Finding]:
-    """Return what leaving out all rows but those to `keep` costs."""
+    """Return the findings about leaving out all rows except those to `keep`."""
     rows = readings.rows[~keep]
     if not rows.size:
         return []
@@ -261,7 +263,7 @@ def _filled(
 
 
 def _reduced(readings: Readings, how: str, trial_ids: NDArray[np.intp], notes: list[str]) -> Readings:
-    """Return one row for each trial, made of its frames; all rows where `how` is "none"."""
+    """Return one row per trial, computed from its frames; all rows if `how` is "none"."""
     if how == "none":
         return readings
     frames = Frames(trial_ids)
@@ -286,11 +288,11 @@ _MISSING = 'missing (missing = "keep" fills them, "drop" leaves their rows out)'
 
 
 class _Reader:
-    """Reads columns of one table and keeps account of the cells that are missing or wrong."""
+    """Reads columns of one table and records which cells are missing or wrong."""
 
     def __init__(self, table: Table, columns: Columns) -> None:
         self.table = table
-        # Columns without which a row is not kept: nothing can be put in their place.
+        # Columns that a row must have: there is no substitute for their cells.
         self.needed = {name for key in KEYS if key != "time" for name in columns.parts(key)}
         self.missing: dict[str, NDArray[np.bool_]] = {}
         self.wrong: dict[str, dict[str, NDArray[np.bool_]]] = {}
@@ -306,7 +308,7 @@ class _Reader:
         return parsed.values
 
     def names(self, columns: tuple[str, ...]) -> NDArray[np.str_]:
-        """Return what `columns` say together, with blanks between; "1" where there is none."""
+        """Return the text of `columns`, joined with blanks; "1" if there are none."""
         parts = [self._names(column) for column in columns] or [np.full(len(self.table.rows), "1")]
         joined = parts[0]
         for part in parts[1:]:
@@ -322,13 +324,13 @@ class _Reader:
             raise TableError(f"{self.table.what}: column {shortened(repr(column))}: {reason}") from reason
 
     def time(self, column: str | None) -> NDArray[np.float64]:
-        """Return what `column` says, 0 throughout without one."""
+        """Return the values of `column`, 0 throughout without one."""
         if column is None:
             return np.zeros(len(self.table.rows))
         return self.read(column, times, "finite numbers, or dates with times")
 
     def trials(self, columns: tuple[str, ...], notes: list[str]) -> NDArray[np.int64]:
-        """Return the number of each row's trial: what one column of whole numbers says, otherwise counted from 1."""
+        """Return the trial number of each row: one column of integers as it is, otherwise counted from 1."""
         if not columns:
             return np.ones(len(self.table.rows), np.int64)
         if (
@@ -343,7 +345,7 @@ class _Reader:
         return trials
 
     def excuse(self, columns: tuple[str, ...], rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Take no cell of `columns` in `rows` (n,) for missing; return in which rows (n,) some were."""
+        """Do not count cells of `columns` in `rows` (n,) as missing; return in which rows (n,) some were."""
         lacking = np.zeros(len(rows), np.bool_)
         for name in columns:
             if name in self.missing:
@@ -354,7 +356,7 @@ class _Reader:
         return lacking
 
     def complete(self, missing: str) -> NDArray[np.bool_]:
-        """Return which rows stay; raises TableError on wrong cells, and on missing ones where they are refused."""
+        """Return which rows stay; raises TableError for wrong cells, and for missing ones if they are not allowed."""
         faults = [f"not {expected}: {self._list(columns)}" for expected, columns in self.wrong.items()]
         if self.missing and missing == "refuse":
             faults.append(f"{_MISSING}: {self._list(self.missing)}")
@@ -379,9 +381,9 @@ class _Reader:
 
 
 class ImportReport(msgspec.Struct, frozen=True):
-    """What `thenar import` says: what is in the set, what coding cost per joint, what was made of it, what is odd.
+    """The report of `thenar import`: the content of the set, coding losses per joint, conversions, and oddities.
 
-    none  in how many of the rows nothing is held
+    none  number of rows in which nothing is held
     """
 
     table: str
@@ -401,16 +403,16 @@ class ImportReport(msgspec.Struct, frozen=True):
 
 
 def import_file(table: Path, columns: Path) -> tuple[GraspSet, ImportReport]:
-    """Import the table in file `table` as the columns.toml in file `columns` says.
+    """Import the table in file `table` with the columns.toml in file `columns`.
 
-    Raises TableError, ColumnsError or RecordingError, naming file, rows and columns; OSError as it comes.
+    Raises TableError, ColumnsError or RecordingError naming file, rows and columns, and OSError.
     """
     wanted = read_columns(columns)
     return import_table(read_table(table, wanted.text), wanted)
 
 
 def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport]:
-    """Import `table` as `columns` says; raises TableError, ColumnsError or RecordingError."""
+    """Import `table` with `columns`; raises TableError, ColumnsError or RecordingError."""
     selection = select(columns, list(table.columns))
     readings, times_us, warnings, notes = read_cells(table, columns, selection)
     grasps, taxonomy, aliases = _labels(table, columns, readings)
@@ -421,7 +423,7 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
     costs = tuple(cost for _, _, cost in coded)
     joints, taxels = coded[: len(selection.joints)], coded[len(selection.joints) :]
     empty = np.zeros((len(grasps), 0), np.uint16)
-    # Frozen, so that the set takes them without copies.
+    # Read-only, so that the set uses them without copies.
     for name in readings.__slots__:
         getattr(readings, name).setflags(write=False)
     grasp_set = GraspSet(
@@ -462,7 +464,7 @@ def report_of(
     warnings: Iterable[Finding],
     notes: Iterable[str] = (),
 ) -> ImportReport:
-    """Return what is to be said of `grasp_set`, which was imported from `what`."""
+    """Return the report on `grasp_set`, which was imported from `what`."""
     return ImportReport(
         table=what,
         rows=len(grasp_set),
@@ -482,7 +484,7 @@ def report_of(
 
 
 def _labels(table: Table, columns: Columns, readings: Readings) -> tuple[NDArray[np.str_], Taxonomy, list[Finding]]:
-    """Return each row's grasp type, the taxonomy, and the aliases that nobody needed."""
+    """Return each row's grasp type, the taxonomy, and a finding about unused aliases."""
     found, where = np.unique(readings.labels, return_inverse=True)
     if len(found) > TYPES:
         raise TableError(
@@ -498,7 +500,7 @@ def _labels(table: Table, columns: Columns, readings: Readings) -> tuple[NDArray
     if unknown.any():
         strange = [label for label, name in zip(aliased, types, strict=True) if name is None]
         raise TableError(
-            f"{table.what}: {len(strange)} labels in {shortened(repr(columns.label))} are no grasp types of "
+            f"{table.what}: {len(strange)} labels in {shortened(repr(columns.label))} are not grasp types of "
             f"{taxonomy.name}: {_unknown(strange, taxonomy)}; {unknown.sum()} rows have them, "
             f"{list_rows(readings.rows[unknown])}; [labels] can translate them"
         )
@@ -514,12 +516,12 @@ def _labels(table: Table, columns: Columns, readings: Readings) -> tuple[NDArray
     )
 
 
-# Labels that a message names, and those of them with what they may mean.
+# Number of labels named in a message, and of those shown with suggestions.
 _NAMED, _SUGGESTED = 30, 3
 
 
 def _unknown(labels: list[str], taxonomy: Taxonomy) -> str:
-    """Return the labels that are no grasp types, all of them as far as a message goes, the first with suggestions."""
+    """Return the labels that are not grasp types, as many as fit a message, the first with suggestions."""
     long = len(labels) > _SUGGESTED
     shown = [f"{shortened(repr(label))}{taxonomy.suggestion(label)}" for label in labels[:_SUGGESTED]]
     room, rest = 400, labels[_SUGGESTED:_NAMED]

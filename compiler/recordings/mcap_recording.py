@@ -1,14 +1,13 @@
-"""Recordings of guided collections (MCAP) into a `GraspSet`: a row for every trial that was accepted, or a stream.
+"""Import recordings of guided collections (MCAP) as a `GraspSet`: a row per accepted trial, or a stream.
 
-A row is what the devices had delivered last when the grasp was captured. Trials in which nothing is held have a row for
+A row is the last reading of each device when the grasp was captured. Trials in which nothing is held have a row for
 every 0.2 s of their movement. A stream has a row for every 10 ms, with its time: a grasp is held while the hand stays
-as it was captured, and nothing is held in the rest of the trials of a collection that also records the empty hand. Of
-another collection the rest is left out, as are trials that were done again, skipped or undone.
+as it was captured, and nothing is held in the rest of the trials of a collection that also records the empty hand. In
+other collections the rest is left out. Trials that were repeated, skipped or undone are always left out.
 
-The CyberGlove's sensors but the wrist's,
-which the paper does not use either, become joints: raw bytes where the glove was not calibrated, half degrees on one
-scale for all subjects where it was. Taxels keep their counts, what their baselines moved taken off; where they were
-calibrated, the counts of all are those of the first calibration.
+The CyberGlove's sensors except the wrist's, which the paper does not use either, become joints: raw bytes if the glove
+was not calibrated, otherwise half degrees on one scale for all subjects. Taxels keep their counts, corrected for the
+drift of their baselines; if they were calibrated, all counts are converted to the first calibration.
 """
 
 from collections.abc import Iterator, Sequence, Set
@@ -41,16 +40,14 @@ from .summary import Finding, find_oddities
 from .taxonomy import Taxonomy
 
 WRIST = ("wrist_pitch", "wrist_yaw")
-# Half degrees, the paper's resolution, from further down than a calibrated hand reaches.
+# Half degrees, the paper's resolution, from below the range of a calibrated hand.
 _HALF_DEGREES = Calibration(code_a=0, value_a=-250.0, code_b=1000, value_b=250.0)
 _BYTES = Calibration(code_a=1, value_a=1.0, code_b=255, value_b=255.0)
 
 
 @dataclass(frozen=True, slots=True)
 class _Grasp:
-    """A row: what is held in which trial, and the newest frames at `time_us`; counts are the taxels', None for one with
-    a fault.
-    """
+    """A row: the trial and its grasp, and the newest frames at `time_us`; a taxel's count is None if it had a fault."""
 
     label: Label
     switches: SwitchFrame | None
@@ -62,16 +59,14 @@ class _Grasp:
         """Return whether everything that the session records was read."""
         read = self.switches is not None and not self.switches.lost | self.switches.unread
         read = read and len(self.counts) == len(session.taxels) and None not in self.counts
-        # A byte of 0 is a sensor that was not measured.
+        # A byte of 0 means that a sensor was not measured.
         measured = not session.sensors or (self.glove is not None and 0 not in self.glove.sensors)
         return measured and (read or not (session.switches or session.taxels))
 
 
 @dataclass(slots=True)
 class _Attempt:
-    """A trial that was captured: when it began, the row of its capture, when it was judged, its rows, and how it was
-    judged.
-    """
+    """A captured trial: its start, the row of its capture, the time of its judgement, its rows, and the judgement."""
 
     begun_us: int
     captured: _Grasp
@@ -82,7 +77,7 @@ class _Attempt:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """What one session brought."""
+    """The content of one session."""
 
     what: str
     session: Session
@@ -93,16 +88,15 @@ class _Part:
 def import_files(
     paths: Sequence[Path], columns: Path | None = None, stream: bool = False
 ) -> tuple[GraspSet, ImportReport]:
-    """Import one table as the columns.toml in file `columns` says, or recordings, which say themselves what they hold,
-    as a `stream` or trial by trial.
+    """Import one table with the columns.toml in file `columns`, or self-describing recordings.
 
-    Without `columns`, what the columns of a table are is found from their names and values.
-
-    Raises TableError, ColumnsError, RecordingError or McapError, naming file, rows and columns; OSError as it comes.
+    Recordings are imported as a `stream` or trial by trial. Without `columns`, the roles of a table's columns are found
+    from their names and values. Raises TableError, ColumnsError, RecordingError or McapError naming file, rows and
+    columns, and OSError.
     """
     if all(path.suffix.lower() == ".mcap" for path in paths):
         if columns is not None:
-            raise ColumnsError(f"a recording says itself what its columns are: leave {columns.name} out")
+            raise ColumnsError(f"a recording describes its own columns: leave {columns.name} out")
         return import_recordings(paths, stream)
     if stream:
         raise ColumnsError("each row of a table is imported as it is: --stream is for recordings (.mcap), leave it out")
@@ -117,10 +111,10 @@ def import_files(
 
 
 def import_recordings(paths: Sequence[Path], stream: bool = False) -> tuple[GraspSet, ImportReport]:
-    """Import the accepted trials of recordings of one glove and one taxonomy; subjects may differ. As a `stream` they
-    have a row every 10 ms, and what was begun anew is a session of its own.
+    """Import the accepted trials of recordings of one glove and one taxonomy; subjects may differ.
 
-    Raises McapError, TableError or RecordingError naming the file; OSError as it comes.
+    As a `stream` they have a row every 10 ms, and every restart is a separate session. Raises McapError, TableError or
+    RecordingError naming the file, and OSError.
     """
     parts: list[_Part] = []
     findings: list[Finding] = []
@@ -136,21 +130,21 @@ def import_recordings(paths: Sequence[Path], stream: bool = False) -> tuple[Gras
     findings += _left_out(parts, stream)
     if not grasps:
         raise TableError(f"{what}: no trial was accepted; `thenar record` makes recordings with labelled trials")
-    # A row of a stream holds what other rows do.
+    # A row of a stream takes as much memory as any other.
     check_made(f"{what}: its trials", _bytes_of(grasps) // (4 if stream else 1), size)
     grasp_set, costs = _joined(grasps, stream)
     return grasp_set, report_of(what, grasp_set, costs, (*findings, *find_oddities(grasp_set, grasp_set.trials)))
 
 
-# From one row of a trial in which nothing is held to the next, and of a stream.
+# Time between rows of a trial in which nothing is held, and of a stream.
 _MOVING_TICK_US, _TICK_US = 200_000, 10_000
-# A hold of a stream goes on over so many ticks in which the hand seems to have moved; and joints that are so near to
-# those that were captured, as a share of how far they go, have not moved.
+# A hold in a stream survives this many ticks in which the hand seems to move; and joints this close to their captured
+# values, as a share of their range, have not moved.
 _BRIDGED, _NEAR, _NEAR_CODES = 3, 0.25, 2.0
 
 
 def _parts(reader: Reader, stream: bool) -> list[_Part]:
-    """Return every session with trials; those without are not labelled and bring nothing."""
+    """Return every session with trials; sessions without are not labelled and contribute nothing."""
     parts: list[_Part] = []
     for watch in _watched(reader, stream):
         if watch.undone:
@@ -166,7 +160,7 @@ def _without(part: _Part, trials: Set[int]) -> _Part:
 
 
 def _watched(reader: Reader, stream: bool) -> Iterator["_Watch"]:
-    """Yield what came of each session, at its end."""
+    """Yield the state of each session at its end."""
     watch = _Watch(reader, stream)
     for entry in reader:
         if isinstance(entry, Session):
@@ -180,8 +174,10 @@ def _watched(reader: Reader, stream: bool) -> Iterator["_Watch"]:
 
 
 class _Watch:
-    """The session that begins: its newest frames, the trials that were captured, and rows at ticks, of a stream from
-    the first label on, otherwise while the empty hand moves; `undone` are trials of sessions before that do not count.
+    """The current session: its newest frames, captured trials, and rows at ticks.
+
+    A stream has rows from the first label on, other imports only while the empty hand moves; `undone` are trials of
+    earlier sessions that do not count.
     """
 
     def __init__(self, reader: Reader, stream: bool) -> None:
@@ -197,11 +193,11 @@ class _Watch:
         self._due_us: int | None = None
 
     def rows(self) -> tuple[_Grasp, ...]:
-        """Return the rows of trials that were accepted."""
+        """Return the rows of accepted trials."""
         return tuple(row for attempt in self.attempts if attempt.accepted for row in attempt.rows)
 
     def frame(self, frame: SwitchFrame | GloveFrame) -> None:
-        """Take a frame, after the ticks that are due before it."""
+        """Process a frame, after the ticks that are due before it."""
         self._tick(frame.time_us)
         if isinstance(frame, SwitchFrame):
             self._switches = frame
@@ -210,7 +206,7 @@ class _Watch:
             self._glove = frame
 
     def label(self, label: Label) -> None:
-        """Take what became of a trial."""
+        """Process the outcome of a trial."""
         self._tick(label.time_us)
         before, self._label = self._label, label
         if label.event == "begun":
@@ -220,7 +216,7 @@ class _Watch:
         elif label.event == "captured":
             row = self._row(label, label.time_us)
             ticks = self.ticks if self._due_us is not None and not self._stream else []
-            # The last tick may be a moment before the capture.
+            # The last tick may be slightly before the capture.
             enough_us = label.time_us - self._tick_us // 2
             rows = [replace(tick, label=label) for tick in ticks if tick.time_us <= enough_us]
             begun_us = self._begun_us
@@ -246,7 +242,7 @@ class _Watch:
             self.undone.add(trial)
 
     def _tick(self, until_us: int) -> None:
-        """Note rows that are due before `until_us`, while devices are read."""
+        """Add the rows that are due before `until_us`, while devices are read."""
         while self._label is not None and self._due_us is not None and self._due_us < until_us:
             steps = 1
             if self._is_fresh(self._due_us):
@@ -268,9 +264,7 @@ class _Watch:
 
 
 def _streamed(watch: _Watch, collection: Collection) -> tuple[_Grasp, ...]:
-    """Return the rows of a session as a stream: those in which a grasp is held, and those of the other rows of trials
-    in which nothing is.
-    """
+    """Return the rows of a session as a stream: those with a grasp, and the other rows of trials with an empty hand."""
     ticks, attempts, session = watch.ticks, watch.attempts, watch.session
     if not ticks:
         return ()
@@ -285,7 +279,7 @@ def _streamed(watch: _Watch, collection: Collection) -> tuple[_Grasp, ...]:
     empty = empty if NONE not in collection.types else set()
     trial, held = np.full(len(ticks), -1), np.zeros(len(ticks), np.bool_)
     ends = [int(np.searchsorted(time, each.captured.time_us, "right")) for each in attempts]
-    # A damaged recording may say that a grasp was captured before the one before it.
+    # A damaged recording may have captures in the wrong order.
     captures = np.maximum.accumulate([0, *ends, len(ticks)]).tolist()
     records_none = NONE in {task.grasp for task in collection.tasks}
     for number, attempt in enumerate(attempts):
@@ -305,9 +299,9 @@ def _streamed(watch: _Watch, collection: Collection) -> tuple[_Grasp, ...]:
 
 
 def _held(closed: NDArray[np.bool_], codes: NDArray[np.int32], time: NDArray[np.int64], here: int) -> tuple[int, int]:
-    """Return from which of neighbouring rows on, and until before which, the hand stays as it is in row `here`.
+    """Return the range of neighbouring rows in which the hand stays as it is in row `here`, with an exclusive end.
 
-    It does while half of the switches that are closed there still are, and while joints stay near.
+    It stays while at least half of the switches closed there are closed, and joints stay close.
     """
     near = np.zeros(len(time), np.bool_)
     near[here] = True
@@ -327,7 +321,7 @@ def _held(closed: NDArray[np.bool_], codes: NDArray[np.int32], time: NDArray[np.
 
 
 def _taxels(reader: Reader) -> Taxels:
-    """Return the taxels of the session that begins, whose baselines are followed as they were live."""
+    """Return the taxels of the current session, whose baselines are tracked as in a live run."""
     session = reader.session
     settings = parse_harness(session.harness, reader.path.name).taxel_settings if session.taxels else None
     return Taxels(session.taxels, [[]] * len(session.taxels), session.taxel_calibration, settings)
@@ -352,9 +346,7 @@ def _check_alike(parts: Sequence[_Part]) -> None:
             ("unit of the joints", _unit(parts[0].session), _unit(part.session)),
         ):
             if first != other:
-                raise TableError(
-                    f"{part.what} and {parts[0].what} differ in {thing}: import them into sets of their own"
-                )
+                raise TableError(f"{part.what} and {parts[0].what} differ in {thing}: import them into separate sets")
 
 
 def _taxonomy(part: _Part) -> Taxonomy:
@@ -370,7 +362,7 @@ def _taxel_unit(session: Session) -> str:
 
 
 def _bytes_of(grasps: Sequence[tuple[_Part, _Grasp]]) -> int:
-    """Return how much memory the arrays of a set of these grasps take: an array of texts is as wide as its longest."""
+    """Return the memory that the arrays of a set of these grasps take: an array of texts is as wide as the longest."""
     session, labels = grasps[0][0].session, [grasp.label for _, grasp in grasps]
     letters = sum(max(len(getattr(label, name)) for label in labels) for name in ("grasp", "subject", "object"))
     return len(grasps) * (len(session.switches) + 2 * len(session.sensors) + 2 * len(session.taxels) + 4 * letters)
@@ -412,7 +404,7 @@ def _joint(
     scale = _HALF_DEGREES if calibrated else _BYTES
     columns = JointColumns((name,), unit, codes=not calibrated, calibration=scale)
     codes, joint, cost = code_joint(name, columns, values, trials)
-    if calibrated:  # as live bytes are coded, halves between two codes included
+    if calibrated:  # coded like live bytes, including halves between two codes
         coded = _coded(joint)
         parts = {id(part): codes_of_bytes(coded, part.session.calibration) for part, _ in grasps}
         codes = np.array([parts[id(part)][_raw(name, part, grasp)] for part, grasp in grasps], np.uint16)
@@ -420,7 +412,7 @@ def _joint(
 
 
 def _taxel(place: int, grasps: Sequence[tuple[_Part, _Grasp]]) -> tuple[list[int], Joint]:
-    """Return the codes of a taxel: its counts; of another calibration than the first, what means the same there."""
+    """Return the codes of a taxel: its counts, converted to the first calibration if another one was used."""
     first = grasps[0][0].session
     name, line = first.taxels[place], _line(first, place)
     taxel = Joint(name, "counts", 0, 0.0, 1, 1.0)
@@ -436,7 +428,7 @@ def _taxel(place: int, grasps: Sequence[tuple[_Part, _Grasp]]) -> tuple[list[int
 
 
 def _coded(joint: Joint) -> BuildCalibration:
-    """Return what the codes of a joint or a taxel mean, as a build has it."""
+    """Return the meaning of a joint's or taxel's codes in the form that a build uses."""
     return BuildCalibration(0, joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
 
 

@@ -1,4 +1,4 @@
-"""Sets of one glove put together, and one set parted by subject, object or session."""
+"""Merge sets of one glove, and split a set by subject, object or session."""
 
 import re
 from collections.abc import Mapping
@@ -17,9 +17,9 @@ from .graspset import CODES, GraspSet, Joint
 from .taxonomy import Taxonomy, is_published
 
 By = Literal["subject", "object", "session"]
-# Codes of two lines that are one but for the last bits of their arithmetic are at most so far from whole ones.
+# The largest distance from integers of codes on two lines that differ only in the last bits of their arithmetic.
 _SAME = 1e-3
-# So many origins fit into the text that says what simulated a set.
+# The most origins that fit into the description of a simulated set.
 _ORIGINS = 4
 _RECORDED = "recorded grasps"
 
@@ -27,21 +27,21 @@ _RECORDED = "recorded grasps"
 def merge(sets: Mapping[str, GraspSet], each: By | None = None) -> GraspSet:
     """Return the rows of all `sets`, one set after the other.
 
-    They have the same switches and joints, in any order; the first set's order counts. Codes are shifted where two
-    calibrations differ by whole codes, as those of two imports on one grid do. Taxonomies of the user's own are united.
-    Times are kept where all sets have them; rows that are each a trial of their own need none, and get 0.
+    They have the same switches and joints, in any order; the first set's order is used. Codes are shifted if two
+    calibrations differ by whole codes, as for two imports on one grid. Users' own taxonomies are united. Times are kept
+    if all sets have them; rows that are separate trials need none, and get 0.
 
     Parameters
     ----------
     sets : mapping of str to GraspSet
         The sets by name, in order.
     each : "subject", "object" or "session", optional
-        Make the rows of each set a subject (or an object, a session) of their own, which the stem of its name names.
+        Make the rows of each set a separate subject (or object, session), called by the stem of its name.
 
     Raises
     ------
     RecordingError
-        The message names the two sets, and the column, calibration, taxonomy or trial in which they clash.
+        With a message naming the two sets, and the conflicting column, calibration, taxonomy or trial.
 
     Examples
     --------
@@ -90,29 +90,29 @@ def _times(found: GraspSet) -> NDArray[np.int64]:
 def split(grasp_set: GraspSet, by: By) -> dict[str, GraspSet]:
     """Return the set of each subject, object or session, by name in alphabetical order.
 
-    Each keeps all columns and the whole taxonomy, so `merge` gives the rows back, in another order.
+    Each keeps all columns and the whole taxonomy, so `merge` restores the rows, in another order.
 
     Parameters
     ----------
     grasp_set : GraspSet
-        The set to part.
+        The set to split.
     by : "subject", "object" or "session"
-        Of what each part has one.
+        What each part has only one of.
 
     Raises
     ------
     RecordingError
-        If `by` is another word.
+        If `by` is anything else.
     """
     column = _column(grasp_set, by)
     return {name: grasp_set.rows(column == name) for name in np.unique(column).tolist()}
 
 
 def split_into(grasp_set: GraspSet, by: By, folder: Path, *, overwrite: bool = False) -> dict[str, Path]:
-    """Write each set of `split` to a file of `folder`, all of them or none; return the files by name.
+    """Write each set of `split` to a file in `folder`, all of them or none; return the files by name.
 
-    A file is called after its name, such as "subject-anna.grasps"; what is not safe in the name of a file becomes an
-    underline. Other files of the folder stay. Raises RecordingError where a file is there already, unless `overwrite`.
+    A file is called by its name, such as "subject-anna.grasps"; characters that are unsafe in file names become
+    underscores. Other files in the folder stay. Raises RecordingError if a file exists already, unless `overwrite`.
     """
     parts = split(grasp_set, by)
     files = _file_names(by, list(parts))
@@ -129,7 +129,7 @@ def split_into(grasp_set: GraspSet, by: By, folder: Path, *, overwrite: bool = F
 
 
 def _file_names(by: str, names: list[str]) -> dict[str, str]:
-    """Return a file name for each, safe on every system, and told apart where case does not count."""
+    """Return a file name for each, safe on every system, and distinct even where case is ignored."""
     files: dict[str, str] = {}
     taken: set[str] = set()
     for name in names:
@@ -144,7 +144,7 @@ def _file_names(by: str, names: list[str]) -> dict[str, str]:
 
 
 def _of_its_own(name: str, found: GraspSet, each: By) -> GraspSet:
-    """Return the set with the stem of its `name` as its only subject, object or session, or before each of several."""
+    """Return the set with the stem of its `name` as its only subject, object or session, or in front of several."""
     names, where = np.unique(_column(found, each), return_inverse=True)
     stem = Path(name).stem
     called = [stem] if len(names) == 1 else [f"{stem} {one}" for one in names.tolist()]
@@ -154,7 +154,7 @@ def _of_its_own(name: str, found: GraspSet, each: By) -> GraspSet:
 
 def _column(grasp_set: GraspSet, by: By) -> NDArray[np.str_]:
     if by not in get_args(By):
-        raise RecordingError(f"{by!r} is none of {list_names(get_args(By))}")
+        raise RecordingError(f"{by!r} is not one of {list_names(get_args(By))}")
     column: NDArray[np.str_] = getattr(grasp_set, f"{by}s")
     return column
 
@@ -204,7 +204,7 @@ def _check_trials(names: list[str], sets: list[GraspSet]) -> None:
             subject, grasp, thing, session, number = clash[0]
             raise RecordingError(
                 f"{len(clash)} trials are in {owner[clash[0]]} and in {name}, the first of subject {subject}, {grasp} "
-                f"with {thing}, session {session}, trial {number}: if each file is a session of its own, add --each "
+                f"with {thing}, session {session}, trial {number}: if each file is a separate session, add --each "
                 "session; if it is somebody else's, --each subject"
             )
         owner |= trials
@@ -225,24 +225,24 @@ def _coded(names: list[str], sets: list[_Coded]) -> _Coded:
 
 
 def _line(names: list[str], joints: list[Joint]) -> Joint:
-    """Return the one of `joints` on whose line the codes of all others are whole and 0 or more."""
+    """Return the joint on whose line the codes of all others are non-negative integers."""
     first = joints[0]
     for name, joint in zip(names, joints, strict=True):
         shift = first.code_a + (joint.value_a - first.value_a) / first.step - joint.code_a
         drift = abs(joint.step / first.step - 1) * CODES
         if joint.unit != first.unit or max(abs(shift - np.rint(shift)), drift) > _SAME:
             raise RecordingError(
-                f"{shortened(joint.name)} is calibrated otherwise in {name} than in {names[0]}: code 0 is "
+                f"{shortened(joint.name)} is calibrated differently in {name} and in {names[0]}: code 0 is "
                 f"{joint.value(0):.6g} {shortened(joint.unit)} and a step {joint.step:.6g}, not "
                 f"{first.value(0):.6g} {shortened(first.unit)} and {first.step:.6g}; import both with one "
                 "`calibration`, or one `grid` and `origin`"
             )
-    # Where values rise with codes the line that begins lowest; where they fall, highest.
+    # The line that starts lowest, or highest if values fall as codes rise.
     return min(joints, key=lambda joint: float(joint.value(0)) / first.step)
 
 
 def _moved(name: str, line: Joint, own: Joint, codes: NDArray[np.uint16]) -> NDArray[np.int64]:
-    """Return on `line` the codes (n,) that mean what they did on their `own`."""
+    """Return the codes (n,) on `line` with the same meaning as these on `own`."""
     moved = codes.astype(np.int64) + (int(line.code(own.value_a)) - own.code_a)
     if moved.max(initial=0) >= CODES:
         raise RecordingError(f"{name}: {shortened(line.name)} gets codes above {CODES - 1}: import with a coarser grid")
@@ -255,7 +255,7 @@ def _places(wanted: tuple[str, ...], names: tuple[str, ...]) -> list[int]:
 
 
 def _origin(sets: list[GraspSet]) -> str:
-    """Return what simulated any of the sets, so that nobody takes them for recordings."""
+    """Return the simulators of all sets, so that nobody mistakes them for recordings."""
     origins = list(dict.fromkeys(origin for found in sets for origin in found.simulated.split("; ")))
     if len(origins) == 1:
         return origins[0]

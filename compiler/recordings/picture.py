@@ -1,4 +1,4 @@
-"""A set as a picture: how many grasps of each type, which switches and taxels each touches, and its joints' values."""
+"""Draw a set: the number of grasps of each type, its contacts with switches and taxels, and its joint values."""
 
 from typing import TYPE_CHECKING
 
@@ -19,11 +19,11 @@ _BLUE = "#2f6690"
 _PALE = "#8fb3cc"
 _ORANGE = "#e07a1f"
 _JOINTS_A_ROW = 6
-# More joints would make a picture that no program opens.
+# With more joints the picture would be too large for image viewers.
 _DRAWN_JOINTS = 60
-# Pixels; hundreds of grasp types are drawn smaller rather than refused by the renderer.
+# Pixels; hundreds of grasp types are drawn smaller, to stay within the limits of the renderer.
 _TALLEST = 20_000
-# Beyond so many columns their names cannot be read side by side.
+# With more columns than this their names are not legible next to each other.
 _NAMED_SWITCHES = 90
 _LONGEST_NAME = 30
 

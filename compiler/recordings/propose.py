@@ -1,4 +1,4 @@
-"""A columns.toml for a table that has none: what each column is, found from its name and its values, with reasons."""
+"""Propose a columns.toml for a table: the role of each column, from its name and values, with reasons."""
 
 import glob
 import re
@@ -47,26 +47,26 @@ _LISTS = {
     "mainouverte vide reposo descanso ninguno ninguna nada manoabierta riposo nessuno nessuna manoaperta",
     "joint": "flex bend joint angle glove cyberglove enc encoder mcp pip dip cmc abduction winkel biegung",
 }
-# Without the s of a plural, as the words of names are looked up.
+# Without a plural s, since words are looked up that way.
 _WORDS = {role: frozenset(word.removesuffix("s") or word for word in words.split()) for role, words in _LISTS.items()}
-# In so many of the changes of a stream's label what means that nothing is held is left or reached.
+# The share of a stream's label changes that lead to or from the label for nothing held.
 _BETWEEN = 0.9
-# Before a grasp and after it nothing is held; a number that more runs than those share is not that of a movement.
+# Nothing is held before and after a grasp; a number shared by more runs than these is not the number of a movement.
 _SHARED = 3
-# More distinct values than these are no grasp types.
+# Columns with more distinct values than this are not grasp types.
 _TYPES = 200
-# An unknown analog column is at rest in so many of its cells, in the lowest tenth of its range: then it is a pad.
+# An unknown analog column is a pad if this share of its cells is at rest, in the lowest tenth of its range.
 _AT_REST, _REST = 0.5, 0.1
-# Bits of the converters that there are.
+# Resolutions in bits of existing converters.
 _CONVERTERS = (8, 10, 12, 14, 16)
 _PADS = ': a placement chooses their levels (threshold = 0.4, or "otsu", makes switches of them)'
 _CODES, _MOST_JOINTS = "whole numbers, taken as codes", 24
-# What is said of joints with values, before their grid.
+# The start of the reason for joints with values, followed by their grid.
 _NUMBERS = "numbers, coded on a grid of "
 
 
 class Role(msgspec.Struct, frozen=True):
-    """What some columns are taken for, and why."""
+    """The assumed role of some columns, and the reason."""
 
     columns: tuple[str, ...]
     role: str
@@ -74,7 +74,7 @@ class Role(msgspec.Struct, frozen=True):
 
 
 class Proposal(msgspec.Struct, frozen=True):
-    """What a table's columns are taken for; `lacks` is what only the user can tell, "" where nothing is."""
+    """The proposed roles of a table's columns; `lacks` is what only the user can say, "" if nothing."""
 
     columns: Columns
     roles: tuple[Role, ...]
@@ -82,7 +82,7 @@ class Proposal(msgspec.Struct, frozen=True):
     lacks: str = ""
 
     def independent(self) -> "Proposal":
-        """Return the proposal with the claim that each row is a trial of its own."""
+        """Return the proposal with the statement that each row is a separate trial."""
         return replace(self, columns=replace(self.columns, frames="independent"), lacks="")
 
     def toml(self) -> str:
@@ -95,15 +95,15 @@ class Proposal(msgspec.Struct, frozen=True):
 
 
 def listed(columns: Sequence[str]) -> str:
-    """Return the names of columns, of more than three the first and the last."""
+    """Return the names of columns; if more than three, only the first and the last."""
     if len(columns) <= 3:
         return ", ".join(map(shortened, columns))
     return f"{shortened(columns[0])} ... {shortened(columns[-1])} ({len(columns)})"
 
 
 class _Column(NamedTuple):
-    """What is known of a column: its words; its numbers, None of text; how many values differ, and in which rows there
-    is one.
+    """Facts about a column: the words of its name; its numbers, None for text; the number of distinct values, and which
+    rows have one.
     """
 
     name: str
@@ -115,22 +115,22 @@ class _Column(NamedTuple):
 
     @property
     def rows(self) -> int:
-        """How many rows it has."""
+        """Number of its rows."""
         return len(self.there)
 
     @property
     def whole(self) -> bool:
-        """Whether it holds whole numbers."""
+        """Whether it holds integers."""
         return self.values is not None and bool((self.values == np.rint(self.values)).all())
 
     @property
     def nominal(self) -> bool:
-        """Whether it may say which of several things a row is of."""
+        """Whether it may be categorical."""
         return bool(self.distinct) and (self.values is None or self.whole)
 
     @property
     def counts_rows(self) -> bool:
-        """Whether it is a number of each row."""
+        """Whether it numbers the rows."""
         return self.whole and self.values is not None and self.rows > 2 and bool((np.diff(self.values) == 1).all())
 
 
@@ -153,14 +153,14 @@ def _look(table: Table, name: str) -> _Column:
 
 
 def propose_file(path: Path) -> tuple[Table, Proposal]:
-    """Return the table in `path`, and what its columns are taken for. Raises TableError; OSError as it comes."""
+    """Return the table in `path`, and the proposed roles of its columns. Raises TableError, OSError."""
     text, remarks = sniff(path) if is_text(path) else (PLAIN, [])
     table = read_table(path, text)
     return table, propose(table, text, remarks)
 
 
 def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ()) -> Proposal:
-    """Return what the columns of `table` are taken for. Raises TableError where none is a label, or none an input."""
+    """Return the proposed roles of the columns of `table`. Raises TableError if there is no label or no input."""
     found = [_look(table, name) for name in table.columns]
     chosen, why = _named(found)
     if "label" not in chosen:
@@ -168,7 +168,7 @@ def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ())
     labels = _texts(table, chosen["label"])
     none = _none(labels)
     held = ~np.isin(labels, none)
-    frames, lacks = _told(table, found, chosen, why, held)
+    frames, lacks = _frames(table, found, chosen, why, held)
     if (unit := _unit(table, chosen)) is not None:
         why["time"] += f"; in {unit}"
     taken = {name for columns in chosen.values() for name in columns}
@@ -207,7 +207,7 @@ def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ())
 
 
 def _named(found: Sequence[_Column]) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
-    """Return the columns by what their names say they are, and why."""
+    """Return the columns with a role given by their names, and the reasons."""
     chosen: dict[str, tuple[str, ...]] = {}
     for key in ("time", "session", "trial", "subject", "object", "label"):
         best = [
@@ -234,8 +234,10 @@ def _is_time(words: frozenset[str]) -> bool:
 
 
 def _none(labels: NDArray[np.str_]) -> tuple[str, ...]:
-    """Return the labels that mean that nothing is held: by their words; or, of a stream, an empty one, 0 or -1, if
-    nearly all runs of others lie between runs of it. Two others are left, or "none" alone is taken.
+    """Return the labels that mean that nothing is held.
+
+    They are found by their words; or, in a stream, an empty label, 0 or -1 is one, if nearly all runs of other labels
+    lie between runs of it. Unless two other labels remain, only "none" is taken.
     """
     found = np.unique(labels).tolist()
     none = {label for label in found if plain(label).removesuffix("s") in _WORDS["none"]}
@@ -254,14 +256,14 @@ def _unit(table: Table, chosen: dict[str, tuple[str, ...]]) -> TimeUnit | None:
 
 
 def _label(what: str, found: Sequence[_Column], chosen: dict[str, tuple[str, ...]]) -> tuple[tuple[str, ...], str]:
-    """Return the column that is most likely the label where none is called so."""
+    """Return the column that is most likely the label if none has such a name."""
     if "object" in chosen:
         return chosen.pop("object"), "no column is called label, grasp or class: the objects are what can be recognised"
     taken = {name for columns in chosen.values() for name in columns}
     few = [column for column in found if column.nominal and 1 < column.distinct <= _TYPES and column.name not in taken]
     texts = [column for column in few if column.values is None]
     if not texts:
-        raise TableError(f"{what}: no column looks like the grasp type: say in a columns.toml which is it (`label`)")
+        raise TableError(f"{what}: no column looks like the grasp type: name it in a columns.toml (`label`)")
     best = min(texts, key=lambda column: column.distinct)
     return (best.name,), f"no column is called label, grasp or class: it is text, {best.distinct} different"
 
@@ -271,14 +273,14 @@ def _texts(table: Table, columns: Iterable[str]) -> NDArray[np.str_]:
     return parts[0] if len(parts) == 1 else np.array([" ".join(row) for row in zip(*parts, strict=True)])
 
 
-def _told(
+def _frames(
     table: Table,
     found: Sequence[_Column],
     chosen: dict[str, tuple[str, ...]],
     why: dict[str, str],
     held: NDArray[np.bool_],
 ) -> tuple[Literal["restart"] | None, str]:
-    """Find how trials are told apart; return what `frames` says of it, and what only the user can say.
+    """Find how trials are delimited; return the value of `frames`, and what only the user can say.
 
     held  (n,) where the label does not mean that nothing is held
     """
@@ -302,14 +304,15 @@ def _told(
             why["time"] += f"; it starts anew {trials} times: these are the trials (frames = restart)"
             return "restart", ""
     return None, (
-        "no column tells which rows are frames of one trial: name it (trial = ...), or state that each row is a trial "
-        'of its own (frames = "independent")'
+        "no column tells which rows are frames of one trial: name it (trial = ...), or state that each row is a "
+        'separate trial (frames = "independent")'
     )
 
 
 def _is_stream(table: Table, chosen: dict[str, tuple[str, ...]], held: NDArray[np.bool_]) -> bool:
-    """Return whether runs of labels tell trials apart, and better than a number of trials: one that many runs share in
-    which nothing is held is no movement's.
+    """Return whether runs of labels delimit trials better than a number of trials.
+
+    A number that many runs share in which nothing is held is not the number of a movement.
     """
     who = [_texts(table, [name]) for key in ("label", "subject", "session", "trial") for name in chosen.get(key, ())]
     if "trial" not in chosen or not in_runs(*who):
@@ -331,7 +334,7 @@ def _add_parts(
     chosen: dict[str, tuple[str, ...]],
     why: dict[str, str],
 ) -> None:
-    """Add to the columns of the trial those without which a time would occur twice in one trial."""
+    """Add columns to those of the trial without which a time would occur twice in one trial."""
     if time is None:
         return
     twice = len(ids) - len(np.unique(np.stack([ids, groups(time)]), axis=1).T)
@@ -348,7 +351,7 @@ def _add_parts(
 
 
 def _inputs(columns: Sequence[_Column], held: NDArray[np.bool_]) -> list[Role]:
-    """Return what the other columns are taken for, those alike together; held (n,) are rows of grasps."""
+    """Return the roles of the other columns, grouped; held (n,) are rows of grasps."""
     found: dict[tuple[str, str], list[str]] = {}
     stems: dict[str, list[_Column]] = {}
     for column in columns:
@@ -356,7 +359,7 @@ def _inputs(columns: Sequence[_Column], held: NDArray[np.bool_]) -> list[Role]:
             found.setdefault(("left out", out), []).append(column.name)
         else:
             stems.setdefault("" if column.bits else _stem(column.name), []).append(column)
-    # Columns that are numbered alike are of one kind, whatever the range of each.
+    # Columns whose names differ only in a number have the same role, whatever the range of each.
     for several in stems.values():
         found.setdefault(_input(several, held), []).extend(column.name for column in several)
     if len(found.get(("joints", _CODES), ())) > _MOST_JOINTS:
@@ -372,7 +375,7 @@ def _stem(name: str) -> str:
 
 
 def _input(columns: Sequence[_Column], held: NDArray[np.bool_]) -> tuple[str, str]:
-    """Return the role of inputs that are alike, and why; held (n,) are rows of grasps."""
+    """Return the role of a group of inputs, and the reason; held (n,) are rows of grasps."""
     words = frozenset[str]().union(*(column.words for column in columns))
     values = np.concatenate([column.values for column in columns if column.values is not None])
     if all(column.bits for column in columns):
@@ -391,7 +394,7 @@ def _input(columns: Sequence[_Column], held: NDArray[np.bool_]) -> tuple[str, st
 
 
 def _bits_of(role: Role, found: Sequence[_Column]) -> int | None:
-    """Return the bits of the smallest converter that gives these counts, None where they are none."""
+    """Return the bits of the smallest converter that gives these counts, None if they are not counts."""
     each = [column.values for column in found if column.name in role.columns and column.values is not None]
     whole = all(column.whole for column in found if column.name in role.columns)
     if not whole or min(part.min() for part in each) < 0:
@@ -401,7 +404,7 @@ def _bits_of(role: Role, found: Sequence[_Column]) -> int | None:
 
 
 def _no_input(column: _Column) -> str:
-    """Return why a column is no input, "" where it is one."""
+    """Return why a column is not an input, "" if it is one."""
     if not column.distinct:
         return "empty"
     if column.values is None:
@@ -420,7 +423,7 @@ def _no_input(column: _Column) -> str:
 
 
 def _joints(role: Role, every: Iterable[str]) -> JointColumns:
-    """Return the entry of joints: of codes, or of values on one grid."""
+    """Return the entry of joints: with codes, or with values on one grid."""
     columns = _globs(role.columns, every)
     if not role.reason.startswith(_NUMBERS):
         return JointColumns(columns, "counts", codes=True)
@@ -430,7 +433,7 @@ def _joints(role: Role, every: Iterable[str]) -> JointColumns:
 
 
 def _globs(columns: Iterable[str], every: Iterable[str]) -> tuple[str, ...]:
-    """Return globs that match exactly `columns` of `every` one: a star where a stem has no others."""
+    """Return globs that match exactly `columns` among `every` one: a star if a stem has no others."""
     there = sorted(every)
     stems: dict[str, list[str]] = {}
     for name in columns:

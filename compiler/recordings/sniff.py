@@ -1,4 +1,4 @@
-"""How a table of text is written: its encoding, delimiter, quotes, decimal sign, and whether it has a header."""
+"""Detect the format of a text table: its encoding, delimiter, quotes, decimal sign, and header."""
 
 import codecs
 import csv
@@ -12,10 +12,10 @@ from .columns import TextFormat
 from .errors import TableError
 from .table import open_bytes, open_lines
 
-# Rows that are looked at, characters of each, and those that clevercsv sees, whose time grows with their square.
+# Rows examined, characters of each, and those given to clevercsv, whose run time is quadratic.
 _ROWS, _CHARACTERS, _SEEN = 60, 5000, 400
 _CHUNK = 1 << 20
-# The bytes that Windows-1252 does not have: to look for them is many times faster than to decode.
+# The bytes that Windows-1252 does not define: searching for them is many times faster than decoding.
 _NOT_WESTERN = b"\x81\x8d\x8f\x90\x9d"
 _DELIMITERS = (",", ";", "\t", "|", " ")
 _SPOKEN = {",": "a comma", ";": "a semicolon", "\t": "a tab", "|": "a bar", " ": "a blank"}
@@ -23,7 +23,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d++(?:[.,]\d*+)?|[.,]\d++)(?:[eE][+-]?\d++)?")
 
 
 def sniff(path: Path) -> tuple[TextFormat, list[str]]:
-    """Return how the table of text in `path` is written, and in sentences why.
+    """Return the format of the text table in `path`, and the reasons as sentences.
 
     Raises TableError where the file cannot be read as text.
     """

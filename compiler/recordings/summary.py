@@ -1,4 +1,4 @@
-"""What a set of grasps holds: counts, balance, columns, oddities, and how separable its grasp types are."""
+"""Summarise a set of grasps: counts, balance, columns, oddities, and the separability of its grasp types."""
 
 from collections.abc import Iterator, Sequence
 
@@ -14,8 +14,10 @@ from .trials import groups, otsu
 
 
 def contacts(grasp_set: GraspSet) -> NDArray[np.bool_]:
-    """Return which elements (n, s + t) were touched: switches that closed, and taxels whose value is above Otsu's
-    threshold of all values in its unit: a taxel that is never pressed is not told by its noise.
+    """Return which elements (n, s + t) were touched: closed switches, and taxels above Otsu's threshold.
+
+    The threshold is computed over all taxels of a unit, so that the noise of a taxel that is never pressed has no
+    effect.
     """
     pressed = np.zeros(grasp_set.taxels.shape, np.bool_)
     units = np.array([taxel.unit for taxel in grasp_set.taxel_columns])
@@ -28,7 +30,7 @@ def contacts(grasp_set: GraspSet) -> NDArray[np.bool_]:
 
 
 class Finding(msgspec.Struct, frozen=True):
-    """One kind of oddity: how often, the first rows as the user counts them, the columns, a sentence for people."""
+    """One kind of oddity: its count, the first rows as the user counts them, the columns, and a sentence."""
 
     kind: str
     count: int
@@ -38,21 +40,22 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 def find_oddities(grasp_set: GraspSet, rows: NDArray[np.int64]) -> tuple[Finding, ...]:
-    """Return everything odd about `grasp_set`, whose rows the user knows by the numbers `rows` (n,). Rows in which
-    nothing is held are alike everywhere, and so not compared.
+    """Return all oddities of `grasp_set`, whose rows have the numbers `rows` (n,) for the user.
+
+    Rows in which nothing is held are naturally alike, and so not compared.
     """
     held = grasp_set.without_none()
     return (*_odd_columns(grasp_set), *_odd_frames(held, rows[~grasp_set.is_none]), *_gaps(held))
 
 
 def constant_columns(columns: NDArray[np.generic], names: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of those columns (n, d) that hold one value only."""
+    """Return the names of the columns (n, d) that are constant."""
     same = (columns == columns[:1]).all(axis=0)
     return tuple(name for name, constant in zip(names, same, strict=True) if constant)
 
 
 def duplicate_columns(columns: NDArray[np.generic], names: Sequence[str]) -> tuple[tuple[str, str], ...]:
-    """Return (name, first column equal to it) for every column (n, d) that repeats another and changes."""
+    """Return (name, first equal column) for every non-constant column (n, d) that repeats another."""
     constant = set(constant_columns(columns, names))
     first: dict[bytes, str] = {}
     pairs = []
@@ -64,7 +67,7 @@ def duplicate_columns(columns: NDArray[np.generic], names: Sequence[str]) -> tup
 
 
 def frame_numbers(switches: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.intp]:
-    """Return (n,) numbers that are equal exactly where the frames are."""
+    """Return numbers (n,) that are equal exactly if the frames are."""
     frames = np.hstack([np.packbits(switches, axis=1), np.ascontiguousarray(codes).view(np.uint8)])
     if not frames.shape[1]:
         return np.zeros(len(frames), np.intp)
@@ -75,7 +78,7 @@ def frame_numbers(switches: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDA
 def disagreeing(frames: NDArray[np.intp], what: NDArray[np.generic]) -> NDArray[np.bool_]:
     """Return (n,) whether the row's frame also occurs with another value of `what` (n,)."""
     found, numbers = np.unique(what, return_inverse=True)
-    # Pairs as numbers take a fraction of the memory of rows of two. In place, as a large set is in memory already.
+    # Pairs encoded as numbers need a fraction of the memory. Done in place, as a large set is in memory already.
     numbers += frames * len(found)
     pairs = np.unique(numbers)
     return np.bincount(pairs // max(len(found), 1), minlength=len(frames))[frames] > 1
@@ -114,7 +117,7 @@ def _odd_frames(grasp_set: GraspSet, rows: NDArray[np.int64]) -> Iterator[Findin
 def _gaps(grasp_set: GraspSet) -> Iterator[Finding]:
     subjects, subject = np.unique(grasp_set.subjects, return_inverse=True)
     present, grasp = np.unique(grasp_set.grasps, return_inverse=True)
-    # Pairs as numbers: far more can be absent than there are rows, so only those that are shown are listed.
+    # Encoded as numbers: many more pairs can be absent than there are rows, so only those shown are listed.
     pairs = np.unique(subject * len(present) + grasp)
     count = len(subjects) * len(present) - len(pairs)
     if count:
@@ -123,16 +126,16 @@ def _gaps(grasp_set: GraspSet) -> Iterator[Finding]:
         yield Finding("grasp types that a subject lacks", count, list_names(shown, count))
 
 
-# Rows compared with each other at most, a sample of a larger set: their number is squared in the time it takes.
+# The most rows compared with each other, a sample of a larger set: the time is quadratic.
 NEIGHBOUR_ROWS = 2000
 
 
 class Separability(msgspec.Struct, frozen=True):
-    """What one choice of inputs can tell apart.
+    """How well some inputs distinguish grasp types.
 
-    `ceiling` is the recognition rate of the best possible memory: the commonest grasp type of every distinct frame; no
-    classifier that sees these inputs alone is right more often on these rows. `neighbour_rate` is the rate of frames by
-    the nearest frame of another trial (Euclidean; joints in standard deviations, switches as 0 and 1) over
+    `ceiling` is the accuracy of the best possible memory: the most frequent grasp type of every distinct frame. No
+    classifier with only these inputs is more accurate on these rows. `neighbour_rate` is the accuracy by frames of the
+    nearest frame of another trial (Euclidean; joints in standard deviations, switches as 0 and 1) over
     `neighbour_rows` rows, None without scikit-learn.
     """
 
@@ -144,8 +147,9 @@ class Separability(msgspec.Struct, frozen=True):
 
 
 def separabilities(grasp_set: GraspSet) -> tuple[Separability, ...]:
-    """Return the separability by switches, by taxels, by joints, and by all of them, as far as the set has them, of the
-    rows in which something is held.
+    """Return the separability by switches, by taxels, by joints, and by all of them, if the set has them.
+
+    Rows in which nothing is held are ignored.
     """
     grasp_set = grasp_set.without_none()
     there = (("switches", grasp_set.switch_names), ("taxels", grasp_set.taxel_columns), ("joints", grasp_set.joints))
@@ -165,7 +169,7 @@ def _separability(grasp_set: GraspSet, inputs: str) -> Separability:
 
 
 def _ceiling(frames: NDArray[np.intp], labels: NDArray[np.intp]) -> float:
-    """Return sum over distinct frames of their commonest label's count, over n."""
+    """Return the sum over distinct frames of their most frequent label's count, over n."""
     pairs, counts = np.unique(np.stack([frames, labels], axis=1), axis=0, return_counts=True)
     commonest = np.zeros(int(frames.max()) + 1, np.intp)
     np.maximum.at(commonest, pairs[:, 0], counts)
@@ -188,30 +192,28 @@ def _neighbour_rate(
         return None, len(rows)
     spread = codes.std(axis=0)
     points = np.hstack([switches[rows], codes[rows] / np.where(spread, spread, 1.0)])
-    # So many are certain to hold one of another trial.
+    # This many are certain to include one of another trial.
     near = NearestNeighbors(n_neighbors=most, algorithm="kd_tree").fit(points).kneighbors(return_distance=False)
     nearest = near[np.arange(len(rows)), (trial[near] != trial[:, np.newaxis]).argmax(axis=1)]
     return float(np.mean(labels[rows][nearest] == labels[rows])), len(rows)
 
 
 class Count(msgspec.Struct, frozen=True):
-    """How many rows have `name`."""
+    """The number of rows with `name`."""
 
     name: str
     rows: int
 
 
 class SwitchUse(msgspec.Struct, frozen=True):
-    """How often a switch is closed: 0 to 1."""
+    """The share of rows in which a switch is closed, 0 to 1."""
 
     name: str
     closed: float
 
 
 class JointRange(msgspec.Struct, frozen=True):
-    """Least and largest value of a joint or taxel in its unit, None in a set without rows; how many distinct codes it
-    takes.
-    """
+    """The range of a joint or taxel in its unit, None in an empty set, and the number of distinct codes."""
 
     name: str
     unit: str
@@ -223,12 +225,12 @@ class JointRange(msgspec.Struct, frozen=True):
 class Summary(msgspec.Struct, frozen=True):
     """A set in numbers.
 
-    none         in how many rows nothing is held: they count in no rate
-    movements    how many trials there are, with the rows around them in which nothing is held
-    seconds      how long the recordings last together; None where times are not known
-    simulated    what simulated the grasps; empty: they were recorded
-    independent  each row is stated to be a trial of its own
-    balance      the rarest grasp type's count over the commonest one's
+    none         number of rows in which nothing is held; they count in no rate
+    movements    number of trials, including the rows around them in which nothing is held
+    seconds      total duration of the recordings; None if times are unknown
+    simulated    the simulator of the grasps; empty: they were recorded
+    independent  each row is stated to be a separate trial
+    balance      the rarest grasp type's count divided by the most frequent one's
     """
 
     rows: int
@@ -252,7 +254,7 @@ class Summary(msgspec.Struct, frozen=True):
 
 
 def summarise(grasp_set: GraspSet) -> Summary:
-    """Return the summary of `grasp_set`, whose rows count from 1. A set without rows has no separability."""
+    """Return the summary of `grasp_set`, with rows counted from 1. An empty set has no separability."""
     counts = np.bincount(grasp_set.labels[~grasp_set.is_none], minlength=len(grasp_set.taxonomy.types))
     grasps = [Count(name, int(rows)) for name, rows in zip(grasp_set.taxonomy.types, counts, strict=True)]
     present = counts[counts > 0]
@@ -279,7 +281,7 @@ def summarise(grasp_set: GraspSet) -> Summary:
 
 
 def _seconds(grasp_set: GraspSet) -> float | None:
-    """Return how long the recordings of all subjects and sessions last together."""
+    """Return the total duration of the recordings of all subjects and sessions."""
     if not grasp_set.times_us.size:
         return None
     recording = groups(grasp_set.subjects, grasp_set.sessions)

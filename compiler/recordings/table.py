@@ -1,7 +1,7 @@
-"""Tables of labelled grasps in: text with delimiters, Weka's ARFF, npz; those of other programs by foreign.py.
+"""Read tables of labelled grasps: delimited text, Weka's ARFF, and npz; foreign.py reads those of other programs.
 
-ARFF has numeric and nominal attributes, quoted names and values, `?` for a missing value. It is read here and not by
-scipy, whose reader loses quotes in nominal values, knows no rows, and is not on a board.
+ARFF has numeric and nominal attributes, quoted names and values, and `?` for a missing value. It is read here because
+the reader of scipy loses quotes in nominal values, reports no rows, and is not installed on a board.
 """
 
 import codecs
@@ -34,7 +34,7 @@ from .foreign import READERS, read_foreign
 
 @contextmanager
 def open_bytes(path: Path) -> Iterator[BinaryIO]:
-    """Open a file of text, gzipped or not; a fault of the packing becomes a TableError."""
+    """Open a text file, gzipped or not; errors in the compression become a TableError."""
     try:
         with open_file(path, TableError) as raw:
             size = os.fstat(raw.fileno()).st_size
@@ -48,7 +48,7 @@ def open_bytes(path: Path) -> Iterator[BinaryIO]:
 
 @contextmanager
 def open_lines(path: Path, encoding: str = "utf-8") -> Iterator[Iterator[str]]:
-    """Open a text file, gzipped or not, behind its byte order mark; a fault of its content becomes a TableError."""
+    """Open a text file, gzipped or not, after its byte order mark; errors in its content become a TableError."""
     known = codecs.lookup(encoding).name
     try:
         with (
@@ -64,7 +64,7 @@ def open_lines(path: Path, encoding: str = "utf-8") -> Iterator[Iterator[str]]:
 
 
 class _Unpacked(io.RawIOBase):
-    """What a packed file unpacks to, as long as it is no more than `limit` bytes."""
+    """The content of a compressed file, limited to `limit` bytes."""
 
     def __init__(self, what: str, packed: BinaryIO, limit: int) -> None:
         super().__init__()
@@ -82,7 +82,7 @@ class _Unpacked(io.RawIOBase):
         if self._left < 0:
             raise TableError(
                 f"{self._what} unpacks to more than {self._limit} bytes, the most for a file of its size: "
-                "unpack it, then it is read as it is"
+                "unpack it and import the result"
             )
         buffer[: len(data)] = data
         return len(data)
@@ -97,14 +97,14 @@ def _lines(what: str, text: io.TextIOWrapper) -> Iterator[str]:
         yield line
 
 
-# Cells that are held as str at a time, while a block is filled or a column is read.
+# Cells kept as str at a time, while a block is filled or a column is read.
 _CELLS = 1 << 18
 _READ = 1 << 14
 
 
 @dataclass(frozen=True, slots=True)
 class _Block:
-    """Rows of a table, column after column: their `text`, where each column ends in it, and the cells' lengths."""
+    """Rows of a table, column by column: their `text`, the end of each column in it, and the cells' lengths."""
 
     rows: int
     text: bytes
@@ -122,7 +122,7 @@ class _Block:
 
 
 class TextRows:
-    """Takes the rows of a table of `width` columns, each a list of as many cells; then gives its columns."""
+    """Collects the rows of a table of `width` columns, each a list of cells; then returns its columns."""
 
     def __init__(self, width: int) -> None:
         self._width = width
@@ -130,13 +130,13 @@ class TextRows:
         self._blocks: list[_Block] = []
 
     def append(self, row: list[str]) -> None:
-        """Take the next row."""
+        """Append the next row."""
         self._rows.append(row)
         if len(self._rows) * self._width >= _CELLS:
             self._store()
 
     def columns(self) -> "list[TextColumn]":
-        """Return the columns; no row is appended after that."""
+        """Return the columns; no row may be appended afterwards."""
         if self._rows:
             self._store()
         return [TextColumn(self._blocks, number) for number in range(self._width)]
@@ -185,7 +185,7 @@ class TextColumn(Sequence[str]):
         raise IndexError("the column has fewer rows")
 
     def pieces(self) -> Iterator[list[str]]:
-        """Yield the cells in lists of some thousands, which are dearer to make than to walk through."""
+        """Yield the cells in lists of some thousands, which are slower to create than to iterate over."""
         piece: list[str] = []
         for block in self._blocks:
             piece += block.column(self._number)
@@ -197,7 +197,7 @@ class TextColumn(Sequence[str]):
 
 
 def pieces(column: Sequence[str] | NDArray[np.generic]) -> Iterator[list[str]]:
-    """Yield the cells of a column of text, in whatever it is, in lists of some thousands."""
+    """Yield the cells of a text column of any type in lists of some thousands."""
     if isinstance(column, TextColumn):
         yield from column.pieces()
         return
@@ -207,21 +207,21 @@ def pieces(column: Sequence[str] | NDArray[np.generic]) -> Iterator[list[str]]:
 
 
 def _small(numbers: NDArray[np.unsignedinteger]) -> NDArray[np.unsignedinteger]:
-    """Return `numbers` in as few bytes as hold their largest."""
+    """Return `numbers` in the smallest type that holds the largest."""
     return numbers.astype(np.min_scalar_type(int(numbers.max(initial=0))))
 
 
-# Text as it was read, or an array of numbers or of str.
+# Text as read, or an array of numbers or of str.
 Column = Sequence[str] | AnyArray
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Named columns of equal length: text as it was read, or numbers, NaN where one is missing.
+    """Named columns of equal length: text as read, or numbers, with NaN for missing ones.
 
-    `rows` are the rows' numbers as the user sees them: the line in a CSV or a spreadsheet, counted from 1 elsewhere.
-    `size` is how many bytes its file has. `cells` says that names are written as cells of a spreadsheet, `decimal` what
-    is before the fractions of numbers in text.
+    `rows` are the rows' numbers as the user sees them: the line in a CSV or spreadsheet, counted from 1 elsewhere.
+    `size` is the size of its file in bytes. `cells` says that names are written as cells of a spreadsheet; `decimal` is
+    the decimal sign of numbers in text.
     """
 
     what: str
@@ -237,14 +237,14 @@ SUFFIXES = (*_TEXTS, ".arff", ".arff.gz", ".npz", *READERS)
 
 
 def is_text(path: Path) -> bool:
-    """Return whether `path` is, by its name, a table of text with delimiters."""
+    """Return whether the name of `path` is that of a delimited text table."""
     return path.name.lower().endswith(_TEXTS)
 
 
 def read_table(path: Path, text: TextFormat = PLAIN) -> Table:
-    """Read a table by its suffix; one of `text` with delimiters as it is written.
+    """Read a table by its suffix; delimited text in the format `text`.
 
-    Raises TableError naming the file, the row and what is wrong with it; OSError as the operating system gives it.
+    Raises TableError naming the file, the row and the fault, and OSError from the operating system.
     """
     name = path.name.lower()
     try:
@@ -305,7 +305,7 @@ def _read_csv(what: str, lines: Iterator[str], text: TextFormat, delimiter: str)
 
 
 def _narrow(what: str, lines: Iterable[str], delimiter: str) -> Iterator[str]:
-    """Yield `lines` as long as none has more cells than a table may have columns."""
+    """Yield `lines` while none has more cells than a table may have columns."""
     for line in lines:
         if line.count(delimiter) >= COLUMNS:
             raise TableError(f"{what} has more than {COLUMNS} columns, the most that are read of a table")
@@ -318,28 +318,28 @@ def _read_npz(path: Path) -> Table:
         raise TableError(f"{path.name}: it holds no arrays")
     lengths = {len(column) for column in columns.values()}
     if len(lengths) > 1:
-        raise TableError(f"{path.name}: its arrays have {list_names(list(map(str, sorted(lengths))))} rows, no table")
+        raise TableError(f"{path.name}: its arrays have unequal lengths, {list_names(list(map(str, sorted(lengths))))}")
     check_names("column", columns)
     return Table(path.name, columns, np.arange(1, lengths.pop() + 1))
 
 
-# A value: quoted, where a backslash takes the next character as it is, or a word; a quote that nothing closes takes the
-# rest of the line. Commas and blanks part values. No quantifier gives back what it took: so the time is linear.
+# A value: quoted, with backslash escapes, or a word; an unclosed quote takes the rest of the line. Commas and blanks
+# separate values. All quantifiers are possessive, so the time is linear.
 _QUOTED = r"""'(?:\\.|[^'\\])*+'|"(?:\\.|[^"\\])*+\""""
 _VALUE = re.compile(rf"""{_QUOTED}|['"].*+|[^\s,{{}}'"%]++""")
 _CLOSED = re.compile(_QUOTED)
 _ATTRIBUTE = re.compile(rf"@attribute\s++({_VALUE.pattern})\s++(.+)", re.IGNORECASE)
 _NUMERIC = ("numeric", "real", "integer")
 
-# The values an attribute may have; None for numbers.
+# The possible values of an attribute; None for numbers.
 _Kinds = dict[str, frozenset[str] | None]
 
 
 def read_arff(what: str, text: Iterable[str]) -> Table:
     """Return the table in the lines `text` of an ARFF file that messages call `what`.
 
-    Its rows are counted from the first after @data; numbers are left as text for the importer to read. Raises
-    TableError naming the line or the row that is wrong.
+    Its rows are counted from the first after @data; numbers stay text for the importer to parse. Raises TableError
+    naming the faulty line or row.
     """
     lines = enumerate(text, start=1)
     kinds = _header(what, lines)
@@ -379,8 +379,8 @@ def _header(what: str, lines: Iterator[tuple[int, str]]) -> _Kinds:
                 raise TableError(f"{what} line {number}: more than {COLUMNS} attributes, or {ROWS} values of them")
         elif word != "@relation" and not word.startswith("%"):
             shown = shortened(repr(word))
-            raise TableError(f"{what} line {number}: {shown} stands where @attribute or @data should")
-    raise TableError(f"{what} is no ARFF: it has no line @data")
+            raise TableError(f"{what} line {number}: expected @attribute or @data, not {shown}")
+    raise TableError(f"{what} is not ARFF: it has no line @data")
 
 
 def _attribute(where: str, line: str) -> tuple[str, frozenset[str] | None]:

@@ -1,13 +1,13 @@
 """Taxonomies of grasp types: Kamakura's 14, Cutkosky's 16, Feix's 33, and the user's own.
 
-A type may be written as its name, and in the published taxonomies also as its abbreviation, full name or number; case,
-underscores and punctuation do not count. An `objects.toml` says with which objects each type is collected (the paper
-gave each two of different volume); a key a grasp type, its value a list of objects:
+A type is referred to by its name, and in the published taxonomies also by its abbreviation, full name or number; case,
+underscores and punctuation are ignored. An `objects.toml` says with which objects each type is collected (the paper
+used two of different volume); each key is a grasp type, its value a list of objects:
 
     PoS = ["bottle", "broom"]
     Tip = ["pin", "bead"]
 
-Of "none" it lists movements of the empty hand, in place of MOVEMENTS.
+For "none" it lists movements of the empty hand, instead of MOVEMENTS.
 """
 
 import difflib
@@ -68,12 +68,12 @@ _PUBLISHED = {
 
 @dataclass(frozen=True, slots=True)
 class Taxonomy:
-    """The grasp types that a set may hold, in their order: a type's index is its label.
+    """The grasp types that a set may hold, in order: a type's index is its label.
 
-    `name` is "kamakura14", "cutkosky16", "feix33", or the user's own. That nothing is held, "none", is no type: every
-    taxonomy has it besides, and its label follows those of the types. A user's own types may name it all the same: then
-    it is a type as any other. Raises RecordingError if two types are equal, a name is empty, or a published name
-    stands over other types than the published ones.
+    `name` is "kamakura14", "cutkosky16", "feix33", or the user's own. "none", meaning that nothing is held, is not a
+    type: every taxonomy has it implicitly, with the label after those of the types. A user's own types may still
+    include it: then it is a type like any other. Raises RecordingError if two types are equal, a name is empty, or a
+    published name is used for other types than the published ones.
     """
 
     name: str
@@ -84,11 +84,11 @@ class Taxonomy:
         check_names("grasp type", self.types)
         published = _PUBLISHED.get(self.name, self.types)
         if self.types != published:
-            raise RecordingError(f"taxonomy {self.name} has {len(published)} types of its own: name yours otherwise")
+            raise RecordingError(f"taxonomy {self.name} has {len(published)} published types: use another name")
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What labels mean: the types, in their order, and that nothing is held."""
+        """The meanings of labels: the types, in order, and that nothing is held."""
         return self.types if NONE in self.types else (*self.types, NONE)
 
     @property
@@ -97,29 +97,29 @@ class Taxonomy:
         return tuple(_KAMAKURA.values()) if self.name == "kamakura14" else self.types
 
     def finder(self) -> Callable[[str], str | None]:
-        """Return a function from a label to the type that it means, or None; made once for many labels."""
+        """Return a function from a label to its type, or None; created once for many labels."""
         types, aliases = frozenset(self.names), self._aliases()
         return lambda label: label if label in types else aliases.get(plain(label))
 
     def find(self, label: str) -> str | None:
-        """Return the type that `label` means, or None."""
+        """Return the type of `label`, or None."""
         return self.finder()(label)
 
     def require(self, label: str) -> str:
-        """Return the type that `label` means; raises RecordingError naming the types that look most like it."""
+        """Return the type of `label`; raises RecordingError naming the most similar types."""
         found = self.find(label)
         if found is None:
             raise RecordingError(self.unknown(label))
         return found
 
     def unknown(self, label: str) -> str:
-        """Return the message about a `label` that means no type, with the types most like it."""
+        """Return the message about an unknown `label`, with the most similar types."""
         return f"{shortened(repr(label))} is not a grasp type of {self.name}{self.suggestion(label)}"
 
     def suggestion(self, label: str) -> str:
-        """Return " (did you mean ...?)" with the nearest types, or the types to choose from when none is near."""
+        """Return " (did you mean ...?)" with the most similar types, or the available types if none is similar."""
         aliases = self._aliases()
-        # Comparing takes the time of the label's length times a type's, for every type.
+        # Each comparison takes time proportional to the length of the label times that of the type.
         written, compared = plain(label[:LONGEST_SHOWN]), list(aliases)[:MOST_COMPARED]
         near = {aliases[alias]: None for alias in difflib.get_close_matches(written, compared, n=3)}
         if near:
@@ -128,7 +128,7 @@ class Taxonomy:
         return f" (its types: {shown})"
 
     def _aliases(self) -> dict[str, str]:
-        """Plain spelling -> type; a spelling that two types share means neither."""
+        """Plain spelling -> type; a spelling shared by two types means neither."""
         found: dict[str, str | None] = {}
         for number, (name, full) in enumerate(zip(self.types, self.full_names, strict=True), start=1):
             spellings = {name, full, str(number)} if self.name in _PUBLISHED else {name}
@@ -141,7 +141,7 @@ class Taxonomy:
 def plain(label: str) -> str:
     """Return `label` without case, blanks, underscores and punctuation: "Sphere_4-Finger" -> "sphere4finger"."""
     words = re.sub(r"[\W_]+", "", label.casefold())
-    # Without int(), which takes no more than 4,300 digits; other scripts' digits count as ours.
+    # Without int(), which takes at most 4,300 digits; digits of other scripts count like ours.
     if words.isdecimal():
         return "".join(str(decimal(digit)) for digit in words).lstrip("0") or "0"
     return words or label
@@ -153,7 +153,7 @@ def own(types: Iterable[str]) -> Taxonomy:
 
 
 def published(name: str) -> Taxonomy:
-    """Return the published taxonomy called `name`; raises RecordingError naming those there are."""
+    """Return the published taxonomy called `name`; raises RecordingError naming the available ones."""
     if name not in _PUBLISHED:
         raise RecordingError(
             f"no taxonomy is called {shortened(repr(name))}: take one of {', '.join(_PUBLISHED)}, own, or a list"
@@ -162,7 +162,7 @@ def published(name: str) -> Taxonomy:
 
 
 def published_for(labels: Iterable[str]) -> str | None:
-    """Return the name of the one published taxonomy whose types all `labels` name, None where none or several have."""
+    """Return the only published taxonomy whose types include all `labels`, None if there is none or several."""
     written = [label for label in labels if not plain(label).isdecimal()]
     fitting = [name for name in _PUBLISHED if written and all(map(published(name).finder(), labels))]
     return fitting[0] if len(fitting) == 1 and written else None
@@ -178,9 +178,9 @@ CUTKOSKY_16 = published("cutkosky16")
 FEIX_33 = published("feix33")
 
 
-# What a grasp type is collected with where no object is named.
+# The object of a grasp type if none is named.
 ANY = "any"
-# What an empty hand does, and how the wearer is asked for it.
+# The movements of an empty hand, and the instructions for them.
 MOVEMENTS = {
     "open hand": "hold the hand open, flat or relaxed, and touch nothing",
     "approach": "reach for an object and shape the hand for it, without touching it",
@@ -190,11 +190,10 @@ MOVEMENTS = {
 
 
 def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[Taxonomy, tuple[Task, ...]]:
-    """Return the taxonomy of this name and what is to be collected of it: what `objects` lists, or every type; with
-    `none`, movements of the empty hand as well.
+    """Return the taxonomy of this name and the tasks to collect: those that `objects` lists, or every type.
 
-    "own" is the user's own taxonomy: the types that `objects` lists, in its order. Raises RecordingError, or
-    ColumnsError naming file, line and key.
+    With `none`, movements of the empty hand are included. "own" is the user's own taxonomy: the types that `objects`
+    lists, in its order. Raises RecordingError, or ColumnsError naming file, line and key.
     """
     if objects is None:
         types = published(taxonomy)
@@ -213,7 +212,7 @@ def collected(taxonomy: str, objects: Path | None, none: bool = False) -> tuple[
         if grasp is None:
             raise source.error((key,), types.unknown(key))
         if grasp in tasks:
-            raise source.error((key,), f"is {grasp}, which is there already: list it once")
+            raise source.error((key,), f"is {grasp}, which is listed already: list it once")
         tasks[grasp] = Task(grasp, _objects(source, key, value))
     return types, (*tasks.values(), *_nothing(movements, none))
 

@@ -1,4 +1,4 @@
-"""Trials: rows told apart by what several columns say, gaps filled from the same trial, many frames reduced to one."""
+"""Trials: number rows by the values of several columns, fill gaps within a trial, and reduce frames to one row."""
 
 import re
 from collections.abc import Sequence
@@ -13,14 +13,14 @@ _DIGITS = re.compile(r"(\d+)")
 
 
 def natural_key(text: str) -> tuple[list[tuple[int, str]], str]:
-    """Return what `text` is sorted by where numbers count as such: "T2" before "T10"."""
+    """Return a sort key for `text` that orders numbers by value: "T2" before "T10"."""
     parts = enumerate(_DIGITS.split(text.casefold()))
-    # Digits by their length, then as text: int() takes no more than 4,300 of them.
+    # Digits by length, then as text: int() takes at most 4,300 of them.
     return [(len(part.lstrip("0")), part.lstrip("0")) if odd % 2 else (-1, part) for odd, part in parts], text
 
 
 def numbered(columns: Sequence[NDArray[np.str_]]) -> tuple[NDArray[np.int64], list[str]]:
-    """Return a number (n,) from 1 for each row, equal where all `columns` (n,) are, and their texts in that order."""
+    """Return a number (n,) from 1 for each row, equal where all `columns` (n,) are, and the texts in that order."""
     number = groups(*columns)
     first = np.unique(number, return_index=True)[1]
     texts = [[str(column[row]) for column in columns] for row in first.tolist()]
@@ -35,29 +35,29 @@ def groups(*columns: NDArray[np.generic]) -> NDArray[np.intp]:
     ids = np.zeros(len(columns[0]), np.intp)
     for column in columns:
         _, part = np.unique(column, return_inverse=True)
-        # Numbered densely again at once: the product of all counts may not fit.
+        # Renumber densely at once: the product of all counts may overflow.
         ids = np.unique(ids * (part.max(initial=0) + 1) + part, return_inverse=True)[1]
     _, first, ids = np.unique(ids, return_index=True, return_inverse=True)
     return np.argsort(np.argsort(first))[ids]
 
 
-# A stream has so many rows a run at least.
+# A stream has at least this many rows per run.
 _RUN = 5
 
 
 def in_runs(*columns: NDArray[np.generic]) -> bool:
-    """Return whether rows lie in runs in which all `columns` (n,) stay, as those of a stream do."""
+    """Return whether rows lie in runs in which all `columns` (n,) are constant, as in a stream."""
     changes = np.logical_or.reduce([column[1:] != column[:-1] for column in columns])
     return _RUN * (int(np.count_nonzero(changes)) + 1) <= len(columns[0])
 
 
 def restarts(ids: NDArray[np.intp], time: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return numbers (n,) from 1 that rise by one where `ids` (n,) changes, or `time` (n,) does not rise."""
+    """Return numbers (n,) from 1 that increase by one where `ids` (n,) change or `time` (n,) does not increase."""
     return np.cumsum((np.diff(ids, prepend=-1) != 0) | ~(np.diff(time, prepend=-np.inf) > 0)).astype(np.int64)
 
 
-# Units of time by the words that name them, and from which step between two frames on it is theirs: frames come 2 to
-# 2000 times a second.
+# Units of time by the words that name them, and the smallest step between two frames for each: frames come 2 to 2000
+# times a second.
 _UNITS = {
     "s": ({"s", "sec", "secs", "second", "seconds", "sekunde", "sekunden"}, 0.0005, 0.5),
     "ms": ({"ms", "msec", "milli", "millis", "millisecond", "milliseconds"}, 2.0, 500.0),
@@ -67,8 +67,9 @@ _UNITS = {
 
 
 def unit_of_time(name: str, time: NDArray[np.float64]) -> Literal["s", "ms", "us", "ns"] | None:
-    """Return the unit of times (n,) in a column called `name`, by its name or by how far apart frames are; None where
-    neither tells, as of frames that are counted.
+    """Return the unit of times (n,) in a column called `name`, by its name or by the distance between frames.
+
+    Return None if neither is conclusive, as for numbered frames.
     """
     words = {*re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())}
     steps = np.diff(time)
@@ -79,17 +80,17 @@ def unit_of_time(name: str, time: NDArray[np.float64]) -> Literal["s", "ms", "us
 
 
 def in_time(trials: NDArray[np.intp], time: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return the rows (n,) such that each trial keeps its places and its frames in them are in the order of `time`."""
+    """Return the rows (n,) ordered such that each trial keeps its places, with its frames in the order of `time`."""
     order = np.empty(len(trials), np.intp)
     order[np.argsort(trials, kind="stable")] = np.lexsort((time, trials))
     return order
 
 
 def fill(values: NDArray[np.generic], missing: NDArray[np.bool_], trials: NDArray[np.intp]) -> int:
-    """Fill the `missing` (n,) of `values` (n,), in place, from the nearest frame of the same trial, of two the earlier.
+    """Fill the `missing` (n,) of `values` (n,) in place from the nearest frame of the same trial, the earlier of two.
 
-    Where the trial has none, the lower median of all that are there. Returns how many were filled so. Labels are not
-    looked at.
+    If the trial has none, use the lower median of all known values. Return the number of cells filled that way. Labels
+    are not used.
     """
     order = np.argsort(trials, kind="stable")
     there, trial, place = ~missing[order], trials[order], np.arange(len(order))
@@ -107,7 +108,7 @@ def fill(values: NDArray[np.generic], missing: NDArray[np.bool_], trials: NDArra
 
 
 class Frames:
-    """The frames of each trial: rows in their order, where each trial starts, and its middle frame."""
+    """The frames of each trial: rows in order, the start of each trial, and its middle frame."""
 
     def __init__(self, trials: NDArray[np.intp]) -> None:
         self.order = np.argsort(trials, kind="stable")
@@ -119,7 +120,7 @@ class Frames:
         self._sorted = np.argsort(self.order[self._middles])
 
     def median(self, values: NDArray[Value]) -> NDArray[Value]:
-        """Return the lower median (trials,) of `values` (n,): a value that occurred; of switches what most are."""
+        """Return the lower median (trials,) of `values` (n,): a value that occurred; for switches the majority."""
         column = values[self.order]
         middle: NDArray[Value] = column[np.lexsort((column, self._trials))][self._middles]
         return middle[self._sorted]
@@ -130,14 +131,14 @@ class Frames:
 
 
 def otsu(values: NDArray[np.float64]) -> float:
-    """Return the threshold that parts `values` into two classes of least variance within (Otsu 1979).
+    """Return the threshold that splits `values` into two classes with the least variance within (Otsu 1979).
 
-    It lies half-way between two neighbouring ones of the finite `values`; where there is one, it is that.
+    It lies half-way between two neighbours among the finite `values`; if there is only one value, it is that.
     """
     found, counts = np.unique(values[np.isfinite(values)], return_counts=True)
     if len(found) < 2:
         return float(found[0]) if len(found) else 0.0
-    # In units of the range, from its foot: what is squared stays finite.
+    # In units of the range, from its minimum, so that squares stay finite.
     scaled = (found / 2 - found[0] / 2) / (found[-1] / 2 - found[0] / 2)
     below, total = np.cumsum(counts)[:-1], counts.sum()
     sums = np.cumsum(scaled * counts)

@@ -37,7 +37,7 @@ _CAPTIONS = {
         "alone are not on it."
     ),
     "switches": (
-        "Recognition rate against the number of switches. Curves are of switches alone: ours are blue, the rivals' are "
+        "Recognition rate against the number of switches. Curves are of switches alone: ours are blue, baselines' are "
         "thin. Points without switches are not on it."
     ),
     "latency": (
@@ -170,7 +170,7 @@ def _make_point(marker: ElementTree.Element, said: str, picked: bool) -> None:
 
 def _detail(point: Point, frontier: Frontier, hand: HandShape | None) -> Detail:
     setting = point.setting
-    what = (inputs_of(point), setting.way.method, training_of(setting), f"{setting.width} bits")
+    what = (inputs_of(point), setting.placement.method, training_of(setting), f"{setting.width} bits")
     words = ", ".join(filter(None, (*what, _wiring(point))))
     return Detail(
         number=point.number,
@@ -257,7 +257,7 @@ def _points(frontier: Frontier) -> PlainTable:
 
 
 def _tables(frontier: Frontier) -> Iterator[PlainTable]:
-    """Yield what to compare with, the rivals, what was screened and how far models are off, where there are any."""
+    """Yield what to compare with, the baselines, what was screened and how far models are off, where there are any."""
     kept = elements_of(frontier).capitalize()
     if frontier.marks:
         marks = tuple(
@@ -278,7 +278,7 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
     if frontier.tried:
         tried = tuple(
             (
-                f"{each.way.method} {each.way.parameter:g}",
+                f"{each.placement.method} {each.placement.parameter:g}",
                 each.inputs,
                 str(each.n_switches),
                 DASH if each.rounds is None else str(each.rounds),

@@ -177,9 +177,10 @@ def guarantee_sentences(content: ReportContent) -> Iterator[str]:
     )
     if worst is not None:
         yield (
-            f"At worst, over every frame there is and not only those recorded, {worst.leader} loses {worst.loss:.3f} "
-            f"steps of its lead over {worst.rival}. Worked out exactly, ties in whole steps included, a lead of more "
-            f"than {worst.safe_margin:.3f} steps is safe: {_share(worst.covered, rows)} rows trained on have it."
+            f"At worst, over every frame there is and not only those recorded, {worst.leader} loses "
+            f"{worst.loss:.3f} steps of its lead over {worst.competitor}. Worked out exactly, ties in whole steps "
+            f"included, a lead of more than {worst.safe_margin:.3f} steps is safe: "
+            f"{_share(worst.covered, rows)} rows trained on have it."
         )
 
 

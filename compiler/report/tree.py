@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..placement.tree import Tree, answer_to, node_text, sizes_of
+from ..placement.tree import Tree, edge_label, node_text, sizes_of
 
 MOST_NODES = 300
 # Of the icicle, in pixels: how far a level is set in, a line, and what is left for the words of the deepest level.
@@ -58,7 +58,7 @@ def tree_view(tree: Tree, names: Sequence[str], grasps: Sequence[str]) -> TreeVi
     for line, (number, following) in enumerate(zip(shown, ends, strict=True)):
         node, depth = tree.nodes[number], tree.depths[number]
         opens = node.input is not None and depth < deepest
-        answer = answer_to(tree, number)
+        answer = edge_label(tree, number)
         name = answer + (class_names[node.majority] if node.input is None else f"{names[node.input]}?")
         nodes.append(
             ShownNode(

@@ -1,1 +1,1 @@
-"""Segments of whole movements: learnt from recordings, found in them, scored, written and drawn."""
+"""Segments of whole movements: learn them from recordings, find, score, write and draw them."""

@@ -1,9 +1,8 @@
 """Segments in files: a table (.csv), an annotation document of ELAN (.eaf), annotations in an MCAP file (.mcap).
 
-A document of ELAN (format 3.0, www.mpi.nl/tools/elan/EAFv3.0.xsd) has a tier for each stream, and one of the truth
-where it is known; times are milliseconds from the beginning of the earliest stream. In MCAP the segments are JSON
-messages on one topic, with their schema, logged at their beginning. Files carry no date: equal segments are equal
-bytes.
+An ELAN document (format 3.0, www.mpi.nl/tools/elan/EAFv3.0.xsd) has a tier for each stream, and one for the truth where
+it is known; times are milliseconds from the start of the earliest stream. In MCAP the segments are JSON messages on one
+topic, with their schema, logged at their start. Files carry no date: equal segments give equal bytes.
 """
 
 import io
@@ -26,12 +25,14 @@ _EPOCH = "1970-01-01T00:00:00+00:00"
 
 
 def write(path: Path, timelines: Sequence[Timeline]) -> None:
-    """Write the segments as the ending of `path` says, one of ENDINGS, whole or not at all. Raises OSError."""
+    """Write the segments in the format of the suffix of `path`, one of ENDINGS, completely or not at all. Raises
+    OSError.
+    """
     write_atomically(path, WRITERS[path.suffix.lower()](timelines))
 
 
 def as_csv(timelines: Sequence[Timeline]) -> bytes:
-    """Return a table of one row a segment."""
+    """Return a table with one row per segment."""
     import csv
 
     text = io.StringIO(newline="")
@@ -45,7 +46,7 @@ def as_csv(timelines: Sequence[Timeline]) -> bytes:
 
 
 def as_eaf(timelines: Sequence[Timeline]) -> bytes:
-    """Return an annotation document of ELAN."""
+    """Return an ELAN annotation document."""
     root = ElementTree.Element(
         "ANNOTATION_DOCUMENT",
         {"AUTHOR": "thenar", "DATE": _EPOCH, "FORMAT": _EAF, "VERSION": _EAF, "xmlns:xsi": _XSI}

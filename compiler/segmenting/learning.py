@@ -1,10 +1,10 @@
-"""A build's `SegmentModel`, learnt from the streams of a set: durations and changes counted, the rest by trying.
+"""Learn a build's `SegmentModel` from the streams of a set: count durations and changes, and search for the costs.
 
-Counted, of the true segments: how long each state lasts (a shortest duration, and a geometric law beyond it), and which
-follows which. Tried, on scores of rows that the tables were not made of: how much a frame weighs (the temperature of
-its emission), what each tick of nothing held costs besides, and what a change costs besides. Few movements say little
-about which is best: of all whose F1@50, decoded live, is within one standard error of the highest, the one is taken
-that announces the fewest grasps while nothing is held; ties by the smaller median error of onsets, then by F1@50.
+Counted on the true segments: how long each state lasts (a shortest duration, and a geometric law beyond it), and which
+state follows which. Searched, on scores of rows that were not used to train the tables: the weight of a frame (the
+temperature of its emission), the extra cost of a tick of nothing held, and the extra cost of a change. Few movements
+say little about the best values. Of all candidates whose F1@50, decoded live, is within one standard error of the
+highest, choose the one with the fewest false announcements; ties by smaller median onset error, then by F1@50.
 """
 
 import math
@@ -23,23 +23,24 @@ from .streams import Stream
 
 Labels = NDArray[np.intp]
 
-LAG_TICKS = 15  # of the live answer: 150 ms
+LAG_TICKS = 15  # delay of the live decision: 150 ms
 _AT_HALF = len(OVERLAPS) - 1
 _LARGEST = 4095
-_SCALE = 256.0  # steps per unit of the scores that are tried
-_MOST_NATS = 6.0  # a frame tells no more, before its temperature
-# The shortest duration is a half of the shortest seen, and no more than so many ticks.
+_SCALE = 256.0  # steps per unit of the scores in the search
+_MOST_NATS = 6.0  # the most evidence of a frame, before its temperature
+# The shortest duration is half of the shortest observed one, and at most this many ticks.
 _SHORTEST, _LONGEST_LEAST = 0.5, 30
-# Temperatures; nats of a score by which nothing held must lead; nats that a change costs besides.
+# Temperatures; nats of a score by which nothing held must lead; additional nats that a change costs.
 TEMPERATURES, LEADS, CHANGES = (0.35, 0.2, 0.1, 0.8), (0.0, 1.0, -1.0, 2.0, -2.0), (2.0, 5.0)
-# Ticks that are decoded to try a model: of longer streams, the first.
+# Ticks decoded per candidate model: the first ones of longer streams.
 _TRIED_TICKS = 20_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Counts:
-    """Of the true segments of streams, without those that a stream cuts off: durations in ticks by state, and how often
-    a state follows another, (K + 1, K + 1), nothing held last.
+    """Counts over the true segments of streams, except segments cut off by a stream.
+
+    Durations in ticks by state, and how often a state follows another, (K + 1, K + 1), with nothing held last.
     """
 
     durations: tuple[tuple[int, ...], ...]
@@ -67,23 +68,23 @@ def learnt(
     scale: float,
     tick_us: int,
 ) -> SegmentModel:
-    """Return the model of a build that detects nothing held.
+    """Learn the model of a build that detects nothing held.
 
     Parameters
     ----------
     streams : sequence of Stream
         The rows in time.
     labels : array of int, shape (n,)
-        The class of each row, nothing held the last.
+        The class of each row, with nothing held as the last class.
     scores : array of float, shape (n, K + 1), or None
-        The scores of each row, of tables that were not made of rows of its movement (or subject). None: nothing is
-        tried, and the first values are taken.
+        The scores of each row, from tables that were not trained on rows of its movement (or subject). None: the costs
+        are not searched, and the first candidates are used.
     n_types : int
-        K.
+        The number of grasp types, K.
     scale : float
-        Steps per unit of the build's own integer tables.
+        Steps per unit of the build's integer tables.
     tick_us : int
-        The time of a tick.
+        The duration of a tick.
 
     Returns
     -------
@@ -103,7 +104,7 @@ def learnt(
 def _best(
     counts: Counts, tests: Sequence[tuple[NDArray[np.int64], Labels]], tick_us: int
 ) -> tuple[float, float, float]:
-    """Return temperature, lead and change with which scores (T, K + 1) are best decoded to their states (T,)."""
+    """Return the temperature, lead and change cost that decode scores (T, K + 1) best to their states (T,)."""
     none = len(counts.durations) - 1
 
     def tried(one: tuple[float, float, float]) -> Score:
@@ -125,8 +126,10 @@ def _best(
 def model_of(
     counts: Counts, temperature: float, lead: float, change: float, scale: float, tick_us: int
 ) -> SegmentModel:
-    """Return the model of what was counted, with a temperature, the nats by which nothing held must lead in a frame,
-    and those that a change costs besides.
+    """Return the model of these counts.
+
+    temperature scales the emissions, `lead` is the nats by which nothing held must lead in a frame, and `change` the
+    additional nats that a change costs.
     """
     K = len(counts.durations) - 1
     shift, gain = gain_of(scale, temperature)
@@ -139,7 +142,7 @@ def model_of(
     extra = STEPS * change
     into = counts.changes[K, :K] + 0.5
     enter = [_cost(share / into.sum(), extra) for share in into]
-    # Alike for all types: few changes are seen of each, and a small processor saves a look-up.
+    # Equal for all types: few changes of each are observed, and a small processor saves a lookup.
     others, ends = int(counts.changes[:K, :K].sum()) + 0.5, int(counts.changes[:K, K].sum()) + 0.5
     leave, other = ends / (others + ends), others / (others + ends)
     more = _cost(other, 0)
@@ -159,7 +162,7 @@ def model_of(
 def live_states(
     model: SegmentModel, lanes: NDArray[np.integer], lag_ticks: int, refused: NDArray[np.bool_] | None = None
 ) -> Labels:
-    """Return the state (T,) that a live decoder gives each tick of the scores (T, n_lanes), `lag_ticks` after it."""
+    """Return the states (T,) that a live decoder reports for scores (T, n_lanes), `lag_ticks` after each tick."""
     decoder = Decoder(model, lag_ticks)
     no = [False] * len(lanes) if refused is None else refused.tolist()
     states = [decoder.push(*tick).state for tick in zip(lanes.tolist(), no, strict=True)][lag_ticks:]
@@ -167,12 +170,12 @@ def live_states(
 
 
 def announced_live(states: Labels, none: int, lag_ticks: int) -> Labels:
-    """Return the state (T,) that is published at each tick, where it is that of `lag_ticks` before."""
+    """Return the state (T,) published at each tick, if it is that of `lag_ticks` earlier."""
     return np.concatenate([np.full(lag_ticks, none, np.intp), states])[: len(states)]
 
 
 def _shortest(durations: Sequence[int]) -> int:
-    """Return the shortest duration to allow where these were seen, without the shortest twentieth."""
+    """Return the shortest duration to allow given observed ones, ignoring the shortest twentieth."""
     if not durations:
         return 1
     seen = sorted(durations)[len(durations) // 20]
@@ -180,7 +183,7 @@ def _shortest(durations: Sequence[int]) -> int:
 
 
 def _staying(durations: Sequence[int], least: int) -> int:
-    """Return the cost of a tick such that durations beyond the shortest are geometric with the mean that was seen."""
+    """Return the cost of a tick with which durations beyond the shortest are geometric with the observed mean."""
     if not durations:
         return 0
     mean = sum(durations) / len(durations) - least

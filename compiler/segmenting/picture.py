@@ -1,4 +1,4 @@
-"""Timelines as a picture: the segments found, and the true ones above them, some seconds a line."""
+"""Draw timelines: the segments found, with the true ones above them, a few seconds per line."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _WIDTH_IN, _LINE_IN, _MOST_LINES = 11.0, 0.62, 60
-# At so many seconds a line, and a font of so many points, the name of a type fits into most grasps.
+# With this many seconds per line and this font size, the name of a type fits into most grasps.
 _SECONDS, _POINTS = 10.0, 7.0
-# What a letter takes at most, in units of the font's size.
+# The largest width of a letter, in units of the font size.
 _LETTER = 0.75
 # Colours of types, far enough from one another to tell neighbours apart; the name says which it is.
-_COLOURS = ("switches", "joints", "both", "rival-1", "rival-2", "rival-3", "link", "miss", "hit")
+_COLOURS = ("switches", "joints", "both", "baseline-1", "baseline-2", "baseline-3", "link", "miss", "hit")
 
 
 def draw(timelines: Sequence[Timeline], kind: str) -> bytes:
@@ -27,8 +27,8 @@ def draw(timelines: Sequence[Timeline], kind: str) -> bytes:
     """
     length = [len(each.states) * each.tick_us / 1e6 for each in timelines]
     if not any(length):
-        raise SegmentingError("there is no frame to draw a timeline of")
-    # Long recordings have more seconds a line, and at last no names.
+        raise SegmentingError("the recordings have no frames to draw")
+    # Long recordings get more seconds per line, and very long ones no names.
     seconds = _SECONDS * max(1.0, sum(length) / (_SECONDS * _MOST_LINES))
     lines = [
         (timeline, number * seconds)

@@ -1,9 +1,9 @@
-"""How well a segmentation agrees with the truth: F1 at overlaps, edit score, onset, end, latency, false preshapes.
+"""The agreement of a segmentation with the truth: F1 at overlaps, edit score, onset, end, latency, false preshapes.
 
 F1 is that of Lea, Flynn, Vidal, Reiter and Hager (Temporal convolutional networks for action segmentation and
 detection, CVPR 2017): a found segment is right if a true one of its type overlaps it by at least a share of their union
-and no earlier one has been counted for it. Nothing held is background: it is no segment. The edit score is one less
-the Levenshtein distance of the two sequences of types over the length of the longer one.
+and no earlier one has been counted for it. Nothing held is background, not a segment. The edit score is one minus the
+Levenshtein distance of the two sequences of types divided by the length of the longer one.
 """
 
 from collections.abc import Iterable
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Labels = NDArray[np.intp]
-# Shares of overlap, in percent: a found segment is right from there on.
+# Shares of overlap, in percent, from which a found segment counts as right.
 OVERLAPS = (10, 25, 50)
 
 
@@ -38,14 +38,14 @@ def segments_of(states: ArrayLike, none: int) -> list[Segment]:
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """What was counted over one stream, or the sum of several.
+    """Counts over one stream, or sums over several.
 
-    true, found   segments; right: those found at each of OVERLAPS; recognised: true ones most of whose ticks have
-                  their type
-    distance      of Levenshtein, and the length of the longer sequence, summed over streams
-    onsets, ends  by how many ticks the segments that are right at the least overlap begin and end too late
-    latencies     ticks from the beginning of true segments until their type is announced, of those for which it is
-    false         announced segments that begin while nothing is held
+    true, found   segments; right: those found correctly at each of OVERLAPS; recognised: true ones with their type in
+                  most of their ticks
+    distance      the Levenshtein distance and the length of the longer sequence, summed over streams
+    onsets, ends  the delays in ticks of the start and end of segments that are right at the smallest overlap
+    latencies     ticks from the start of a true segment until its type is announced, where it is
+    false         announced segments that start while nothing is held
     """
 
     true: int = 0
@@ -61,7 +61,7 @@ class Score:
 
     @classmethod
     def total(cls, scores: Iterable[Self]) -> Self:
-        """Return the sum of several."""
+        """Return the sum of several scores."""
         every = list(scores)
 
         def added(name: str) -> int:
@@ -84,23 +84,23 @@ class Score:
         )
 
     def f1(self, place: int) -> float:
-        """Return F1 at an overlap, by its place among OVERLAPS; 1 where nothing is, and nothing was found."""
+        """Return F1 at an overlap, by its index in OVERLAPS; 1 if there are no segments and none was found."""
         counted = self.true + self.found
         return 2 * self.right[place] / counted if counted else 1.0
 
     @property
     def edit(self) -> float:
-        """The edit score; 1 where nothing is, and nothing was found."""
+        """The edit score; 1 if there are no segments and none was found."""
         return 1 - self.distance / self.longer if self.longer else 1.0
 
     @property
     def recognition(self) -> float:
-        """The share of true segments most of whose ticks have their type."""
+        """The share of true segments with their type in most of their ticks."""
         return self.recognised / self.true if self.true else 1.0
 
     @property
     def onset(self) -> float:
-        """The median of by how many ticks segments begin too early or too late; of none, infinite."""
+        """The median absolute onset error in ticks; infinite without segments."""
         return median(map(abs, self.onsets)) if self.onsets else float("inf")
 
 
@@ -114,7 +114,7 @@ def score(truth: ArrayLike, found: ArrayLike, none: int, announced: ArrayLike | 
     none : int
         The state in which nothing is held.
     announced : array of int, shape (T,), optional
-        The state that is published at each tick, which may be that of an earlier one. None: nothing is published.
+        The state published at each tick, which may lag behind. None: nothing is published.
 
     Returns
     -------
@@ -140,15 +140,16 @@ def score(truth: ArrayLike, found: ArrayLike, none: int, announced: ArrayLike | 
 
 
 def _matched(true: list[Segment], found: list[Segment]) -> tuple[tuple[int, ...], list[tuple[Segment, int]]]:
-    """Return how many of `found` are right at each of OVERLAPS; and, at the least of them, the true segments with the
-    places of those that are right.
+    """Return how many of `found` are right at each of OVERLAPS, and the matches at the smallest overlap.
+
+    A match is the index of a true segment and the segment found for it.
     """
     counts, pairs, first = [0] * len(OVERLAPS), list[tuple[Segment, int]](), 0
     taken: list[set[int]] = [set() for _ in OVERLAPS]
     for place, one in enumerate(found):
         while first < len(true) and true[first].end <= one.start:
             first += 1
-        # Of equal overlaps, the earlier.
+        # Between equal overlaps, take the earlier.
         best, common, union, at = -1, 0, 1, first
         while at < len(true) and true[at].start < one.end:
             other = true[at]
@@ -167,8 +168,10 @@ def _matched(true: list[Segment], found: list[Segment]) -> tuple[tuple[int, ...]
 
 
 def _announced(true: list[Segment], truth: Labels, announced: Labels, none: int) -> tuple[list[int], int]:
-    """Return after how many ticks each true segment is announced, before the next one begins, of those that are; and
-    how many announced segments begin while nothing is held. One that is announced too early has a negative latency.
+    """Return the latencies in ticks of true segments announced before the next one, and the number of false
+    announcements.
+
+    A segment that is announced too early has a negative latency; a false one starts while nothing is held.
     """
     latencies = []
     for place, one in enumerate(true):
@@ -184,7 +187,7 @@ def _announced(true: list[Segment], truth: Labels, announced: Labels, none: int)
 
 
 def levenshtein(one: list[int], other: list[int]) -> int:
-    """Return the fewest insertions, deletions and replacements that make one sequence of the other."""
+    """Return the smallest number of insertions, deletions and replacements between two sequences."""
     columns, numbers = np.array(other, np.intp), np.arange(len(other) + 1)
     row = numbers.copy()
     for done, state in enumerate(one, 1):

@@ -1,4 +1,4 @@
-"""Streams: the rows of a set of grasps in time, tick by tick, as a live glove would have sent them."""
+"""Streams: the rows of a set of grasps in time, tick by tick, in the order in which a live glove sends them."""
 
 from dataclasses import dataclass
 
@@ -10,20 +10,20 @@ from thenar.drivers.errors import ThenarError
 from ..recordings.graspset import GraspSet
 from ..recordings.trials import groups
 
-TICK_US = 10_000  # also from one row to the next, where times are not known
-# A longer pause ends a stream: what was held before it says nothing of what is held after it.
+TICK_US = 10_000  # also between consecutive rows if times are unknown
+# A longer pause ends a stream: the grasp before it carries no information about the one after it.
 PAUSE_US = 1_000_000
 
 
 class SegmentingError(ThenarError, ValueError):
-    """Recordings in which no segments can be found, or from which none can be learnt."""
+    """Recordings in which no segments can be found, or from which none can be learned."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stream:
     """A subject's rows in one session, without a pause.
 
-    rows      (T,) the newest row of the set at each tick
+    rows      (T,) index of the newest row of the set at each tick
     start_us  the time of the first tick, on the clock of the set
     """
 
@@ -34,7 +34,7 @@ class Stream:
 
 
 def moving(grasp_set: GraspSet) -> NDArray[np.bool_]:
-    """Return (n,) which rows are of a whole movement, and no trial of their own."""
+    """Return (n,) which rows are part of a whole movement, rather than separate trials."""
     movements = grasp_set.movement_ids
     return np.asarray((np.bincount(movements, minlength=1)[movements] > 1) & (not grasp_set.independent))
 
@@ -42,13 +42,13 @@ def moving(grasp_set: GraspSet) -> NDArray[np.bool_]:
 def streams_of(grasp_set: GraspSet, tick_us: int = TICK_US) -> tuple[Stream, ...]:
     """Return the streams of a set, in the order of their first rows.
 
-    A stream ends where the time does not rise, and before a pause. A row that is a trial of its own, as those of static
-    grasps are, is of no stream. Raises SegmentingError where all rows are.
+    A stream ends where the time does not increase, and before a pause. Rows that are separate trials, such as static
+    grasps, belong to no stream. Raises SegmentingError if all rows do.
     """
     within = moving(grasp_set)
     if not within.any():
         raise SegmentingError(
-            "each row of the set is a trial of its own: segments need whole movements, as `thenar record` and "
+            "each row of the set is a separate trial: segments need whole movements, as `thenar record` or "
             'scenes with rows = "all" make them'
         )
     owner, found = groups(grasp_set.subjects, grasp_set.sessions), []

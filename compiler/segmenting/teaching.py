@@ -1,9 +1,9 @@
-"""What several demonstrations have in common: the consensus of their grasps, as a task and as a behaviour tree.
+"""Find the consensus of several demonstrations, as a task and as a behaviour tree.
 
-The demonstrations' sequences of types are aligned with one another, one after another: the one that is nearest to all
-others first (the centre of a star), then the others by their distance from it. Each is placed into the columns that
-there are by dynamic programming, such that the sum over all pairs of demonstrations of what differs is least: two
-types, or a type and a gap, count 1 (edit distance). A column is a step where most of the demonstrations have one type.
+The demonstrations' sequences of types are aligned one after another: first the one with the smallest distance to all
+others (the centre of a star), then the others by their distance from it. Dynamic programming places each into the
+existing columns such that the sum of differences over all pairs of demonstrations is minimal: two different types, or a
+type and a gap, count 1 (edit distance). A column is a step if most demonstrations have the same type there.
 """
 
 from collections import Counter
@@ -24,14 +24,14 @@ from .scores import levenshtein
 from .streams import SegmentingError
 from .transitions import Transitions
 
-# What is held so much longer than the longest that was shown deviates.
+# Holding a grasp this much longer than the longest demonstration is a deviation.
 LIMIT = 2.0
 Column = tuple[int | None, ...]
 
 
 class Shown(NamedTuple):
-    """A grasp of a demonstration: its type, how long it was held, and what the joints read meanwhile (the median of
-    each, in the build's units; none where they were not read).
+    """A grasp of a demonstration: its type, its duration, and the median of each joint while it was held, in the
+    build's units; empty if joints were not read.
     """
 
     grasp: str
@@ -40,7 +40,7 @@ class Shown(NamedTuple):
 
 
 class Demonstration(NamedTuple):
-    """A demonstration: its name, and its grasps in their order."""
+    """A demonstration: its name, and its grasps in order."""
 
     name: str
     grasps: tuple[Shown, ...]
@@ -52,9 +52,9 @@ class Demonstration(NamedTuple):
 
 
 def aligned(sequences: Sequence[Sequence[str]]) -> list[Column]:
-    """Return the columns of an alignment: of each sequence, in their order, which of its items is there; None: a gap.
+    """Return the columns of an alignment: for each sequence, in order, the index of its item there; None: a gap.
 
-    The same for the same sequences; of equal alignments, that which puts items into earlier columns.
+    The result is deterministic; of equal alignments, the one with items in earlier columns is returned.
     """
     number_of = {name: number for number, name in enumerate(dict.fromkeys(chain(*sequences)))}
     numbers = [[number_of[name] for name in sequence] for sequence in sequences]
@@ -71,7 +71,7 @@ def aligned(sequences: Sequence[Sequence[str]]) -> list[Column]:
 def _joined(
     columns: list[list[int | None]], before: Sequence[Sequence[str]], sequence: Sequence[str]
 ) -> list[list[int | None]]:
-    """Return the columns with one more sequence: the cheapest alignment, found from the end."""
+    """Return the columns with one more sequence: the cheapest alignment, computed from the end."""
     rows, width, others = len(sequence), len(columns), len(before)
     filled = [sum(item is not None for item in column) for column in columns]
 
@@ -114,26 +114,26 @@ def taught(
     Parameters
     ----------
     build : Build
-        What recognised them.
+        The build that recognised them.
     shown : sequence of Demonstration
-        One at least.
+        At least one.
     name : str
-        What the task is called.
+        The name of the task.
     preshapes : PreshapeTable, optional
-        What the robot's hand takes for each type.
+        The preshapes of the robot's hand by type.
     transitions : Transitions, optional
-        Of other recordings: what often follows there may follow here.
+        Counts from other recordings: a frequent transition there is allowed here.
 
     Raises
     ------
     SegmentingError
-        If most of them have no grasp in common.
+        If no grasp occurs in most of them.
     """
     columns = aligned([one.types for one in shown])
     steps = [found for column in columns if (found := _majority(shown, column)) is not None]
     if not steps:
         raise SegmentingError(
-            f"the {len(shown)} demonstrations have no grasp in common that most of them show: "
+            f"the {len(shown)} demonstrations have no grasp that occurs in most of them: "
             f"{'; '.join(f'{one.name}: ' + ' '.join(one.types[:8]) for one in shown[:4])}"
         )
     next_types = [grasp for grasp, _ in steps[1:]] + [None]
@@ -152,7 +152,7 @@ def taught(
 
 
 def _majority(shown: Sequence[Demonstration], column: Column) -> tuple[str, dict[int, int]] | None:
-    """Return the type that most demonstrations have in a column, and the place of it in each that does."""
+    """Return the type that most demonstrations have in a column, and its index in each that does."""
     there = {number: at for number, at in enumerate(column) if at is not None}
     counts = Counter(shown[number].types[at] for number, at in there.items())
     grasp, count = counts.most_common(1)[0]
@@ -161,7 +161,7 @@ def _majority(shown: Sequence[Demonstration], column: Column) -> tuple[str, dict
 
 
 def _ordered(first: str | None, counts: Counter[str]) -> tuple[str, ...]:
-    """Return `first`, and then the others, the most frequent first and those of equal counts by name."""
+    """Return `first`, then the others, the most frequent first, ties by name."""
     others = sorted(counts.keys() - {first}, key=lambda grasp: (-counts[grasp], grasp))
     return (*(() if first is None else (first,)), *others)
 
@@ -209,7 +209,7 @@ _PORTS = ("grasp", "preshape", "joints", "median_s", "limit_s")
 def behaviour_tree(task: Task) -> bytes:
     """Return the task as a tree of BehaviorTree.CPP 4: a Sequence of actions Grasp, with the ports _PORTS.
 
-    `joints` are name=value, parted by semicolons; an empty `preshape` is none.
+    `joints` are name=value, separated by semicolons; an empty `preshape` means none.
     """
     root = ElementTree.Element("root", {"BTCPP_format": "4", "main_tree_to_execute": "task"})
     tree = ElementTree.SubElement(root, "BehaviorTree", {"ID": "task"})

@@ -10,9 +10,9 @@ from .scores import segments_of
 
 
 class FoundSegment(msgspec.Struct, frozen=True):
-    """A segment: its beginning and end in seconds, its grasp type, and the mean probability of that type in its ticks.
+    """A segment: its start and end in seconds, its grasp type, and the mean probability of that type over its ticks.
 
-    subject, session  whose stream it is of
+    subject, session  of the stream
     """
 
     start_s: float
@@ -25,13 +25,13 @@ class FoundSegment(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Timeline:
-    """A stream of T ticks and what was found in it.
+    """A stream of T ticks and the states found in it.
 
-    start_us, tick_us  the time of the first tick, on the stream's clock, and from tick to tick
+    start_us, tick_us  the time of the first tick, on the stream's clock, and the duration of a tick
     zero_us            the time from which seconds are counted
-    types              names of states 0 to K - 1; state K is nothing held
-    states, truth      (T,) found, and as recorded; None: that is not known
-    probabilities      (T,) of the state found
+    types              names of states 0 to K - 1; state K means that nothing is held
+    states, truth      (T,) found, and as recorded; None: unknown
+    probabilities      (T,) of the states found
     """
 
     subject: str
@@ -46,15 +46,15 @@ class Timeline:
 
     @property
     def name(self) -> str:
-        """Whose it is: "A", or "A 2" in another session than the first."""
+        """The subject, and the session unless it is the first: "A", or "A 2"."""
         return self.subject if self.session == "1" else f"{self.subject} {self.session}"
 
     def seconds(self, tick: int) -> float:
-        """Return when a tick is."""
+        """Return the time of a tick in seconds."""
         return (self.start_us - self.zero_us + tick * self.tick_us) / 1e6
 
     def segments(self) -> tuple[FoundSegment, ...]:
-        """Return the segments in their order."""
+        """Return the segments in order."""
         return tuple(
             FoundSegment(
                 self.seconds(one.start),
@@ -69,8 +69,9 @@ class Timeline:
 
 
 def probabilities(scores: NDArray[np.integer], states: NDArray[np.intp], scale: float) -> NDArray[np.float64]:
-    """Return the softmax (T,) of the states found, of scores (T, n_lanes) at `scale` steps per unit; 0 of nothing held
-    where that has no score.
+    """Return the softmax probabilities (T,) of the states found, for scores (T, n_lanes) at `scale` steps per unit.
+
+    The probability of nothing held is 0 if the scores do not include it.
     """
     behind = np.exp((scores - scores.max(axis=1, keepdims=True)) / scale)
     own = behind[np.arange(len(states)), np.minimum(states, scores.shape[1] - 1)] / behind.sum(axis=1)

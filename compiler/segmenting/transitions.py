@@ -1,6 +1,6 @@
-"""Which grasp type follows which: counts of changes from segment to segment, and a graph of them.
+"""Transitions between grasp types: counts of changes from segment to segment, and a graph of them.
 
-Nothing held between two grasps is passed over: PoS, nothing, PMF is a change from PoS to PMF.
+Nothing held between two grasps is skipped: PoS, nothing, PMF is a change from PoS to PMF.
 """
 
 from collections.abc import Iterable, Sequence
@@ -21,14 +21,15 @@ from .scores import segments_of
 from .streams import SegmentingError, streams_of
 from .timeline import Timeline
 
-# What follows less often than that is not admissible, and is drawn faintly.
+# Rarer transitions are not admissible, and are drawn faintly.
 FREQUENT = 0.1
 _LARGEST = 1 << 24
 
 
 class TransitionFile(Struct, frozen=True, forbid_unknown_fields=True):
-    """What a graph is as JSON: counts[i][j] segments of types[i] were followed by one of types[j]; `probabilities` are
-    the same over the sum of their row, 0 where that is.
+    """The JSON form of a graph: counts[i][j] segments of types[i] were followed by one of types[j].
+
+    `probabilities` are the counts divided by the sum of their row, 0 where that is 0.
     """
 
     types: tuple[str, ...]
@@ -45,7 +46,7 @@ class Transitions:
 
     @classmethod
     def of(cls, sequences: Iterable[Sequence[str]], types: Sequence[str]) -> "Transitions":
-        """Count in sequences of types."""
+        """Count the changes in sequences of types."""
         counts, place = np.zeros((len(types), len(types)), np.intp), {name: at for at, name in enumerate(types)}
         for sequence in sequences:
             for one, other in pairwise(sequence):
@@ -54,7 +55,7 @@ class Transitions:
 
     @classmethod
     def of_set(cls, grasp_set: GraspSet) -> "Transitions":
-        """Count in the true segments of a set's streams. Raises SegmentingError where rows are no movements."""
+        """Count the changes in the true segments of a set. Raises SegmentingError if rows are not movements."""
         names, labels = grasp_set.taxonomy.types, grasp_set.labels
         there = sorted(set(labels[~grasp_set.is_none].tolist()))
         streams = [segments_of(labels[stream.rows], len(names)) for stream in streams_of(grasp_set)]
@@ -62,28 +63,28 @@ class Transitions:
 
     @classmethod
     def of_timelines(cls, timelines: Sequence[Timeline]) -> "Transitions":
-        """Count in what was found in streams of the same types."""
+        """Count the changes in segments found in streams of the same types."""
         every = ([one.type for one in each.segments()] for each in timelines)
         return cls.of(every, timelines[0].types if timelines else ())
 
     @classmethod
     def load(cls, path: Path) -> "Transitions":
-        """Return what `save` wrote. Raises SegmentingError that names the file, OSError."""
+        """Load a file written by `save`. Raises SegmentingError that names the file, OSError."""
         try:
             found = msgspec.json.decode(read_file(path, _LARGEST, SegmentingError), type=TransitionFile)
             counts = np.array(found.counts, np.intp).reshape(len(found.types), len(found.types))
         except (msgspec.DecodeError, UnicodeDecodeError, ValueError, OverflowError) as wrong:
-            raise SegmentingError(f"{path} is no graph of transitions: {wrong}") from None
+            raise SegmentingError(f"{path} is not a transitions file: {wrong}") from None
         return cls(found.types, counts)
 
     @property
     def probabilities(self) -> NDArray[np.float64]:
-        """How often each type follows a type, (K, K); rows of zeros where nothing does."""
+        """The share of each successor type among the changes of a type, (K, K); zero rows for types without changes."""
         counts = self.counts.astype(np.float64)
         return np.asarray(counts / np.maximum(counts.sum(axis=1, keepdims=True), 1))
 
     def frequent(self, grasp: str) -> tuple[str, ...]:
-        """Return the types that follow `grasp` in FREQUENT of its changes or more, the most frequent first."""
+        """Return the types that follow `grasp` in at least FREQUENT of its changes, the most frequent first."""
         if grasp not in self.types:
             return ()
         row = self.probabilities[self.types.index(grasp)]
@@ -96,13 +97,13 @@ class Transitions:
         return msgspec.json.encode(found) + b"\n"
 
 
-# Of the picture: its side, the radius of the circle of types and of a type's own, which is less where there are many.
+# The picture's side, the radius of the circle of types, and the radius of a type, reduced if there are many.
 SIZE, _CIRCLE, _LARGEST_DOT = 720, 262.0, 21.0
 
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A type: its place, and of its name that on the outside, which `anchor` says how to align."""
+    """A type: its position, and the position of its name outside, aligned by `anchor`."""
 
     name: str
     x: float
@@ -114,7 +115,7 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A change: `path` is a value of `d`, `tip` of the arrow's `points`; how wide and how opaque; what it says."""
+    """A change: `path` is a value of `d`, `tip` of the arrow's `points`; its width, opacity and text."""
 
     path: str
     tip: str
@@ -125,7 +126,7 @@ class Edge:
 
 @dataclass(frozen=True, slots=True)
 class Graph:
-    """Types on a circle, and changes as arrows between them, the rarest first so that frequent ones lie above."""
+    """Types on a circle, and changes as arrows between them, the rarest first so that frequent ones are on top."""
 
     nodes: tuple[Node, ...]
     edges: tuple[Edge, ...]
@@ -172,8 +173,9 @@ def graph_of(found: Transitions) -> Graph:
 def _edge(
     start: tuple[float, float], end: tuple[float, float], angle: float, dot: float, share: float, words: str
 ) -> Edge:
-    """Return the arrow from a type to another, bent towards the middle, so that both directions are apart; or a loop
-    outside.
+    """Return the arrow from one type to another, or a loop outside the circle.
+
+    Arrows bend towards the middle, so that both directions are apart.
     """
     width, opacity = 1 + 6 * share, 0.12 if share < FREQUENT else min(1.0, 0.35 + share)
     if start == end:

@@ -1,1 +1,1 @@
-"""From an ensemble of stumps to score tables, and from those to integers, with proved bounds."""
+"""Collapse an ensemble of stumps to score tables, and quantise those to integers with proved bounds."""

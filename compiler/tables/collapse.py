@@ -1,8 +1,8 @@
-"""From an ensemble of decision stumps to score tables, without approximation.
+"""Collapse an ensemble of decision stumps to score tables, without approximation.
 
-Boosted stumps are additive. A round adds to class k  f_k = (K-1)/K (g_k - mean_j g_j)  with g_j the answer of the stump
-of class j, which looks at one input. So everything that the rounds ever add because of one input is a function of that
-input alone: for a switch a constant and a row to be added if it is closed, for a joint a row per interval of its codes.
+Boosted stumps are additive. A round adds to class k  f_k = (K-1)/K (g_k - mean_j g_j)  with g_j the output of the stump
+of class j, which reads one input. So the sum of everything that the rounds add for one input is a function of that
+input alone: for a switch a constant, and a row that is added if it is closed; for a joint a row per interval of codes.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from thenar.runtime.tables import HIGHEST_CODE, Pair
 from ..boosting.stumps import Stumps, spread
 from ..elementary import add_exactly
 
-# Rows of answers that are written out at a time: of 1000 classes, 2 MB.
+# Rows of stump outputs that are expanded at a time: 2 MB with 1000 classes.
 _WRITTEN_OUT = 256
 
 Floats = NDArray[np.float64]
@@ -25,16 +25,16 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """What a joint adds in proportion to its code: row_k * (clamp(code, low, high) - low).
+    """The contribution of a joint in proportion to its code: row_k * (clamp(code, low, high) - low).
 
     Parameters
     ----------
     joint : int
-        The number of the joint, from 0.
+        The index of the joint, from 0.
     low, high : int
-        The codes between which it rises, low < high: the range that was trained on.
+        The codes between which the contribution changes, low < high: the range in the training rows.
     row : ndarray of float, shape (K,)
-        What each code adds.
+        The contribution per code.
     """
 
     joint: int
@@ -43,31 +43,32 @@ class Line:
     row: Floats
 
     def of(self, codes: NDArray[np.uint16]) -> Floats:
-        """Return what it adds (n, K) for all joints' codes (n, j)."""
+        """Return the contribution (n, K) to rows with codes (n, j) of all joints."""
         above = np.clip(codes[:, self.joint].astype(np.int64), self.low, self.high) - self.low
         return above[:, np.newaxis] * self.row
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScoreTables:
-    """F_k = bias_k + sum over switches s of bits_s * switch_rows[s, k] + sum over joints a of joint_rows[a][bin_a, k].
+    """`F_k = bias_k + sum over s of bits_s * switch_rows[s, k] + sum over joints a of joint_rows[a][bin_a, k]`.
 
-    Linear joints add what their lines say besides, pairs of joints a row for both codes.
+    Linear joints also add their lines, and pairs of joints add a row that depends on both codes.
 
     Parameters
     ----------
     bias : ndarray of float, shape (K,)
-        The scores with every switch open, before any joint.
+        The scores with every switch open, before any joint is added.
     switch_rows : ndarray of float, shape (s, K)
-        What a closed switch adds.
+        The contribution of a closed switch.
     thresholds : tuple of j ndarrays of uint16, shape (T_a,)
         Strictly increasing; bin_a is the number of thresholds below the code, so code <= t goes left of t.
     joint_rows : tuple of j ndarrays of float, shape (T_a + 1, K)
-        What a joint adds in each bin; of a joint that is nothing but linear one row of zeros.
+        The contribution of a joint in each bin; a purely linear joint has one row of zeros.
     lines : tuple of Line, optional
-        What some of the joints add in proportion to their codes, at most one a joint, in the order of the joints.
+        Contributions in proportion to the code, for some joints, at most one each, in the order of the joints.
     pairs : tuple of Pair, optional
-        What joints add two by two, each joint in one pair at most, in the order of their first joints; and no lines.
+        Contributions of two joints together; each joint is in one pair at most, in the order of first joints. Tables
+        with pairs have no lines.
 
     Examples
     --------
@@ -88,7 +89,7 @@ class ScoreTables:
 
     @property
     def n_inputs(self) -> int:
-        """Kept switches and joints together."""
+        """Number of kept switches and joints."""
         return len(self.switch_rows) + len(self.thresholds)
 
     @property
@@ -98,7 +99,7 @@ class ScoreTables:
 
     def scores(self, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> Floats:
         """Return F (n, K) of the kept switches (n, s) and the joints' codes (n, j)."""
-        # Row after row and not as a matrix product, whose bits depend on the machine.
+        # Add row by row: the last bits of a matrix product depend on the machine.
         scores = np.tile(self.bias, (len(bits), 1))
         for closed, row in zip(bits.T, self.switch_rows, strict=True):
             scores += np.where(closed[:, np.newaxis], row, 0.0)
@@ -112,17 +113,18 @@ class ScoreTables:
 
 
 def first_codes(*thresholds: NDArray[np.uint16]) -> NDArray[np.int64]:
-    """Return the smallest code of each bin of a joint, where the bins of several `thresholds` overlap of each part.
+    """Return the smallest code of each bin of a joint, where bins are intersections of those of several `thresholds`.
 
-    Such a code stands for all codes of its bin; a bin beyond the codes has none.
+    Such a code represents all codes of its bin; a bin beyond the range of codes has none.
     """
     codes = np.unique(np.concatenate([[0], *(each.astype(np.int64) + 1 for each in thresholds)]))
     return codes[codes <= HIGHEST_CODE]
 
 
 def added(one: ScoreTables, other: ScoreTables) -> ScoreTables:
-    """Return tables whose scores are the sums of the scores of two, of the same inputs and classes; at most one of them
-    has lines or pairs.
+    """Return tables whose scores are the sums of the scores of two tables with the same inputs and classes.
+
+    At most one of the two has lines or pairs.
     """
     thresholds, joint_rows = [], []
     parts = zip(one.thresholds, one.joint_rows, other.thresholds, other.joint_rows, strict=True)
@@ -136,7 +138,7 @@ def added(one: ScoreTables, other: ScoreTables) -> ScoreTables:
     )
 
 
-# What trainers make: score tables, or an ensemble that collapses to them.
+# The models that trainers return: score tables, or an ensemble that collapses to them.
 Model = Stumps | ScoreTables
 
 
@@ -148,13 +150,14 @@ def model_scores(model: Model, bits: NDArray[np.bool_], codes: NDArray[np.uint16
 def collapse(model: Model, n_switches: int) -> ScoreTables:
     """Return the score tables of a model over [kept switches | joint codes], the first `n_switches` being switches.
 
-    Those of an ensemble are equal to its scores on bits and codes 0..65535 up to the rounding of sums (1e-12 of what is
-    summed), however many rounds there are: all that an input adds is summed with compensation, and rounded once.
+    For an ensemble, the scores equal the ensemble's on bits and codes 0..65535 except for rounding of sums (1e-12 of
+    the sum of magnitudes), for any number of rounds: contributions to one input are summed with compensation, then
+    rounded once.
     """
     if isinstance(model, ScoreTables):
         return model
     stumps = model
-    left, right = _answers(stumps, 0), _answers(stumps, 1)
+    left, right = _contributions(stumps, 0), _contributions(stumps, 1)
     columns, floors = stumps.columns.ravel(), np.floor(stumps.thresholds.ravel())
     bias = np.zeros(stumps.n_classes)
     switch_rows = np.zeros((n_switches, stumps.n_classes))
@@ -174,9 +177,9 @@ def collapse(model: Model, n_switches: int) -> ScoreTables:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Answers:
-    """What n stumps add to K classes: `own` (n,) to the stump's own class, one of `classes` (n,), and `others` (n,) to
-    each other class. Written out they would be (n, K), gigabytes of a thousand classes.
+class _Contributions:
+    """The contributions of n stumps to K classes: `own` (n,) to each stump's own class, one of `classes` (n,), and
+    `others` (n,) to each other class. As an (n, K) array they would take gigabytes with a thousand classes.
     """
 
     own: Floats
@@ -187,15 +190,15 @@ class _Answers:
     def __len__(self) -> int:
         return len(self.own)
 
-    def __getitem__(self, chosen: NDArray[np.intp] | slice) -> "_Answers":
-        return _Answers(self.own[chosen], self.others[chosen], self.classes[chosen], self.n_classes)
+    def __getitem__(self, chosen: NDArray[np.intp] | slice) -> "_Contributions":
+        return _Contributions(self.own[chosen], self.others[chosen], self.classes[chosen], self.n_classes)
 
-    def less(self, other: "_Answers") -> "_Answers":
-        """Return these less the answers of the same stumps in another branch."""
-        return _Answers(self.own - other.own, self.others - other.others, self.classes, self.n_classes)
+    def less(self, other: "_Contributions") -> "_Contributions":
+        """Return these contributions minus those of the same stumps in another branch."""
+        return _Contributions(self.own - other.own, self.others - other.others, self.classes, self.n_classes)
 
     def rows(self) -> Iterator[Floats]:
-        """Yield a row (K,) of each stump."""
+        """Yield a row (K,) for each stump."""
         for start in range(0, len(self), _WRITTEN_OUT):
             part = self[start : start + _WRITTEN_OUT]
             written = np.repeat(part.others[:, np.newaxis], self.n_classes, axis=1)
@@ -203,22 +206,22 @@ class _Answers:
             yield from written
 
 
-def _answers(stumps: Stumps, branch: int) -> _Answers:
-    """Return the answers of the M K stumps in a branch: centring spreads it from its own class."""
+def _contributions(stumps: Stumps, branch: int) -> _Contributions:
+    """Return the contributions of the M K stumps in a branch: centring spreads each output over the classes."""
     own, others = spread(stumps.values[:, :, branch].ravel(), stumps.n_classes, stumps.shrinkage)
-    return _Answers(own, others, np.tile(np.arange(stumps.n_classes), stumps.n_rounds), stumps.n_classes)
+    return _Contributions(own, others, np.tile(np.arange(stumps.n_classes), stumps.n_rounds), stumps.n_classes)
 
 
-def _where(chosen: NDArray[np.bool_], one: _Answers, other: _Answers) -> _Answers:
+def _where(chosen: NDArray[np.bool_], one: _Contributions, other: _Contributions) -> _Contributions:
     own, others = np.where(chosen, one.own, other.own), np.where(chosen, one.others, other.others)
-    return _Answers(own, others, one.classes, one.n_classes)
+    return _Contributions(own, others, one.classes, one.n_classes)
 
 
-def _joint(floors: Floats, left: _Answers, right: _Answers) -> tuple[NDArray[np.uint16], Floats]:
-    """Return (thresholds (T,), rows (T + 1, K)) of one joint's stumps; a threshold beyond the codes needs no bin."""
+def _joint(floors: Floats, left: _Contributions, right: _Contributions) -> tuple[NDArray[np.uint16], Floats]:
+    """Return (thresholds (T,), rows (T + 1, K)) of one joint's stumps; thresholds beyond the codes need no bin."""
     order = np.argsort(floors, kind="stable")
     steps = np.unique(floors[(floors >= 0) & (floors < HIGHEST_CODE)])
-    # The smallest code of each bin stands for all of its codes: no floor lies between them.
+    # The smallest code of each bin represents all of its codes: no threshold lies between them.
     passed = np.searchsorted(floors[order], np.append(0.0, steps + 1)).tolist()
     answer_right = _sums(right[order], passed)
     answer_left = _sums(left[order[::-1]], [len(order) - n for n in reversed(passed)])[::-1]
@@ -226,10 +229,10 @@ def _joint(floors: Floats, left: _Answers, right: _Answers) -> tuple[NDArray[np.
     return steps.astype(np.uint16), high + (low + answer_left[:, 1])
 
 
-def _sums(answers: _Answers, stops: list[int]) -> Floats:
-    """Return the sums of the first n answers for each n in `stops`, ascending, in two parts: (stops, 2, K)."""
-    total = carry = np.zeros(answers.n_classes)
-    sums, done, rows = [], 0, answers.rows()
+def _sums(contributions: _Contributions, stops: list[int]) -> Floats:
+    """Return the sums of the first n contributions for each n in `stops`, ascending, in two parts: (stops, 2, K)."""
+    total = carry = np.zeros(contributions.n_classes)
+    sums, done, rows = [], 0, contributions.rows()
     for stop in stops:
         for row in islice(rows, stop - done):
             total, carry = add_exactly(total, carry, row)

@@ -58,13 +58,13 @@ class Comparison:
 class WorstCase(Struct, frozen=True, kw_only=True):
     """What integers can do at worst, in steps, exactly and over every frame there is, recorded or not.
 
-    In the frame `closed` (names of kept switches) and `codes`, the lead of grasp type `leader` over `rival` loses most.
+    In the frame `closed` (names of kept switches) and `codes`, `leader` loses most of its lead over `competitor`.
     A margin above safe_margin keeps its grasp type: true of `covered` rows, of which `covered_changed` change all the
     same. `reach` is the furthest that a sum gets from zero, in any order, whole or with inputs missing: for `reaching`.
     """
 
     leader: str
-    rival: str
+    competitor: str
     loss: float
     bound: float
     closed: tuple[str, ...]
@@ -96,7 +96,7 @@ def worst_case(
     covered = comparison.margins > max(safe, TIE * integers.scale) + 2 * comparison.slack
     return WorstCase(
         leader=grasps[frame.leader],
-        rival=grasps[frame.rival],
+        competitor=grasps[frame.competitor],
         loss=float(frame.loss),
         bound=comparison.safe_margin + 2 * comparison.slack,
         closed=tuple(name for name, bit in zip(switches, frame.bits.tolist(), strict=True) if bit),

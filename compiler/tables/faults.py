@@ -1,10 +1,10 @@
-"""What faults of inputs leave of recognition: every fault on every row, counted from the integer tables.
+"""The accuracy that remains under input faults: every fault on every row, counted from the integer tables.
 
-Scores are sums, so a fault changes one term of each: an input that is stuck adds the row of the value at which it is
-stuck, one that is lost the row that stands in. Trials are counted, each recognised as most of its frames.
+Scores are sums, so a fault changes one term of each: a stuck input adds the row of the value at which it is stuck, a
+lost input its substitute row. Trials are counted as correct by the majority of their frames.
 
-Answers are found without sorting: with scores S_k, the largest of S_k * K + (K - 1 - k) names the class of the largest
-score, the lowest of several, by its remainder.
+Predictions need no sorting: with scores S_k, the largest value of S_k * K + (K - 1 - k) encodes in its remainder the
+class with the largest score, the lowest number at a tie.
 """
 
 from collections import Counter
@@ -23,18 +23,18 @@ Numbers = NDArray[np.intp]
 Steps = NDArray[np.int64]
 Found = tuple[int, ...]
 
-# Steps of all inputs that are held at a time, and additions beyond which no pairs are looked at: some minutes.
+# Steps of all inputs kept in memory at a time, and additions beyond which pairs are skipped: some minutes.
 _HELD, _MOST = 1 << 23, 1 << 37
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FaultCounts:
-    """How many of `total` trials are recognised: `correct` without a fault, and with each of these.
+    """How many of `total` trials are correct: `correct` without a fault, and with each of these.
 
-    lost   (inputs,) each input lost, switches first; stuck: for each input (values,), stuck at each value
-    dead   each group of inputs lost together
-    pairs  for each two inputs, both lost, in the order of itertools.combinations; none where they are too many
-    values for each input, its values in words
+    lost   (inputs,) with each input lost, switches first; stuck: for each input (values,), stuck at each value
+    dead   with each group of inputs lost together
+    pairs  with two inputs lost, in the order of itertools.combinations; empty if there are too many
+    values for each input, descriptions of its values
     """
 
     total: int
@@ -55,10 +55,10 @@ def count_faults(
     groups: Sequence[Sequence[int]] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> FaultCounts:
-    """Count the trials that each fault leaves, of rows with kept switches (n, s), codes (n, j), labels and trials (n,).
+    """Count the trials that stay correct under each fault, for rows of all trials.
 
-    Labels that are none of the tables' classes are never recognised. `groups` are inputs that fail together, by number:
-    switches first, then joints.
+    Rows are kept switches (n, s), codes (n, j), labels and trials (n,). Labels outside the tables' classes are never
+    correct. `groups` are indices of inputs that fail together, switches first, then joints.
     """
     terms = [*_switches(tables), *_joints(tables)]
     joined = [_Joined.of(tables, pair) for pair in tables.pairs]
@@ -81,14 +81,14 @@ def count_faults(
 
 
 def _cuts(trial: Numbers, size: int) -> list[int]:
-    """Return where to cut rows of ascending trials into blocks of about `size` rows that part no trial."""
+    """Return where to cut rows of ascending trials into blocks of about `size` rows without splitting a trial."""
     starts = np.flatnonzero(np.diff(trial, prepend=-1))
     return [*starts[np.flatnonzero(np.diff(starts // size, prepend=-1))].tolist(), len(trial)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Term:
-    """An input: what each of its values adds, (values, K), what stands in for it (K,), and its values in words."""
+    """An input: the rows of its values, (values, K), its substitute row (K,), and descriptions of its values."""
 
     rows: Steps
     mean: Steps
@@ -110,13 +110,13 @@ def _joints(tables: IntegerTables) -> Iterator[_Term]:
 
 
 def _steps(tables: IntegerTables, joint: int) -> Steps:
-    """Return the codes after which something of a joint changes; what it says up to the next is one value."""
+    """Return the last code of each interval of a joint in which its contribution is constant."""
     return np.union1d(tables.binned(joint)[0], tables.steps_of(joint)).astype(np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Joined:
-    """What two inputs add together: rows (values + 1, values + 1, K); the last value of each is that it is lost."""
+    """The contribution of two inputs together, (values + 1, values + 1, K); the last value of each means lost."""
 
     inputs: tuple[int, int]
     rows: Steps
@@ -129,13 +129,13 @@ class _Joined:
         return cls((tables.n_switches + one, tables.n_switches + other), pair.rows[np.ix_(*bins)].astype(np.int64))
 
     def turned(self, first: int) -> tuple[int, Steps]:
-        """Return the other input than `first`, and the rows with the values of `first` first."""
+        """Return the index of the other input than `first`, and the rows with the axis of `first` first."""
         one, other = self.inputs
         return (other, self.rows) if first == one else (one, self.rows.swapaxes(0, 1))
 
 
 class _Block:
-    """Some rows, whole trials of them: at (inputs, n) is the value of each input; labels and trials (n,), ascending."""
+    """Rows of complete trials: `at` (inputs, n) is the value of each input; labels and trials (n,), ascending."""
 
     def __init__(
         self,
@@ -149,7 +149,7 @@ class _Block:
         self._k = tables.n_classes
         self._labels, self._trial = labels, trials - trials[0]
         self._first = np.flatnonzero(np.diff(trials, prepend=-1))
-        # All in one number a class: int64 has room for sums of any faults.
+        # One number per class: int64 has room for the sums under any faults.
         self._terms = [np.ascontiguousarray(term.rows.T * self._k) for term in terms]
         self._at = at
         self.whole = (tables.bias.astype(np.int64) * self._k + np.arange(self._k)[::-1])[:, None].repeat(at.shape[1], 1)
@@ -160,7 +160,7 @@ class _Block:
             for term, rows, values in zip(terms, self._terms, at, strict=True)
         ]
         self._joined = {one: pair.turned(one) for pair in joined for one in pair.inputs}
-        # Of two that are lost together, by how much their own two differences are wrong.
+        # If both inputs of a pair are lost, the correction to the sum of their separate differences.
         self._both: dict[tuple[int, int], Steps] = {}
         for pair in joined:
             (one, other), now = pair.inputs, self._added(pair.inputs[0], at[pair.inputs[0]])
@@ -172,13 +172,13 @@ class _Block:
             )
 
     def _added(self, one: int, value: Numbers | int) -> Steps:
-        """Return what a paired input adds, (K, n), at this value in each row, together with the other of its pair."""
+        """Return the contribution (K, n) of a paired input with this value in each row, together with its partner."""
         other, rows = self._joined[one]
         found: Steps = rows[value, self._at[other]].T * self._k
         return found
 
     def right(self, scores: Steps) -> int:
-        """Return how many trials are recognised by scores (K, n)."""
+        """Return the number of trials that are correct with scores (K, n)."""
         found = self._k - 1 - scores.max(axis=0) % self._k
         if len(self._first) == len(self._labels):
             return int(np.count_nonzero(found == self._labels))
@@ -186,7 +186,7 @@ class _Block:
         return int(np.count_nonzero(counts.reshape(-1, self._k).argmax(axis=1) == self._labels[self._first]))
 
     def counts(self, together: Sequence[Found], *, pairs: bool) -> Iterator[int]:
-        """Yield the trials recognised with each group of inputs lost, each input stuck at each value, each two lost."""
+        """Yield the correct trials with each group of inputs lost, each input stuck at each value, each pair lost."""
         for group in together:
             both = (more for pair, more in self._both.items() if {*pair} <= {*group})
             yield self.right(sum(both, sum((self.lost[element] for element in group), self.whole)))
@@ -204,10 +204,12 @@ class _Block:
 
 
 def groups_of(scan: ScanMap | None, sources: Sequence[str], n_joints: int) -> Mapping[str, Found]:
-    """Return the inputs that fail together, by what they fail with: a taxel of several levels; a port, a chip or a
-    board of the scan map, counted from 1 as the harness has them; and the device that reads the joints.
+    """Return the inputs that fail together, by the name of the common part.
 
-    sources  of each kept switch its own name, or that of the taxel that it is a level of
+    Parts are taxels of several levels; ports, chips and boards of the scan map, counted from 1 as in the harness; and
+    the device that reads the joints.
+
+    sources  for each kept switch its name, or that of the taxel whose level it is
     """
     found: dict[str, Found] = {}
     for taxel, levels in Counter(sources).items():
@@ -230,7 +232,7 @@ def groups_of(scan: ScanMap | None, sources: Sequence[str], n_joints: int) -> Ma
 
 
 def worst_faults(counts: FaultCounts, names: Sequence[str], groups: Mapping[str, Found]) -> Faults:
-    """Return the worst fault of each kind, the first of several; `names` are those of the inputs."""
+    """Return the worst fault of each kind, the first of equal ones; `names` are those of the inputs."""
     lost = [Faulty("lost", (name,), left) for name, left in zip(names, counts.lost, strict=True)]
     stuck = [
         Faulty(f"stuck {'' if value in _BIT else 'at '}{value}", (name,), left)

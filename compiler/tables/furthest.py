@@ -1,4 +1,4 @@
-"""How far a sum of integer rows can get, and the frame and order of summation that get it there."""
+"""The largest magnitude that a sum of integer rows can reach, with the frame and order of summation that reach it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,12 +14,11 @@ _SIGNS = 1, -1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Furthest:
-    """A frame, perhaps with inputs missing, whose rows added in this `order` get further from zero than any other's.
+    """A frame, perhaps with inputs missing, whose rows reach the largest partial sum when added in this `order`.
 
-    The first `n_terms` of them give class `grasp` the partial sum `total`; the others lead back. order (n,) numbers the
-    terms: 0 the bias, then switches, then joints, then what slopes or pairs add, n of them. bits (s,) and codes (j,)
-    with the masks of what is missing, as the runtime takes them; `terms` (n, K) are the rows themselves, in the order
-    of their numbers.
+    The first `n_terms` rows bring class `grasp` to the partial sum `total`; the others lead back. order (n,) numbers
+    the terms: 0 the bias, then switches, then joints, then slopes or pairs, n in all. bits (s,) and codes (j,) come
+    with the masks of missing inputs that the runtime takes; `terms` (n, K) are the rows themselves, by number.
     """
 
     grasp: int
@@ -34,10 +33,10 @@ class Furthest:
 
 
 def furthest(tables: IntegerTables, *, missing: bool = True) -> Furthest:
-    """Return what reaches `tables.bound`; without `missing`, the furthest that frames get of which all can be read.
+    """Return the sum that reaches `tables.bound`; without `missing`, the largest over frames that are read completely.
 
-    A bin that no code falls into, above a threshold of 65535, counts for the bound but for no frame; `collapse` makes
-    none.
+    A bin that no code can reach, above a threshold of 65535, counts for the bound but for no frame; `collapse` never
+    makes one.
     """
     choices = list(_choices(tables, missing))
     onwards = [[np.maximum(sign * terms, 0).sum(axis=0) for _, terms in choices] for sign in _SIGNS]
@@ -70,7 +69,7 @@ def furthest(tables: IntegerTables, *, missing: bool = True) -> Furthest:
 
 
 def _choices(tables: IntegerTables, missing: bool) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Yield what bias, switches, (c,), and units of joints, (c, joints), can say, and the terms for it, (t, c, K)."""
+    """Yield, for bias, switches and units of joints, the choices, (c,) or (c, joints), and their terms, (t, c, K)."""
     last = slice(None if missing else -1)
     yield np.zeros(1, np.int64), tables.bias[np.newaxis, np.newaxis].astype(np.int64)
     for row, mean in zip(tables.switch_rows, tables.switch_means, strict=True):

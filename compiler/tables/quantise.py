@@ -1,19 +1,19 @@
-"""From score tables to integer tables: one scale for all, fine, yet such that no sum can overflow.
+"""Quantise score tables to integers: one scale for all rows, as fine as possible without overflow of any sum.
 
 Rounding every row to whole steps moves a score by at most (inputs + 1)/2 steps, half a step for the bias and for each
 input's row. Two scores can therefore approach each other by at most inputs + 1 steps, and a frame whose best score
-leads by more than that keeps its grasp type. This holds of every scale: a coarser one only makes a step worth more.
+leads by more than that keeps its grasp type. This holds for every scale: a coarser one only makes a step worth more.
 
-Firmware adds up what look-ups give: the sum of the rows of a few switches, or a row of a joint. Where it stores these
-in entries of 8 bits, as what exceeds the least of the look-up and class, no look-up may span more than 255 steps. A
-scale for that is some 4 steps per unit of score, where one for 16 bits is some 300.
+Firmware adds the results of table lookups: the sum of the rows of a few switches, or a row of a joint. Where it stores
+these in entries of 8 bits, as the excess over the minimum for the lookup and class, no lookup may span more than 255
+steps. The scale is then about 4 steps per unit of score, compared with about 300 for 16 bits.
 
-The row of a line becomes whole steps per distance from the middle of its range (runtime/tables.py), a byte each: half a
-step times the largest distance, at most 127, is what that moves a score. Where tables have lines and entries are of 8
-bits, these are the upper halves of steps: rows of switches and bins are then rounded to multiples of 256 steps, and
-only lines and bias are as fine as the sums of 16 bits allow. The bias takes back what rounding moves scores by in the
-mean: x times the error of a switch's row becomes x less its mean times the error, which is no more for an x of 0 or 1.
-Such scores are relative to the last class, which is then one class less to add up.
+The row of a line becomes whole steps per distance from the middle of its range (runtime/tables.py), a byte each. This
+moves a score by at most half a step times the largest distance, which is at most 127. Where tables have lines and
+entries of 8 bits, the entries are the upper halves of steps: rows of switches and bins are rounded to multiples of 256
+steps, and only lines and bias use the full resolution of 16-bit sums. The bias compensates the mean rounding error: x
+times the error of a switch's row becomes (x - mean) times the error, which is no larger for x = 0 or 1. Such scores are
+relative to the last class, so there is one class less to add up.
 """
 
 import math
@@ -29,11 +29,11 @@ from .collapse import Floats, Line, ScoreTables
 
 
 def balance(tables: ScoreTables) -> ScoreTables:
-    """Return tables of equal scores whose bias is spread over the joints' rows, as far as their ranges take it.
+    """Return tables of equal scores whose bias is spread over the joints' rows, as far as their ranges allow.
 
-    What moves from the bias into all rows of a joint changes no score. A partial sum can reach |bias| plus the range of
-    every input; with the bias gone it reaches no further than complete scores do, and there is nothing better. A line
-    reaches least where it adds nothing in the middle of its range: rows here are those that it has there.
+    Moving a constant from the bias into all rows of a joint changes no score. A partial sum can reach |bias| plus the
+    range of every input; without bias it reaches no further than complete scores do, which is optimal. A line reaches
+    least where its zero is in the middle of its range: rows here are taken there.
     """
     if not tables.joint_rows:
         return tables
@@ -43,7 +43,7 @@ def balance(tables: ScoreTables) -> ScoreTables:
     middle_rows = [rows + middle for rows, middle in zip(tables.joint_rows, middles, strict=True)]
     lowest = np.stack([rows.min(axis=0) for rows in middle_rows])
     spans = np.stack([rows.max(axis=0) for rows in middle_rows]) - lowest
-    # Each joint gives up its lowest row and the same share of its span; the share is such that the bias becomes zero.
+    # Each joint gives up its lowest row and a common share of its span, chosen such that the bias becomes zero.
     wanted, room = -tables.bias - lowest.sum(axis=0), spans.sum(axis=0)
     share = np.divide(wanted, room, out=np.zeros_like(room), where=room > 0).clip(0, 1)
     moved = lowest + share * spans
@@ -52,7 +52,7 @@ def balance(tables: ScoreTables) -> ScoreTables:
 
 
 def as_deployed(tables: ScoreTables, grid: int) -> ScoreTables:
-    """Return the tables that integers with rows on a `grid` are made of: there, scores are relative to the last."""
+    """Return the tables before rounding to a `grid`: scores relative to the last class if rows are on one."""
     if grid == 1:
         return tables
 
@@ -68,11 +68,10 @@ def as_deployed(tables: ScoreTables, grid: int) -> ScoreTables:
 
 
 def slope_of(line: Line, scale: float) -> tuple[Slope, Floats]:
-    """Return a line in whole steps, without its row; and the row (K,), in whole steps per distance, that it should
-    have.
+    """Return a line in whole steps, without its row; and the exact row (K,) in steps per distance.
 
-    Codes are divided by the least power of two that makes their range fit a byte, or multiplied by the least one that
-    makes a byte of every entry of the row, if there is one.
+    Codes are divided by the smallest power of two that makes their range fit a byte, or multiplied by the smallest one
+    that makes every entry of the row fit a byte, if there is one.
     """
     span, gain = line.high - line.low, 0
     while span >> -gain > WIDEST:
@@ -84,14 +83,14 @@ def slope_of(line: Line, scale: float) -> tuple[Slope, Floats]:
 
 
 def offset_of(slope: Slope) -> float:
-    """Return how far above the lowest code of a slope nothing is added: where codes are divided, in the middle of those
-    that become one.
+    """Return the distance from a slope's lowest code to its zero: the middle of the codes that share the zero distance,
+    where codes are divided.
     """
     return slope.zero / 2.0**slope.gain + max(2.0**-slope.gain - 1, 0) / 2
 
 
-# The most consecutive switches that firmware looks up together in tables of narrow entries. Any so many, wherever a
-# group of them may begin, keep the span; so fewer do as well.
+# The most consecutive switches that firmware looks up together in tables of narrow entries. Every group of this many
+# consecutive switches keeps the span, so smaller groups do as well.
 GROUP_SIZE = 5
 
 # Scales that `kindest_scale` tries, evenly spaced down to four fifths of the finest.
@@ -100,11 +99,11 @@ _LARGEST = 127  # entry of a slope's row
 
 
 def finest_scale(tables: ScoreTables, limit: float, widest: int, grid: int = 1) -> float:
-    """Return the largest double below FINEST_SCALE at which no sum of rounded rows exceeds `limit` and no look-up
-    spans more than `widest`; 1 for tables of zeros.
+    """Return the largest scale at which no sum exceeds `limit` and no lookup spans more than `widest`.
 
-    Rounded terms never fall as the scale grows, so neither do sums and spans, and bisection over the doubles is exact.
-    With lines, or rows on a `grid`, it finds one of the largest.
+    It is a double below FINEST_SCALE; 1 for tables of zeros. Rounded terms never shrink as the scale grows, so neither
+    do sums and spans, and bisection over the doubles is exact. With lines, or rows on a `grid`, the result is only one
+    of the largest.
     """
     whole = reach(tables, 1.0, rounded=False)
     if whole == 0:
@@ -123,16 +122,15 @@ def finest_scale(tables: ScoreTables, limit: float, widest: int, grid: int = 1) 
 def kindest_scale(
     tables: ScoreTables, finest: float, bits: NDArray[np.bool_], codes: NDArray[np.uint16], grid: int = 1
 ) -> float:
-    """Return, of `finest` and scales a little coarser, the one at which the fewest rows, bits (n, s) and codes (n, j),
-    change their class; of equal ones the finest.
+    """Return, of `finest` and slightly coarser scales, the one at which the fewest rows change class.
 
-    Where steps are coarse, whether a frame that many rows share changes its class is a matter of luck and not of how
-    coarse they are. What is proved of rounding is proved at every scale.
+    The rows are bits (n, s) and codes (n, j); ties go to the finest scale. With coarse steps, whether a common frame
+    changes its class depends on luck rather than on the scale. The bounds on rounding hold at every scale.
     """
     scales = finest * (1 - np.arange(TRIED) / _TRIED_OF_ALL)
     scores = tables.scores(bits, codes)
     most = max(rounding_error(tables, scale, grid) for scale in scales[[0, -1]].tolist())
-    near = _leads(scores) * scales[-1] <= 2 * most + 1  # no scale can change the others: quantise.py
+    near = _leads(scores) * scales[-1] <= 2 * most + 1  # no scale can change the other rows: quantise.py
     right, closed = winners(scores[near]), bits[near].astype(np.float64)
     asked, means = codes[near], _mean(bits.astype(np.int64))
     changed = []
@@ -143,9 +141,11 @@ def kindest_scale(
 
 
 def rounding_error(tables: ScoreTables, scale: float, grid: int = 1) -> float:
-    """Return the most steps that rounding can move a score: half of one for the bias, for a joint's only row and for
-    that of a pair, half of the `grid` for the row of each switch and bin, and for each line half of one times the
-    largest distance, besides what codes that become one differ by.
+    """Return the most steps by which rounding can move a score.
+
+    It is half a step for the bias, for a joint's only row and for the row of a pair; half of the `grid` for the row of
+    each switch and bin; and for each line half a step times the largest distance, plus the difference between codes
+    that share a distance.
     """
     binned = sum(len(steps) > 0 for steps in tables.thresholds)
     error = (tables.n_inputs + len(tables.pairs) + 1 + (grid - 1) * (len(tables.switch_rows) + binned)) / 2
@@ -156,8 +156,8 @@ def rounding_error(tables: ScoreTables, scale: float, grid: int = 1) -> float:
 
 
 def reach(tables: ScoreTables, scale: float, *, rounded: bool = True, grid: int = 1) -> float:
-    """Return the largest absolute value that a partial sum of the scaled rows can take, in any order; infinity if an
-    entry of a slope's row does not fit its byte.
+    """Return the largest absolute value of a partial sum of the scaled rows, in any order; infinity if an entry of a
+    slope's row does not fit its byte.
     """
     upper, lower = _extremes(tables, scale, rounded=rounded, grid=grid)
     for line in tables.lines:
@@ -171,31 +171,32 @@ def reach(tables: ScoreTables, scale: float, *, rounded: bool = True, grid: int 
 
 
 def span(tables: ScoreTables, scale: float) -> float:
-    """Return the most that what a look-up gives a class can differ by: a joint's rows and zero, scaled and rounded, or
-    the sums of some of GROUP_SIZE consecutive switches' rows.
+    """Return the largest difference between results of one lookup for a class.
 
-    Zero, which `balance` puts between a joint's rows anyhow, is among them so that no span falls as the scale grows.
+    A lookup returns a joint's row or zero, scaled and rounded, or the sum of the rows of some of GROUP_SIZE consecutive
+    switches. Zero, which `balance` puts between a joint's rows anyway, is included so that no span shrinks as the scale
+    grows.
     """
     upper, lower = _extremes(tables, scale)
     switches, joints = np.split(upper[1:] - lower[1:], [len(tables.switch_rows)])
-    # Sums of whole numbers are exact: so is the difference of two of them, GROUP_SIZE switches apart.
+    # Sums of integers are exact, and so is the difference of two of them, GROUP_SIZE switches apart.
     sums = np.cumsum(np.vstack([np.zeros((GROUP_SIZE, len(tables.bias))), switches]), axis=0)
     groups = sums[GROUP_SIZE:] - sums[:-GROUP_SIZE]
     return float(np.vstack([groups, joints]).max(initial=0.0))
 
 
 def _leads(scores: Floats) -> Floats:
-    """Return by how much the best of each row of (n, K) leads the second best, (n,)."""
+    """Return the lead (n,) of the best over the second best score in each row of (n, K)."""
     second, best = np.partition(scores, -2, axis=1)[:, -2:].T
     leads: Floats = best - second
     return leads
 
 
 def _whole_scores(tables: ScoreTables, scale: float, closed: Floats, codes: NDArray[np.uint16], grid: int) -> Floats:
-    """Return the scores (n, K) of the tables but for the bias in whole steps: closed (n, s) switches, and the joints'
-    codes (n, j).
+    """Return the scores (n, K) of the tables without the bias, in whole steps, for closed switches (n, s) and the
+    joints' codes (n, j).
     """
-    # Sums of whole numbers are exact, in any order: a matrix product may add them up.
+    # Sums of integers are exact in any order, so a matrix product may add them up.
     scores: Floats = closed @ _whole(tables.switch_rows * scale, grid)
     for column, steps, rows in zip(codes.T, tables.thresholds, _middle_rows(tables, scale, grid), strict=True):
         scores += rows[np.searchsorted(steps, column)]
@@ -208,8 +209,9 @@ def _whole_scores(tables: ScoreTables, scale: float, closed: Floats, codes: NDAr
 
 
 def _whole_bias(tables: ScoreTables, scale: float, grid: int, means: Floats) -> Floats:
-    """Return the bias in whole steps, with what the rounding of switches' rows to a `grid` takes from scores in the
-    mean, where each of the switches is closed in `means` (s,) of all rows.
+    """Return the bias in whole steps, with compensation for the mean error of rounding switches' rows to a `grid`.
+
+    `means` (s,) are the shares of rows in which each switch is closed.
     """
     rows = tables.switch_rows * scale
     lost = means[:, np.newaxis] * (rows - _whole(rows, grid)) if grid > 1 else 0 * rows
@@ -223,8 +225,9 @@ def _whole(rows: Floats, grid: int) -> Floats:
 
 
 def _middle_rows(tables: ScoreTables, scale: float, grid: int, *, rounded: bool = True) -> list[Floats]:
-    """Return the joints' rows (T_a + 1, K) in whole steps, at the codes where their slopes add nothing. A joint's only
-    row is part of the start, and needs no grid.
+    """Return the joints' rows (T_a + 1, K) in whole steps, at the zeros of their slopes.
+
+    A joint's only row becomes part of the starting value and needs no grid.
     """
     middle = list(tables.joint_rows)
     for line in tables.lines:
@@ -233,14 +236,14 @@ def _middle_rows(tables: ScoreTables, scale: float, grid: int, *, rounded: bool 
 
 
 def _outermost(tables: ScoreTables) -> ScoreTables:
-    """Return the tables with each joint's largest and smallest rows alone: rounding keeps them outermost."""
+    """Return the tables with only each joint's largest and smallest rows: rounding keeps them extreme."""
     outer = (np.array([rows.max(axis=0), rows.min(axis=0)]) if len(rows) > 1 else rows for rows in tables.joint_rows)
     return replace(tables, joint_rows=tuple(outer))
 
 
 def _extremes(tables: ScoreTables, scale: float, *, rounded: bool = True, grid: int = 1) -> tuple[Floats, Floats]:
-    """Return the most and the least, zero included, that bias, switches, joints, but for their lines, and pairs add:
-    (1 + s + j + p, K) each.
+    """Return the largest and smallest contributions, zero included, of bias, switches, joints (without their lines) and
+    pairs: (1 + s + j + p, K) each.
     """
     bias, switches = tables.bias[np.newaxis] * scale, tables.switch_rows * scale
     if rounded:
@@ -265,10 +268,10 @@ def quantise(
 ) -> IntegerTables:
     """Return integer tables whose sums fit `width` bits (4 to 16), rounded half to even.
 
-    bits (n, s) and codes (n, j) are the rows trained on; their mean contributions stand in for missing inputs. No
-    look-up, a joint or up to GROUP_SIZE consecutive switches, spans more than 2^entry_bits - 1 steps in any class. With
-    16 that is no limit, as sums of 16 bits span no more, and the scale is the finest; with fewer it is the kindest.
-    With lines, entries of fewer than 16 bits are multiples of 256 instead.
+    bits (n, s) and codes (n, j) are the training rows; their mean contributions replace missing inputs. No lookup (a
+    joint, or up to GROUP_SIZE consecutive switches) spans more than 2^entry_bits - 1 steps in any class. With 16 bits
+    this is no restriction, since sums of 16 bits span no more, and the scale is the finest; with fewer it is the
+    kindest. With lines, entries of fewer than 16 bits are multiples of 256 instead.
     """
     grid, means = COARSE if tables.lines and entry_bits < 16 else 1, _mean(bits.astype(np.int64))
     balanced = balance(as_deployed(tables, grid))
@@ -281,7 +284,7 @@ def quantise(
         beyond = reach(replace(balanced, bias=bias / scale), scale, grid=grid) - limit
         if grid == 1 or beyond <= 0:
             break
-        room += beyond  # what the bias takes back, too, needs room
+        room += beyond  # the compensation in the bias needs room, too
     lines = {line.joint: line.of(codes) for line in balanced.lines}
     switch_rows = _whole(balanced.switch_rows * scale, grid).astype(np.int16)
     switch_means = np.rint(balanced.switch_rows * means[:, np.newaxis] * scale)
@@ -303,7 +306,7 @@ def quantise(
     )
     joint_means = []
     for joint, (column, steps, rows) in enumerate(zip(codes.T, balanced.thresholds, balanced.joint_rows, strict=True)):
-        # A mean computed in floating point may round to just outside of what it is the mean of, and so of int16.
+        # A mean computed in floating point may round to just outside the range of its values, and so of int16.
         mean = np.rint(_mean(rows[np.searchsorted(steps, column)] + lines.get(joint, 0.0)) * scale)
         added = integers.choices(joint)[1].sum(axis=0)
         joint_means.append(np.clip(mean, added.min(axis=0), added.max(axis=0)))
@@ -311,18 +314,18 @@ def quantise(
 
 
 def _merged(thresholds: NDArray[np.uint16], rows: Integers) -> tuple[NDArray[np.uint16], Integers]:
-    """Return the joint's thresholds and rows without the thresholds that rounding has made meaningless."""
+    """Return the joint's thresholds and rows without the thresholds that rounding has made redundant."""
     kept = (rows[1:] != rows[:-1]).any(axis=1)
     return thresholds[kept], rows[np.concatenate([[True], kept])]
 
 
 def _mean(rows: NDArray[np.int64] | Floats) -> Floats:
-    """Return the mean (K,) of rows (n, K), summed exactly, so that it has the same bits on every machine."""
+    """Return the mean (K,) of rows (n, K), summed exactly, so that its bits are the same on every machine."""
     return np.array([math.fsum(column) / len(rows) for column in rows.T])
 
 
 def integer_scores(tables: IntegerTables, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.int32]:
     """Return the scores (n, K), in steps, of the kept switches (n, s) and the joints' codes (n, j)."""
-    # No partial sum leaves int16 (IntegerTables), so nothing overflows; a product of small whole numbers is exact.
+    # No partial sum leaves int16 (IntegerTables), so nothing overflows; a product of small integers is exact.
     scores: NDArray[np.int32] = tables.joint_sums(codes) + bits.astype(np.int32) @ tables.switch_rows.astype(np.int32)
     return scores

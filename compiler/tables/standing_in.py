@@ -1,17 +1,18 @@
-"""What stands in for a lost input: the row by which all others explain the recordings best.
+"""Substitutes for lost inputs: for each input, the constant row with which the others explain the recordings best.
 
-A mean row is what an input adds on average. But the others often say the same as it does, or the opposite, and are
-weighed as if it were there: without it, some grasp types are too probable on the whole and others not enough. So each
-input is left out of the rows that were trained on, and what stands in for it changes until every type is as probable in
-sum as it is frequent: there the likelihood is the highest that a constant row can give. A step adds ln(frequency / sum
-of the probabilities) to each type, which never lowers it (J. N. Darroch and D. Ratcliff, Ann. Math. Stat. 43, 1972).
+A mean row is an input's average contribution. But the other inputs are often correlated with it, and their rows were
+learned with the input present: without it, some grasp types become too probable on the whole and others not enough. So
+each input is left out of the training rows, and its substitute changes until the summed probability of every type
+equals its frequency: that is the maximum of the likelihood for a constant row. A step adds ln(frequency / sum of the
+probabilities) to each type, which never lowers the likelihood (J. N. Darroch and D. Ratcliff, Ann. Math. Stat. 43,
+1972).
 
-Where a build has switches and joints, all of a kind may be lost at once, and the sum of their rows stands in. Steps of
-single inputs miss what that sum lacks; the least squares of both kinds of remainders say how a step is shared. Inputs
-that add the same whatever they read take no part: a silent joint more changes nothing for the others.
+Where a build has switches and joints, all inputs of one kind may be lost at once, and the sum of their substitutes is
+used. Steps for single inputs leave a residual in that sum; least squares over both kinds of residuals say how to share
+a step. Inputs whose contribution is constant take no part: another silent joint changes nothing for the others.
 
-An entry stays between the least and the most that the input adds to its type: then no sum can leave its bounds. The
-steps are few, as those that follow suit the rows trained on more than others, above all where several are lost.
+An entry stays between the input's smallest and largest contribution to its type, so no sum can leave its bounds. There
+are few steps, because later ones overfit the training rows, above all where several inputs are lost.
 """
 
 from collections.abc import Sequence
@@ -24,9 +25,9 @@ from thenar.runtime.tables import IntegerTables
 
 from ..elementary import log, softmax
 
-# Steps from the mean rows; distinct rows that are looked at.
+# Steps from the mean rows; the number of distinct rows used.
 STEPS, ROWS = 20, 1000
-# A type that no row has, or that is given no share, is neither impossible nor certain.
+# A type without rows, or with probability zero, is neither impossible nor certain.
 _DOUBT = 0.5
 Steps = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -35,12 +36,12 @@ Floats = NDArray[np.float64]
 def fit_lost(
     tables: IntegerTables, bits: NDArray[np.bool_], codes: NDArray[np.uint16], labels: NDArray[np.intp]
 ) -> IntegerTables:
-    """Return the tables with what stands in for each lost switch and joint fitted to the rows trained on.
+    """Return the tables with the substitutes for each lost switch and joint fitted to the training rows.
 
     Parameters
     ----------
     tables : IntegerTables
-        Their mean rows are where the fit begins.
+        Their mean rows are the starting point of the fit.
     bits : array of bool, shape (n, s)
         The kept switches.
     codes : array of uint16, shape (n, j)
@@ -57,7 +58,7 @@ def fit_lost(
     added = [tables.choices(joint)[1].sum(axis=0) for joint in range(tables.n_joints)]
     ends = np.minimum(switch_rows, 0), np.maximum(switch_rows, 0)
     spans = tuple(np.array([end(rows, axis=0) for rows in added]).reshape(-1, len(wanted)) for end in (np.min, np.max))
-    # Of each input that says something, and then of all of its kind if others do: the scores of the rows without.
+    # For each varying input, and then for all of its kind if the other kind varies: the scores without it.
     of_switches, of_joints = (np.flatnonzero((least != most).any(axis=1)) for least, most in (ends, spans))
     switches = [whole - bits[:, switch, np.newaxis] * switch_rows[switch] for switch in of_switches]
     each = [whole - joints + _without(tables, codes, [joint]) for joint in of_joints.tolist()]
@@ -72,7 +73,7 @@ def fit_lost(
         found, before, lacks = means.astype(np.int64), list[Steps](), list[Floats]()
         for _ in range(STEPS if len(chosen) else 0):
             rows = [*found[chosen], found.sum(axis=0)][: len(others)]
-            # A row that has not moved lacks what it did.
+            # A row that has not moved keeps its residual.
             lacks = [
                 lacks[number]
                 if before and np.array_equal(before[number], row)
@@ -96,9 +97,7 @@ def fit_lost(
 def _distinct(
     bits: NDArray[np.bool_], codes: NDArray[np.uint16], labels: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], Floats]:
-    """Return numbers of rows of which no two are the same, ROWS of them at most, and how often each is there: whatever
-    the order of the rows is, the same rows.
-    """
+    """Return the indices of distinct rows, at most ROWS, and how often each occurs: the same rows for any row order."""
     held = np.column_stack([labels, np.packbits(bits, axis=1), codes])
     _, rows, often = np.unique(held, axis=0, return_index=True, return_counts=True)
     number = min(len(rows), ROWS)
@@ -107,7 +106,7 @@ def _distinct(
 
 
 def _without(tables: IntegerTables, codes: NDArray[np.uint16], joints: Sequence[int]) -> Steps:
-    """Return the bias and what the joints add but for these, (n, K): a lost joint of a pair has code 0 there."""
+    """Return bias plus joints without the given `joints`, (n, K): a lost joint of a pair reads as code 0."""
     left = codes.copy()
     left[:, list(joints)] = 0
     own = [tables.binned(joint)[1][0].astype(np.int64) for joint in joints]
@@ -116,9 +115,9 @@ def _without(tables: IntegerTables, codes: NDArray[np.uint16], joints: Sequence[
 
 
 def _lack(scores: Steps, often: Floats, wanted: Floats, scale: float) -> Floats:
-    """Return how many steps of score each type lacks, (K,), to be as probable as it is `wanted`."""
+    """Return the steps of score (K,) that each type lacks to reach its `wanted` probability."""
     shares = softmax(np.ascontiguousarray(scores.T / scale))
-    # Added up in whole parts, so few that a double holds their sum: its order is no matter.
+    # Summed in integer parts, few enough for an exact double: the order does not matter.
     parts = 2.0 ** min(32, 52 - int(wanted.sum()).bit_length())
     given = np.rint(shares * often * parts).sum(axis=1) / parts + _DOUBT
     return scale * log(wanted / given)

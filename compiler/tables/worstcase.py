@@ -28,13 +28,13 @@ _WORDS = 1 << 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorstFrame:
-    """The frame, bits (s,) and codes (j,), in which class `leader` loses most of its lead over `rival`: `loss` steps.
+    """The frame, bits (s,) and codes (j,), in which class `leader` loses the most, `loss` steps, over `competitor`.
 
     A negative loss is a gain. Lead and loss are exact.
     """
 
     leader: int
-    rival: int
+    competitor: int
     loss: Fraction
     bits: NDArray[np.bool_]
     codes: NDArray[np.uint16]
@@ -55,9 +55,9 @@ class Rounding:
         errors, self._step = _errors(choices, integers.scale)
         self._pairs = _Pairs(errors)
 
-    def worst(self, leader: int, rival: int) -> WorstFrame:
-        """Return the frame that takes most from the lead of class `leader` over class `rival`."""
-        taken = self._pairs.taken(leader, rival)
+    def worst(self, leader: int, competitor: int) -> WorstFrame:
+        """Return the frame that takes most from the lead of class `leader` over class `competitor`."""
+        taken = self._pairs.taken(leader, competitor)
         # Of equal ones the first: an open switch, the lowest code.
         picked = [choice.index(max(choice)) for choice in taken]
         values = [values[pick] for values, pick in zip(self._values, picked[1:], strict=True)]
@@ -65,12 +65,12 @@ class Rounding:
         for unit, own in zip(self._units, values[self._n_switches :], strict=True):
             codes[list(unit)] = own
         loss = Fraction(sum(map(max, taken)), self._step)
-        return WorstFrame(leader, rival, loss, np.array(bits, bool), codes)
+        return WorstFrame(leader, competitor, loss, np.array(bits, bool), codes)
 
     def worst_of_all(self) -> WorstFrame:
         """Return the worst frame of the pair of classes that has the worst; of equal pairs of the first."""
-        _, leader, rival = self._pairs.greatest(0)
-        return self.worst(leader, rival)
+        _, leader, competitor = self._pairs.greatest(0)
+        return self.worst(leader, competitor)
 
     def safe_margin(self) -> Fraction:
         """Return the least margin, in steps, of which this is proved: a frame whose best score leads by more keeps it.
@@ -104,13 +104,14 @@ class _Pairs:
         self._alike = [np.stack(group, axis=1) for group in by_choices.values()]
         self._first = np.stack([self._losses(k, slice(None), 1)[0] for k in range(self._n_classes)])
 
-    def taken(self, leader: int, rival: int) -> list[list[int]]:
-        """Return by how much each choice of each input lowers the lead of `leader` over `rival`."""
-        return [self._whole(parts[:, :, leader] - parts[:, :, rival]) for parts in self._parts]
+    def taken(self, leader: int, competitor: int) -> list[list[int]]:
+        """Return by how much each choice of each input lowers the lead of `leader` over `competitor`."""
+        return [self._whole(parts[:, :, leader] - parts[:, :, competitor]) for parts in self._parts]
 
     def greatest(self, tie: int) -> tuple[int, int, int]:
-        """Return the greatest loss, less `tie` of pairs whose rival has the higher number, and its leader and rival; of
-        equal ones the first pair.
+        """Return the greatest loss, its leader and its competitor: the first such pair.
+
+        The loss counts `tie` less where the competitor has the higher number.
         """
         classes = np.arange(self._n_classes)
         # Sums are below 2^61: what is a quarter of a word off is further off than any two of them.
@@ -120,20 +121,20 @@ class _Pairs:
         likely = near >= int(near.max()) - 2 * self._inputs - 2
         found = []
         for leader in np.flatnonzero(likely.any(axis=1)).tolist():
-            rivals = np.flatnonzero(likely[leader])
-            losses = self._whole(self._losses(leader, rivals, len(self._shifts)))
-            pairs = zip(losses, rivals.tolist(), strict=True)
-            found += [(loss - tie * (leader < rival), leader, rival) for loss, rival in pairs]
+            competitors = np.flatnonzero(likely[leader])
+            losses = self._whole(self._losses(leader, competitors, len(self._shifts)))
+            pairs = zip(losses, competitors.tolist(), strict=True)
+            found += [(loss - tie * (leader < competitor), leader, competitor) for loss, competitor in pairs]
         return max(found, key=lambda pair: pair[0])
 
-    def _losses(self, leader: int, rivals: slice | NDArray[np.intp], parts: int) -> NDArray[np.int64]:
-        """Return the losses of `leader` to m rivals in their first parts, (parts, m); only the first has a sign."""
-        totals = np.zeros((parts, len(np.arange(self._n_classes)[rivals])), np.int64)
+    def _losses(self, leader: int, competitors: slice | NDArray[np.intp], parts: int) -> NDArray[np.int64]:
+        """Return the losses of `leader` to m competitors in their first parts, (parts, m); only the first is signed."""
+        totals = np.zeros((parts, len(np.arange(self._n_classes)[competitors])), np.int64)
         for group in self._alike:
             at_once = max(1, _WORDS // (group.shape[2] * totals.shape[1]))
             for start in range(0, group.shape[1], at_once):
                 piece = group[:parts, start : start + at_once]
-                apart = self._carried(piece[..., leader, np.newaxis] - piece[..., rivals])
+                apart = self._carried(piece[..., leader, np.newaxis] - piece[..., competitors])
                 for part, differences in enumerate(apart):
                     most = differences.max(axis=1, keepdims=True)
                     totals[part] += most.sum(axis=(0, 1))

@@ -1,1 +1,1 @@
-"""What makes a recogniser of samples: LogitBoost, and whatever else gives a sum over inputs."""
+"""Trainers, which fit a model to samples: LogitBoost, and other models that are a sum over inputs."""

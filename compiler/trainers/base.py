@@ -1,4 +1,4 @@
-"""The shape of a trainer, and the registry of all trainers."""
+"""The interface of trainers, and the registry of all trainers."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -20,27 +20,27 @@ Number = float | int | str | None
 
 
 class TrainerError(ThenarError, ValueError):
-    """A setting that a trainer does not take, or a value that is out of its range."""
+    """An unknown setting of a trainer, or a value out of its range."""
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A number, or one of a few names, that a trainer takes: `--name` on the command line, with hyphens.
+    """A number or name that configures a trainer: `--name` on the command line, with hyphens.
 
     Parameters
     ----------
     name : str
         An identifier, such as "max_bins".
     what : str
-        The sentence of `--help`.
+        The sentence in `--help`.
     kind : type
         int, float, or str.
     default : int, float, str or None
-        Without a value; None is a value of its own.
+        The value if none is given; None is a valid default.
     least, most : int or float, optional
-        The least and the largest number that make sense.
+        The range of valid numbers.
     names : tuple of str, optional
-        The values of a str.
+        The valid values of a str.
 
     Examples
     --------
@@ -58,7 +58,7 @@ class Setting:
     names: tuple[str, ...] = ()
 
     def checked(self, value: Number) -> Number:
-        """Return the value as one of its kind. Raises TrainerError for one that makes no sense."""
+        """Return the value converted to its kind. Raises TrainerError for an invalid one."""
         if value is None:
             return None
         if self.names or isinstance(value, str):
@@ -74,23 +74,23 @@ class Setting:
 
 
 class Trainer(ABC):
-    """What makes an additive model: scores that are a sum over inputs, F_k(x) = b_k + sum over i of T_i[x_i][k].
+    """A method that fits an additive model: a sum over inputs, F_k(x) = b_k + `sum over i of T_i[x_i][k]`.
 
-    A member of `TRAINERS` is an instance, that a module of this folder defines as `MEMBER`.
+    Each member of `TRAINERS` is an instance, defined in a module of this folder as `MEMBER`.
 
     Attributes
     ----------
     name : str
-        How people choose it: `--trainer NAME`.
+        The value of `--trainer NAME`.
     what : str
-        A sentence about it, for `--help`.
+        A phrase for `--help`.
     settings : tuple of Setting
-        The numbers that it takes. Trainers that share a name share its meaning.
+        The hyperparameters. Trainers that share a name share its meaning.
     tried : tuple of mapping
-        Settings, by name, of the ways to train that are compared where a trainer and its settings are chosen; the
-        others have their defaults. The most regular first. Empty: only who names the trainer gets it.
+        Combinations of settings that are compared where trainer and settings are chosen automatically, the most regular
+        first; other settings have their defaults. Empty: the trainer is used only if named.
     staged : bool
-        Whether it takes `rounds`, and one training gives the models of all smaller numbers of rounds as well.
+        Whether `rounds` is a setting, and one training also gives the models of all smaller numbers of rounds.
     """
 
     name: str
@@ -110,27 +110,27 @@ class Trainer(ABC):
         settings : mapping
             A value for each of the trainer's `settings`.
         report : callable, optional
-            Called with (done, total) as the work goes on.
+            Called with (done, total) as the work proceeds.
 
         Returns
         -------
         ScoreTables or Stumps
-            A model of these s switches and j joints, with a class for each of `samples.grasps`. It is a function of
-            the samples and settings alone, to the last bit.
+            A model of these s switches and j joints, with a class for each of `samples.grasps`. It depends on samples
+            and settings only, to the last bit.
         """
 
     def stages(self, samples: "Samples", settings: Mapping[str, Any], rounds: Sequence[int]) -> "tuple[Model, ...]":
-        """Return a model for each of these numbers of rounds, of one training; see `train`.
+        """Return a model for each of these numbers of rounds, from one training; see `train`.
 
-        Staged trainers override it. Each model is the one that `train` makes for that many rounds, to the last bit; a
-        trainer without stages has the same one for all.
+        Staged trainers override this method. Each model is the one that `train` returns for that number of rounds, to
+        the last bit; a trainer without stages returns the same one for all.
         """
         return (self.train(samples, settings),) * len(rounds)
 
     def candidates(self, given: Mapping[str, Number]) -> tuple[dict[str, Number], ...]:
-        """Return values for all settings, for each way to train that is compared where these settings are `given`.
+        """Return all combinations of settings to compare when these settings are `given`.
 
-        Raises TrainerError for a setting that it does not take, or a value that is out of its range.
+        Raises TrainerError for an unknown setting, or a value out of its range.
         """
         fixed = self.checked(given)
         defaults = {setting.name: setting.default for setting in self.settings}
@@ -143,19 +143,19 @@ class Trainer(ABC):
     def checked(self, given: Mapping[str, Number]) -> dict[str, Number]:
         """Return given settings as values of their kind.
 
-        Raises TrainerError for a setting that it does not take, or a value that is out of its range.
+        Raises TrainerError for an unknown setting, or a value out of its range.
         """
         settings = {setting.name: setting for setting in self.settings}
         values: dict[str, Number] = {}
         for name, value in given.items():
             if name not in settings:
-                raise TrainerError(f"trainer {self.name!r} takes no setting {name!r}: leave it out")
+                raise TrainerError(f"trainer {self.name!r} has no setting {name!r}: leave it out")
             values[name] = settings[name].checked(value)
         return values
 
 
 def changed(options: Options, changes: Mapping[str, Any]) -> Options:
-    """Return `options` with other values, by name; what is no option is a setting of the trainer."""
+    """Return `options` with other values, by name; names that are not options are settings of the trainer."""
     fields = {name: value for name, value in changes.items() if name in Options.__struct_fields__}
     settings = {name: value for name, value in changes.items() if name not in fields}
     asked = replace(options, **fields)
@@ -165,14 +165,15 @@ def changed(options: Options, changes: Mapping[str, Any]) -> Options:
 TRAINERS: Members[Trainer] = Members("trainer", Trainer, "thenar.compiler.trainers", "thenar.trainers")  # type: ignore[type-abstract]
 
 
-# Options that are settings of some trainers. None is not given.
+# Options that are settings of some trainers. None means not given.
 SHARED = ("rounds", "shrinkage", "tolerance", "max_bins")
 
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """A trainer by its name, and values for all its settings: what a worker process needs to train; `masked`: it learns
-    from rows in which inputs are lost as well.
+    """A trainer by name, and values for all its settings: the information that a worker process needs to train.
+
+    If `masked`, it also learns from rows in which inputs are lost.
     """
 
     trainer: str
@@ -181,8 +182,10 @@ class Training:
 
     @classmethod
     def of(cls, options: Options) -> "Training":
-        """Return what `options` ask for, with defaults for what they leave open: of LogitBoost, the paper's, where they
-        leave open the trainer. Raises MemberError or TrainerError where that makes no sense.
+        """Return the training that `options` define, with defaults for what is not given.
+
+        If no trainer is given, the defaults are the paper's, of LogitBoost. Raises MemberError or TrainerError for
+        invalid options.
         """
         trainer, given = _asked(options)[0]
         return cls(
@@ -193,9 +196,9 @@ class Training:
 
     @classmethod
     def candidates(cls, options: Options) -> "tuple[Training, ...]":
-        """Return every way to train that `options` leave open, to be compared: one, where they leave none open.
+        """Return every training that `options` allow, to be compared: a single one if nothing is left open.
 
-        Raises MemberError or TrainerError where that makes no sense.
+        Raises MemberError or TrainerError for invalid options.
         """
         asked = _asked(options)
         if options.trainer == AUTO and len(asked) > 1:
@@ -208,7 +211,7 @@ class Training:
 
     @classmethod
     def chosen(cls, fitting: Fitting, *, masked: bool = False) -> "Training":
-        """Return the way that was chosen."""
+        """Return the training that was chosen."""
         return cls(fitting.trainer, TRAINERS.named(fitting.trainer).checked(fitting.settings), masked)
 
     def train(self, samples: "Samples", report: Report | None = None) -> "Model":
@@ -224,10 +227,10 @@ class Training:
 
 
 def _asked(options: Options) -> list[tuple[Trainer, dict[str, Number]]]:
-    """Return the trainers that may make the model, and the settings that are given to each.
+    """Return the trainers that may be used, and the settings given to each.
 
-    A given setting that some trainers do not take is meant for the simplest that does, with fewer settings than those
-    after it: `rounds` for LogitBoost, and not for a trainer that boosts and does more.
+    A given setting that some trainers lack applies to the simplest trainer that has it, the one with the fewest
+    settings: `rounds` means LogitBoost, not a trainer that boosts and does more.
     """
     shared = {name: value for name in SHARED if (value := getattr(options, name)) is not None}
     if options.trainer != AUTO:
@@ -240,9 +243,9 @@ def _asked(options: Options) -> list[tuple[Trainer, dict[str, Number]]]:
     if not takers:
         lacking = sorted(given.keys() - set().union(*names.values()))
         wrong = (
-            f"no trainer takes the setting {lacking[0]!r}"
+            f"no trainer has the setting {lacking[0]!r}"
             if lacking
-            else f"no trainer takes all of {', '.join(sorted(given))}"
+            else f"no trainer has all of {', '.join(sorted(given))}"
         )
         raise TrainerError(f"{wrong}: leave it out")
     if len(takers) < len(names):

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class Logit(Trainer):
-    """Multinomial logistic regression on tables of each input, with a penalty; convex, so it has one answer."""
+    """Multinomial logistic regression on tables of each input, with a penalty; convex, so the solution is unique."""
 
     name = "logit"
     what = "multinomial logistic regression on a table for each input"
@@ -19,12 +19,12 @@ class Logit(Trainer):
         Setting("penalty", "Pull of scores towards zero (logit).", float, 0.5, 1e-6, 1e6),
         Setting("smoothness", "Pull of a joint's neighbouring bins towards each other (logit).", float, 2.0, 0.0, 1e6),
         Setting(
-            "max_bins", "At most so many bins a joint: smaller tables.  [default: no limit; logit: 16]", int, 16, 2
+            "max_bins", "Most bins per joint; fewer make smaller tables.  [default: no limit; logit: 16]", int, 16, 2
         ),
         Setting("linear", "1: joints add scores in proportion to their codes, without bins (logit).", int, 0, 0, 1),
     )
 
-    # The smoothness that suits grows with the bins: each step is the smaller, the more there are.
+    # The best smoothness grows with the number of bins: more bins mean smaller steps between them.
     tried = (
         {"penalty": 1.0, "smoothness": 4.0, "max_bins": 16},
         {"penalty": 3.0, "smoothness": 24.0, "max_bins": 32},
@@ -44,8 +44,10 @@ class Logit(Trainer):
 
 
 def of_none(samples: "Samples") -> dict[str, Any]:
-    """Return what the logit is given besides where some rows show nothing held: all switches say that alike, and rows
-    of static grasps do not.
+    """Return additional arguments of the logit where some rows hold nothing.
+
+    All switches are evidence against nothing held, so their number is an input too; static grasps are known to be held
+    and teach the class of nothing held nothing.
     """
     return {"counted": samples.n_switches, "held": samples.given_held} if samples.has_none else {}
 

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 
 class Pairs(Trainer):
-    """What joints say two by two, besides what each says alone, chosen by what it adds."""
+    """The logit with interactions of pairs of joints, chosen by their gain."""
 
     name = "pairs"
-    what = "the logit, and tables for pairs of joints"
+    what = "the logit, with tables for pairs of joints"
     rank = 2
     settings = (
         *(setting for setting in LOGIT.settings if setting.name != "linear"),

@@ -1,4 +1,4 @@
-"""Boosted stumps and the additive logit, their scores added."""
+"""The sum of boosted stumps and the additive logit."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     from ..samples import Samples
     from ..tables.collapse import ScoreTables
 
-# Those of both, once where they share a name.
+# The settings of both trainers, each shared name once.
 _SETTINGS = {setting.name: setting for setting in (*LOGIT.settings, *LOGITBOOST.settings)}
 
 
 class Sum(Trainer):
-    """The mean of two opinions: what both trainers add because of an input, in one table."""
+    """The sum of two models' scores: both contributions of an input are in one table."""
 
     name = "sum"
     what = "the sum of logitboost and logit"
@@ -35,7 +35,7 @@ class Sum(Trainer):
     def stages(
         self, samples: "Samples", settings: Mapping[str, Any], rounds: Sequence[int]
     ) -> "tuple[ScoreTables, ...]":
-        """Return the logit's tables with those of the first rounds of the longest boosting."""
+        """Return the logit's tables plus those of the first rounds of the longest boosting."""
         from ..tables.collapse import added, collapse
 
         still = LOGIT.train(samples, _own(LOGIT, settings))

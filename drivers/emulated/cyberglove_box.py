@@ -167,7 +167,7 @@ class Doubts:
 
 
 class CyberGloveBox:
-    """Understands the commands of `docs/reference/cyberglove.md`, in both dialects. While it streams, nothing but a Ctrl-C."""
+    """Reply to the commands of `docs/reference/devices.md`, in both dialects; while streaming, only to Ctrl-C."""
 
     def __init__(self, state: GloveState, text: str, doubts: Doubts) -> None:
         self.state, self.text, self.doubts = state, text, doubts

@@ -129,7 +129,7 @@ def own_joints(joints: Sequence[str]) -> str:
         return ""
     return (
         f"joints {list_names(joints)} have to be read by a source of your own: a board that prints them ([[stream]] of "
-        "glove.toml), the converter of a board ([analog] of board.toml), or a source that you add (docs/how-to/extend.md)"
+        "glove.toml), the converter of a board ([analog] of board.toml), or a source of yours (docs/how-to/extend.md)"
     )
 
 

@@ -45,9 +45,9 @@ class BothWays:
 
 
 @precisely()
-def lost(exact: Sequence[mpf], deployed: Sequence[int], leader: int, rival: int) -> mpf:
-    """Return how many steps of the lead of class `leader` over `rival` are gone."""
-    return (exact[leader] - exact[rival]) - (deployed[leader] - deployed[rival])
+def lost(exact: Sequence[mpf], deployed: Sequence[int], leader: int, competitor: int) -> mpf:
+    """Return how many steps of the lead of class `leader` over `competitor` are gone."""
+    return (exact[leader] - exact[competitor]) - (deployed[leader] - deployed[competitor])
 
 
 # What can add the last step to a sum, and in which array it stands.
@@ -187,12 +187,12 @@ def _witnesses(seeds: range) -> Finding:
     small = small_build(small_set(7, rows=200, switches=24, joints=3, types=6, noise=0.15), rounds=40)
     for case in (Quantised("a compiled build", small.tables, small.build.tables), *_tables(seeds)):
         rounding, both = Rounding(case.tables, case.integers), BothWays(case.tables, case.integers)
-        for leader, rival in permutations(range(case.integers.n_classes), 2):
-            frame = rounding.worst(leader, rival)
+        for leader, competitor in permutations(range(case.integers.n_classes), 2):
+            frame = rounding.worst(leader, competitor)
             exact, deployed = both.run(frame.bits.tolist(), frame.codes.tolist())
             with precisely():
-                error = float(abs(lost(exact, deployed, leader, rival) - ratio(frame.loss)))
-            worst.see(error, f"{case.name}, classes {leader} and {rival}")
+                error = float(abs(lost(exact, deployed, leader, competitor) - ratio(frame.loss)))
+            worst.see(error, f"{case.name}, classes {leader} and {competitor}")
     return worst.finding()
 
 

@@ -9,7 +9,13 @@ from msgspec.structs import replace
 
 from thenar.cli import run
 from thenar.compiler import GraspSet
-from thenar.compiler.frontier.points import FrontierError, Point, Way, frontier_from_bytes, frontier_to_bytes
+from thenar.compiler.frontier.points import (
+    FrontierError,
+    PlacementChoice,
+    Point,
+    frontier_from_bytes,
+    frontier_to_bytes,
+)
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.propose import propose_harness
 
@@ -56,10 +62,13 @@ def test_a_glove_that_the_point_is_not_wired_as_is_named(
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (_setting(way=Way("nonsense", 6.0)), "takes a method that is not there: 'nonsense'"),
-        (_setting(way=Way("elimination", 0.0)), "takes 0.0 for its method: it is a whole number from 1 on"),
-        (_setting(way=Way("id3", 0.5)), "takes 0.5 for its method: it is a whole number from 0 on"),
-        (_setting(way=Way("id3", -1.0)), "is not a frontier's"),
+        (_setting(placement=PlacementChoice("nonsense", 6.0)), "takes a method that is not there: 'nonsense'"),
+        (
+            _setting(placement=PlacementChoice("elimination", 0.0)),
+            "takes 0.0 for its method: it is a whole number from 1 on",
+        ),
+        (_setting(placement=PlacementChoice("id3", 0.5)), "takes 0.5 for its method: it is a whole number from 0 on"),
+        (_setting(placement=PlacementChoice("id3", -1.0)), "is not a frontier's"),
         (_setting(clock_hz=0), "has switches without a wiring or its clock"),
         (_setting(clock_hz=1), "runs its mcp23017 at 1 Hz, which it cannot"),
         (_setting(clock_hz=12_000_000), "runs its mcp23017 at 12000000 Hz, which it cannot"),

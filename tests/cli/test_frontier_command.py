@@ -19,7 +19,7 @@ Thenar = Callable[..., subprocess.CompletedProcess[str]]
 # A trainer of which nothing is left to choose.
 SETTLED = ("--trainer", "logitboost", "--shrinkage", 1, "--max-bins", 65536)
 QUICK = (
-    *("--target", "host", "--methods", "elimination,id3", "--rivals", "mrmr"),
+    *("--target", "host", "--methods", "elimination,id3", "--baselines", "mrmr"),
     *("--rounds", 6, "--finalists", 2, "--repeats", 1, "--jobs", 1, *SETTLED),
 )
 pytestmark = pytest.mark.slow
@@ -60,7 +60,7 @@ def test_a_record_is_the_vendors_formula_unless_the_wire_alone_is_asked_for(
 ) -> None:
     joints = tuple(replace(joint, name=name) for joint, name in zip(small_set.joints, SENSORS_18, strict=False))
     replace(small_set, joints=joints).save(tmp_path / "set.grasps")
-    few = ("--methods", "id3", "--rivals", "none", "--rounds", 2, "--finalists", 1, "--repeats", 1, "--jobs", 1)
+    few = ("--methods", "id3", "--baselines", "none", "--rounds", 2, "--finalists", 1, "--repeats", 1, "--jobs", 1)
     wire_us = round(5 * 10e6 / 115_200)
     for options, how, us in (((), "formula", 500 + wire_us), (("--record-time", "wire"), "wire", wire_us)):
         done = thenar("frontier", tmp_path / "set.grasps", "-o", tmp_path / "frontier", *few, *SETTLED, *options)

@@ -89,7 +89,7 @@ def completed(*words: str) -> list[str]:
         (("emulate", "qu"), ["quick"]),
         (("place", "set.grasps", "--method", ""), [*METHODS]),
         (("frontier", "--methods", "id3,cm"), ["id3,cmim"]),
-        (("evaluate", "--rivals", "mr"), ["mrmr"]),
+        (("evaluate", "--baselines", "mr"), ["mrmr"]),
         (("compile", "--trainer", ""), ["auto", *TRAINERS]),
         (("compile", "--preset", "f"), ["fastest"]),
         (("compile", "--meth"), ["--method"]),

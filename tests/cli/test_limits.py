@@ -51,7 +51,7 @@ def test_what_contradicts_or_is_not_known_is_refused(thenar: Thenar, set_file: P
         (("--apart-mm", 6), "where s0, s1, s2, s3, s4 and 1 more lie is not known"),
         (("--budget-us", 0), "--never and --budget-us leave nothing"),
         (("--at-most", 3, "pads"), "'pads' is not"),
-        (("--crowd", "--keep", 2, "--robust"), "--crowd looks for the placement of many subjects"),
+        (("--population", "--keep", 2, "--robust"), "--population looks for the placement of many subjects"),
         (where, "--layout says where switches lie, for --apart-mm"),
     ):
         done = thenar("place", set_file, *asked)

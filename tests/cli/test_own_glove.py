@@ -139,7 +139,7 @@ def test_without_a_layout_nothing_is_drawn_and_with_one_everything_is(
 def test_a_frontier_leaves_the_unknown_time_of_joints_out_and_says_so_or_takes_what_it_is_told(
     thenar: Thenar, grasps: Path, tmp_path: Path
 ) -> None:
-    few = ("--methods", "id3", "--rivals", "none", "--rounds", 5, "--repeats", 1, "--finalists", 1, "--jobs", 1)
+    few = ("--methods", "id3", "--baselines", "none", "--rounds", 5, "--repeats", 1, "--finalists", 1, "--jobs", 1)
     settled = ("--trainer", "logitboost", "--shrinkage", 1, "--max-bins", 65536)  # nothing is left to choose
     found: dict[str, list[Any]] = {}
     for name, more in (("left out", ()), ("given", ("--joint-us", 5000))):

@@ -112,7 +112,7 @@ def test_a_standard_placement_is_printed_stored_and_drawn(
     crowd_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     stored, drawn = tmp_path / "crowd.json", tmp_path / "crowd.svg"
-    ask = ["place", str(crowd_file), "--crowd", "--keep", "3", "--method", "cmim", "--jobs", "1"]
+    ask = ["place", str(crowd_file), "--population", "--keep", "3", "--method", "cmim", "--jobs", "1"]
     assert run([*ask, "-o", str(stored), "--draw", str(drawn)]) == 0
     said = capsys.readouterr().out
     for words in (
@@ -138,14 +138,14 @@ def test_a_standard_placement_is_printed_stored_and_drawn(
         (["--method", "cmim", "--keep", "3", "--prune", "4"], "method 'cmim' takes --keep M and no --prune"),
         (["--method", "elimintion"], "there is no method 'elimintion' (did you mean 'elimination'"),
         (["--method", "cmim", "--keep", "3", "--tree"], "--tree prints the tree of the paper's ID3"),
-        (["--method", "cmim", "--keep", "3", "--draw", "a.svg"], "--draw draws ID3's tree, or a --crowd"),
-        (["--crowd", "--keep", "3", "--exact"], "--exact judges one placement"),
-        (["--crowd", "--method", "id3", "--keep", "3"], "--crowd takes a method that keeps M switches"),
-        (["--crowd", "--keep", "3"], "the set has 1 subject(s)"),
+        (["--method", "cmim", "--keep", "3", "--draw", "a.svg"], "--draw draws ID3's tree, or a --population"),
+        (["--population", "--keep", "3", "--exact"], "--exact judges one placement"),
+        (["--population", "--method", "id3", "--keep", "3"], "--population takes a method that keeps M switches"),
+        (["--population", "--keep", "3"], "the set has 1 subject(s)"),
         (["--joints"], "--joints is for other methods"),
         (["--glove", "GLOVE"], "--glove says what scans cost"),
         (["--method", "elimination", "--keep", "3", "--glove", "GLOVE"], "weighs that: elimination-cost, id3-cost"),
-        (["--crowd", "--method", "id3-cost", "--keep", "3", "--glove", "GLOVE"], "--glove says what scans cost"),
+        (["--population", "--method", "id3-cost", "--keep", "3", "--glove", "GLOVE"], "--glove says what scans cost"),
     ],
 )
 def test_what_does_not_go_together_is_one_sentence_and_code_two(

@@ -87,7 +87,7 @@ def test_refusals_say_what_to_do(
     assert run(["evaluate", str(tmp_path / "held.grasps"), "--streams"]) == 2
     assert "nothing is held" in capsys.readouterr().err
     assert run(["evaluate", str(movements), "--streams", "--subject", "A"]) == 2
-    assert "it takes two" in capsys.readouterr().err
+    assert "a subject out takes two" in capsys.readouterr().err
 
 
 def test_streams_are_evaluated_without_the_subject(

@@ -37,7 +37,7 @@ PF_EXITING = 4
 COMMANDS = {
     "simulate": "simulate crowd -o new.grasps --jobs 2",
     "plan": "plan quick --anew -o new.json --jobs 2",
-    "place": "place crowd.grasps --crowd --keep 4 --method elimination --jobs 2",
+    "place": "place crowd.grasps --population --keep 4 --method elimination --jobs 2",
     "evaluate": "evaluate set.grasps --repeats 50 -o new.json --jobs 2",
     "compile": "compile set.grasps -o new --rounds 100000 --folds 10",
     "verify": "verify build set.grasps --firmware host",

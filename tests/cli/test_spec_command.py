@@ -132,7 +132,7 @@ def test_a_board_is_described_by_its_pins_or_its_expanders(
 
 def test_a_glove_of_ones_own_has_no_pattern_and_no_length(thenar: Thenar, build_folder: Path, tmp_path: Path) -> None:
     told = said(thenar("spec", build_folder, "-o", tmp_path / "spec"))
-    assert "where this glove's switches lie is not known" in told
+    assert "the positions of this glove's switches are unknown" in told
     assert not (tmp_path / "spec" / "cutting.svg").exists()
     assert "give a --layout instead" in refused(thenar("spec", build_folder, "--hand-length", 180))
 
@@ -148,7 +148,7 @@ def test_a_spec_is_replaced_whole_and_anything_else_is_kept(
     other = tmp_path / "other"
     other.mkdir()
     (other / "letter.txt").write_text("dear")
-    assert "is no spec" in refused(thenar("spec", hand_build, "-o", other))
+    assert "is not a spec" in refused(thenar("spec", hand_build, "-o", other))
     assert [path.name for path in other.iterdir()] == ["letter.txt"]
 
 

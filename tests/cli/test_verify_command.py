@@ -43,7 +43,8 @@ def test_the_worst_of_all_frames_is_printed_beside_its_bounds(
     worst = json.loads(thenar("verify", build_folder, set_file, "--json").stdout)["worst"]
     codes = " ".join(map(str, worst["codes"]))
     assert (
-        f"worst frame there is: {worst['leader']} loses {worst['loss']:.3f} steps of its lead over {worst['rival']}, "
+        f"worst frame there is: {worst['leader']} loses {worst['loss']:.3f} steps of its lead over "
+        f"{worst['competitor']}, "
         f"allowed {worst['bound']:.3f} ({len(worst['closed'])} switches closed, codes {codes})"
     ) in lines
     assert (

@@ -127,7 +127,7 @@ def test_of_many_switches_few_are_chosen_without_counting_all_pairs(
     assert len(set(chosen[0])) == 5
 
 
-def test_the_rivals_of_an_evaluation_take_a_set_of_many_switches(wide: GraspSet) -> None:
+def test_the_baselines_of_an_evaluation_take_a_set_of_many_switches(wide: GraspSet) -> None:
     study = evaluate(wide, Options(folds=2, repeats=1, rounds=1, protocols=("nested",), tables=("baselines",)), jobs=1)
     assert [row.name for row in study.tables[0].rows] == ["ID3", "CMIM", "top-k", "random"]
 

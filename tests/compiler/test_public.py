@@ -164,7 +164,7 @@ def test_what_is_no_sum_over_these_columns_is_refused(grasp_set: GraspSet, X: np
     for estimator, because in (
         (few, "was fitted on 3 columns"),
         (scaled, "must select columns"),
-        (strange, "the estimator knows no"),
+        (strange, "the estimator does not know"),
         (bare, "has no model that is a sum"),
     ):
         with pytest.raises(CompileError, match=because):

@@ -87,7 +87,10 @@ def test_a_name_that_there_is_not_is_answered_with_all_that_there_are(members: C
         ("other_bad:ONE", "two packages define the sort 'one': uninstall one of them"),
         ("no_such_module:ONE", "cannot be loaded: No module named 'no_such_module'; mend or uninstall it"),
         ("other_bad:THREE", "cannot be loaded: module 'other_bad' has no attribute 'THREE'; mend or uninstall it"),
-        ("other_bad:NONE", r"the sort 'b' \(other_bad:NONE\) of another package is no Sort: docs/how-to/extend.md says"),
+        (
+            "other_bad:NONE",
+            r"the sort 'b' \(other_bad:NONE\) of another package is no Sort: docs/how-to/extend.md says",
+        ),
     ],
 )
 def test_a_member_of_another_package_that_cannot_be_one_is_refused_in_a_sentence(

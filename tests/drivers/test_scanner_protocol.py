@@ -225,7 +225,7 @@ TO_BOARD: st.SearchStrategy[ToBoard] = st.one_of(
     st.builds(SetChannels, U8, U32, st.integers(0, (1 << 24) - 1), st.sampled_from([24, 32, 248])),
 )
 
-# Every message with its bytes, as docs/reference/scanner-board.md draws them.
+# Every message with its bytes, as docs/reference/devices.md draws them.
 DRAWN: list[tuple[FromBoard | ToBoard, int, str]] = [
     (
         Hello(1, 1, 0x1234, 0x0A0B0C0D, 1, 2, 3, 1, 40, 1000, 0, 50_000, 5000, 10_000, 0x01020304),
@@ -368,7 +368,7 @@ def test_the_period_of_a_board_is_the_shorter_of_what_it_sends(
 
 
 def test_the_frames_in_the_documentation_are_sound_ones() -> None:
-    text = (Path(__file__).parents[2] / "docs" / "reference" / "scanner-board.md").read_text()
+    text = (Path(__file__).parents[2] / "docs" / "reference" / "devices.md").read_text()
     shown = [bytes.fromhex(found) for found in re.findall(r"`((?:[0-9a-f]{2} )+00)`", text)]
     decoder = scanner_protocol.FrameDecoder()
     assert [read(received) for encoded in shown for received in decoder.feed(encoded)] == [

@@ -45,7 +45,7 @@ def test_a_chip_of_another_package_is_proposed_specified_emulated_and_read(
     bill = list(csv.DictReader(Path(spec, "bom.csv").read_text().splitlines()))
     kept = len(json.loads(Path(build, "build.json").read_text())["switches"])
     assert [row["maker"] for row in bill if row["part_number"] == "TCA9534PWR"] == ["Texas Instruments"]
-    assert [row["quantity"] for row in bill if "has no pull-ups" in row["note"]] == [str(kept)]
+    assert [row["quantity"] for row in bill if "without pull-ups" in row["note"]] == [str(kept)]
 
     if shutil.which("umockdev-wrapper") is None:
         message = "program umockdev-wrapper is missing"

@@ -43,7 +43,7 @@ def test_a_method_of_another_package_is_listed_chosen_by_and_compared(
 
     for command in ("place", "compile", "frontier", "evaluate"):
         said = " ".join(there.thenar(command, "--help").split())
-        assert "Those that depend most on the grasp type, alone, by Pearson's chi-squared (rival)." in said
+        assert "Those that depend most on the grasp type, alone, by Pearson's chi-squared (baseline)." in said
 
     bits = small_set.switches
     closed, opened = (chi2(values, small_set.labels)[0] for values in (bits, ~bits))
@@ -54,7 +54,7 @@ def test_a_method_of_another_package_is_listed_chosen_by_and_compared(
     settled = ("--trainer", "logitboost", "--shrinkage", "1", "--max-bins", "65536")
     found = json.loads(
         there.thenar(
-            *("frontier", str(file), "-o", str(tmp_path / "found"), "--methods", "chi2", "--rivals", "none"),
+            *("frontier", str(file), "-o", str(tmp_path / "found"), "--methods", "chi2", "--baselines", "none"),
             *quick,
             *settled,
         )
@@ -64,7 +64,7 @@ def test_a_method_of_another_package_is_listed_chosen_by_and_compared(
 
     study = json.loads(
         there.thenar(
-            *("evaluate", str(file), "--tables", "baselines", "--rivals", "chi2", "--folds", "2", "--repeats", "1"),
+            *("evaluate", str(file), "--tables", "baselines", "--baselines", "chi2", "--folds", "2", "--repeats", "1"),
             *("--rounds", "2", "--json"),
         )
     )

@@ -85,7 +85,7 @@ def test_a_frontier_of_the_trainer_has_one_stage_and_its_points_are_built(
 
     folder, build = tmp_path / "frontier", tmp_path / "build"
     given = ("frontier", str(recordings), "-o", str(folder), "--trainer", "naive-bayes")
-    few = ("--methods", "elimination", "--rivals", "none", "--repeats", "1", "--finalists", "2", "--jobs", "1")
+    few = ("--methods", "elimination", "--baselines", "none", "--repeats", "1", "--finalists", "2", "--jobs", "1")
     found = json.loads(installed.thenar(*given, "--joint-bins", "5", *few, "--json"))
     settings = [point["setting"] for point in found["points"]]
     assert {(each["trainer"], each["rounds"]) for each in settings} == {("naive-bayes", None)}
@@ -114,7 +114,7 @@ def test_a_setting_names_the_trainer_that_takes_it_and_of_another_it_is_refused(
 ) -> None:
     given = ("compile", str(recordings), "-o", str(tmp_path / "build"), "--no-report", "--folds", "0")
     assert "--rounds is no setting" in installed.thenar(*given, "--trainer", "naive-bayes", "--rounds", "5", code=2)
-    assert "no trainer takes all of rounds, smoothing" in installed.thenar(
+    assert "no trainer has all of rounds, smoothing" in installed.thenar(
         *given, "--smoothing", "2", "--rounds", "5", code=2
     )
     assert not (tmp_path / "build").exists()

@@ -170,7 +170,11 @@ def _folder(data: bytes, folder: Path) -> None:
 def _frontier() -> list[bytes]:
     rate = Rate("new subject", "trials", (9,), 10, 2, 0.9, 0.85, 0.95)
     us = points.Time(12.5, "wire")
-    ways = (points.Way("elimination", 4.0), points.Way("id3", 2.0), points.Way("elimination", 3.0))
+    ways = (
+        points.PlacementChoice("elimination", 4.0),
+        points.PlacementChoice("id3", 2.0),
+        points.PlacementChoice("elimination", 3.0),
+    )
     wirings = (("mcp23017", 400_000), ("as wired", 400_000), ("board", 1_000_000))
     settings = [
         points.Recipe(way, "both", 4, 8, "", "full", "single", wiring, clock_hz, 16, None)
@@ -200,7 +204,7 @@ def _frontier() -> list[bytes]:
                 rate=rate,
                 luck=0.01,
                 frames=rate,
-                beside=rate,
+                other_rate=rate,
                 scan=us,
                 transfer=us,
                 classify=us,

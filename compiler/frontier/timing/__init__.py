@@ -1,1 +1,1 @@
-"""What reading and classifying take: predicted, simulated, measured, and held against one another."""
+"""Times of reading and classifying: predicted, simulated, measured, and compared with each other."""

@@ -1,4 +1,4 @@
-"""The model of classify times beside what is measured: layouts compiled and simulated, or Python timed."""
+"""Validate the model of classify times against measurements: layouts compiled and simulated, or Python timed."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -19,11 +19,11 @@ from .classify_times import ClassifyModel, fitting
 from .python_times import classify_us
 from .simulated import Outcome, run_layout, run_scan, scan_trials
 
-# At least so many points are measured.
+# The least number of measured points.
 LEAST = 30
 # Of more tables than this, evenly spaced ones give the layouts.
 _TABLES = 10
-# Of the inputs, where more tables are needed: halves, quarters and so on down to 64ths, from the coarsest.
+# Shares of the inputs for additional tables: halves, quarters and so on down to 64ths, from the coarsest.
 _SHARES = tuple(step / 2**level for level in range(1, 7) for step in range(2**level - 1, 0, -2))
 
 _T = TypeVar("_T")
@@ -32,10 +32,10 @@ _T = TypeVar("_T")
 def check(
     model: ClassifyModel, several: Sequence[IntegerTables], *, jobs: int = 1, least: int = LEAST
 ) -> tuple[Check, ...]:
-    """Return how far the model's times are off, over at least `least` points, evenly spread over the tables and their
-    layouts; where these are too few, over the same tables with fewer inputs as well. On an AVR, also how far scans are.
+    """Return the model's time errors over at least `least` points, evenly spread over the tables and their layouts; if
+    these are too few, also over the same tables with fewer inputs. On an AVR, also the errors of scan times.
 
-    The tables should be those of the run. There are no checks where tools are missing (`unchecked` says which), on a
+    The tables should be those of the run. There are no checks if tools are missing (`unchecked` names them), on a
     Raspberry Pi that is not this machine, or without points. Raises FirmwareError if a layout does not compile or run.
     """
     if not several or unchecked(model) is not None:
@@ -52,12 +52,12 @@ def check(
 
 
 def unchecked(model: ClassifyModel) -> str | None:
-    """Return, in a sentence, what keeps the model from being held against measured times here; None if nothing."""
+    """Return, in a sentence, why the model cannot be validated here; None if it can."""
     if model.part is None:
-        other = "classify times on pi were not held against measured ones: this machine is no Raspberry Pi"
+        other = "classify times on pi were not validated by measurement: this machine is no Raspberry Pi"
         return other if model.factor != 1.0 else None
     if lack := model.part.missing():
-        return f"classify times on {model.target} were not held against a simulator: {lack}"
+        return f"classify times on {model.target} were not validated in a simulator: {lack}"
     return None
 
 
@@ -105,7 +105,7 @@ def with_fewer(tables: IntegerTables, switches: int, joints: int) -> IntegerTabl
 
 
 def _spread(several: Sequence[_T], most: int) -> list[_T]:
-    """Return at most so many of these, evenly spaced, the first and the last among them."""
+    """Return at most `most` of these, evenly spaced, including the first and the last."""
     places = np.linspace(0, len(several) - 1, min(most, len(several))).round().astype(int)
     return [several[place] for place in places.tolist()]
 

@@ -1,4 +1,4 @@
-"""What classifying a frame takes on a target, layout by layout, without compiling anything."""
+"""Predict the time of classifying a frame on a target, for each layout, without compiling."""
 
 from dataclasses import dataclass
 
@@ -11,15 +11,15 @@ from ..points import FrontierError, How
 from .python_times import PythonCost, fit_here
 from .scan_times import on_a_pi
 
-# How many times as long as here Python takes on a Raspberry Pi 4. Doubtful: a guess, and "here" is any machine.
+# Python's time on a Raspberry Pi 4 relative to here. Doubtful: a guess, and "here" is any machine.
 PI_FACTOR = 4.0
 
 
 @dataclass(frozen=True, slots=True)
 class Classified:
-    """What a layout costs: microseconds a frame, bytes of flash and RAM; of the tables alone on host and pi.
+    """A layout's costs: microseconds a frame, bytes of flash and RAM; of the tables alone on host and pi.
 
-    layout  in words; "" where nothing is laid out
+    layout  in words; "" on host and pi, which have none
     """
 
     layout: str
@@ -30,16 +30,16 @@ class Classified:
 
 
 class ClassifyModel:
-    """Predicts what classifying takes on `target`, one of `timed()`.
+    """Predicts the time of classifying on `target`, one of `timed()`.
 
-    AVR       cycles that classify() takes at most, counted instruction by instruction, at `clock_hz`
-    Cortex-M  instructions that classify() takes, about and at most, at `clock_hz` and one cycle each: no core of these
-              is much faster, and loads, taken branches and slow flash take more cycles, so times are lower bounds
-    host      wall time of the runtime's Scorer here, by a line through many tables that are timed when it is made
-    pi        that times `factor`; as it is, where this machine is a Raspberry Pi
+    AVR       the most cycles of classify(), counted instruction by instruction, at `clock_hz`
+    Cortex-M  typical and most instructions of classify(), at `clock_hz` and one cycle each: hardly any such core is
+              faster, and loads, taken branches and slow flash take more cycles, so times are lower bounds
+    host      wall time of the runtime's Scorer here, by a linear fit to tables that are timed on construction
+    pi        that times `factor`; the same time if this machine is a Raspberry Pi
 
-    python is what `fit_here` returned, to be used again; clock_hz is another clock than the part's usual one; factor is
-    ignored elsewhere than on pi. Raises FrontierError for another target.
+    python is the result of `fit_here`, for reuse; clock_hz replaces the part's default clock; factor is ignored except
+    on pi. Raises FrontierError for another target.
     """
 
     def __init__(
@@ -56,13 +56,13 @@ class ClassifyModel:
 
     @property
     def identity(self) -> tuple[object, ...]:
-        """What its predictions depend on besides the tables."""
+        """Everything that its predictions depend on, in addition to the tables."""
         return self.target, self.clock_hz, self.python, self.factor
 
     def options(self, tables: IntegerTables) -> tuple[Classified, ...]:
-        """Return the layouts that fit the part than which none is both faster and smaller, the fastest first.
+        """Return the Pareto front of (time, flash) of the layouts that fit the part, the fastest first.
 
-        None, where none fits. On host and pi there is one, the runtime's own.
+        It is empty if none fits. On host and pi it has one layout, the runtime's.
         """
         if self.part is None:
             assert self.python is not None
@@ -74,13 +74,13 @@ class ClassifyModel:
         )
 
     def us(self, steps: int) -> float:
-        """Return the microseconds of so many cycles or instructions of the part."""
+        """Return the microseconds of `steps` cycles or instructions of the part."""
         assert self.clock_hz is not None
         return steps * 1e6 / self.clock_hz
 
     @property
     def note(self) -> str:
-        """What has to be said of its times, in a sentence; "" where nothing has."""
+        """The caveat on its times, in a sentence; "" if there is none."""
         if self.part is not None and not self.part.avr and self.clock_hz is not None:
             return (
                 f"on {self.target} times are instructions, counted by qemu, at {self.clock_hz / 1e6:g} MHz and one "

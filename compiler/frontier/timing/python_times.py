@@ -1,4 +1,4 @@
-"""What classifying a frame takes in Python on this machine: timed on tables of many shapes, and a line through it."""
+"""The time of classifying a frame in Python on this machine: tables of many shapes timed, and a linear fit."""
 
 import time
 from collections.abc import Sequence
@@ -22,9 +22,9 @@ _FRAMES, _PASSES = 20, 20
 
 @dataclass(frozen=True, slots=True)
 class PythonCost:
-    """Microseconds a frame: a constant, and of each switch, joint, class, and class of a switch and of a joint.
+    """Microseconds a frame: a constant, and per switch, joint, class, (switch, class) and (joint, class).
 
-    yardstick  what tables of the shape YARDSTICK took when these were found: the machine's pace
+    yardstick  time of tables of the shape YARDSTICK during the fit: the machine's speed
     """
 
     constant: float
@@ -36,7 +36,7 @@ class PythonCost:
     yardstick: float
 
     def us(self, tables: IntegerTables) -> float:
-        """Return what `runtime.scores` and finding the best class take, on average over frames."""
+        """Return the mean time over frames of `runtime.scores` and finding the best class."""
         return float(_features(tables.n_switches, tables.n_joints, tables.n_classes) @ np.array(self._weights))
 
     @property
@@ -45,9 +45,9 @@ class PythonCost:
 
 
 def fit_here() -> PythonCost:
-    """Time tables of many shapes on this machine and return the least relative squares, no weight below 0.
+    """Time tables of many shapes on this machine and fit them by least relative squares, no weight below 0.
 
-    Takes about a second, and differs from one run to the next as the machine does.
+    Takes about a second, and differs from one run to the next with the machine's speed.
     """
     from scipy.optimize import nnls
 
@@ -59,14 +59,14 @@ def fit_here() -> PythonCost:
 
 
 def classify_us(several: Sequence[IntegerTables], yardstick: float | None = None) -> list[float]:
-    """Return what classifying a frame takes here with each of the tables, as `Build.classify` does it: the mean over
+    """Return the time of classifying a frame here with each of the tables, as `Build.classify` does it: the mean over
     random frames.
 
-    yardstick  microseconds that tables of the shape YARDSTICK take at the pace for which is asked; None: as it is now
+    yardstick  microseconds of tables of the shape YARDSTICK at the reference speed; None: at the current speed
 
-    Of every frame the least of some passes over all tables: other work on the machine only ever adds, and a moment in
-    which there is much of it meets all of them. But clocks, and neighbours of a virtual machine, change its pace for
-    minutes, by half and more: so the yardstick is timed in the same passes.
+    For every frame the least of several passes over all tables counts: other work on the machine only adds time, and a
+    busy moment affects all of them. But clocks, and neighbours of a virtual machine, change its speed for minutes, by
+    half and more: so the yardstick is timed in the same passes.
     """
     timed = [_Timed(tables) for tables in (*several, random_tables(*YARDSTICK))]
     for _ in range(_PASSES):
@@ -77,7 +77,7 @@ def classify_us(several: Sequence[IntegerTables], yardstick: float | None = None
 
 
 class _Timed:
-    """Tables as the runtime holds them, frames, and the least that each of them took so far."""
+    """Tables in the runtime's form, frames, and the least time of each frame so far."""
 
     def __init__(self, tables: IntegerTables) -> None:
         probes = random_frames(tables, _FRAMES, seed=1)
@@ -99,7 +99,7 @@ def _features(switches: int, joints: int, classes: int) -> NDArray[np.float64]:
 
 
 def random_tables(switches: int, joints: int, classes: int) -> IntegerTables:
-    """Return tables of that shape, always the same, with 8 rows a joint: what stands in them has no bearing on time."""
+    """Return tables of that shape, always the same, with 8 rows a joint: their values do not affect the time."""
     random = np.random.default_rng(switches + 1000 * joints)
 
     def rows(*shape: int) -> NDArray[np.int16]:

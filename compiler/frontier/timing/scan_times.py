@@ -1,6 +1,4 @@
-"""How long a scan takes: arithmetic of the wire, what calls and a firmware's own work take besides, and how often
-recorded frames end it early.
-"""
+"""The time of a scan: arithmetic of the wire, the overhead of calls and firmware, and early ends on recorded frames."""
 
 import os
 import time
@@ -29,28 +27,28 @@ from ...firmware.targets import TARGETS
 from ..points import How, Time
 from .wirings import Wiring
 
-# So many evenly spaced frames decide on the order of ports; all of them, on how often a scan then ends early.
+# Number of evenly spaced frames that decide the order of ports; all frames decide how often a scan then ends early.
 _ORDERING = 200
 NO_TIME = Time(0.0, "wire")
-# The byte that asks a CyberGlove for a record.
+# The request byte for a record of a CyberGlove.
 ASKING_US = sending_us(len(POLL), 115_200)
-# One transfer of a Raspberry Pi beside its wire. Doubtful: a kernel trace of a Pi 3 has 20 us from the call to the
-# adapter and 6 us back; others measured 300 us (Pi Zero) with an older library.
+# Overhead of one transfer on a Raspberry Pi. Doubtful: a kernel trace of a Pi 3 has 20 us from the call to the adapter
+# and 6 us back; others measured 300 us (Pi Zero) with an older library.
 PI_CALL_US = 30.0
 MODEL_FILE = Path("/proc/device-tree/model")
 _CALLS, _BATCHES = 200, 9
-# Cycles of thenar's scanning firmware while no switch changes, fitted to what libsimavr counts (`simulated`) of 1 to
-# 100 switches on chips of three kinds, within 5 %: of a scan, a key, a reading, and a byte of its answer. A change is
-# debounced and told of besides: compiler.firmware.board_files has bounds.
-_SCAN, _KEY, _READING, _ANSWER_BYTE = 520, 40, 530, 560
+# Cycles of thenar's scanning firmware while no switch changes, fitted to libsimavr's counts (`simulated`) for 1 to 100
+# switches on chips of three kinds, within 5 %: per scan, key, reading, and byte of its reply. A change also needs to be
+# debounced and reported: compiler.firmware.board_files has bounds.
+_SCAN, _KEY, _READING, _REPLY_BYTE = 520, 40, 530, 560
 _BOARD = "avr328p"
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
-    """Microseconds beside the wire: of a transaction and of a byte that it reads; of a scan and of a key that it reads.
+class Overhead:
+    """Microseconds in addition to the wire: per transaction, byte read, scan, and key read.
 
-    what  in a sentence, what these are and where they come from
+    what  a sentence on these and their source
     """
 
     what: str
@@ -60,50 +58,49 @@ class Beside:
     key_us: float = 0.0
 
     def reading_us(self, reading: Reading) -> float:
-        """Return what one transaction takes beside its SCL periods."""
+        """Return the overhead of one transaction beyond its SCL periods."""
         return self.call_us + self.byte_us * reading.length
 
 
-WIRE_ONLY = Beside("scans are those of the wire alone")
+WIRE_ONLY = Overhead("scans are those of the wire alone")
 
 
-def beside_wire(target: str) -> Beside:
-    """Return what reading takes on `target` (a name of `frontier --target`) beside the wire."""
+def overhead_of(target: str) -> Overhead:
+    """Return the reading overhead on `target` (a name of `frontier --target`)."""
     if target in TARGETS and TARGETS[target].clock_hz is not None:
         if "scan" in TARGETS[target].modes:
-            return firmware_beside(target)
-        return Beside(f"scans on {target} are those of the wire alone: thenar has no scanning firmware for it")
+            return firmware_overhead(target)
+        return Overhead(f"scans on {target} are those of the wire alone: thenar has no scanning firmware for it")
     if target == "pi" and not on_a_pi():
-        return Beside(
-            f"a transfer on a Raspberry Pi takes {PI_CALL_US:g} us beside the wire: doubtful, from a kernel trace of a "
+        return Overhead(
+            f"a transfer on a Raspberry Pi has {PI_CALL_US:g} us of overhead: doubtful, from a kernel trace of a "
             "Pi 3; run thenar frontier on the Pi itself",
             call_us=PI_CALL_US,
         )
     measured = measured_call_us()
-    return Beside(
-        f"a transfer takes {measured:.1f} us beside the wire, measured here: the system call, without what the "
-        "adapter's driver adds",
+    return Overhead(
+        f"a transfer has {measured:.1f} us of overhead, measured here: the system call, without the adapter's driver",
         call_us=measured,
     )
 
 
-def firmware_beside(target: str) -> Beside:
-    """Return what thenar's scanning firmware takes on an AVR at its usual clock, while no switch changes."""
+def firmware_overhead(target: str) -> Overhead:
+    """Return the overhead of thenar's scanning firmware on an AVR at its default clock, while no switch changes."""
     part = TARGETS[target]
     assert part.clock_hz is not None
     us = 1e6 / part.clock_hz
-    return Beside(
-        f"scans on {part.named} hold the cycles that thenar's firmware takes beside the wire while no switch changes",
+    return Overhead(
+        f"scans on {part.named} include the cycles of thenar's firmware while no switch changes",
         call_us=_READING * us,
-        byte_us=_ANSWER_BYTE * us,
+        byte_us=_REPLY_BYTE * us,
         scan_us=_SCAN * us,
         key_us=_KEY * us,
     )
 
 
-def board_beside() -> Beside:
-    """Return what a scanner board of thenar's firmware takes before it sends."""
-    return firmware_beside(_BOARD)
+def board_overhead() -> Overhead:
+    """Return the overhead of a scanner board with thenar's firmware before it sends."""
+    return firmware_overhead(_BOARD)
 
 
 def on_a_pi() -> bool:
@@ -115,47 +112,46 @@ def on_a_pi() -> bool:
 
 
 def measured_call_us() -> float:
-    """Return what a transfer takes here, as drivers.i2c.node makes it, on a device that refuses it at once.
+    """Return the time of a transfer here, made as by drivers.i2c.node, on a device that rejects it at once.
 
-    The median of several means: a moment in which other work ran does not count.
+    The median of several means, which is robust against other work.
     """
     from smbus2 import i2c_msg
     from smbus2.smbus2 import I2C_RDWR, i2c_rdwr_ioctl_data
 
-    answer = i2c_msg.read(0x20, 2)
-    messages = [i2c_msg.write(0x20, b"\x12"), answer]
+    reply = i2c_msg.read(0x20, 2)
+    messages = [i2c_msg.write(0x20, b"\x12"), reply]
     transfer = i2c_rdwr_ioctl_data.create(*messages)  # type: ignore[arg-type]  # as in node.py
     device = os.open(os.devnull, os.O_RDWR)
     try:
         return median(
-            _mean_us(lambda: ioctl(device, I2C_RDWR, transfer), lambda: bytes(answer)) for _ in range(_BATCHES)
+            _mean_us(lambda: ioctl(device, I2C_RDWR, transfer), lambda: bytes(reply)) for _ in range(_BATCHES)
         )
     finally:
         os.close(device)
 
 
-def _mean_us(call: Callable[[], object], answered: Callable[[], object]) -> float:
+def _mean_us(call: Callable[[], object], converted: Callable[[], object]) -> float:
     start = time.perf_counter()
     for _ in range(_CALLS):
         with suppress(OSError):
             call()
-        answered()
+        converted()
     return 1e6 * (time.perf_counter() - start) / _CALLS
 
 
 @dataclass(frozen=True, slots=True)
 class ScanTimes:
-    """What reading the kept switches takes, in microseconds.
+    """Times of reading the kept switches, in microseconds.
 
     full_us   every port is read
-    early_us  the mean over recorded frames, each scan ended as soon as it is decided; ends of buses cannot be told
-              apart here: they are read one after another, as `scan_us` of the runtime adds them up
-    ports     transactions of a whole scan, and a board's frame is one; chips: a board is one
-    how       "wire", or "model" where a firmware's own work is in it
-    early_ports  how many ports of chips are read then, the mean over the same frames: after each of them the scores are
-              looked at
-    alone_us, alone_ports  the same where the joints are read after the switches, if these do not decide
-    asked     in which share of the frames they do not
+    early_us  the mean over recorded frames, each scan ended as soon as it is decided; early ends of separate buses are
+              not modelled: they are read one after another, as `scan_us` of the runtime adds them up
+    ports     transactions of a whole scan, where a board's frame is one; chips: a board is one
+    how       "wire", or "model" if firmware cycles are included
+    early_ports  mean number of ports of chips read then, over the same frames: the scores are checked after each
+    alone_us, alone_ports  the same if the joints are read after the switches, unless these decide
+    asked     the share of frames in which they do not
     """
 
     full_us: float
@@ -175,14 +171,14 @@ def scan_times(
     wiring: Wiring,
     bits: NDArray[np.bool_],
     codes: NDArray[np.uint16],
-    beside: Beside = WIRE_ONLY,
+    overhead: Overhead = WIRE_ONLY,
 ) -> ScanTimes:
-    """Return what scans of the build's switches `names` take, the build's order, over frames bits (n, s), codes (n, j).
+    """Return the scan times of a build's switches `names`, in its order, over frames bits (n, s), codes (n, j).
 
-    beside is what every transaction takes besides the wire; a board takes what thenar's firmware does to scan its keys
-    before it sends. Boards and buses work side by side, so the slower counts. Scans end here when the grasp type is
-    certain, which is for decisions on single frames: one that asks for a lead reads on until that is safe as well, and
-    a sequential test needs whole scans. Raises HarnessError if a switch has no place.
+    overhead is added to every transaction; a board has the overhead of thenar's firmware for scanning its keys before
+    it sends. Boards and buses work in parallel, so the slowest counts. Scans end here when the grasp type is certain,
+    which serves decisions on single frames: a decision with a lead reads on until that is certain as well, and a
+    sequential test needs whole scans. Raises HarnessError if a switch has no place.
     """
     if not len(names):
         return ScanTimes(0.0, 0.0, 0, 0, "wire", 0.0)
@@ -198,19 +194,19 @@ def scan_times(
     board_us = max((*(_board_us(*board) for board in boards), *rows_us), default=0.0)
     ports = [port.elements for port in scan.ports]
     known = Decided(tables, ports, bits, codes)
-    full_us, early_us, early_ports = _bus_us(scan, harness, known, beside) if ports else (0.0, 0.0, 0.0)
+    full_us, early_us, early_ports = _bus_us(scan, harness, known, overhead) if ports else (0.0, 0.0, 0.0)
     alone_us, alone_ports, asked = early_us, early_ports, 1.0
     if tables.n_joints and len(bits):
         unknown = Decided(tables, ports, bits, codes, on_demand=True)
         asked = unknown.undecided((1 << len(ports)) - 1) / len(bits)
         if ports:
-            _, alone_us, alone_ports = _bus_us(scan, harness, unknown, beside)
+            _, alone_us, alone_ports = _bus_us(scan, harness, unknown, overhead)
     return ScanTimes(
         full_us=max(full_us, board_us),
         early_us=max(early_us, board_us),
         ports=len(scan.ports) + len(boards) + len(streams),
         chips=len({(port.bus, port.chip) for port in scan.ports}) + len(boards),
-        how="model" if boards or beside.scan_us else "wire",
+        how="model" if boards or overhead.scan_us else "wire",
         early_ports=early_ports,
         alone_us=max(alone_us, board_us),
         alone_ports=alone_ports,
@@ -219,26 +215,26 @@ def scan_times(
 
 
 def _board_us(board: ScannerWiring, channels: int) -> float:
-    """Return what a board takes that is asked for so many of its taxels: their codes come in frames of their own, as
-    soon as all are converted.
+    """Return the time of a board for this number of taxels: their codes come in separate frames, after all are
+    converted.
     """
-    own = board_beside()
+    own = board_overhead()
     keys_us = own.scan_us + own.key_us * len(board.switches) + scanner_us(board)
     if not channels:
         return keys_us
     return max(keys_us, analog_us(channels, board.baud), conversions_us(board, channels))
 
 
-def _bus_us(scan: ScanMap, harness: Harness, frames: Decided, beside: Beside) -> tuple[float, float, float]:
+def _bus_us(scan: ScanMap, harness: Harness, frames: Decided, overhead: Overhead) -> tuple[float, float, float]:
     """Return the time of a whole scan of the chips, and the mean time and number of ports of one that ends early."""
     costs = Costs(scan.ports, harness)
-    always = beside.scan_us + beside.key_us * len(scan.switches)
+    always = overhead.scan_us + overhead.key_us * len(scan.switches)
     whole, weighted, shares, read = [always], [always], list[float](), 0
     for number, port in enumerate(scan.ports):
-        # A selection of a channel is a transaction as well.
+        # Selecting a channel is a transaction as well.
         wire_ns = costs.after(read, number)
         selected = wire_ns > costs.after(read | 1 << number, number)
-        us = wire_ns / 1000 + beside.reading_us(reading_of(port, harness)) + beside.call_us * selected
+        us = wire_ns / 1000 + overhead.reading_us(reading_of(port, harness)) + overhead.call_us * selected
         # The first port is always read: nothing stops a scan before it.
         share = frames.undecided(read) / len(frames) if read and len(frames) else 1.0
         whole.append(us)
@@ -250,10 +246,10 @@ def _bus_us(scan: ScanMap, harness: Harness, frames: Decided, beside: Beside) ->
 
 @dataclass(frozen=True, slots=True)
 class Records:
-    """What reading joints takes: each of them, and all together besides; no less than least_us.
+    """Time of reading joints: per joint, and a constant; no less than least_us.
 
-    how   where these come from: "formula" is the vendor's for a CyberGlove
-    what  in a sentence, what they are
+    how   the source: "formula" is the vendor's for a CyberGlove
+    what  a sentence on it
     """
 
     fixed_us: float = 0.0
@@ -263,7 +259,7 @@ class Records:
     what: str = ""
 
     def of(self, joints: int) -> Time:
-        """Return what reading so many joints takes."""
+        """Return the time of reading this number of joints."""
         return Time(max(self.fixed_us + joints * self.each_us, self.least_us), self.how) if joints else NO_TIME
 
 
@@ -279,12 +275,11 @@ def records_of(
     filtered: bool = False,
     masked: bool = True,
 ) -> Records:
-    """Return what reading some of the joints of these names takes.
+    """Return the time of reading some of the joints with these names.
 
-    A CyberGlove, which may call its sensors otherwise where it is wired as `glove`, sends those alone that are asked
-    for where its mask is set (`masked`), else all of its 18 or 22. It takes what `glove_us` says: as measured where
-    glove.toml says so, else by the vendor's formula, or `wire_only`. `given_us` for all joints overrides that. Of other
-    joints the time is unknown.
+    A CyberGlove, whose sensors may have other names if it is wired as `glove`, sends only the requested ones if its
+    mask is set (`masked`), else all of its 18 or 22. Its time is `glove_us`: as measured if glove.toml has it, else by
+    the vendor's formula, or `wire_only`. `given_us` for all joints overrides that. The time of other joints is unknown.
     """
     if given_us is not None and joints:
         return Records(each_us=given_us / len(joints), how="given")
@@ -303,9 +298,9 @@ def records_of(
 
 
 _RECORDS: Mapping[How, str] = {
-    "wire": "a CyberGlove's record is its bytes on the line: what the box takes to digitise its sensors is left out",
+    "wire": "a CyberGlove's record is its bytes on the line: the box's time to digitise its sensors is left out",
     "formula": "a CyberGlove's record is the vendor's formula, of a single source: each sensor is digitised in 250 us "
-    "(376 us through the filter) before the record is sent; thenar doctor measures the glove that is there",
-    "measured": "a CyberGlove's record is what record_us of glove.toml says, as it was measured, and of fewer sensors "
+    "(376 us through the filter) before the record is sent; thenar doctor measures a connected glove",
+    "measured": "a CyberGlove's record is record_us of glove.toml, as measured, and for fewer sensors "
     "in proportion to the vendor's formula",
 }

@@ -1,5 +1,5 @@
-"""What classifying and scanning really take, in a simulator: a layout compiled, and its slowest frames run; on an AVR,
-thenar's scanning firmware on a simulated board, its next scan always due.
+"""Measure classifying and scanning in a simulator: compile a layout and run its slowest frames; on an AVR, run thenar's
+scanning firmware on a simulated board that scans without pause.
 """
 
 import json
@@ -23,7 +23,7 @@ from ...firmware.targets import TARGETS, Target
 from ...firmware.tools import call, workshop
 from ...firmware.words import numbered
 from .python_times import random_tables
-from .scan_times import beside_wire, scan_times
+from .scan_times import overhead_of, scan_times
 from .wirings import Wiring, names_of
 
 _TRIALS = (
@@ -38,22 +38,22 @@ _TRIALS = (
     ("tca6424a", 16, 400_000),
     ("tca6424a", 33, 400_000),
 )
-# Cycles that are watched: some tens of scans.
+# Cycles of a simulation: some tens of scans.
 _WATCHED = 1_600_000
-# A START, and a repeated one before what is read: chips with registers, which alone an AVR's firmware reads.
+# A START, and a repeated one before reading: chips with registers, the only ones that an AVR's firmware reads.
 _STARTS = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Cycles, or instructions, as predicted and as counted of the slowest frame; microseconds on host."""
+    """Predicted and counted cycles, or instructions, of the slowest frame; microseconds on host."""
 
     predicted: float
     counted: float
 
     @property
     def error(self) -> float:
-        """How far the prediction is off, as a share of what was counted."""
+        """The relative error of the prediction."""
         return abs(self.predicted - self.counted) / self.counted
 
 
@@ -69,7 +69,7 @@ def run_layout(trial: tuple[Option, Target]) -> Outcome:
 
 @dataclass(frozen=True, slots=True)
 class ScanTrial:
-    """So many switches on chips of one kind, read by an AVR, `target` ("avr328p"), at a clock of the bus."""
+    """A number of switches on chips of one kind, read by an AVR, `target` ("avr328p"), at a clock of the bus."""
 
     target: str
     kind: str
@@ -78,7 +78,7 @@ class ScanTrial:
 
     @property
     def wiring(self) -> Wiring:
-        """How they hang there."""
+        """Their wiring."""
         return Wiring(self.kind, self.clock_hz, muxes=False)
 
 
@@ -88,10 +88,10 @@ def scan_trials(target: str) -> tuple[ScanTrial, ...]:
 
 
 def run_scan(trial: ScanTrial) -> Outcome:
-    """Return what a whole scan takes as predicted, and as simulated, in microseconds. Raises FirmwareError."""
+    """Return the predicted and the simulated time of a whole scan, in microseconds. Raises FirmwareError."""
     nothing = np.zeros((1, trial.switches), bool), np.zeros((1, 0), np.uint16)
     tables = random_tables(trial.switches, 0, 2)
-    times = scan_times(names_of(trial.switches), tables, trial.wiring, *nothing, beside_wire(trial.target))
+    times = scan_times(names_of(trial.switches), tables, trial.wiring, *nothing, overhead_of(trial.target))
     return Outcome(times.full_us, simulated_scan_us(trial))
 
 
@@ -116,7 +116,7 @@ def _board(trial: ScanTrial, bus: BusWiring) -> Board:
 
 
 def _watched(folder: Path, board: Board) -> tuple[int, int]:
-    """Return cycles of the simulated part, and how many START conditions there were meanwhile."""
+    """Return cycles of the simulated part, and the number of START conditions in that time."""
     lines = [f"part {board.part} {board.clock_hz}", f"uart 0 {board.baud} {folder / 'port'}"]
     lines += [f"chip {chip.kind} {chip.address}" for chip in board.chips]
     (folder / "wiring").write_text("\n".join(lines) + "\n")
@@ -149,8 +149,8 @@ def _now(board: "subprocess.Popen[bytes]") -> tuple[int, int]:
     assert board.stdout is not None
     board.stdin.write(b"now\n")
     board.stdin.flush()
-    answer = board.stdout.readline()
-    if not answer:
+    reply = board.stdout.readline()
+    if not reply:
         raise FirmwareError("the simulated board ended by itself")
-    told = json.loads(answer)
-    return int(told["cycle"]), int(told["starts"])
+    reported = json.loads(reply)
+    return int(reported["cycle"]), int(reported["starts"])

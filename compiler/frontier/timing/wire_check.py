@@ -1,8 +1,8 @@
-"""The arithmetic of scan times beside real transactions: the driver on emulated buses, which count SCL periods.
+"""Compare the arithmetic of scan times with real transactions: the driver on emulated buses, which count SCL periods.
 
-The driver runs in a process of its own, for umockdev shows its device nodes to no other: this very module. The first
-line on stdin is a harness as JSON; it answers when its buses are open and were scanned once, and scans each bus _SCANS
-times for every further line.
+The driver runs in a separate process, this very module, since umockdev shows its device nodes to no other. The first
+line on stdin is a harness as JSON; the reply follows when its buses are open and were scanned once. Every further line
+scans each bus _SCANS times.
 """
 
 import os
@@ -28,14 +28,14 @@ from .wirings import BOARD, names_of, wirings
 # Numbers of switches on new gloves; the most need muxes.
 _SIZES = (8, 20, 33, 66, 115)
 _SCANS = 2
-# Checks of the chips' registers are traffic that is no scan's.
+# Checks of the chips' registers are traffic that belongs to no scan.
 _NEVER_S = 3600.0
 
 
 def check_wire(given: Harness | None = None) -> tuple[tuple[Check, ...], str | None]:
-    """Return how far the arithmetic is off on the buses of the given harness, and on those of new gloves of several
-    sizes, in every kind of chip and at every clock that a frontier tries; or what kept it from being seen, in a
-    sentence.
+    """Return the errors of the arithmetic on the buses of the given harness, and on those of new gloves of several
+    sizes, with every kind of chip and at every clock that a frontier tries; or, in a sentence, why they could not be
+    measured.
 
     Each bus is scanned by the driver as on a Raspberry Pi 4: one read a transfer. Takes a few seconds.
     """
@@ -43,7 +43,7 @@ def check_wire(given: Harness | None = None) -> tuple[tuple[Check, ...], str | N
     try:
         seen_us = _seen_us(buses)
     except DeviceError as lack:
-        return (), f"scan times were not held against an emulated bus: {lack}"
+        return (), f"scan times were not validated on an emulated bus: {lack}"
     errors = [abs(_predicted_us(bus) - seen) / seen for bus, seen in zip(buses, seen_us, strict=True)]
     return (Check("time of a whole scan on an emulated bus", "wire", len(errors), fmean(errors), max(errors)),), None
 
@@ -57,7 +57,7 @@ def _new_buses() -> Iterator[BusWiring]:
 
 
 def _renamed(buses: Sequence[BusWiring]) -> tuple[BusWiring, ...]:
-    """Return the buses that have chips, each with a device and switches of its own."""
+    """Return the buses with chips, each with a unique device and unique switches."""
     return tuple(
         replace(
             bus,
@@ -76,7 +76,7 @@ def _predicted_us(bus: BusWiring) -> float:
 
 
 def _seen_us(buses: Sequence[BusWiring]) -> list[float]:
-    """Return what a scan of each bus takes by the SCL periods and the transfers that the bus itself counts."""
+    """Return the scan time of each bus by the SCL periods and the transfers that the bus itself counts."""
     harness = Harness(name="emulated", buses=tuple(buses))
     with EmulatedI2c([_emulated(bus) for bus in buses]) as emulated, _client(emulated) as client:
         _tell(client, msgspec.json.encode(harness))
@@ -98,7 +98,7 @@ def _emulated(bus: BusWiring) -> EmulatedBus:
 
 
 def _client(emulated: EmulatedI2c) -> "subprocess.Popen[bytes]":
-    # -P: the modules of the current folder are none of ours.
+    # -P: modules of the current folder must not be imported.
     command = [sys.executable, "-P", "-m", f"{__package__}.wire_check"]
     seen = os.environ | emulated.environment
     return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=seen)
@@ -115,7 +115,7 @@ def _tell(client: "subprocess.Popen[bytes]", line: bytes) -> None:
 
 
 def main() -> None:
-    """Do as the lines on stdin say, and answer each with an empty one."""
+    """Serve the lines on stdin, and reply to each with an empty line."""
     harness = msgspec.json.decode(sys.stdin.readline(), type=Harness)
     with ExitStack() as stack:
         scans = [_scan_of(harness, number, stack) for number in range(len(harness.buses))]
@@ -142,7 +142,7 @@ def _read(scans: list[Scan], times: int) -> None:
     for scan in scans:
         for _ in range(times):
             if None in scan.read():
-                sys.exit("a chip of the emulated bus did not answer")
+                sys.exit("a chip of the emulated bus did not reply")
     print(flush=True)
 
 

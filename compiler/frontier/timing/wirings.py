@@ -1,4 +1,4 @@
-"""What a glove may be wired to: as it is, or as a new one would be, with port expanders at a clock or on a board."""
+"""Wirings of a glove: the given one, or a new one, with port expanders at some clock or on a board."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,13 +22,13 @@ CLOCKS_HZ = (100_000, 400_000, 1_000_000)
 BAUDS = (115_200, 1_000_000)
 # Chips that SPI0 of a Raspberry Pi selects.
 _SELECTS = 2
-# What an AVR's own bus is allowed in board.toml.
+# The clocks that board.toml allows for an AVR's bus.
 _AVR_HZ = range(50_000, 400_001)
 
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """A way to wire switches.
+    """A wiring of switches.
 
     name      "as wired" (the given harness), "board" (a switch scanner), or a kind of port expander or of converter for
               a new glove
@@ -43,9 +43,9 @@ class Wiring:
     muxes: bool = True
 
     def harness_of(self, names: Sequence[str], joints: Sequence[str] = ()) -> Harness:
-        """Return the harness in which the switches `names` are read, with a CyberGlove where `joints` are one's.
+        """Return the harness that reads the switches `names`, with a CyberGlove if `joints` are one's.
 
-        The given harness is returned as it is. Raises HarnessError where there is no room for so many switches.
+        The given harness is returned unchanged. Raises HarnessError if there is no room for the switches.
         """
         if self.harness is not None:
             return self.harness
@@ -79,21 +79,21 @@ class Wiring:
         if not any(chip.mux for bus in harness.buses for chip in bus.chips):
             return
         if not self.muxes:
-            raise HarnessError(f"so many {self.name} need a TCA9548A, of which the firmware selects no channels")
+            raise HarnessError(f"{self.name} chips need a TCA9548A here, whose channels the firmware cannot select")
         if self.clock_hz > tca9548a.CLOCK_HZ:
             raise HarnessError(
-                f"so many {self.name} need a TCA9548A, which runs at {tca9548a.CLOCK_HZ} Hz at most: slow the bus down"
+                f"{self.name} chips need a TCA9548A, which runs at {tca9548a.CLOCK_HZ} Hz at most: slow the bus down"
             )
 
 
 def wirings(
     given: Harness | None, target: str = "host", *, switches: bool = True, taxels: bool = False
 ) -> tuple[Wiring, ...]:
-    """Return the wirings worth trying for `target` (a name of `thenar frontier --target`): the given one, and those of
-    a new glove with `switches` and `taxels`. Taxels are on ADS7828, or on one of the converters on SPI.
+    """Return the candidate wirings for `target` (a name of `thenar frontier --target`): the given one, and those of a
+    new glove with `switches` and `taxels`. Taxels are on ADS7828, or on one of the converters on SPI.
 
-    An AVR reads its chips itself: without muxes, with registers, at 50 to 400 kHz, as board.toml has it. What is wired
-    otherwise, a board of its own included, is none of its wirings.
+    An AVR reads its chips itself: without muxes, with registers, at 50 to 400 kHz, as board.toml has it. Other wirings,
+    including scanner boards, are not among its candidates.
     """
     avr = reads_by_itself(target)
     found = (
@@ -112,12 +112,12 @@ def wirings(
 
 
 def reads_by_itself(target: str) -> bool:
-    """Return whether thenar's firmware for `target` reads the glove, with no computer besides."""
+    """Return whether thenar's firmware for `target` reads the glove, without a computer."""
     return target in TARGETS and "scan" in TARGETS[target].modes
 
 
 def names_of(count: int) -> list[str]:
-    """Return names for the switches of a glove that is only tried: s0, s1, ..."""
+    """Return names for the switches of a hypothetical glove: s0, s1, ..."""
     return [f"s{number}" for number in range(count)]
 
 

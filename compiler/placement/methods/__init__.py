@@ -1,1 +1,1 @@
-"""Ways to choose switches, a file a method or a family of them: `base` says what a method is, and finds them all."""
+"""Methods that choose switches, one file per method or family; `base` defines a method and finds them all."""

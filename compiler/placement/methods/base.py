@@ -1,4 +1,4 @@
-"""A placement method: what its author supplies, and all methods by their names."""
+"""The interface of a placement method, and the registry of all methods."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -19,58 +19,58 @@ Chooser = Callable[[float], Columns]
 Bits = NDArray[np.bool_]
 Labels = NDArray[np.intp]
 
-# The paper's method, and the one that we take where nothing else is asked for.
+# The paper's method, and the default of ours.
 PAPERS, BEST = "id3", "elimination"
 
-# Numbers of switches; the paper's own sizes are near 26 to 66. Coarser: of methods that are there to be compared.
+# Numbers of switches; the paper's sizes are near 26 to 66. Baselines get the coarser list.
 FINE = (1, 2, 3, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 28, 33, 40, 50, 66, 100, 130)
 COARSE = (4, 8, 12, 16, 20, 24, 28, 33, 40, 50, 66)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Method:
-    """A way to choose switches, and everything that is true of it.
+    """A method that chooses switches, and its properties.
 
     Parameters
     ----------
     name : str
         The name, as the command line spells it.
     help : str
-        One sentence for people, without a full stop.
+        One sentence for users, without a full stop.
     learn : callable
         `learn(samples, ports)` does the expensive work once and returns the chooser: a function of the parameter that
-        returns the kept switches, as columns of `samples.switches`, in their order. It may keep fewer than asked for.
-        `ports` is None where the costs of reading are not known. `ranked` makes `learn` of a ranking.
+        returns the kept switches, as columns of `samples.switches`, in their order. It may keep fewer than requested.
+        `ports` is None if the costs of reading are unknown. `ranked` turns a ranking into `learn`.
     parameter : {"switches", "S"}
-        What the chooser takes: how many switches to keep at most, or the paper's S, the number of rows below which a
+        The chooser's argument: how many switches to keep at most, or the paper's S, the number of rows below which a
         node of a tree decides nothing.
     ours : bool
-        Whether it is the paper's or thenar's own; the others are rivals, shown for comparison.
+        Whether it is the paper's method or thenar's; the others are baselines.
     uses_joints : bool
-        Whether the choice depends on the joints' codes, where there are any.
+        Whether the choice depends on the joints' codes, if there are any.
     uses_ports : bool
-        Whether the choice depends on what reading the ports costs.
+        Whether the choice depends on the costs of reading the ports.
     sizes : tuple of int
-        The parameters that a frontier tries, as far as there are so many switches.
+        The parameters that a frontier tries, up to the number of switches.
     nested : bool
-        Whether the first of M switches are those of a smaller M: one ranking answers all, with limits as well.
+        Whether the first of M switches are those of a smaller M, so that one ranking serves all M, with limits too.
     all_too : bool
         Whether a frontier also tries to keep all switches.
     tried : {"always", "wired", "unwired", "never"}
-        When a frontier tries it without being asked to: "wired" where the glove's own wiring is known.
+        When a frontier tries it by default: "wired" if the glove's actual wiring is known.
     imports, install : str
-        The package that it cannot do without, and what pip calls it; "" where it needs none but scikit-learn.
+        The package that it requires, and its name for pip; "" if scikit-learn suffices.
     seconds : float
-        Expected time of a core for all sizes, with 160 switches and 3000 rows: it only predicts the time left.
+        Expected core time for all sizes, with 160 switches and 3000 rows; only used to predict the time left.
     label : str
         Its name in the tables of `evaluate`; "" for `name`.
     rank : int
-        Its place among thenar's own methods. Other packages' methods come after them.
+        Its position among thenar's methods. Other packages' methods come after them.
 
     Raises
     ------
     PlacementError
-        If the parameter is none of the two.
+        If the parameter is neither of the two.
     """
 
     name: str
@@ -96,7 +96,7 @@ class Method:
 
     @property
     def installed(self) -> bool:
-        """Whether the package that it needs is there."""
+        """Whether the package that it requires is installed."""
         return not self.imports or find_spec(self.imports) is not None
 
     @property
@@ -110,7 +110,7 @@ class Method:
         return self.parameter == "switches"
 
     def check_given(self, keep: int | None, prune: int) -> None:
-        """Raise PlacementError unless what the method takes is given, and nothing else."""
+        """Raise PlacementError unless the method's parameter is given, and nothing else."""
         if self.by_number and keep is None:
             raise PlacementError(f"method {self.name!r} needs --keep M: how many switches to keep")
         if self.by_number and prune:
@@ -119,7 +119,7 @@ class Method:
             raise PlacementError(f"method {self.name!r} takes --prune S and no --keep: choose another --method")
 
     def ladder(self, n_switches: int) -> tuple[int, ...]:
-        """Return the parameters that a frontier tries among so many switches."""
+        """Return the parameters that a frontier tries among `n_switches` switches."""
         if not self.by_number:
             return self.sizes
         return (*(size for size in self.sizes if size < n_switches), *([n_switches] if self.all_too else []))
@@ -127,15 +127,15 @@ class Method:
     def chooser(self, samples: Samples, ports: PortCosts | None = None) -> Chooser:
         """Do the expensive work, and return the kept switches as a function of the parameter.
 
-        Numbers of switches are rounded down. Without `ports` all switches cost the same. Raises PlacementError where
-        there are no switches, where `ports` are those of other switches, or where the package needed is missing.
+        Numbers of switches are rounded down. Without `ports` all switches cost the same. Raises PlacementError if
+        there are no switches, if `ports` are those of other switches, or if the required package is missing.
         """
         if not self.installed:
             raise PlacementError(f"{self.name} needs {self.imports}, which is missing: pip install {self.install}")
         if not samples.n_switches:
             raise PlacementError("there are no switches to choose from: the set holds joints only")
         if ports is not None and len(ports.port_of) != samples.n_switches:
-            raise PlacementError(f"ports are known of {len(ports.port_of)} switches, the set has {samples.n_switches}")
+            raise PlacementError(f"ports are given for {len(ports.port_of)} switches, the set has {samples.n_switches}")
         return self.learn(samples, ports)
 
 
@@ -143,23 +143,23 @@ METHODS: Members[Method] = Members("placement method", Method, "thenar.compiler.
 
 
 def usual(*, ours: bool, wired: bool = False) -> tuple[str, ...]:
-    """Return the methods, ours or the rivals, that a frontier tries without being asked to."""
+    """Return the methods, ours or the baselines, that a frontier tries by default."""
     when = ("always", "wired" if wired else "unwired")
     return tuple(name for name, method in METHODS.items() if method.ours == ours and method.tried in when)
 
 
 def first_of(order: Columns) -> Chooser:
-    """Return the chooser that keeps the first so many switches of an order."""
+    """Return the chooser that keeps the first switches of an order."""
     return lambda most: order[: max(int(most), 0)]
 
 
 def ranked(rank: Callable[[Bits, Labels], Iterable[int]]) -> Callable[[Samples, PortCosts | None], Chooser]:
-    """Return `learn` of a method that ranks switches: fewer of them are the first of more.
+    """Return `learn` of a method that ranks switches: a smaller placement is a prefix of a larger one.
 
     `rank(bits, labels)` returns or yields the columns of bits (n, s), all of which vary, best first; labels (n,) are
-    class numbers, of which there are at least two. What is yielded is ranked only as far as is asked for. Joints are
-    ignored, and switches that never change are never chosen. What rests on the machine's linear algebra may decide
-    near ties otherwise on another machine.
+    class numbers, of which there are at least two. A generator is consumed only as far as needed. Joints are ignored,
+    and switches that never change are never chosen. A ranking by linear algebra may resolve near ties differently on
+    another machine.
     """
 
     def learn(samples: Samples, _: PortCosts | None) -> Chooser:
@@ -170,7 +170,7 @@ def ranked(rank: Callable[[Bits, Labels], Iterable[int]]) -> Callable[[Samples, 
         order: list[int] = []
         rest: Iterator[int] = iter(())
         if varying.size and np.ptp(labels):
-            # The matrices are small: threads would wait for each other longer than they work.
+            # The matrices are small: threads would spend more time waiting than working.
             with threadpool_limits(1):
                 rest = iter(rank(bits[:, varying], labels))
 

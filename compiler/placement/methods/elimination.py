@@ -1,18 +1,18 @@
-"""Backward elimination: the switch whose row of the score tables is missed least goes, again and again.
+"""Backward elimination: repeatedly drop the switch whose row of the score tables raises the loss least when removed.
 
-The tables are those that boosting heads for (`logistic`), of all switches that are left and of the joints. While many
-switches are left, the few whose rows cost least to replace by their means go at once; of the last FINE, one goes at a
-time, and the likeliest CANDIDATES for it are tried: the tables are fitted on without each, since the others may stand
-in for it. Of equally likely ones the lowest number goes, of equally good candidates the likeliest.
+The tables are those that boosting converges to (`logistic`), of all remaining switches and of the joints. While many
+switches are left, the few whose rows are cheapest to replace by their means are dropped together. The last FINE are
+dropped one at a time, from CANDIDATES candidates: the tables are refitted without each, since the others may
+compensate. Of equally likely candidates the lowest number is tried, of equally good ones the likeliest is dropped.
 
-With the times of ports, a rise is held against what the port takes, shared out over those of its switches that are
-left: the last one of a port pays for all of it.
+With the times of ports, a rise in loss is weighed against the time of the port, split among its remaining switches: the
+last one of a port pays for all of it.
 
-`elimination-boosted` does the same on the tables of boosting itself: LogitBoost learns from all switches that are left,
-and the joints; its stumps collapse to one row of scores a switch. Those that cost least go, BOOSTED_SHARE of them at
-once while many are left; boosting then starts anew. Of equally cheap ones the lowest number goes first.
+`elimination-boosted` does the same on boosted tables: LogitBoost is trained on all remaining switches and the joints;
+its stumps collapse to one row of scores per switch. The cheapest are dropped, BOOSTED_SHARE of them at once while many
+are left; then boosting starts again. Of equally cheap ones the lowest number is dropped first.
 
-The joints' codes, where there are any, are always kept. Of many rows, a sample is looked at.
+The joints' codes, if any, are always kept. Of many rows, a sample is used.
 """
 
 import numpy as np
@@ -29,31 +29,31 @@ from .base import BEST, FINE, Method, first_of
 
 Bits = NDArray[np.bool_]
 
-# One at a time goes of so many that are left, and so many candidates are tried for it.
+# With at most FINE left they are dropped one at a time, each from CANDIDATES candidates.
 LAST, CANDIDATES = 40, 6
-# Of the switches that are left, how many go at once while they are many.
+# The share of the remaining switches that is dropped at once while many are left.
 SHARE = 0.05
 # Steps of L-BFGS: at first, for a candidate, and after a removal.
 FIRST_STEPS, TRIAL_STEPS, STEPS = 60, 3, 5
-# What the mean time of a port counts, where a switch itself counts 1.
+# Weight of a port's mean time, relative to a weight of 1 for the switch itself.
 PORT_WEIGHT = 16.0
 MOST_ROWS = 8192
 BINS = 8
 BOOSTED_ROUNDS, BOOSTED_SHARE = 40, 0.12
-# So many factors in 0.5 .. 1 are multiplied before their exponents are taken out again: 2^-512 is far from underflow.
+# Number of factors in 0.5 .. 1 that are multiplied before their exponents are extracted: 2^-512 is no underflow.
 _FACTORS = 512
 
 
 def elimination_order(samples: Samples, ports: PortCosts | None = None) -> Columns:
-    """Return the switches that vary in `samples`, the last one to go first.
+    """Return the switches that vary in `samples`, most important first (the last one dropped).
 
-    Takes the time of some 1500 evaluations of the tables for 160 switches, whatever they are.
+    Takes the time of some 1500 evaluations of the tables for 160 switches, independent of the data.
     """
     return _Elimination(sampled(samples), ports).order()
 
 
 def boosted_elimination_order(samples: Samples) -> Columns:
-    """Return the switches that vary in `samples`, the last one to go first: some 35 trainings for 160 switches."""
+    """Return the varying switches, most important first, after some 35 trainings for 160 switches."""
     rows = sampled(samples)
     left = np.flatnonzero(_varying(rows))
     gone: list[int] = []
@@ -65,7 +65,7 @@ def boosted_elimination_order(samples: Samples) -> Columns:
 
 
 def _boosted_costs(samples: Samples, left: NDArray[np.intp]) -> Floats:
-    """Return (len(left),) by how much the loss rises without each of the switches `left`."""
+    """Return the rise in loss (len(left),) without each of the switches `left`."""
     X = samples.kept(tuple(left.tolist()))
     stumps, _ = boost(X, samples.labels, samples.n_classes, rounds=BOOSTED_ROUNDS, max_bins=BINS)
     rows = collapse(stumps, len(left)).switch_rows
@@ -98,7 +98,7 @@ class _Elimination:
         return tuple(self._left + self._gone[::-1])
 
     def _try(self, candidates: list[int]) -> int:
-        """Go on without the candidate (a position) whose absence, once the others stand in for it, costs least."""
+        """Drop the candidate (a position) whose removal, after the others are refitted, costs least."""
         fits = [self._fit.without([position]) for position in candidates]
         for fit in fits:
             fit.improve(TRIAL_STEPS)
@@ -115,7 +115,7 @@ class _Elimination:
         self._bits = np.delete(self._bits, positions, axis=0)
 
     def _costs(self) -> Floats:
-        """Return what each switch that is left costs; only how they compare matters."""
+        """Return the relative cost of dropping each remaining switch."""
         if self._ports is None:
             return np.ones(len(self._left))
         return 1.0 + PORT_WEIGHT * self._ports.shares(self._left)
@@ -126,7 +126,7 @@ def _varying(samples: Samples) -> Bits:
 
 
 def sampled(samples: Samples, most: int = MOST_ROWS) -> Samples:
-    """Return so many rows at most, spread evenly over each class's rows, in order: classes keep their shares."""
+    """Return at most `most` rows, spread evenly over each class's rows, in order: classes keep their shares."""
     if len(samples.labels) <= most:
         return samples
     by_class = np.argsort(samples.labels, kind="stable")
@@ -137,7 +137,7 @@ def sampled(samples: Samples, most: int = MOST_ROWS) -> Samples:
 def thermometer(codes: NDArray[np.uint16]) -> NDArray[np.bool_]:
     """Return bits (b, n) of codes (n, j): for each joint, whether the code exceeds each of its BINS - 1 quantiles.
 
-    Thresholds that no code exceeds, or that are equal, give no bit.
+    Duplicate thresholds, and those that no code exceeds, give no bit.
     """
     n = len(codes)
     rows = []
@@ -151,7 +151,7 @@ def removal_rises(probability: Floats, bits: NDArray[np.bool_], rows: Floats, la
     """Return the rise (s,) of the sum of -ln P(label) for each switch whose row is replaced by its mean.
 
     probability (K, n) with all rows in place, bits (s, n), rows (s, K), labels (n,). Removal changes the scores of a
-    frame by one of two vectors d (K,), whether the switch is closed or open; the loss then rises by
+    frame by one of two vectors d (K,), depending on whether the switch is closed; the loss then rises by
     ln(sum over k of P_k exp d_k) - d_label.
     """
     n_classes, n = probability.shape
@@ -165,7 +165,7 @@ def removal_rises(probability: Floats, bits: NDArray[np.bool_], rows: Floats, la
 
 def _shares_after(probability: Floats, bits: NDArray[np.bool_], closed: Floats, opened: Floats) -> Floats:
     """Return the sum (n, s) over classes of P times its factor (s, K), added class by class."""
-    # Not as a matrix product: its bits would depend on the machine.
+    # Not a matrix product: its last bits would depend on the machine.
     total = np.zeros(bits.shape)
     for shares, if_closed, if_open in zip(probability, closed.T, opened.T, strict=True):
         factors = np.where(bits, if_closed, if_open)
@@ -177,7 +177,7 @@ def _shares_after(probability: Floats, bits: NDArray[np.bool_], closed: Floats, 
 def sums_of_logs(factors: Floats) -> Floats:
     """Return the sum over axis 0 of ln `factors` (n, s), all > 0: (s,), as logarithms of products.
 
-    Factors are multiplied in a fixed order, first halves by second halves, with their exponents taken out.
+    Factors are multiplied in a fixed order, first halves by second halves, with their exponents extracted.
     """
     product, powers = np.frexp(factors)
     exponents = powers.sum(axis=0, dtype=np.int64)
@@ -201,7 +201,7 @@ def _halved(product: Floats) -> Floats:
 MEMBER = (
     Method(
         name=BEST,
-        help="The switch whose row of the score tables is missed least goes, again and again: tables fitted whole",
+        help="Repeatedly drop the switch whose removal raises the loss least: score tables fitted jointly",
         learn=lambda samples, _: first_of(elimination_order(samples)),
         nested=True,
         ours=True,
@@ -214,7 +214,7 @@ MEMBER = (
     ),
     Method(
         name="elimination-cost",
-        help="Elimination that holds what a switch is worth against its part of the time to read its port",
+        help="Elimination that weighs each switch against its share of the time to read its port",
         learn=lambda samples, ports: first_of(elimination_order(samples, ports)),
         nested=True,
         ours=True,
@@ -228,7 +228,7 @@ MEMBER = (
     ),
     Method(
         name="elimination-boosted",
-        help="The same on boosted tables: LogitBoost starts anew once the switches whose removal costs least are gone",
+        help="The same on boosted tables: LogitBoost is retrained after the cheapest switches are dropped",
         learn=lambda samples, _: first_of(boosted_elimination_order(samples)),
         nested=True,
         ours=True,

@@ -1,6 +1,6 @@
-"""Rankings by what each switch tells about the grasp type, and at random: what a placement is compared with.
+"""Baselines that rank switches by information about the grasp type, or at random.
 
-Equal amounts of information, exactly compared, are decided by the lowest number.
+Ties of information, exactly compared, go to the lowest number.
 """
 
 from collections.abc import Iterator
@@ -20,9 +20,9 @@ _SEED = 0
 
 
 def random_placement(n_inputs: int, m: int, seed: int) -> Columns:
-    """Return m different inputs out of n_inputs, drawn with `seed`; all of them, in drawn order, if m is larger."""
+    """Return m distinct inputs out of n_inputs, drawn with `seed`; all of them, in drawn order, if m is larger."""
     if m < 0:
-        raise PlacementError(f"{m} inputs were asked for, a number >= 0 is needed")
+        raise PlacementError(f"{m} inputs were requested, a number >= 0 is needed")
     return tuple(np.random.default_rng(seed).permutation(n_inputs)[:m].tolist())
 
 
@@ -31,10 +31,10 @@ def _random(bits: Bits, _: Labels) -> Columns:
 
 
 def most_informative(bits: Bits, labels: Labels) -> Columns:
-    """Return the inputs of bits (n, d) that vary, those first that each, alone, tell most about labels (n,)."""
+    """Return the inputs of bits (n, d) that vary, by the information of each, alone, about labels (n,)."""
     counts = _counted(bits, labels)
     scores = counts.information()
-    # Bits of equal counts tell the same: one of them stands for all.
+    # Bits of equal counts have equal information: one of them represents all.
     alike, kind = counts.kinds()
 
     def order(one: int, other: int) -> int:
@@ -47,7 +47,7 @@ def most_informative(bits: Bits, labels: Labels) -> Columns:
 
 
 def cmim(bits: Bits, labels: Labels) -> Iterator[int]:
-    """Yield the inputs of bits (n, d) that vary by conditional mutual information maximisation, one after the other.
+    """Yield the inputs of bits (n, d) that vary, by conditional mutual information maximisation.
 
     Fleuret, "Fast binary feature selection with conditional mutual information", JMLR 5 (2004), section 3.1: each time
     the input a of maximum  min over the chosen b of I(y; a | b),  first that of maximum I(y; a).
@@ -74,8 +74,8 @@ def mrmr(bits: Bits, labels: Labels) -> Iterator[int]:
     """Yield all inputs of bits (n, d) by minimum redundancy and maximum relevance to labels (n,).
 
     Peng, Long, Ding, "Feature selection based on mutual information", IEEE PAMI 27 (2005), equation 6 (the difference):
-    each time the input a of maximum  I(y; a) - mean over the chosen b of I(a; b).  Counts are whole numbers and
-    logarithms are elementary's, so that every machine chooses alike.
+    each time the input a of maximum  I(y; a) - mean over the chosen b of I(a; b).  Counts are integers and logarithms
+    are those of `elementary`, so every machine makes the same choice.
     """
     relevance = _information(bits, labels[:, None] == np.unique(labels))
     left = list(range(bits.shape[1]))
@@ -95,15 +95,15 @@ def _counted(bits: Bits, labels: Labels) -> Cooccurrence:
 
 
 def _sign(counts: Cooccurrence, scores: Floats, one: tuple[int, int | None], other: tuple[int, int | None]) -> int:
-    """Return the sign of I(class; a | b) of pair `one` less that of pair `other`, whose rough values are `scores`."""
+    """Return the sign of I(class; a | b) of pair `one` minus that of pair `other`; `scores` are approximate values."""
     apart = scores[0] - scores[1]
     return counts.sign(one, other) if abs(apart) <= 2 * counts.error_bound else int(np.sign(apart))
 
 
 def _information(bits: Bits, member: Bits) -> Floats:
-    """Return n * I(a; class) in nats for every column a of bits (n, d), classes being given by member (n, k)."""
+    """Return n * I(a; class) in nats for every column a of bits (n, d), with class membership in member (n, k)."""
     n = len(bits)
-    ones = member.T.astype(np.float64) @ bits.astype(np.float64)  # whole numbers: exact in any order
+    ones = member.T.astype(np.float64) @ bits.astype(np.float64)  # integers: exact in any order
     sizes = member.sum(axis=0, dtype=np.float64)[:, None]
     total = ones.sum(axis=0)
     joint = add_up(np.concatenate([n_log_n(ones, log), n_log_n(sizes - ones, log)]))
@@ -130,7 +130,7 @@ MEMBER = (
     ),
     Method(
         name="mutual-information",
-        help="Those that each tell most about the grasp type, alone",
+        help="Highest information about the grasp type, each switch alone",
         learn=ranked(most_informative),
         nested=True,
         tried="always",

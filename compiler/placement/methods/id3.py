@@ -1,25 +1,24 @@
-"""ID3: the paper's, under every S from one tree; pruned otherwise; and grown with an eye on scan time.
+"""ID3: the paper's, for every S from one tree; with other kinds of pruning; and cost-aware, by scan time.
 
-Cost-aware ID3 splits nodes largest first (of equal ones the one found first), so that the switches found first are
-those that most rows ask for: the beginning of one growth serves every number of switches. At a node the switch of the
-largest
+Cost-aware ID3 splits nodes largest first (of equal ones the one found first), so that the switches found first decide
+the most rows: a prefix of one growth serves every number of switches. At a node the switch of the largest
 
     |C| * gain / (1 + marginal time / mean time of a port)
 
-is chosen: gain against cost, with the cost that is left of it. A switch on a port that is read anyway is free; one on a
-port of its own counts half where all ports take equally long. Of equal ones the cheaper wins, then the lowest number.
-The comparison is exact.
+is chosen: gain divided by the remaining cost. A switch on a port that is already read is free; one on another port
+counts half if all ports take equally long. Of equal ones the cheaper wins, then the lowest number. The comparison is
+exact.
 
-Pruning is of weakest links: the decisions that bring least go first, until few enough inputs are left (Breiman,
-Friedman, Olshen and Stone, Classification and Regression Trees, 1984, section 3.3). With R the risk of a node as a
-leaf, the weakest link is the decision t of the smallest
+Pruning is of weakest links: the decisions with the least gain are removed first, until few enough inputs are left
+(Breiman, Friedman, Olshen and Stone, Classification and Regression Trees, 1984, section 3.3). With R the risk of a node
+as a leaf, the weakest link is the decision t of the smallest
 
     g(t) = (R(t) - sum of R over the leaves below t) / (leaves below t - 1),
 
-and it becomes a leaf. The risk is the caller's: entropy of the rows that the tree was grown on makes this
-cost-complexity pruning; errors on rows held out make it reduced-error pruning, since the links of g <= 0 are those that
-Quinlan's bottom-up procedure (1987) takes off. Risks are whole numbers, so that g is compared exactly; of equal links
-the last in preorder goes first, what hangs below before what it hangs from.
+and it becomes a leaf. The caller supplies the risk. Entropy of the training rows gives cost-complexity pruning. Errors
+on held-out rows give reduced-error pruning, since the links of g <= 0 are those that Quinlan's bottom-up procedure
+(1987) removes. Risks are integers, so g is compared exactly; of equal links the last in preorder is removed first,
+descendants before ancestors.
 """
 
 import collections
@@ -41,16 +40,16 @@ from ..ports import PortCosts
 from ..tree import Tree
 from .base import PAPERS, Chooser, Method, first_of
 
-# A decision's share of the entropy, in whole 2^-30 bits: far below what a row more or less changes.
+# A decision's share of the entropy, in integer multiples of 2^-30 bits: far below the effect of one row.
 _BITS = 30
 
 
 @dataclass(frozen=True)
 class PruningPath:
-    """How a tree is pruned: the first n of `order`, numbers of its nodes, are made leaves, for n = 0 to all.
+    """The pruning sequence of a tree: the first n of `order`, numbers of its nodes, become leaves, for n = 0 to all.
 
-    strengths  (links,) g of each as it went, never descending
-    n_inputs   (links + 1,) how many different inputs the tree asks for once the first n links are gone
+    strengths  (links,) g of each at its removal, never descending
+    n_inputs   (links + 1,) the number of distinct inputs in the tree after the first n links are removed
     """
 
     tree: Tree
@@ -60,12 +59,12 @@ class PruningPath:
 
     @cached_property
     def n_useless(self) -> int:
-        """Number of links of g <= 0: without them the risk is no higher."""
+        """Number of links of g <= 0: their removal does not raise the risk."""
         return bisect_right(self.strengths, 0)
 
     def placement(self, most: float, least_links: int = 0) -> tuple[int, ...]:
-        """Return the inputs, in preorder of their nodes, of the largest tree on the path that asks for at most `most`,
-        with `least_links` of the links, the first ones, gone in any case.
+        """Return the inputs, in preorder of their nodes, of the largest tree on the path with at most `most` inputs and
+        with at least the first `least_links` links removed.
         """
         links = next(n for n in range(least_links, len(self.n_inputs)) if self.n_inputs[n] <= max(most, 0))
         leaves = set(self.order[:links])
@@ -73,7 +72,7 @@ class PruningPath:
 
 
 def weakest_links(tree: Tree, brought: Sequence[int]) -> PruningPath:
-    """Return how `tree` is pruned, where the decision at each node lowers the risk by `brought` (0 for a leaf)."""
+    """Return the pruning path of `tree`, given how much the decision at each node lowers the risk (0 for a leaf)."""
     pruning = _Pruning(tree, brought)
     steps = list(pruning.steps())
     n_inputs = (len(set(tree.inputs)), *(left for _, _, left in steps))
@@ -81,14 +80,14 @@ def weakest_links(tree: Tree, brought: Sequence[int]) -> PruningPath:
 
 
 def entropy_brought(tree: Tree) -> list[int]:
-    """Return by how much each node's decision lowers the entropy of the rows that the tree was grown on."""
+    """Return by how much each node's decision lowers the entropy of the training rows."""
     return [round(Fraction(node.gain) * node.size * 2**_BITS) for node in tree.nodes]
 
 
 def errors_spared(tree: Tree, X: NDArray[np.bool_], labels: NDArray[np.intp]) -> list[int]:
     """Return by how many each node's decision lowers the errors on rows X (n, d), of class numbers `labels` (n,).
 
-    X holds the tree's bits: every value is met below every decision.
+    X holds the tree's bits: every decision has a child for every value.
     """
     errors = [0] * len(tree.nodes)
     spared = [0] * len(tree.nodes)
@@ -107,7 +106,7 @@ def errors_spared(tree: Tree, X: NDArray[np.bool_], labels: NDArray[np.intp]) ->
 
 
 class _Pruning:
-    """The decisions of a tree that still stand; every node with what those below it, and itself, bring together."""
+    """The remaining decisions of a tree; each node with the total reduction of itself and those below it."""
 
     def __init__(self, tree: Tree, brought: Sequence[int]) -> None:
         self.tree = tree
@@ -121,14 +120,14 @@ class _Pruning:
         self.labels = collections.Counter(node.input for node in tree.nodes if node.input is not None)
 
     def steps(self) -> Iterator[tuple[int, Fraction, int]]:
-        """Yield each weakest link as it goes: node, g, how many different inputs are left."""
-        waiting = [self._key(number) for number, stands in enumerate(self.standing) if stands]
+        """Yield each weakest link as it is removed: node, g, number of distinct inputs left."""
+        waiting = [self._key(number) for number, remaining in enumerate(self.standing) if remaining]
         heapify(waiting)
         while waiting:
             key = heappop(waiting)
             number = -key[1]
             if not self.standing[number] or key != self._key(number):
-                continue  # gone, or pushed again since
+                continue  # removed, or pushed again since
             for above in self._take_off(number):
                 heappush(waiting, self._key(above))
             yield number, key[0], len(self.labels)
@@ -137,7 +136,7 @@ class _Pruning:
         return Fraction(self.brought[number], self.links[number]), -number
 
     def _take_off(self, number: int) -> Iterator[int]:
-        """Make a node a leaf; yield the nodes above it, whose links are others now."""
+        """Turn a node into a leaf; yield its ancestors, whose links change."""
         brought, links = self.brought[number], self.links[number]
         self._clear(number)
         above = self.tree.parents[number]
@@ -159,7 +158,7 @@ class _Pruning:
 
 
 def _labels(tree: Tree, leaves: set[int]) -> Iterator[int]:
-    """Yield the inputs of the decisions of `tree` in preorder, those at or below `leaves` left out."""
+    """Yield the inputs of the decisions of `tree` in preorder, except at or below `leaves`."""
     waiting = [0]
     while waiting:
         number = waiting.pop()
@@ -170,7 +169,7 @@ def _labels(tree: Tree, leaves: set[int]) -> Iterator[int]:
 
 
 _HELD_OUT = 3
-# The paper's S, and beyond, until next to nothing is left of the tree.
+# The paper's S, and larger ones, until almost nothing is left of the tree.
 _PRUNES = (0, 10, 13, 29, 62, 100, 150, 200, 300, 400, 600, 1000)
 
 
@@ -178,7 +177,7 @@ def _papers(samples: Samples, _: PortCosts | None) -> Chooser:
     """Return S -> the inputs of grow_id3(min_samples=S) on the switches, from one unpruned tree.
 
     S only decides which nodes are terminal: a node has no more rows than any node above it, so the tree under S is the
-    unpruned one less the decisions of fewer than S rows, in the same preorder.
+    unpruned one without the decisions of fewer than S rows, in the same preorder.
     """
     tree = grow_id3(samples.switches, samples.labels)
     decisions = [(node.input, node.size) for node in tree.nodes if node.input is not None]
@@ -186,7 +185,7 @@ def _papers(samples: Samples, _: PortCosts | None) -> Chooser:
 
 
 def _cost_complexity(samples: Samples, _: PortCosts | None) -> Chooser:
-    """Return m -> the inputs, at most m, of the unpruned tree less its weakest links, by entropy of the rows."""
+    """Return m -> the inputs, at most m, of the tree after cost-complexity pruning by entropy of the rows."""
     tree = grow_id3(samples.switches, samples.labels)
     return weakest_links(tree, entropy_brought(tree)).placement
 
@@ -194,19 +193,19 @@ def _cost_complexity(samples: Samples, _: PortCosts | None) -> Chooser:
 def _reduced_error(samples: Samples, _: PortCosts | None) -> Chooser:
     """Return m -> the inputs, at most m, of a tree grown on two thirds of the rows and pruned by errors on the others.
 
-    What spares no error on the rows held out goes in any case (Quinlan 1987); then the weakest links, until at most m
+    Decisions that save no held-out error are always removed (Quinlan 1987); then the weakest links, until at most m
     inputs are left.
     """
     held_out = every_third(samples.labels)
     tree = grow_id3(samples.switches[~held_out], samples.labels[~held_out])
-    # Numbers of the tree's classes, of which every one has rows to grow on.
+    # Numbers of the tree's classes; each has rows in the growing part.
     labels = np.searchsorted(np.array(tree.classes), samples.labels[held_out])
     path = weakest_links(tree, errors_spared(tree, samples.switches[held_out], labels))
     return lambda most: path.placement(most, path.n_useless)
 
 
 def every_third(labels: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Return (n,) which rows are the third, sixth ... of their class."""
+    """Return a mask (n,) of the third, sixth ... row of each class."""
     order = np.argsort(labels, kind="stable")
     firsts = np.searchsorted(labels[order], labels[order])
     chosen = np.zeros(len(labels), np.bool_)
@@ -215,7 +214,7 @@ def every_third(labels: NDArray[np.intp]) -> NDArray[np.bool_]:
 
 
 def cost_aware_order(samples: Samples, ports: PortCosts | None = None) -> Columns:
-    """Return the switches that cost-aware ID3 asks for, in the order found; without `ports` all cost alike."""
+    """Return the switches of cost-aware ID3, in the order found; without `ports` all cost the same."""
     ports = ports or PortCosts((0,) * samples.n_switches, (0.0,))
     bits, labels, n_classes = samples.switches, samples.labels, samples.n_classes
     counter = Counter(Digits.from_matrix(bits), labels, n_classes)
@@ -265,7 +264,7 @@ MEMBER = (
     ),
     Method(
         name="id3-ccp",
-        help="ID3 less its weakest links (cost-complexity pruning by entropy)",
+        help="ID3 without its weakest links (cost-complexity pruning by entropy)",
         learn=_cost_complexity,
         ours=True,
         tried="unwired",
@@ -273,7 +272,7 @@ MEMBER = (
     ),
     Method(
         name="id3-rep",
-        help="ID3 pruned by its errors on every third row, which it was not grown on (reduced-error pruning)",
+        help="ID3 pruned by its errors on every third row, held out while it grows (reduced-error pruning)",
         learn=_reduced_error,
         ours=True,
         rank=7,

@@ -1,4 +1,4 @@
-"""Rivals from PySensors: sparse sensors for classification (SSPOC), and for reconstruction by pivoted QR."""
+"""Baselines from PySensors: sparse sensors for classification (SSPOC), and for reconstruction by pivoted QR."""
 
 from typing import Any
 
@@ -9,14 +9,14 @@ from ...samples import Columns
 from .base import Bits, Labels, Method, ranked
 
 _SEED = 0
-# With PySensors' defaults (no modes, penalty 0.1) SSPOC recognised 4 to 34 points worse on simulated grasps.
+# With PySensors' defaults (no modes, penalty 0.1) SSPOC was 4 to 34 points less accurate on simulated grasps.
 _MODES, _PENALTY = 20, 0.01
 
 
 def sspoc_order(bits: Bits, labels: Labels) -> Columns:
-    """Return the inputs of bits (n, d) by the weight that SSPOC gives them, in the space of the first 20 modes.
+    """Return the inputs of bits (n, d) by their SSPOC weights, in the space of the first 20 modes.
 
-    Brunton, Brunton, Proctor, Kutz, SIAM J. Appl. Math. 76 (2016). Inputs of no weight come last, by their numbers.
+    Brunton, Brunton, Proctor, Kutz, SIAM J. Appl. Math. 76 (2016). Inputs of weight 0 come last, by their numbers.
     """
     from pysensors.basis import SVD
     from pysensors.classification import SSPOC
@@ -30,7 +30,7 @@ def sspoc_order(bits: Bits, labels: Labels) -> Columns:
 
 
 def qr_order(bits: Bits, _: Labels) -> Columns:
-    """Return the inputs of bits (n, d) in the order of QR's pivots; the labels are not looked at.
+    """Return the inputs of bits (n, d) in the order of QR's pivots; the labels are ignored.
 
     Manohar, Brunton, Kutz, Brunton, IEEE Control Systems 38 (2018).
     """
@@ -42,7 +42,7 @@ def qr_order(bits: Bits, _: Labels) -> Columns:
 
 
 def _by_input(weights: Any, n_inputs: int) -> NDArray[np.float64]:
-    """Return SSPOC's weights as (inputs, classes): of two classes it has one column, without an axis."""
+    """Return SSPOC's weights as (inputs, classes); for two classes it returns one column, without an axis."""
     return np.asarray(weights, dtype=np.float64).reshape(n_inputs, -1)
 
 

@@ -1,4 +1,4 @@
-"""What a practitioner would take from scikit-learn: recursive elimination, and importance in a forest."""
+"""Common choices from scikit-learn: recursive elimination, and importance in a random forest."""
 
 import numpy as np
 
@@ -7,18 +7,18 @@ from .base import Bits, Labels, Method, ranked
 
 _SEED = 0
 _TREES = 300
-# scikit-learn's default of 100 ends some fits with a warning that they have not converged. With its own tolerance,
-# a tenth of this one, elimination takes twice as long and the switches that it leaves recognise no better.
+# With scikit-learn's default of 100 some fits end with a convergence warning. With its default tolerance, a tenth of
+# this one, elimination takes twice as long and the remaining switches are no more accurate.
 _ITERATIONS, _TOLERANCE = 2000, 1e-3
 
 
 def _elimination_by_regression(bits: Bits, labels: Labels) -> Columns:
-    """Return the switches in the reverse of the order in which recursive elimination drops them, one at a time."""
+    """Return the switches in the reverse order of recursive elimination, which drops one at a time."""
     from scipy.sparse import csr_matrix
     from sklearn.feature_selection import RFE
     from sklearn.linear_model import LogisticRegression
 
-    # Few switches are closed at a time: sparse rows give the same model, in a fraction of the time.
+    # Few switches are closed at a time: sparse rows give the same model in a fraction of the time.
     elimination = RFE(LogisticRegression(max_iter=_ITERATIONS, tol=_TOLERANCE), n_features_to_select=1, step=1)
     elimination.fit(csr_matrix(bits, dtype=np.float64), labels)
     return tuple(np.argsort(elimination.ranking_, kind="stable").tolist())

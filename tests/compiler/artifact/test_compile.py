@@ -242,13 +242,13 @@ def test_recordings_of_one_kind_need_no_option(make_set: Make, tmp_path: Path, l
     [
         ({"switches": 0}, {"inputs": "switches"}, "the recordings have no switches"),
         ({"joints": 0}, {"inputs": "joints"}, "the recordings have no joints"),
-        ({"types": 1}, {}, "nothing to tell apart"),
+        ({"types": 1}, {}, "nothing to distinguish"),
         ({}, {"inputs": "switches", "prune": 1000}, "no switch is worth keeping: lower --prune"),
         ({}, {"rounds": 0}, "rounds=0"),
         ({}, {"shrinkage": 2.0}, "shrinkage=2.0"),
         ({}, {"prune": -1}, "min_samples is -1"),
         ({"rows": 4}, {"folds": 5}, "cannot be cut into 5 folds"),
-        ({}, {"table_bits": 9}, "tables of 9 bits: firmware has entries of 8 or 16"),
+        ({}, {"table_bits": 9}, "table_bits=9: firmware tables have entries of 8 or 16 bits"),
     ],
 )
 def test_what_makes_no_build_is_refused_and_nothing_written(

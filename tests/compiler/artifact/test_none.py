@@ -196,7 +196,7 @@ def test_static_grasps_teach_types_and_not_whether_something_is_held(mixed: Gras
 
 @pytest.mark.parametrize("share", [-0.1, 0.5])
 def test_a_share_that_makes_no_sense_is_an_error(moved: GraspSet, tmp_path: Path, share: float) -> None:
-    with pytest.raises(CompileError, match="may be refused"):
+    with pytest.raises(CompileError, match="give a share of grasps"):
         compile_build(moved, tmp_path / "build", refuse=share)
 
 

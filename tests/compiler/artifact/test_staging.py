@@ -41,11 +41,11 @@ def test_a_build_takes_its_place_and_leaves_nothing_beside_it(tmp_path: Path, be
     ("files", "reason"),
     [
         ({"notes.txt": b"mine"}, "is not empty and not a build"),
-        ({**OLD, "notes.txt": b"mine"}, r"holds notes\.txt, which is not of a build"),
-        ({**FIRM, "firmware/main.c": b"mine"}, r"holds firmware/main\.c, which is not of a build"),
-        ({**TOLD, "spec/notes.txt": b"mine"}, r"holds spec/notes\.txt, which is not of a build"),
-        ({**OLD, "firmware": b"mine"}, r"holds firmware, which is not of a build"),
-        ({**OLD, "thenar_glove.c": b"mine"}, r"holds thenar_glove\.c, which is not of a build"),
+        ({**OLD, "notes.txt": b"mine"}, r"holds notes\.txt, which is not part of a build"),
+        ({**FIRM, "firmware/main.c": b"mine"}, r"holds firmware/main\.c, which is not part of a build"),
+        ({**TOLD, "spec/notes.txt": b"mine"}, r"holds spec/notes\.txt, which is not part of a build"),
+        ({**OLD, "firmware": b"mine"}, r"holds firmware, which is not part of a build"),
+        ({**OLD, "thenar_glove.c": b"mine"}, r"holds thenar_glove\.c, which is not part of a build"),
     ],
 )
 def test_a_users_files_are_never_deleted(tmp_path: Path, files: dict[str, bytes], reason: str) -> None:
@@ -78,7 +78,7 @@ def test_files_put_into_the_folder_during_the_training_stay(tmp_path: Path) -> N
 def test_a_folder_by_the_name_of_a_file_of_a_build_is_not_of_a_build(tmp_path: Path) -> None:
     _fill(tmp_path / "build", {"build.json": b"old"})
     _fill(tmp_path / "build" / "tables.bin", {"notes.txt": b"mine"})
-    with pytest.raises(CompileError, match=r"holds tables\.bin, which is not of a build"):
+    with pytest.raises(CompileError, match=r"holds tables\.bin, which is not part of a build"):
         check_target(tmp_path / "build")
 
 
@@ -86,7 +86,7 @@ def test_a_link_by_the_name_of_a_folder_of_a_build_is_not_of_a_build(tmp_path: P
     _fill(tmp_path / "build", OLD)
     _fill(tmp_path / "mine", {"thenar_glove.c": b"mine"})
     (tmp_path / "build" / "firmware").symlink_to(tmp_path / "mine")
-    with pytest.raises(CompileError, match=r"holds firmware, which is not of a build"):
+    with pytest.raises(CompileError, match=r"holds firmware, which is not part of a build"):
         check_target(tmp_path / "build")
     assert _content(tmp_path / "mine") == {"thenar_glove.c": b"mine"}
 

@@ -126,7 +126,7 @@ def test_pads_of_another_scale_or_kind_are_refused(padded: GraspSet, tmp_path: P
         taxels=np.empty(0, np.uint16),
         taxel_columns=(),
     )
-    with pytest.raises(CompileError, match="is a switch here, in the build a taxel"):
+    with pytest.raises(CompileError, match="is a switch here, but a taxel in the build"):
         verify(tmp_path / "build", bits)
 
 
@@ -138,10 +138,10 @@ def test_joints_alone_need_no_thresholds_and_estimators_take_none(padded: GraspS
         compile_estimator(LogitBoostClassifier(), padded, tmp_path / "estimator")
 
 
-@pytest.mark.parametrize("crowd", [False, True])
-def test_pads_are_placed_like_switches(make_set: Make, tmp_path: Path, crowd: bool) -> None:
+@pytest.mark.parametrize("population", [False, True])
+def test_pads_are_placed_like_switches(make_set: Make, tmp_path: Path, population: bool) -> None:
     with_pads(make_set(subjects=8), 1).save(tmp_path / "set.grasps")
-    wanted = ["--crowd", "--keep", "3", "--jobs", "1"] if crowd else []
+    wanted = ["--population", "--keep", "3", "--jobs", "1"] if population else []
     assert run(["place", str(tmp_path / "set.grasps"), *wanted, "-o", str(tmp_path / "placement.json")]) == 0
     names = {switch["name"] for switch in json.loads((tmp_path / "placement.json").read_bytes())["switches"]}
     assert {name.partition(">")[0] for name in names} & {pad.name for pad in PADS}
@@ -163,7 +163,7 @@ def test_the_best_joints_are_chosen_inside_each_fold_and_read_alone(make_set: Ma
             compile_build(recorded.rows(fold.train), tmp_path / "fold", folds=0, **options)
             correct += verify(tmp_path / "fold", recorded.rows(fold.test)).recognised[0].integers
         assert rate.correct == correct
-    with pytest.raises(CompileError, match="there are no joints to keep some of"):
+    with pytest.raises(CompileError, match="the recordings have no joints to choose from"):
         compile_build(recorded, tmp_path / "none", inputs="switches", **options)
 
 

@@ -87,9 +87,9 @@ def test_the_worst_frame_is_told_whether_recorded_or_not(folder: Path, grasp_set
     bits = [switch.name in worst.closed for switch in build.manifest.switches]
     stumps = ensemble_from_bytes((folder / "ensemble.bin").read_bytes())
     exact = collapse(stumps, len(bits)).scores(np.array([bits]), np.array([worst.codes], np.uint16))[0]
-    leader, rival = build.grasps.index(worst.leader), build.grasps.index(worst.rival)
+    leader, competitor = build.grasps.index(worst.leader), build.grasps.index(worst.competitor)
     deployed = build.scores(bits, np.array(worst.codes, np.uint16))
-    lost = (exact[leader] - exact[rival]) * build.tables.scale - (deployed[leader] - deployed[rival])
+    lost = (exact[leader] - exact[competitor]) * build.tables.scale - (deployed[leader] - deployed[competitor])
     assert lost == pytest.approx(worst.loss, abs=1e-9)
     assert 0 < worst.loss < worst.bound
     assert worst.bound == pytest.approx(build.manifest.proof.safe_margin, rel=1e-11, abs=1e-9)
@@ -150,7 +150,7 @@ def test_every_changed_row_is_told(folder: Path, grasp_set: GraspSet) -> None:
 
 
 def test_missing_inputs_are_named(folder: Path, make_set: Make) -> None:
-    with pytest.raises(CompileError, match="lack joints that the build needs: j2"):
+    with pytest.raises(CompileError, match="lack joints of the build: j2"):
         verify(folder, make_set(joints=2))
 
 
@@ -161,14 +161,14 @@ def test_codes_that_mean_something_else_are_refused(folder: Path, grasp_set: Gra
         grasp_set.switches, grasp_set.switch_names, grasp_set.codes, joints,
         grasp_set.grasps, grasp_set.taxonomy, grasp_set.subjects, grasp_set.objects, grasp_set.trials,
     )  # fmt: skip
-    with pytest.raises(CompileError, match="joint j1 is coded differently here: code 0 is 10 deg, in the build 0 deg"):
+    with pytest.raises(CompileError, match="j1 is coded differently here: code 0 is 10 deg, but 0 deg in the build"):
         verify(folder, other)
 
 
 def test_the_point_at_which_codes_mean_something_else_is_named(folder: Path, grasp_set: GraspSet) -> None:
     steeper = replace(grasp_set.joints[1], value_b=200.0)
     other = replace(grasp_set, joints=(grasp_set.joints[0], steeper, grasp_set.joints[2]))
-    with pytest.raises(CompileError, match=r"code 255 is 200 deg, in the build 127\.5 deg"):
+    with pytest.raises(CompileError, match=r"code 255 is 200 deg, but 127\.5 deg in the build"):
         verify(folder, other)
 
 

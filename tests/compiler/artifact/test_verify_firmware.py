@@ -244,7 +244,7 @@ def test_without_the_tools_it_says_what_to_install(
     build: Path, grasp_set: GraspSet, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     monkeypatch.setenv("PATH", "/nowhere")
-    with pytest.raises(FirmwareError, match=f"firmware for {PARTS[kind][0]} cannot be tried here: .*apt-get install"):
+    with pytest.raises(FirmwareError, match=f"firmware for {PARTS[kind][0]} cannot be run here: .*apt-get install"):
         verify_firmware(build, grasp_set, (kind,))
 
 

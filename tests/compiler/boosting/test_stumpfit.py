@@ -123,7 +123,7 @@ def test_values_are_weighted_means_within_the_clamp(problem: tuple[np.ndarray, n
         weight = weights[0, branch].sum()
         if weight > 1e-6 * weights.sum():
             np.testing.assert_allclose(value, responses[0, branch].sum() / weight, atol=1e-9)
-            assert (fitted.answers[0, branch] == value).all()
+            assert (fitted.outputs[0, branch] == value).all()
         elif weight == 0.0:
             np.testing.assert_allclose(value, mean, atol=1e-9)
 

@@ -1,4 +1,4 @@
-"""Agreement with Weka 3.6.14's LogitBoost on recorded answers (docs/project/weka-parity.md says where it ends and why)."""
+"""Agreement with Weka 3.6.14's LogitBoost on recorded results (limits: docs/project/weka-parity.md)."""
 
 import json
 from functools import cache

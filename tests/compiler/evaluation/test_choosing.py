@@ -227,9 +227,9 @@ def test_where_all_that_is_compared_is_given_one_candidate_is_left(changes: dict
 @pytest.mark.parametrize(
     ("changes", "because"),
     [
-        ({"round": 3}, "no trainer takes the setting 'round'"),
-        ({"tolerance": 0.1, "round": 3}, "no trainer takes the setting 'round'"),
-        ({"trainer": "logit", "ties": 1.0}, "trainer 'logit' takes no setting 'ties'"),
+        ({"round": 3}, "no trainer has the setting 'round'"),
+        ({"tolerance": 0.1, "round": 3}, "no trainer has the setting 'round'"),
+        ({"trainer": "logit", "ties": 1.0}, "trainer 'logit' has no setting 'ties'"),
         ({"penalty": -1.0}, "penalty=-1.0 must be at least"),
     ],
 )

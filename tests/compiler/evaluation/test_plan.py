@@ -194,8 +194,8 @@ def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps:
         assert columns_of(used.chosen(name, rows, 3)) == METHODS[name].chooser(seen)(3)
 
 
-def test_any_method_can_be_a_rival(make_grasps: Make) -> None:
-    table = replace(planner_of(make_grasps()), rivals=("mrmr",)).table("baselines", NESTED)
+def test_any_method_can_be_a_baseline(make_grasps: Make) -> None:
+    table = replace(planner_of(make_grasps()), baselines=("mrmr",)).table("baselines", NESTED)
     assert [line.name for line in table] == ["ID3", "mrmr", "random"]
 
 

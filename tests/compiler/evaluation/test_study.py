@@ -5,11 +5,11 @@ import msgspec
 import numpy as np
 import pytest
 
+from thenar.compiler.evaluation.baselines import CLASSIFIERS
 from thenar.compiler.evaluation.folds import EvaluationError, Fold
 from thenar.compiler.evaluation.plan import REFERENCE, CellPlan, FoldFit, RowPlan, learners
 from thenar.compiler.evaluation.populations import Population, Scheme
 from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.evaluation.rivals import CLASSIFIERS
 from thenar.compiler.evaluation.study import TABLES, Options, Study, evaluate
 from thenar.compiler.evaluation.tables import RateTable, Reader, Row
 from thenar.compiler.placement.elements import Element
@@ -226,7 +226,7 @@ def test_other_cuts_have_one_repeat_and_a_column_a_subject(make_grasps: Make, sc
         assert all(len(c.rate.correct) == 1 for line in each.rows for c in line.cells if line.name != "random")
 
 
-def test_every_trainer_is_compared_on_the_same_folds_and_inputs_with_rivals(study: Study) -> None:
+def test_every_trainer_is_compared_on_the_same_folds_and_inputs_with_baselines(study: Study) -> None:
     compared = table(study, "trainers")
     assert [(line.what, line.name) for line in compared.rows] == [
         (what, name) for what in ("Angle + Sel-Co", "Angle", "Sel-Co") for name in learners()

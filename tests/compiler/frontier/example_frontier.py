@@ -18,12 +18,12 @@ from thenar.compiler.frontier.points import (
     Frontier,
     Latency,
     Mark,
+    PlacementChoice,
     Point,
     Recipe,
     Scan,
     Time,
     Tried,
-    Way,
     frontier_from_bytes,
     frontier_to_bytes,
 )
@@ -185,7 +185,9 @@ def _point(
 ) -> Point:
     transfer_us = 0.0 if inputs == "switches" else TRANSFER_US
     layout = f"{8 * (1 + (width > 8))}-bit entries, {4 if kept > 8 else 2} switches a look-up"
-    setting = Recipe(Way(method, parameter), inputs, rounds, width, layout, scan, decision, wiring, 1000 * clock_khz)
+    setting = Recipe(
+        PlacementChoice(method, parameter), inputs, rounds, width, layout, scan, decision, wiring, 1000 * clock_khz
+    )
     return Point(
         number=number,
         setting=setting,
@@ -193,7 +195,7 @@ def _point(
         rate=rate(mean),
         luck=0.004,
         frames=None,
-        beside=rate(mean + (1 - mean) / 4, "pooled"),
+        other_rate=rate(mean + (1 - mean) / 4, "pooled"),
         scan=Time(scan_us, "wire"),
         transfer=Time(transfer_us, "wire"),
         classify=Time(classify_us, "simulated" if number % 3 == 1 else "model"),
@@ -214,7 +216,7 @@ def _tried() -> tuple[Tried, ...]:
     ]
     methods = (("elimination", 0.998, 1.02, 120), ("id3", 0.985, 1.16, 100), ("rfe", 0.994, 1.1, 150))
     return tuple(
-        Tried(Way(method, float(size)), inputs, size, rounds, rate(mean * worse), us * slower)
+        Tried(PlacementChoice(method, float(size)), inputs, size, rounds, rate(mean * worse), us * slower)
         for (inputs, size, mean, us), (method, worse, slower, rounds) in product(kept, methods)
     )
 

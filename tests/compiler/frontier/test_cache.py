@@ -307,7 +307,7 @@ def test_one_progress_goes_over_all_stages_and_counts_nothing_that_was_stored(tm
     asked(tmp_path / "store", calls_in(tmp_path, [2]))
     with Store(tmp_path / "store", "set") as store:
         cache = Cache(store, lambda done, total: told.append((done, total)), jobs=1)
-        cache.foresee({"first": 10.0, "second": 20.0})
+        cache.expect({"first": 10.0, "second": 20.0})
         cache.ask("first", calls_in(tmp_path, range(3)))
         cache.ask("second", [squared.call(40.0, 9, tmp_path / "notes")])
     assert told == [(0, 23), (2, 23), (3, 23), (3, 43), (43, 43)]

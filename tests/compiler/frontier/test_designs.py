@@ -9,7 +9,7 @@ from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.designs import Design, best_designs, designs, lucks, points_of, with_whole_scans
 from thenar.compiler.frontier.finalists import Close
 from thenar.compiler.frontier.latency import POLICIES
-from thenar.compiler.frontier.points import Latency, Time, Way
+from thenar.compiler.frontier.points import Latency, PlacementChoice, Time
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Search, Shape
@@ -25,7 +25,7 @@ WAIT = Latency(1000.0, 2000.0, 0.0)
 
 
 def names(choice: Candidate) -> list[str]:
-    return [f"s{number}" for number in range(int(choice.way.parameter))]
+    return [f"s{number}" for number in range(int(choice.placement.parameter))]
 
 
 def trained(choice: Candidate) -> Training:
@@ -42,9 +42,9 @@ def close_of(switches: int = 20, rate: float = 0.9, early_us: float = 200.0, lay
     scan = ScanTimes(500.0, early_us, 4, 2, "wire", 1.5)
     wired = (Wired("mcp23017", 400_000, scan),) if switches else ()
     tables = PricedTables(TABLED, b"", (Classified("plain", layout_us, "model", 900, 30),), wired, 1.25)
-    way = Way("id3", float(switches))
+    choice = PlacementChoice("id3", float(switches))
     screened = Screened(
-        Candidate(way, "switches" if switches else "joints"), tuple(range(switches)), judged(rate), layout_us
+        Candidate(choice, "switches" if switches else "joints"), tuple(range(switches)), judged(rate), layout_us
     )
     return Close(screened, {}, {TABLED: judged(rate)}, {}, {}, (tables,), 2.0)
 

@@ -4,7 +4,7 @@ from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.price import price
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
-from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY, Beside
+from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY, Overhead
 from thenar.compiler.frontier.timing.wirings import wirings
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
@@ -22,7 +22,7 @@ def test_whatever_times_depend_on_is_part_of_the_question(grasp_set: GraspSet) -
     equipments = [
         Equipment(MODEL, wirings(None), WIRE_ONLY),
         Equipment(ClassifyModel("avr328p"), wirings(None), WIRE_ONLY),
-        Equipment(MODEL, wirings(None), Beside("", call_us=1.0)),
+        Equipment(MODEL, wirings(None), Overhead("", call_us=1.0)),
         *(Equipment(MODEL, wirings(given), WIRE_ONLY) for given in (glove, slower, other, faster)),
     ]
     names, rows = tuple(NAMES), Samples.of(grasp_set)

@@ -3,7 +3,7 @@ import pytest
 
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.finalists import depth_of, finalists, papers_depth, papers_tables, worthwhile
-from thenar.compiler.frontier.points import Way
+from thenar.compiler.frontier.points import PlacementChoice
 from thenar.compiler.frontier.price import Tabled
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import NO_SWITCHES, Candidate, Search, Shape
@@ -16,7 +16,7 @@ def judged(rate: float) -> Judged:
 
 
 def _screened(size: int, rate: float, frame_us: float, inputs: Inputs = "switches", method: str = "id3") -> Screened:
-    choice = Candidate(Way(method, float(size)), inputs)
+    choice = Candidate(PlacementChoice(method, float(size)), inputs)
     return Screened(choice, tuple(range(size)), judged(rate), frame_us)
 
 
@@ -77,10 +77,10 @@ def test_of_every_shape_the_fewest_rounds_that_do_as_well_are_worth_a_price() ->
 
 
 def test_the_papers_tables_have_a_hundred_rounds_or_as_many_as_there_are() -> None:
-    rounds = [papers_tables(Search(methods=("id3",), rivals=(), rounds=most)).rounds for most in (300, 100, 50)]
+    rounds = [papers_tables(Search(methods=("id3",), baselines=(), rounds=most)).rounds for most in (300, 100, 50)]
     assert rounds == [100, 100, 50]
     for most in (300, 100, 50, 1):
-        search = Search(methods=("id3",), rivals=(), rounds=most)
+        search = Search(methods=("id3",), baselines=(), rounds=most)
         assert papers_tables(search).rounds in search.tabled
 
 
@@ -92,14 +92,14 @@ def right(count: int) -> bytes:
 def test_rounds_beyond_the_papers_are_followed_where_they_win_more_than_a_fifth_of_a_percent(
     late: int, rounds: int
 ) -> None:
-    search = Search(methods=("id3",), rivals=())
+    search = Search(methods=("id3",), baselines=())
     correct = [450 + (late if stage > 100 else 0) for stage in search.stages]
     fits = [Tally(tuple(map(right, counts)), (), ()) for counts in (correct, [450] * len(correct))]
     assert depth_of(search, fits, 1000).rounds == rounds
 
 
 def test_a_search_of_few_rounds_is_followed_to_its_end() -> None:
-    search = Search(methods=("id3",), rivals=(), rounds=50)
+    search = Search(methods=("id3",), baselines=(), rounds=50)
     assert depth_of(search, [Tally(tuple(map(right, range(len(search.stages)))), (), ())], 10) == search
 
 

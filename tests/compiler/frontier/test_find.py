@@ -45,7 +45,7 @@ def asked(folder: Path, grasp_set: GraspSet, **changes: Any) -> Request:
     """Return arguments of find_frontier; `changes` are of its search or of itself."""
     search: dict[str, Any] = {
         "methods": ("elimination", "id3"),
-        "rivals": ("mrmr",),
+        "baselines": ("mrmr",),
         "rounds": 6,
         "trainer": "logitboost",
     }
@@ -82,7 +82,7 @@ def test_rows_in_which_nothing_is_held_change_no_rate(
     more = with_none(first[0]["grasp_set"])
     found = found_of(first[0] | {"grasp_set": more, "output": tmp_path / "out"})
     assert found.fingerprint == more.fingerprint()
-    assert [(one.way, one.rate) for one in found.tried] == [(one.way, one.rate) for one in first[1].tried]
+    assert [(one.placement, one.rate) for one in found.tried] == [(one.placement, one.rate) for one in first[1].tried]
 
 
 def test_points_are_numbered_from_the_fastest_frame_on(first: tuple[Request, Frontier]) -> None:
@@ -116,7 +116,7 @@ def test_subjects_are_left_out_where_there_are_several(first: tuple[Request, Fro
     assert (found.subjects, found.by, found.trials) == (2, "new subject", found.rows)
     rates = [point.rate for point in found.points] + [tried.rate for tried in found.tried]
     assert {rate.what for rate in (*rates, *(mark.rate for mark in found.marks))} == {"new subject, trials"}
-    assert {point.beside and point.beside.what for point in found.points} == {"pooled, trials"}
+    assert {point.other_rate and point.other_rate.what for point in found.points} == {"pooled, trials"}
     assert {point.rate.over for point in found.points} == {2}
 
 
@@ -127,9 +127,9 @@ def rows_recognised(grasp_set: GraspSet, point: Point, train: Rows, test: Rows) 
     codes = grasp_set.codes if joints else grasp_set.codes[:, :0]
     columns: tuple[int, ...] = ()
     if setting.inputs != "joints":
-        beside = codes if setting.way.method == "elimination" else codes[:, :0]
+        beside = codes if setting.placement.method == "elimination" else codes[:, :0]
         learning = Samples(grasp_set.switches[train], beside[train], labels[train], tuple("0123"))
-        columns = METHODS[setting.way.method].chooser(learning)(setting.way.parameter)
+        columns = METHODS[setting.placement.method].chooser(learning)(setting.placement.parameter)
     bits = grasp_set.switches[:, list(columns)]
     X = np.hstack([bits.astype(np.uint16), codes])
     assert setting.rounds is not None
@@ -143,12 +143,12 @@ def rows_recognised(grasp_set: GraspSet, point: Point, train: Rows, test: Rows) 
 def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_path: Path, make_set: Make) -> None:
     """Stratified folds, and each subject from the others; all of it done here once more, one by one."""
     grasp_set = make_set(subjects=3)
-    found = found_of(asked(tmp_path, grasp_set, repeats=2, rivals=()))
+    found = found_of(asked(tmp_path, grasp_set, repeats=2, baselines=()))
     labels = np.unique(grasp_set.labels, return_inverse=True)[1]
     for point in found.points:
         pooled = [rows_recognised(grasp_set, point, fold.train, fold.test) for fold in weka_folds(labels, 4, 1)]
-        assert point.beside is not None
-        assert point.beside.mean == pytest.approx(sum(pooled) / len(grasp_set))
+        assert point.other_rate is not None
+        assert point.other_rate.mean == pytest.approx(sum(pooled) / len(grasp_set))
         others = [np.flatnonzero(grasp_set.subjects == subject) for subject in ("S0", "S1", "S2")]
         alone = [
             rows_recognised(grasp_set, point, np.setdiff1d(np.arange(len(grasp_set)), test), test) for test in others
@@ -160,7 +160,7 @@ def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_pat
 def test_frames_of_a_trial_are_on_one_side_of_every_fold(tmp_path: Path, make_set: Make) -> None:
     """Every row ten times: with copies on both sides of a fold every rate would be 100 %, over 960 units."""
     grasp_set = make_set(subjects=2)
-    request = {"methods": ("id3",), "rivals": (), "by": "trial"}
+    request = {"methods": ("id3",), "baselines": (), "by": "trial"}
     repeated = found_of(asked(tmp_path / "ten", grasp_set.rows(np.repeat(np.arange(96), 10)), **request))
     assert (repeated.rows, repeated.trials, repeated.by) == (960, 96, "pooled")
     assert repeated.points
@@ -201,7 +201,7 @@ def test_running_again_finds_everything_in_the_store(first: tuple[Request, Front
 
 
 def test_a_store_of_the_older_form_is_computed_anew_and_that_is_said(tmp_path: Path, make_set: Make) -> None:
-    request = asked(tmp_path, make_set(), methods=("id3",), rivals=())
+    request = asked(tmp_path, make_set(), methods=("id3",), baselines=())
     first = found_of(request)
     store = request["output"] / "store.jsonl"
     store.write_bytes(OLD_HEADERS[-1] + store.read_bytes().split(b"\n", 1)[1])
@@ -215,7 +215,7 @@ def test_a_store_of_the_older_form_is_computed_anew_and_that_is_said(tmp_path: P
 
 def test_without_a_folder_nothing_is_kept(tmp_path: Path, make_set: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert found_of(asked(tmp_path, make_set(), output=None, methods=("id3",), rivals=())).points
+    assert found_of(asked(tmp_path, make_set(), output=None, methods=("id3",), baselines=())).points
     assert not list(tmp_path.iterdir())
 
 
@@ -257,8 +257,8 @@ def test_a_set_may_lack_switches_or_joints(
     found = found_of(asked(tmp_path, make_set(switches=switches, joints=joints)))
     assert {each.inputs for each in found.tried} == inputs
     assert found.points
-    assert (found.by, found.beside) == ("pooled", None)
-    assert all(point.beside is None for point in found.points)
+    assert (found.by, found.other) == ("pooled", None)
+    assert all(point.other_rate is None for point in found.points)
     if joints == 0:
         assert "paper, S = 62" in [mark.name for mark in found.marks]
 
@@ -278,20 +278,20 @@ def test_a_glove_of_fewer_switches_serves_the_placements_within_it(tmp_path: Pat
 
 def test_what_ports_cost_is_part_of_the_question(tmp_path: Path, make_set: Make) -> None:
     methods = ("id3-cost",)
-    request = asked(tmp_path, make_set(), methods=methods, rivals=())
+    request = asked(tmp_path, make_set(), methods=methods, baselines=())
     names = [f"s{number}" for number in range(14)]
     glove = propose_harness(names[::-1], "pca9555")
     alone = found_of({**request, "output": tmp_path / "alone", "harness": glove})
     found_of(request)
     after = found_of({**request, "harness": glove})
-    assert [(each.way, each.n_switches, each.rate) for each in after.tried] == [
-        (each.way, each.n_switches, each.rate) for each in alone.tried
+    assert [(each.placement, each.n_switches, each.rate) for each in after.tried] == [
+        (each.placement, each.n_switches, each.rate) for each in alone.tried
     ]
     assert len(keys_in(tmp_path / "out" / "store.jsonl")) > len(keys_in(tmp_path / "alone" / "store.jsonl"))
 
 
 def test_another_stream_is_another_question(tmp_path: Path, make_set: Make) -> None:
-    request = asked(tmp_path, make_set(), methods=("id3",), rivals=())
+    request = asked(tmp_path, make_set(), methods=("id3",), baselines=())
     found_of(request)
     before = keys_in(request["output"] / "store.jsonl")
     found_of({**request, "stream": make_set(seed=7)})
@@ -309,7 +309,7 @@ def test_recordings_that_are_trained_on_are_no_stream(tmp_path: Path, make_set: 
 def test_a_build_is_marked_with_what_it_recognises(tmp_path: Path, make_set: Make) -> None:
     grasp_set = make_set()
     build = compile_build(grasp_set, tmp_path / "mine", rounds=5, folds=4).folder
-    found = found_of(asked(tmp_path, grasp_set, build=build, methods=("id3",), rivals=()))
+    found = found_of(asked(tmp_path, grasp_set, build=build, methods=("id3",), baselines=()))
     assert found.marks[-1].name == "build mine"
 
 
@@ -329,14 +329,14 @@ def test_a_build_of_other_switches_is_refused(tmp_path: Path, make_set: Make) ->
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_an_unknown_rival_is_told(tmp_path: Path, make_set: Make) -> None:
+def test_an_unknown_baseline_is_told(tmp_path: Path, make_set: Make) -> None:
     with pytest.raises(MemberError, match="there is no placement method 'nonsense'"):
-        found_of(asked(tmp_path, make_set(), rivals=("nonsense",)))
+        found_of(asked(tmp_path, make_set(), baselines=("nonsense",)))
 
 
 def test_two_workers_of_a_cluster_find_the_same(tmp_path: Path, make_set: Make) -> None:
     grasp_set = make_set(subjects=2)
-    few = {"methods": ("id3",), "rivals": (), "target": "avr328p"}
+    few = {"methods": ("id3",), "baselines": (), "target": "avr328p"}
     here = found_of(asked(tmp_path / "here", grasp_set, **few))
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0") as cluster:
         there = found_of(asked(tmp_path / "there", grasp_set, **few, cluster=cluster.scheduler_address))
@@ -345,7 +345,7 @@ def test_two_workers_of_a_cluster_find_the_same(tmp_path: Path, make_set: Make) 
 
 def _timeless(found: Frontier) -> tuple[object, ...]:
     points = [
-        (each.setting, each.switches, each.rate, each.luck, each.beside, each.frame, each.latency)
+        (each.setting, each.switches, each.rate, each.luck, each.other_rate, each.frame, each.latency)
         for each in found.points
     ]
     rest = (found.tried, found.curves, found.marks, found.combinations, found.picked)
@@ -355,13 +355,15 @@ def _timeless(found: Frontier) -> tuple[object, ...]:
 def test_every_trainer_is_on_one_picture_and_what_compile_makes_of_a_point_is_what_the_point_says(
     tmp_path: Path, make_set: Make
 ) -> None:
-    request = asked(tmp_path, make_set(subjects=2), methods=("id3",), rivals=(), trainer="auto", settings={})
+    request = asked(tmp_path, make_set(subjects=2), methods=("id3",), baselines=(), trainer="auto", settings={})
     found = found_of(request)
     assert set(found.trainers) == {name for name, trainer in TRAINERS.items() if trainer.tried}
     drawn = (tmp_path / "out" / "frontier.svg").read_text()
     # Outlines: but each trainer has a line in the key, and the file another size than with one trainer.
     assert drawn != pictures(replace(found, tried=found.tried[:1]), "svg")["frontier"].decode()
-    tried = {name: {(one.way, one.inputs) for one in found.tried if one.trainer == name} for name in found.trainers}
+    tried = {
+        name: {(one.placement, one.inputs) for one in found.tried if one.trainer == name} for name in found.trainers
+    }
     assert tried["logit"] <= tried["logitboost"]
     assert tried["logit"]
     path = tmp_path / "out" / "frontier.json"
@@ -383,7 +385,7 @@ def test_every_trainer_is_on_one_picture_and_what_compile_makes_of_a_point_is_wh
 
 def test_a_trainer_may_be_forced(tmp_path: Path, make_set: Make) -> None:
     found = found_of(
-        asked(tmp_path, make_set(), methods=("id3",), rivals=(), trainer="logit", settings={"penalty": 1.0})
+        asked(tmp_path, make_set(), methods=("id3",), baselines=(), trainer="logit", settings={"penalty": 1.0})
     )
     assert found.trainers == ("logit",)
     assert {point.setting.trainer for point in found.points} == {"logit"}
@@ -413,7 +415,7 @@ def test_points_may_read_some_of_the_joints_and_what_is_built_of_them_reads_thes
     tmp_path: Path, make_set: Make
 ) -> None:
     grasp_set = with_sensors(make_set(switches=3, subjects=2), 5)
-    found = found_of(asked(tmp_path, grasp_set, finalists=6, rivals=(), methods=("elimination",)))
+    found = found_of(asked(tmp_path, grasp_set, finalists=6, baselines=(), methods=("elimination",)))
     fewer = [point for point in found.points if point.joints]
     assert fewer
     for point in found.points:

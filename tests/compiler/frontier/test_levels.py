@@ -12,7 +12,7 @@ from thenar.compiler.frontier.cache import Cache, Store
 from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.find import FRONTIER_NAME, find_frontier
 from thenar.compiler.frontier.picked import picked
-from thenar.compiler.frontier.points import Frontier, Point, Way
+from thenar.compiler.frontier.points import Frontier, PlacementChoice, Point
 from thenar.compiler.frontier.search import TAXEL_LEVELS, Candidate, Search
 from thenar.compiler.frontier.stream import Stream, stream_of
 from thenar.compiler.frontier.survey import Cuts, Survey
@@ -27,7 +27,7 @@ from thenar.compiler.samples import Samples
 from thenar.runtime.names import taxel_and_code
 
 SEARCH = Search(
-    methods=("elimination-cost",), rivals=(), rounds=4, repeats=1, finalists=2, trainer="logitboost",
+    methods=("elimination-cost",), baselines=(), rounds=4, repeats=1, finalists=2, trainer="logitboost",
     settings={"shrinkage": 1.0, "max_bins": 65536},
 )  # fmt: skip
 
@@ -106,7 +106,7 @@ def test_levels_of_a_fold_come_from_its_training_rows_alone(pressed: GraspSet, t
         equipment = Equipment(ClassifyModel("avr328p"), (), WIRE_ONLY)
         cache = Cache(store, lambda _done, _all: None, jobs=1)
         survey = Survey(pressed, "set", samples, ports, SEARCH, cuts, equipment, cache)
-        choice, fold = Candidate(Way("elimination-cost", 5.0), "switches", levels=3), cuts.screening[0]
+        choice, fold = Candidate(PlacementChoice("elimination-cost", 5.0), "switches", levels=3), cuts.screening[0]
         survey.choose("placements", [choice], [fold])
         alone = samples.rows(fold.train).with_joints(())
         elements = elements_of(alone, 3)

@@ -12,7 +12,7 @@ from thenar.compiler.frontier.designs import Design
 from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.finalists import Close
 from thenar.compiler.frontier.measure import measured
-from thenar.compiler.frontier.points import Time, Way
+from thenar.compiler.frontier.points import PlacementChoice, Time
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Shape
@@ -32,7 +32,7 @@ def design_of(model: ClassifyModel) -> Design:
     wired = Wired("mcp23017", 400_000, scan)
     priced = PricedTables(Tabled(1, Shape(16)), tables_to_bytes(tables), model.options(tables), (wired,), 1.0)
     judged = Judged(Rate.counted((9,), 10, of="pooled"), np.arange(10), 1)
-    screened = Screened(Candidate(Way("id3", 6.0), "switches"), tuple(range(6)), judged, 1.0)
+    screened = Screened(Candidate(PlacementChoice("id3", 6.0), "switches"), tuple(range(6)), judged, 1.0)
     close = Close(screened, {}, {}, {}, {}, (priced,), 1.0)
     return Design(close, priced, priced.classified[0], wired, "early", Time(0.0, "wire"))
 

@@ -122,7 +122,7 @@ def test_a_frontier_learns_segments_from_the_training_rows_of_the_fold_that_is_p
         return taught(moving, *args)
 
     monkeypatch.setattr(Moving, "segmenting", watched)
-    search = Search(methods=("id3",), rivals=(), rounds=5, trainer="logitboost", repeats=1, finalists=1)
+    search = Search(methods=("id3",), baselines=(), rounds=5, trainer="logitboost", repeats=1, finalists=1)
     found = find_frontier(grasp_set, tmp_path / "out", search=search, jobs=1)
     assert "segments" in {point.setting.decision for point in found.points}
     # The first fold tests subject 0.

@@ -4,9 +4,16 @@ import numpy as np
 import pytest
 
 from thenar.compiler.frontier.find import choices_to_mark, find_frontier
-from thenar.compiler.frontier.points import FrontierError, Way
+from thenar.compiler.frontier.points import FrontierError, PlacementChoice
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
-from thenar.compiler.frontier.search import Candidate, Search, Shape, available_inputs, curve_ways, ways
+from thenar.compiler.frontier.search import (
+    Candidate,
+    Search,
+    Shape,
+    available_inputs,
+    curve_placements,
+    tried_placements,
+)
 from thenar.compiler.frontier.timing.classify_times import Classified
 from thenar.compiler.frontier.timing.scan_times import ScanTimes
 from thenar.compiler.recordings.graspset import GraspSet
@@ -30,10 +37,10 @@ def test_what_fits_no_flash_has_no_time() -> None:
 
 
 def test_elimination_is_tried_at_every_size_up_to_all_switches() -> None:
-    assert [way.parameter for way in ways("elimination", 9)] == [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 9.0]
-    assert [way.parameter for way in ways("elimination", 8)] == [1.0, 2.0, 3.0, 4.0, 6.0, 8.0]
-    assert [way.parameter for way in ways("elimination", 1)] == [1.0]
-    assert max(way.parameter for way in curve_ways("rfe", 20)) == 16.0
+    assert [choice.parameter for choice in tried_placements("elimination", 9)] == [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 9.0]
+    assert [choice.parameter for choice in tried_placements("elimination", 8)] == [1.0, 2.0, 3.0, 4.0, 6.0, 8.0]
+    assert [choice.parameter for choice in tried_placements("elimination", 1)] == [1.0]
+    assert max(choice.parameter for choice in curve_placements("rfe", 20)) == 16.0
 
 
 def test_inputs_are_those_that_a_set_has() -> None:
@@ -48,10 +55,10 @@ def test_nothing_is_screened_with_more_rounds_than_are_trained() -> None:
 
 
 def test_the_papers_placements_are_marked_with_all_inputs_that_there_are() -> None:
-    assert Candidate(Way("id3", 62.0), "both") in choices_to_mark(14, 3)
-    assert Candidate(Way("id3", 62.0), "switches") in choices_to_mark(14, 0)
-    assert choices_to_mark(14, 0)[Candidate(Way("elimination", 14.0), "switches")] == "all of 14"
-    assert choices_to_mark(14, 3)[Candidate(Way("elimination", 14.0), "both")] == "all of 14, joints"
+    assert Candidate(PlacementChoice("id3", 62.0), "both") in choices_to_mark(14, 3)
+    assert Candidate(PlacementChoice("id3", 62.0), "switches") in choices_to_mark(14, 0)
+    assert choices_to_mark(14, 0)[Candidate(PlacementChoice("elimination", 14.0), "switches")] == "all of 14"
+    assert choices_to_mark(14, 3)[Candidate(PlacementChoice("elimination", 14.0), "both")] == "all of 14, joints"
     assert choices_to_mark(0, 3) == {}
 
 

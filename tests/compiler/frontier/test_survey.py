@@ -21,7 +21,7 @@ from thenar.compiler.tables.quantise import quantise
 from thenar.runtime.scores import Scorer
 
 COLUMNS = (3, 0, 7, 9)
-SEARCH = Search(methods=("id3",), rivals=(), repeats=2)
+SEARCH = Search(methods=("id3",), baselines=(), repeats=2)
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +117,7 @@ def test_nobody_left_out_is_trained_on_and_a_tenth_at_most_is_tested_of_many(mak
     for subjects, folds in ((3, 3), (10, 10), (24, 10)):
         grasp_set = make_set(rows=480, subjects=subjects)
         cuts = cuts_of(grasp_set)
-        assert (len(cuts.subjects), cuts.by, cuts.beside) == (folds, "new subject", "pooled")
+        assert (len(cuts.subjects), cuts.by, cuts.other) == (folds, "new subject", "pooled")
         assert cuts.screening == cuts.subjects
         for fold in cuts.subjects:
             assert set(grasp_set.subjects[fold.train]).isdisjoint(grasp_set.subjects[fold.test])
@@ -126,7 +126,7 @@ def test_nobody_left_out_is_trained_on_and_a_tenth_at_most_is_tested_of_many(mak
 def test_points_are_chosen_by_what_is_asked_for(make_set: Callable[..., GraspSet]) -> None:
     samples = Samples.of(make_set(subjects=3))
     by_trial = Cuts.of(samples, replace(SEARCH, by="trial"))
-    assert (by_trial.by, by_trial.beside, by_trial.screening) == ("pooled", "new subject", by_trial.repeats[0])
+    assert (by_trial.by, by_trial.other, by_trial.screening) == ("pooled", "new subject", by_trial.repeats[0])
     assert Cuts.of(samples, replace(SEARCH, by="subject")).by == "new subject"
     with pytest.raises(EvaluationError, match="needs two or more subjects"):
         Cuts.of(Samples.of(make_set()), replace(SEARCH, by="subject"))

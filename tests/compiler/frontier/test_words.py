@@ -33,7 +33,7 @@ def test_rates_are_named_by_what_they_are_of_and_their_unit(examples: Any) -> No
     point = msgspec.structs.replace(frontier.points[0], frames=frontier.points[1].rate)
     several = rates_of(examples.example_frontier(points=(point,), picked=None))
     assert list(several) == ["new subject", "new subject, frames", "pooled"]
-    assert [rate(point) for rate in several.values()] == [point.rate, point.frames, point.beside]
+    assert [rate(point) for rate in several.values()] == [point.rate, point.frames, point.other_rate]
     assert list(rates_of(examples.example_frontier(subjects=1, by="pooled"))) == ["pooled"]
 
 
@@ -108,7 +108,7 @@ def test_what_is_read_again_are_the_points(examples: Any) -> None:
     rows = _rows(frontier)
     assert len(rows) == len(frontier.points)
     for row, point in zip(rows, frontier.points, strict=True):
-        way, setting = point.setting.way, point.setting
+        way, setting = point.setting.placement, point.setting
         assert tuple(row) == COLUMNS
         assert (int(row["number"]), int(row["n_switches"])) == (point.number, len(point.switches))
         assert (row["method"], float(row["parameter"])) == (way.method, way.parameter)
@@ -121,7 +121,7 @@ def test_what_is_read_again_are_the_points(examples: Any) -> None:
         for name in ("scan", "transfer", "classify", "frame"):
             time = getattr(point, name)
             assert (float(row[f"{name}_us"]), row[f"{name}_how"]) == (time.us, time.how)
-        for name in ("rate", "beside"):
+        for name in ("rate", "other_rate"):
             rate = getattr(point, name)
             numbers = tuple(float(row[name + end]) for end in ("", "_low", "_high"))
             assert (row[f"{name}_of"], *numbers) == (rate.what, rate.mean, rate.low, rate.high)
@@ -145,8 +145,10 @@ def test_names_come_back_as_they_are(examples: Any, name: str) -> None:
 
 def test_one_subject_has_no_rate_of_new_ones(examples: Any) -> None:
     points = examples.example_frontier().points
-    (row,) = _rows(examples.example_frontier(points=(msgspec.structs.replace(points[0], beside=None),), picked=None))
-    assert (row["beside_of"], row["beside"], row["beside_low"], row["beside_high"]) == ("",) * 4
+    (row,) = _rows(
+        examples.example_frontier(points=(msgspec.structs.replace(points[0], other_rate=None),), picked=None)
+    )
+    assert (row["other_rate_of"], row["other_rate"], row["other_rate_low"], row["other_rate_high"]) == ("",) * 4
 
 
 def test_equal_frontiers_give_equal_tables(examples: Any) -> None:

@@ -57,7 +57,7 @@ def test_a_scan_map_needs_its_own_harness(manifest_of: Manifests) -> None:
     harness = propose_harness(["a", "b"])
     scan = whole_scan(harness, ["a"])
     assert glove_spec(manifest_of(["a"]), scan, harness).scan is scan
-    with pytest.raises(SpecError, match="compiled for a wiring of its own"):
+    with pytest.raises(SpecError, match="compiled for a specific wiring"):
         glove_spec(manifest_of(["a"]), scan)
     with pytest.raises(HarnessError, match="another wiring"):
         glove_spec(manifest_of(["a"]), scan, propose_harness(["b", "a"]))
@@ -83,14 +83,14 @@ def test_switches_closer_than_their_bodies_are_told(manifest_of: Manifests, hand
     small = glove_spec(manifest_of(names), hand=hand.scaled(150.0)).summary.remarks
     assert len(small) == 1
     assert small[0].startswith("SW1 and SW2 are 3.")
-    assert small[0].endswith("their bodies 4.9 mm broad: move one of them aside")
+    assert small[0].endswith("their bodies 4.9 mm wide: move one of them aside")
 
 
 def test_a_strange_glove_is_described_without_places(manifest_of: Manifests, hand: HandShape) -> None:
     summary = glove_spec(manifest_of(["index_distal_2", "mine"]), hand=hand).summary
     assert summary.hand_length_mm is None
     assert {(s.part, s.side, s.x_mm, s.y_mm) for s in summary.switches} == {(None, None, None, None)}
-    assert summary.remarks[-1].startswith("where this glove's switches lie is not known")
+    assert summary.remarks[-1].startswith("the positions of this glove's switches are unknown")
 
 
 @pytest.mark.parametrize("kind", sorted(expanders()))

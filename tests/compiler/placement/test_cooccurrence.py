@@ -1,4 +1,4 @@
-"""Counts of pairs of bits; what they tell is held against the reference in tests/stability and test_rivals.py."""
+"""Counts of pairs of bits; what they tell is held against the reference in tests/stability and test_baselines.py."""
 
 import numpy as np
 from hypothesis import given

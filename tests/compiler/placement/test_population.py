@@ -1,4 +1,4 @@
-"""Standard placements: of a crowd whose subjects press different switches, and bettered by exchanges at the edge."""
+"""Placements for a population whose subjects press different switches, and their refinement by exchanges."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from thenar.compiler.placement.placement import Aim
 from thenar.compiler.placement.population import (
     EXCHANGES,
     Asked,
-    Crowd,
+    Population,
     Refining,
     rates,
     served,
@@ -24,7 +24,7 @@ TYPES, EACH = 4, 24
 ODD = tuple(range(1, 40, 4))  # subjects whose hands press switches 2 and 3 instead of 0 and 1
 
 
-def crowd(people: int = 40, odd: tuple[int, ...] = ODD) -> Crowd:
+def make_population(people: int = 40, odd: tuple[int, ...] = ODD) -> Population:
     random = np.random.default_rng(6)
     subjects = np.repeat(np.arange(people), EACH)
     labels = np.arange(people * EACH) % TYPES
@@ -33,14 +33,19 @@ def crowd(people: int = 40, odd: tuple[int, ...] = ODD) -> Crowd:
     others = np.isin(subjects, odd)
     bits[~others, 0:2] = told[~others]
     bits[others, 2:4] = told[others]
-    return Crowd(Samples(bits, np.zeros((len(labels), 0), np.uint16), labels, tuple(map(str, range(TYPES)))), subjects)
+    return Population(
+        Samples(bits, np.zeros((len(labels), 0), np.uint16), labels, tuple(map(str, range(TYPES)))), subjects
+    )
 
 
 TAKE = Asked(keep=2, method="cmim", rows=600, rounds=10, repeats=2)
 
 
 def test_two_switches_serve_the_many_and_four_serve_the_odd_ones_too() -> None:
-    two, four = standard_placement(crowd(), TAKE), standard_placement(crowd(), replace(TAKE, keep=4))
+    two, four = (
+        standard_placement(make_population(), TAKE),
+        standard_placement(make_population(), replace(TAKE, keep=4)),
+    )
     assert set(four.columns) == {0, 1, 2, 3}
     assert set(two.columns) <= {0, 1, 2, 3}
     best = max(point.served.worst_tenth for point in four.curve)
@@ -48,7 +53,7 @@ def test_two_switches_serve_the_many_and_four_serve_the_odd_ones_too() -> None:
 
 
 def test_the_curve_rises_with_the_number_of_subjects_and_names_every_aim() -> None:
-    found = standard_placement(crowd(odd=()), TAKE)
+    found = standard_placement(make_population(odd=()), TAKE)
     assert (found.subjects, found.held_out) == (40, 8)
     assert [(point.subjects, point.aim) for point in found.curve] == [
         (size, aim) for size in (2, 5, 10, 20, 32) for aim in ("plain", "mean", "worst tenth")
@@ -58,13 +63,13 @@ def test_the_curve_rises_with_the_number_of_subjects_and_names_every_aim() -> No
 
 
 def test_the_aim_is_the_one_that_did_better_among_those_learnt_from() -> None:
-    found = standard_placement(crowd(), TAKE)
+    found = standard_placement(make_population(), TAKE)
     worth = {point.aim: point.served.worth for point in found.tried}
     assert worth[found.aim] == max(worth.values())
 
 
 def test_nothing_is_learnt_from_held_out_subjects() -> None:
-    whole = crowd()
+    whole = make_population()
     found = standard_placement(whole, TAKE)
     people = np.random.default_rng(TAKE.seed).permutation(np.arange(40))
     held_out = np.isin(whole.subjects, people[:8])
@@ -77,39 +82,39 @@ def test_nothing_is_learnt_from_held_out_subjects() -> None:
 
 def test_any_number_of_processes_gives_the_same_answer() -> None:
     told: list[tuple[int, int]] = []
-    one = standard_placement(crowd(16), TAKE, 1, lambda done, all_: told.append((done, all_)))
-    assert one == standard_placement(crowd(16), TAKE, 2)
+    one = standard_placement(make_population(16), TAKE, 1, lambda done, all_: told.append((done, all_)))
+    assert one == standard_placement(make_population(16), TAKE, 2)
     assert told[-1][0] == told[-1][1] == len(told)
 
 
 def test_few_subjects_are_refused() -> None:
     with pytest.raises(PlacementError, match="7 subject"):
-        standard_placement(crowd(7), TAKE)
+        standard_placement(make_population(7), TAKE)
 
 
 def test_rows_are_drawn_evenly_and_repeatably() -> None:
-    drawn = crowd().drawn(400, 3)
+    drawn = make_population().drawn(400, 3)
     assert set(np.bincount(drawn.subjects).tolist()) == {10}
-    assert np.array_equal(drawn.samples.switches, crowd().drawn(400, 3).samples.switches)
-    assert len(crowd().drawn(10**6, 3).subjects) == 40 * EACH
+    assert np.array_equal(drawn.samples.switches, make_population().drawn(400, 3).samples.switches)
+    assert len(make_population().drawn(10**6, 3).subjects) == 40 * EACH
 
 
-def framed(crowd: Crowd, frames: int) -> Crowd:
-    """Return the crowd with `frames` of each row, which is a trial."""
-    rows = np.repeat(np.arange(len(crowd.subjects)), frames)
-    return Crowd(replace(crowd.samples.rows(rows), trials=rows), crowd.subjects[rows])
+def framed(whole: Population, frames: int) -> Population:
+    """Return the population with `frames` of each row, which is a trial."""
+    rows = np.repeat(np.arange(len(whole.subjects)), frames)
+    return Population(replace(whole.samples.rows(rows), trials=rows), whole.subjects[rows])
 
 
 def test_trials_are_drawn_whole() -> None:
-    one, four = crowd().drawn(400, 3), framed(crowd(), 4).drawn(1600, 3)
+    one, four = make_population().drawn(400, 3), framed(make_population(), 4).drawn(1600, 3)
     assert np.array_equal(four.samples.switches, np.repeat(one.samples.switches, 4, axis=0))
     assert set(np.unique(four.samples.trials, return_counts=True)[1].tolist()) == {4}
-    assert set(np.bincount(framed(crowd(), 3).drawn(40 * 7, 3).subjects).tolist()) == {6}
-    assert set(np.bincount(framed(crowd(), 9).drawn(40 * 7, 3).subjects).tolist()) == {9}
+    assert set(np.bincount(framed(make_population(), 3).drawn(40 * 7, 3).subjects).tolist()) == {6}
+    assert set(np.bincount(framed(make_population(), 9).drawn(40 * 7, 3).subjects).tolist()) == {9}
 
 
 def test_a_rate_is_one_of_trials_each_recognised_as_most_of_its_frames() -> None:
-    whole = crowd()
+    whole = make_population()
     three = framed(whole, 3)
     spoilt = three.samples.switches.copy()
     spoilt[::3] ^= True
@@ -126,7 +131,7 @@ def test_service_is_the_mean_the_worst_tenth_and_the_lowest() -> None:
 
 
 def test_rates_are_each_subjects_own() -> None:
-    whole = crowd()
+    whole = make_population()
     found = rates(whole, whole, elements(0, 1), 10)
     assert found.shape == (40,)
     assert found[list(ODD)].max() < np.delete(found, ODD).min()
@@ -141,7 +146,7 @@ def _twenty_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(population, "ENOUGH_SUBJECTS", 8)
 
 
-def edgy(people: int = PEOPLE) -> Crowd:
+def edgy(people: int = PEOPLE) -> Population:
     """Return people whom switches 0 and 1 serve; a FEW of them press 0 at random, and 2 tells what 0 does of all, less
     well; 3 and above tell nothing.
     """
@@ -154,7 +159,9 @@ def edgy(people: int = PEOPLE) -> Crowd:
     bits[:, 0] = np.where(few, bits[:, 0], low)
     bits[:, 1] = high
     bits[:, 2] = low ^ (random.random(len(labels)) < 0.12)
-    return Crowd(Samples(bits, np.zeros((len(labels), 0), np.uint16), labels, tuple(map(str, range(TYPES)))), subjects)
+    return Population(
+        Samples(bits, np.zeros((len(labels), 0), np.uint16), labels, tuple(map(str, range(TYPES)))), subjects
+    )
 
 
 def elements(*columns: int) -> Elements:

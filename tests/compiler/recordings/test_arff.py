@@ -41,7 +41,7 @@ def test_a_gzipped_arff_is_read_by_its_suffix(tmp_path: Path) -> None:
     ("text", "reason"),
     [
         ("", "t.arff is no ARFF: it has no line @data"),
-        ("garbage\n", "t.arff line 1: 'garbage' stands where @attribute or @data should"),
+        ("garbage\n", "t.arff line 1: expected @attribute or @data, not 'garbage'"),
         (HEADER.replace("s {", "'my joint' {"), "line 4: attribute 'my joint' occurs twice"),
         (HEADER.replace("NUMERIC", "string"), "line 3: attribute 'my joint' is string; only numeric and nominal"),
         (HEADER.replace("{0, 1}", "{0, 1"), r"line 4: attribute 's' is \{0, 1; only"),

@@ -148,13 +148,13 @@ def test_five_megabytes_of_escaped_quotes_are_refused_in_linear_time(tmp_path: P
         (
             "csv.gz",
             gzip.compress(b"a\n" + b" " * 10_000_000, mtime=0),
-            "unpacks to more than 6.*: unpack it, then it is",
+            "unpacks to more than 6.*: unpack it and import",
         ),
         ("arff", ARFF + b"@data\n" + b"a\n" * 1_000_001, "more than 1000000 rows"),
         ("npz", packed(0, a=npy("<U0", "(400000000,)")), "its elements have no bytes"),
-        ("npz", packed(0, a=npy("<U1", "(1,)", b"\xff\xff\xff\x7f")), "holds characters that there are not"),
+        ("npz", packed(0, a=npy("<U1", "(1,)", b"\xff\xff\xff\x7f")), "holds invalid characters"),
         ("npz", packed(0, a=npy("|O", "(1,)", bytes(8))), "'.O', neither numbers nor text"),
-        ("npz", packed(0, a=npy("<f8", "(2,)", bytes(8))), "of other length than its shape"),
+        ("npz", packed(0, a=npy("<f8", "(2,)", bytes(8))), "its length does not match its shape"),
         ("npz", packed(8, a=npy("|i1", "(1, 900000)", bytes(900_000))), "more than 100000 columns"),
         (
             "npz",

@@ -96,7 +96,7 @@ def test_a_sealed_header_that_contradicts_its_arrays_is_refused(
     header, arrays = unpack(unseal(good, KIND, VERSION, "good")[1])
     changed = msgspec.json.encode(msgspec.json.decode(header) | changes)
     message = refusal(seal(KIND, VERSION, pack(changed, arrays)), tmp_path)
-    assert message.startswith("set.grasps contradicts itself: ")
+    assert message.startswith("set.grasps is inconsistent: ")
     assert re.search(reason, message)
 
 

@@ -140,7 +140,7 @@ def test_a_claim_of_terabytes_is_refused(tmp_path: Path) -> None:
 
 
 def test_arrays_of_several_lengths_and_columns_of_one_name_are_no_table(tmp_path: Path) -> None:
-    assert "its arrays have 2, 3 rows, no table" in refused(hdf5(tmp_path / "t.h5", a=[1, 2], b=[1, 2, 3]))
+    assert "its arrays have unequal lengths, 2, 3" in refused(hdf5(tmp_path / "t.h5", a=[1, 2], b=[1, 2, 3]))
     pd.DataFrame([["a", 1]], columns=["g", "g"]).to_excel(tmp_path / "t.xlsx", index=False)
     assert "two columns are called 'g'" in refused(tmp_path / "t.xlsx")
     pd.DataFrame().to_excel(tmp_path / "u.xlsx")

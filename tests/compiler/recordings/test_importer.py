@@ -46,7 +46,7 @@ def test_all_unknown_labels_are_named_at_once_and_the_first_answered_with_the_ne
     with pytest.raises(TableError) as refused:
         import_table(table("PoS", "PoX", "PoX", "PoH", "mug"), columns)
     said = str(refused.value)
-    assert said.startswith("t.csv: 2 labels in 'g' are no grasp types of kamakura14: 'PoX' (did you mean ")
+    assert said.startswith("t.csv: 2 labels in 'g' are not grasp types of kamakura14: 'PoX' (did you mean ")
     assert "'mug' (its types: PoS," in said
     assert said.endswith("; 3 rows have them, rows 3, 4, 6; [labels] can translate them")
     with pytest.raises(TableError) as refused:

@@ -89,7 +89,7 @@ def test_taxels_are_merged_as_joints_are(small: GraspSet) -> None:
     with pytest.raises(RecordingError, match="b lacks 2 taxels that a has: pad 1, pad 2"):
         merge({"a": one, "b": another(small)})
     wide = replace(two, taxel_columns=(pads[1], replace(pads[0], value_b=2.0)))
-    with pytest.raises(RecordingError, match="pad 1 is calibrated otherwise in b than in a"):
+    with pytest.raises(RecordingError, match="pad 1 is calibrated differently in b and in a"):
         merge({"a": one, "b": wide})
 
 
@@ -115,7 +115,7 @@ INDEX, WRIST = Joint("index", "deg", 0, -10.0, 100, 40.0), Joint("wrist", "deg",
         ({"joints": (INDEX, replace(WRIST, name="elbow"))}, "b.grasps lacks 1 joint that a.grasps has: wrist"),
         (
             {"joints": (replace(INDEX, value_a=-10.2, value_b=39.8), WRIST)},
-            "index is calibrated otherwise in b.grasps than in a.grasps: code 0 is -10.2 deg and a step 0.5, not "
+            "index is calibrated differently in b.grasps and in a.grasps: code 0 is -10.2 deg and a step 0.5, not "
             "-10 deg and 0.5",
         ),
         ({"joints": (replace(INDEX, value_b=45.0), WRIST)}, "code 0 is -10 deg and a step 0.55, not -10 deg and 0.5"),

@@ -227,7 +227,7 @@ def test_a_star_takes_exactly_the_columns_that_are_alike() -> None:
 @pytest.mark.parametrize(
     ("columns", "reason"),
     [
-        ({"x": np.array([0.5, 1.5, 2.5])}, "no column looks like the grasp type: say in a columns.toml which is it"),
+        ({"x": np.array([0.5, 1.5, 2.5])}, "no column looks like the grasp type: name it in a columns.toml"),
         ({"grasp": ["a", "b", "a"], "note": ["u", "v", "w"]}, "no column holds numbers that change: it has no inputs"),
     ],
 )

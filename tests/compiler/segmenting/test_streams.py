@@ -62,7 +62,7 @@ def test_rows_that_are_trials_of_their_own_are_no_movements(make_movements: Make
     held = grasp_set.rows(np.unique(grasp_set.trial_ids, return_index=True)[1]).without_none()
     with pytest.raises(SegmentingError, match="whole movements"):
         streams_of(held)
-    with pytest.raises(SegmentingError, match="trial of its own"):
+    with pytest.raises(SegmentingError, match="separate trial"):
         streams_of(replace(grasp_set, independent=True))
 
 

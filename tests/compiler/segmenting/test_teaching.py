@@ -78,7 +78,7 @@ def test_a_step_has_medians_a_limit_a_preshape_and_what_often_follows_elsewhere(
 
 
 def test_demonstrations_with_nothing_in_common_teach_nothing(build: Path) -> None:
-    with pytest.raises(SegmentingError, match=r"have no grasp in common that most of them show: 1: pinch; 2: hook"):
+    with pytest.raises(SegmentingError, match=r"have no grasp that occurs in most of them: 1: pinch; 2: hook"):
         taught(Build.load(build), [demo("1", "p"), demo("2", "h"), demo("3", "f")], "t")
 
 

@@ -70,7 +70,7 @@ def test_nothing_held_is_passed_over_and_what_is_written_is_read(
     assert (again.types, again.counts.tolist()) == (found.types, found.counts.tolist())
     for wrong in (b"{}", b'{"types":["a"],"counts":[[1,2]],"probabilities":[[1]]}', b"\xff"):
         path.write_bytes(wrong)
-        with pytest.raises(SegmentingError, match=r"graph\.json is no graph of transitions"):
+        with pytest.raises(SegmentingError, match=r"graph\.json is not a transitions file"):
             Transitions.load(path)
 
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.boosting.stumps import Stumps, centred, spread
-from thenar.compiler.tables.collapse import _answers, _joint, collapse
+from thenar.compiler.tables.collapse import _contributions, _joint, collapse
 
 MakeStumps = Callable[..., Stumps]
 MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
@@ -112,14 +112,14 @@ def test_thresholds_are_codes(make_stumps: MakeStumps) -> None:
     assert [steps.dtype for steps in collapse(make_stumps(), 6).thresholds] == [np.uint16] * 3
 
 
-def test_answers_at_one_threshold_are_added_in_the_order_of_the_rounds() -> None:
+def test_contributions_at_one_threshold_are_added_in_the_order_of_the_rounds() -> None:
     # However sorting treats equal thresholds: some processors' fastest way does not keep their order.
     random = np.random.default_rng(8)
     rounds = 400
     thresholds = np.array(random.integers(0, 3, (rounds, 2)) + 0.5, np.float64)
     stumps = Stumps(1, np.zeros((rounds, 2), np.int32), thresholds, random.normal(0, 1e3, (rounds, 2, 3)), 1.0)
     order = np.argsort(thresholds.ravel(), kind="mergesort")
-    by_threshold = _joint(np.floor(thresholds.ravel())[order], *(_answers(stumps, side)[order] for side in (0, 1)))
+    by_threshold = _joint(np.floor(thresholds.ravel())[order], *(_contributions(stumps, side)[order] for side in (0, 1)))
     assert collapse(stumps, 0).joint_rows[0].tobytes() == by_threshold[1].tobytes()
 
 

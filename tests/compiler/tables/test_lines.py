@@ -146,11 +146,11 @@ def test_of_all_codes_none_loses_more_and_the_witness_as_much(seed: int, entry_b
         return [scale * x - n for x, n in zip(_exact(tables, frame, at), steps, strict=True)]
 
     every = {(bit, code): errors(np.array([bit]), code) for bit in (False, True) for code in range(1100)}
-    for leader, rival in permutations(range(3), 2):
-        worst = rounding.worst(leader, rival)
-        assert worst.loss == max(each[leader] - each[rival] for each in every.values())
+    for leader, competitor in permutations(range(3), 2):
+        worst = rounding.worst(leader, competitor)
+        assert worst.loss == max(each[leader] - each[competitor] for each in every.values())
         own = errors(worst.bits, int(worst.codes[0]))
-        assert worst.loss == own[leader] - own[rival]
+        assert worst.loss == own[leader] - own[competitor]
 
 
 @settings(deadline=None)

@@ -132,11 +132,11 @@ def test_of_all_codes_none_loses_more_and_the_witness_as_much(seed: int) -> None
         return [scale * x - n for x, n in zip(_exact(tables, np.zeros(0, bool), at), steps, strict=True)]
 
     every = [errors(frame) for frame in product(np.append(0, np.arange(1, 43)).tolist(), repeat=2)]
-    for leader, rival in permutations(range(4), 2):
-        worst = rounding.worst(leader, rival)
-        assert worst.loss == max(each[leader] - each[rival] for each in every)
+    for leader, competitor in permutations(range(4), 2):
+        worst = rounding.worst(leader, competitor)
+        assert worst.loss == max(each[leader] - each[competitor] for each in every)
         own = errors(tuple(worst.codes.tolist()))
-        assert worst.loss == own[leader] - own[rival]
+        assert worst.loss == own[leader] - own[competitor]
 
 
 @settings(deadline=None)

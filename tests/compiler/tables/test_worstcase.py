@@ -42,9 +42,9 @@ def _every_run(tables: ScoreTables, integers: IntegerTables) -> Iterator[Ran]:
             yield _run(tables, integers, bits, frame)
 
 
-def _lost(run: Ran, leader: int, rival: int) -> Fraction:
+def _lost(run: Ran, leader: int, competitor: int) -> Fraction:
     exact, deployed = run
-    return (exact[leader] - exact[rival]) - (deployed[leader] - deployed[rival])
+    return (exact[leader] - exact[competitor]) - (deployed[leader] - deployed[competitor])
 
 
 def _small(make_stumps: MakeStumps, make_rows: MakeRows, seed: int, width: int) -> tuple[ScoreTables, IntegerTables]:
@@ -61,7 +61,7 @@ def test_of_all_frames_none_loses_more_and_the_witness_as_much(
     rounding, runs = Rounding(tables, integers), list(_every_run(tables, integers))
     for pair in permutations(range(3), 2):
         frame = rounding.worst(*pair)
-        assert (frame.leader, frame.rival) == pair
+        assert (frame.leader, frame.competitor) == pair
         assert frame.loss == max(_lost(run, *pair) for run in runs)
         assert frame.loss == _lost(_run(tables, integers, tuple(frame.bits), tuple(frame.codes.tolist())), *pair)
     assert rounding.worst_of_all().loss == max(rounding.worst(*pair).loss for pair in permutations(range(3), 2))
@@ -109,7 +109,9 @@ def test_the_switch_is_closed_where_that_costs_the_lead() -> None:
 
 
 @pytest.mark.parametrize(("leader", "safe"), [(0, "0"), (1, "3/4")])
-def test_a_rival_of_the_lower_number_wins_ties_and_the_other_must_be_better_by_a_step(leader: int, safe: str) -> None:
+def test_a_competitor_of_the_lower_number_wins_ties_and_the_other_must_be_better_by_a_step(
+    leader: int, safe: str
+) -> None:
     bias = [0.0, 0.0]
     bias[leader] = 0.375  # at 2 steps a unit, 3/4 of a step, of which nothing is left
     rounding = _switches(bias, [], [0, 0], [])
@@ -186,8 +188,9 @@ def test_the_worst_pair_is_the_first_of_the_worst_however_many_bits_part_it_from
     rows = [[[data.draw(numbers) for _ in range(classes)] for _ in range(count)] for count in choices]
     tie = data.draw(st.sampled_from([0, 1, 2**61, 2**150, 2**1100]))
     losses = {
-        (leader, rival): sum(max(row[leader] - row[rival] for row in each) for each in rows) - tie * (leader < rival)
-        for leader, rival in permutations(range(classes), 2)
+        (leader, competitor): sum(max(row[leader] - row[competitor] for row in each) for each in rows)
+        - tie * (leader < competitor)
+        for leader, competitor in permutations(range(classes), 2)
     }
     worst = max(losses, key=losses.__getitem__)
     assert _Pairs([np.array(each, object) for each in rows]).greatest(tie) == (losses[worst], *worst)

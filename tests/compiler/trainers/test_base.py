@@ -58,7 +58,7 @@ def test_options_give_a_trainer_all_its_settings(constant: Constant) -> None:
     ("changes", "because"),
     [
         ({"trainer": "oracle"}, "there is no trainer 'oracle': choose one of logitboost, logit, sum, pairs, constant"),
-        ({"round": 3}, "no trainer takes the setting 'round'"),
+        ({"round": 3}, "no trainer has the setting 'round'"),
         ({"rounds": 0}, "rounds=0 must be at least 1"),
         ({"shrinkage": SMALLEST_SHRINKAGE / 2}, "shrinkage=5e-07 must be at least 1e-06"),
         ({"shrinkage": 1.5}, "shrinkage=1.5 must be at most 1"),
@@ -81,7 +81,7 @@ def test_what_a_trainer_does_not_take_is_refused(
 def test_a_trainer_that_makes_a_model_of_something_else_is_at_fault(
     constant: Constant, grasp_set: GraspSet, tmp_path: Path
 ) -> None:
-    with pytest.raises(ThenarError, match="trainer 'constant' made a model that has tables of other shapes"):
+    with pytest.raises(ThenarError, match="returned an invalid model that has tables whose shapes do not fit"):
         compile_build(grasp_set, tmp_path / "build", trainer="constant", excess=1, folds=0)
     manifest = compile_build(grasp_set, tmp_path / "build", trainer="constant", folds=0).manifest
     assert manifest.options.settings == {"excess": 0.0}

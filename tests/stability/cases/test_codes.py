@@ -37,9 +37,9 @@ def test_a_threshold_lies_where_it_parts_two_neighbours(values: list[float]) -> 
         assert low <= threshold < high
         middle = (Fraction(low) + Fraction(high)) / 2
         # No double between the two lies closer to the middle.
-        for rival in np.nextafter(threshold, [-np.inf, np.inf]).tolist():
-            if low <= rival < high:
-                assert abs(Fraction(rival) - middle) >= abs(Fraction(threshold) - middle)
+        for near in np.nextafter(threshold, [-np.inf, np.inf]).tolist():
+            if low <= near < high:
+                assert abs(Fraction(near) - middle) >= abs(Fraction(threshold) - middle)
 
 
 @settings(deadline=None, max_examples=40)
@@ -93,7 +93,7 @@ def test_degrees_are_coded_to_the_nearest_step_or_refused_with_their_rows(values
     too_fine = grid <= 1.0001e-9 * (max(map(abs, values)) + 65536 * grid)
     if complaints:
         assert ("would get codes outside" in complaints and too_wide) or (
-            "cannot be told apart" in complaints and too_fine
+            "cannot be distinguished" in complaints and too_fine
         )
         return
     step = Fraction(joint.value_b - joint.value_a) / (joint.code_b - joint.code_a)

@@ -47,8 +47,8 @@ def test_of_many_columns_the_first_of_the_best_is_asked_for_whatever_their_order
         assert found is None
         return
     assert found in varying
-    rivals = [(compare_gains(tables[n].tolist(), tables[found].tolist()), numbers[n]) for n in varying]
-    assert all(sign < 0 or (sign == 0 and number >= numbers[found]) for sign, number in rivals)
+    others = [(compare_gains(tables[n].tolist(), tables[found].tolist()), numbers[n]) for n in varying]
+    assert all(sign < 0 or (sign == 0 and number >= numbers[found]) for sign, number in others)
 
 
 def test_among_small_tables_are_gains_that_are_equal_and_float_otherwise() -> None:
@@ -101,7 +101,7 @@ def test_a_tree_asks_for_no_constant_and_no_second_of_equals_or_complements(seed
 
 @settings(deadline=None, max_examples=30)
 @given(seeds, st.integers(1, 6))
-def test_rival_placements_pass_over_constants_and_second_equals_too(seed: int, size: int) -> None:
+def test_baseline_placements_pass_over_constants_and_second_equals_too(seed: int, size: int) -> None:
     X, labels = hard_columns(seed)
     useless = np.hstack([X, ~X, X, np.ones((len(X), 2), bool)])
     assert list(islice(cmim(useless, labels), size)) == list(islice(cmim(X, labels), size))

@@ -148,10 +148,10 @@ def test_the_worst_frame_run_through_scorer_and_reference_loses_exactly_what_was
     frame = rounding.worst_of_all()
     most = ratio(frame.loss)
     with precisely():
-        assert lost(*both.run(frame.bits.tolist(), frame.codes.tolist()), frame.leader, frame.rival) == most
+        assert lost(*both.run(frame.bits.tolist(), frame.codes.tolist()), frame.leader, frame.competitor) == most
         assert most <= switches + len(bins) + 1 + 2 * float_slack(case.tables, case.integers.scale)
         for bits, codes in _drawn_frames(case, seed):
-            assert lost(*both.run(bits, codes), frame.leader, frame.rival) <= most
+            assert lost(*both.run(bits, codes), frame.leader, frame.competitor) <= most
 
 
 def _drawn_frames(case: Quantised, seed: int) -> list[tuple[list[bool], list[int]]]:

@@ -9,12 +9,12 @@ from thenar.compiler.firmware.targets import timed
 from thenar.compiler.frontier.points import Time
 from thenar.compiler.frontier.timing.python_times import random_tables
 from thenar.compiler.frontier.timing.scan_times import (
-    Beside,
+    Overhead,
     ScanTimes,
-    beside_wire,
-    board_beside,
-    firmware_beside,
+    board_overhead,
+    firmware_overhead,
     measured_call_us,
+    overhead_of,
     records_of,
     scan_times,
 )
@@ -28,7 +28,7 @@ from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us, scanner_us
 from thenar.runtime.scores import Scorer
 
-CALL = Beside("a call", call_us=7.0)
+CALL = Overhead("a call", call_us=7.0)
 wired = st.builds(
     Wiring, st.sampled_from(["mcp23017", "pca9555", "tca6424a", "pcf8575"]), st.sampled_from([100_000, 400_000])
 )
@@ -88,14 +88,14 @@ def _selects(costs: Costs, read: int, port: int) -> bool:
 def test_on_an_avr_the_firmware_takes_its_time_for_scan_keys_readings_and_bytes() -> None:
     tables, wiring, names = random_tables(20, 0, 4), Wiring("mcp23017", 400_000), names_of(20)
     bare = scan_times(names, tables, wiring, *frames(20, 0))
-    there = scan_times(names, tables, wiring, *frames(20, 0), firmware_beside("avr328p"))
+    there = scan_times(names, tables, wiring, *frames(20, 0), firmware_overhead("avr328p"))
     cycles = 520 + 40 * 20 + 2 * 530 + (2 + 1) * 560
     assert there.full_us - bare.full_us == pytest.approx(cycles / 16)
     assert (bare.how, there.how) == ("wire", "model")
 
 
 def test_a_board_scans_its_keys_and_then_sends_its_whole_frame() -> None:
-    wiring, tables, own = Wiring(BOARD, 115_200), random_tables(33, 0, 4), board_beside()
+    wiring, tables, own = Wiring(BOARD, 115_200), random_tables(33, 0, 4), board_overhead()
     times = scan_times(names_of(33), tables, wiring, *frames(33, 0))
     line_us = scanner_us(wiring.harness_of(names_of(33)).scanners[0])
     assert times.full_us == times.early_us == pytest.approx(line_us + own.scan_us + 33 * own.key_us)
@@ -171,11 +171,11 @@ def test_a_firmware_that_sets_no_mask_waits_for_all_sensors() -> None:
 
 
 @pytest.mark.parametrize("target", timed())
-def test_every_target_says_what_its_scans_hold_beside_the_wire(target: str) -> None:
-    beside = beside_wire(target)
-    assert len(beside.what) > 20
-    assert (beside.scan_us > 0) == target.startswith("avr")
-    assert (beside.call_us > 0) == (not target.startswith(("cortex", "rv32")))
+def test_every_target_says_the_overhead_of_its_scans(target: str) -> None:
+    overhead = overhead_of(target)
+    assert len(overhead.what) > 20
+    assert (overhead.scan_us > 0) == target.startswith("avr")
+    assert (overhead.call_us > 0) == (not target.startswith(("cortex", "rv32")))
 
 
 def test_a_system_call_is_timed() -> None:

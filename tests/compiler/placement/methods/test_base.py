@@ -21,7 +21,7 @@ def learning(switches: int = 14) -> Samples:
     return Samples(bits, np.zeros((150, 0), np.uint16), labels, tuple("01234"))
 
 
-def test_the_papers_ours_and_the_rivals_are_there() -> None:
+def test_the_papers_ours_and_the_baselines_are_there() -> None:
     assert OURS == ["elimination", "elimination-cost", "elimination-boosted", "id3", "id3-cost", "id3-ccp", "id3-rep"]
     assert [name for name in METHODS if name not in OURS] == [
         *("rfe", "forest", "mrmr", "cmim", "mutual-information", "random", "sspoc", "qr")

@@ -1,4 +1,4 @@
-"""Rivals beside their definitions, with information as exact products of whole numbers."""
+"""Baselines beside their definitions, with information as exact products of whole numbers."""
 
 from collections import Counter
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""The rivals: what each ranks first, and what all of them keep to."""
+"""The baselines: what each ranks first, and what all of them keep to."""
 
 import sys
 
@@ -10,7 +10,7 @@ from thenar.compiler.placement.inputs import PlacementError
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.samples import Samples
 
-RIVALS = [
+BASELINES = [
     pytest.param(name, marks=pytest.mark.skipif(not method.installed, reason=f"{method.install} is not installed"))
     for name, method in METHODS.items()
     if not method.ours
@@ -39,7 +39,7 @@ def test_who_looks_at_labels_finds_the_switches_that_tell_the_types(name: str, l
     assert set(METHODS[name].chooser(learning)(3)) == set(TELLING)
 
 
-@pytest.mark.parametrize("name", RIVALS)
+@pytest.mark.parametrize("name", BASELINES)
 def test_placements_are_nested_repeatable_and_of_switches_that_vary(name: str, learning: Samples) -> None:
     choose, again = METHODS[name].chooser(learning), METHODS[name].chooser(learning)
     everything = choose(100)
@@ -48,7 +48,7 @@ def test_placements_are_nested_repeatable_and_of_switches_that_vary(name: str, l
         assert choose(m) == again(m) == everything[:m]
 
 
-@pytest.mark.parametrize("name", RIVALS)
+@pytest.mark.parametrize("name", BASELINES)
 def test_where_nothing_varies_or_one_type_is_left_nothing_is_chosen(name: str, learning: Samples) -> None:
     still = Samples(np.ones((6, 3), bool), np.zeros((6, 0), np.uint16), np.arange(6) % 2, tuple("01"))
     alike = Samples(learning.switches, learning.codes, np.zeros(len(learning.labels), np.intp), tuple("01"))

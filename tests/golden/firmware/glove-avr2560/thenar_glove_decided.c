@@ -15,8 +15,8 @@
 #define CLASSES 3u
 #define LAST_PORT (THENAR_GLOVE_SCANNED_PORTS - 1u)
 
-/* By so many steps the leader (row) must be ahead of a rival (column) after a port: the most that the unread switches
-   can bring the rival closer, and one more where the rival would win a tie. 65535: no lead is enough.
+/* Steps by which the leader (row) must be ahead of a competitor (column) after a port: the most by which the unread
+   switches can bring the competitor closer, and one more where it would win a tie. 65535: no lead is enough.
 
    columns:
    power grip, tip pinch, lateral pinch
@@ -41,10 +41,10 @@ bool thenar_glove_decided(
         const uint16_t best = (uint16_t)glove->scores[leader];
         const uint16_t *needed = hurdles[port][leader];
 
-        for (uint16_t rival = 0u; decided && (rival < CLASSES); rival++) {
-            const uint16_t lead = (uint16_t)(best - (uint16_t)glove->scores[rival]);
+        for (uint16_t competitor = 0u; decided && (competitor < CLASSES); competitor++) {
+            const uint16_t lead = (uint16_t)(best - (uint16_t)glove->scores[competitor]);
 
-            decided = lead >= READ(needed[rival]);
+            decided = lead >= READ(needed[competitor]);
         }
     }
     return decided;

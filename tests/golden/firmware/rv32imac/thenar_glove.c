@@ -46,7 +46,7 @@ uint16_t thenar_glove_margin(const thenar_glove *glove)
         } else if (score > second) {
             second = score;
         } else {
-            /* no rival */
+            /* no competitor */
         }
     }
     return (uint16_t)((uint16_t)best - (uint16_t)second);

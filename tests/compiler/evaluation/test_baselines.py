@@ -4,9 +4,9 @@ import numpy as np
 from sklearn.linear_model import LogisticRegression
 from sklearn.neighbors import KNeighborsClassifier
 
+from thenar.compiler.evaluation.baselines import CLASSIFIERS
 from thenar.compiler.evaluation.folds import Fold
 from thenar.compiler.evaluation.plan import Data, FoldFit, predictions
-from thenar.compiler.evaluation.rivals import CLASSIFIERS
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import Training
@@ -15,7 +15,7 @@ Make = Callable[..., GraspSet]
 PAPERS = Training("logitboost", {"rounds": 2})
 
 
-def test_rivals_answer_as_scikit_learns_on_the_same_standardised_columns(make_grasps: Make) -> None:
+def test_baselines_answer_as_scikit_learns_on_the_same_standardised_columns(make_grasps: Make) -> None:
     grasps = make_grasps(noise=0.3, per_type=10)
     data, rows = Data.of(grasps), np.arange(len(grasps))
     fold, columns = Fold(rows[::2], rows[1::2], "1"), (1, 3, 4, 12, 13)
