@@ -193,4 +193,4 @@ def _check_same_glove(journal: Journal, session: Session) -> None:
         ("calibration of taxels", begun.taxel_calibration, session.taxel_calibration),
     ):
         if before != now:
-            raise SettingError(f"{journal.path} was begun with another {what}: name another --output for this glove")
+            raise SettingError(f"{journal.path} was begun with different {what}: name another --output for this glove")

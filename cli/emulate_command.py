@@ -174,7 +174,7 @@ def _check_folder(folder: Path) -> None:
 def _performance(
     source: str, subject: str | None, period_ms: float | None, rest_ms: float | None, *, cyberglove: bool
 ) -> tuple["Performance", "CableOf"]:
-    """Return what to play, and the effects on serial line n."""
+    """Return the performance, and the effects on serial line n."""
     from thenar.simulator.playing import performance
 
     given_us, rest_us = (None if given is None else round(given * 1000) for given in (period_ms, rest_ms))

@@ -1,7 +1,7 @@
-"""The group of sub-commands, and what becomes of errors: a sentence and an exit code, also of unexpected ones.
+"""The group of sub-commands, and how errors end: in a sentence and an exit code, also unexpected ones.
 
-Each sub-command is loaded only when it is called. A reader that goes away (`| head`) ends a command in silence, with
-click's exit code 1.
+Each sub-command is loaded only when it is called. If the reader of a pipe goes away (`| head`), the command ends
+silently with click's exit code 1.
 """
 
 import os
@@ -24,7 +24,7 @@ COMMANDS = (
     *("firmware", "spec", "run", "monitor", "calibrate", "record", "emulate", "doctor", "stability"),
 )
 
-# What the extras of pyproject.toml bring, by the names that are imported.
+# The packages that the extras of pyproject.toml install, by import name.
 EXTRAS: Mapping[str, tuple[str, ...]] = {
     "compiler": (
         *("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "ezdxf", "clevercsv"),
@@ -41,7 +41,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
 }
 
 
-# Options that have another name now, for the hint.
+# Options that were renamed, for the hint.
 RENAMED = {"--placement": "--method"}
 
 
@@ -85,7 +85,7 @@ def thenar() -> None:
 
 
 def run_group(arguments: Sequence[str]) -> int:
-    """Run `thenar` with `arguments` and return its exit code; what the user did wrong is one sentence on stderr."""
+    """Run `thenar` with `arguments` and return its exit code; report a user's mistake in one sentence on stderr."""
     if arguments[:1] == ["help"]:
         arguments = [*arguments[1:2], "--help"]
     try:
@@ -102,7 +102,7 @@ def run_group(arguments: Sequence[str]) -> int:
 
 
 def _sentence(fault: Exception, arguments: Sequence[str]) -> str:
-    """Return what to say of an error."""
+    """Return the sentence that reports an error."""
     match fault:
         case click.NoSuchOption() if fault.option_name in RENAMED:
             return f"{fault.message} Did you mean '{RENAMED[fault.option_name]}'?"
@@ -114,14 +114,14 @@ def _sentence(fault: Exception, arguments: Sequence[str]) -> str:
             reason = fault.strerror or str(fault)
             return f"{fault.filename}: {reason}" if fault.filename else reason
         case MemoryError():
-            return f"not enough memory ({fault}): take fewer rows or columns"
+            return f"not enough memory ({fault}): use fewer rows or columns"
         case ModuleNotFoundError():
             return f"{fault.name} is not installed: pip install '{_brought_by(fault, arguments)}'"
     return _kept(fault)
 
 
 def _brought_by(lack: ModuleNotFoundError, arguments: Sequence[str]) -> str:
-    """Return the requirement to install: thenar with an extra that has the package, the command's first; or thenar."""
+    """Return the requirement to install: thenar with an extra that has the package (the command's first), or thenar."""
     package = (lack.name or "").partition(".")[0]
     bringing = [extra for extra, packages in EXTRAS.items() if package in packages]
     bringing.sort(key=lambda extra: extra not in arguments[:1])
@@ -129,12 +129,12 @@ def _brought_by(lack: ModuleNotFoundError, arguments: Sequence[str]) -> str:
 
 
 def _kept(fault: Exception) -> str:
-    """Write the traceback of an error that nobody expected to a file that only its owner reads; return what to say."""
-    what = f"unexpected {type(fault).__name__}: this is a mistake in thenar"
+    """Write the traceback of an unexpected error to a file that only its owner can read; return the message."""
+    what = f"unexpected {type(fault).__name__}: this is a bug in thenar"
     try:
         descriptor, path = tempfile.mkstemp(prefix="thenar-", suffix=".txt")
         with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:
             file.write("".join(traceback.format_exception(fault)))
     except OSError as reason:
         return f"{what}, and its traceback could not be written ({reason.strerror}); please report it"
-    return f"{what}; please report it with the file {path}, which says where"
+    return f"{what}; please report it with the file {path}, which holds the traceback"

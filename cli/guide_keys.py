@@ -1,4 +1,4 @@
-"""Keys of a guided collection: single ones where stdin is a terminal, a line each elsewhere."""
+"""Keys of a guided collection: single keys if stdin is a terminal, else one per line."""
 
 import os
 import re
@@ -12,12 +12,12 @@ from thenar.runtime.recording.guide import Key
 
 LETTERS = {Key.ACCEPT: "Enter", Key.REDO: "r", Key.UNDO: "u", Key.SKIP: "s", Key.PAUSE: "p", Key.QUIT: "q"}
 _MEANT = {letter: key for key, letter in LETTERS.items()} | dict.fromkeys(("", " ", "a"), Key.ACCEPT)
-# What a terminal sends for arrows, function keys and the like.
+# Escape sequences that a terminal sends for arrows, function keys and the like.
 _ESCAPES = re.compile(r"\x1b(?:\[[0-9;?]*[ -/]*[@-~]|O.)?")
 
 
 class GuideKeys:
-    """Reads `descriptor` without waiting for it: Enter, blank and a accept, other keys are LETTERS, the end leaves."""
+    """Reads `descriptor` without blocking: Enter, space and a accept, other keys are LETTERS, end of input leaves."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
@@ -29,8 +29,8 @@ class GuideKeys:
     def __enter__(self) -> Self:
         if self._raw:
             self._before = termios.tcgetattr(self._descriptor)
-            # Ctrl-C stays what it is.
-            # Keys that were pressed a moment too early count as well.
+            # Ctrl-C keeps its meaning.
+            # Keys pressed a moment too early count as well.
             tty.setcbreak(self._descriptor, termios.TCSADRAIN)
         return self
 
@@ -41,7 +41,7 @@ class GuideKeys:
             termios.tcsetattr(self._descriptor, termios.TCSADRAIN, self._before)
 
     def pressed(self) -> list[Key]:
-        """Return what was pressed since the last call."""
+        """Return the keys pressed since the last call."""
         if self._ended or not select.select([self._descriptor], [], [], 0.0)[0]:
             return []
         typed = self._typed()
@@ -54,7 +54,7 @@ class GuideKeys:
     def _typed(self) -> str:
         try:
             return os.read(self._descriptor, 4096).decode("utf-8", "replace")
-        except OSError:  # a terminal that was closed
+        except OSError:  # the terminal was closed
             return ""
 
     def _words(self) -> list[str]:

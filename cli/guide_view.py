@@ -1,4 +1,4 @@
-"""What a guided collection shows: the grasp to take, the countdown, what was captured, and how far it is."""
+"""The view of a guided collection: the grasp to take, the countdown, the captured readings, and the progress."""
 
 from collections.abc import Sequence
 from types import TracebackType
@@ -21,7 +21,7 @@ _REDRAW_US = 100_000
 
 
 class GuideView:
-    """Draws on a terminal ten times a second and at every change, in place; elsewhere says in a line what is new."""
+    """Draws in place on a terminal, ten times a second and at every change; elsewhere prints one line per change."""
 
     def __init__(self, console: Console, taxonomy: Taxonomy) -> None:
         self._console = console
@@ -43,7 +43,7 @@ class GuideView:
             self._live.stop()
 
     def show(self, now_us: int, guide: Guide, devices: Sequence[DeviceState]) -> None:
-        """Show where `guide` stands, if it is time to or news."""
+        """Show the guide's state, if it changed or the next refresh is due."""
         if self._live is None:
             self._say(guide, devices)
         elif now_us >= self._due_us or self._shown != guide.step:
@@ -100,5 +100,5 @@ class GuideView:
 
 
 def _keys(guide: Guide) -> str:
-    """Return the keys that do something now: "Enter: start the countdown   q: leave"."""
+    """Return the keys that are active now: "Enter: start the countdown   q: leave"."""
     return "   ".join(f"{LETTERS[key]}: {what}" for key, what in guide.offered().items())

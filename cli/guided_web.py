@@ -1,4 +1,4 @@
-"""`thenar record --web`: what the page shows of a trial, the drawing of a glove, and the recognition so far."""
+"""`thenar record --web`: the page of a trial, the drawing of a glove, and the accuracy so far."""
 
 from collections.abc import Mapping
 from concurrent.futures import BrokenExecutor
@@ -23,12 +23,12 @@ from thenar.runtime.web.guided import GuidePage
 
 from .web_options import say_page
 
-# Of a glove of which nobody knows where its switches lie.
+# For a glove whose switch positions are unknown.
 _COLUMNS, _PITCH_MM = 4, (50.0, 22.0)
 
 
 def shown(taxonomy: Taxonomy, trial: Trial) -> Mapping[str, object]:
-    """Return how the page shows a trial: its title and detail, and the pose to draw, None where no posture is known."""
+    """Return the page's view of a trial: title, detail, and the pose to draw, or None for an unknown posture."""
     if trial.grasp == NONE and NONE not in taxonomy.types:
         doing = MOVEMENTS.get(trial.object, "touch nothing")
         return {"title": f"Nothing held: {trial.object}", "detail": doing, "pose": _pose((0.0,) * 4, [(0.0,) * 4] * 4)}
@@ -40,7 +40,7 @@ def shown(taxonomy: Taxonomy, trial: Trial) -> Mapping[str, object]:
 
 @cache
 def postures(taxonomy: str) -> dict[str, list[float]]:
-    """Return the pose of each type of a taxonomy for which thenar has nominal postures, in the order of POSED."""
+    """Return the pose of each type of a taxonomy that has nominal postures, in the order of POSED."""
     from thenar.simulator.planning.prehension import load_prehensions
 
     file = files("thenar.simulator.planning") / "data" / f"{taxonomy}.toml"
@@ -52,7 +52,7 @@ def postures(taxonomy: str) -> dict[str, list[float]]:
     }
 
 
-# The joints of a pose, and what each moves: of hand.js's posed hand.
+# The joints of a pose, and the movement of each, for the posed hand of hand.js.
 POSED = (
     *(("thumb", "rotation"), ("thumb", "abduction"), ("thumb", "mcp"), ("thumb", "ip")),
     *((digit, joint) for digit in ("index", "middle", "ring", "little") for joint in ("mcp", "pip", "dip")),
@@ -62,22 +62,22 @@ POSED = (
 def _pose(thumb: tuple[float, ...], fingers: list[tuple[float, ...]]) -> list[float]:
     """Return the angles of POSED from those of the simulator's hand: abduction, first, second and third flexion.
 
-    The posed hand turns its thumb about other axes. What this makes of them is for people to look at.
+    The posed hand turns its thumb about other axes, so the result is only for display.
     """
     abduction, flexion, *bends = thumb
     return [20 + 1.3 * abduction, 42 - 0.7 * flexion, *bends, *(angle for finger in fingers for angle in finger[1:])]
 
 
 def drawn_pose() -> HandDrawing:
-    """Return the drawing of a hand that poses show themselves on: joints, and no switch."""
+    """Return the drawing of a hand that shows poses: joints, and no switch."""
     joints = [Calibration(at, f"{digit} {moves}", "deg", 0, 0.0, 90, 90.0) for at, (digit, moves) in enumerate(POSED)]
     return HandDrawing(view="", placed=False, radius_mm=1.0, switches=(), taxels=(), joints=drawn_joints(joints))
 
 
 def drawn_glove(session: Session) -> HandDrawing:
-    """Return the drawing of the glove that is recorded: every switch as the bit that it has in a frame.
+    """Return the drawing of the recorded glove: every switch as the bit that it has in a frame.
 
-    Switches whose names thenar's own hand has are drawn there, others in a grid.
+    Switches named as on thenar's own hand are drawn there, others in a grid.
     """
     from thenar.simulator.handmaps.handmap import hand_map
 
@@ -103,7 +103,7 @@ def drawn_glove(session: Session) -> HandDrawing:
     spots = list(zip(names, places, strict=True))
     return HandDrawing(
         switches=tuple(DrawnSwitch(name, x, y, bit) for bit, (name, (x, y)) in enumerate(spots[:n])),
-        # One level each, by which hand.js draws how far a taxel is pressed; no frame has a bit for it.
+        # One level each: hand.js draws how far a taxel is pressed, and no frame has a bit for it.
         taxels=tuple(DrawnTaxel(name, x, y, ((0, n + at),)) for at, (name, (x, y)) in enumerate(spots[n:])),
         joints=drawn_joints([_joint(at, session) for at in range(len(session.sensors))]),
         **drawn,
@@ -115,7 +115,7 @@ def _line(points: Any) -> tuple[tuple[float, float], ...]:
 
 
 def _joint(number: int, session: Session) -> Calibration:
-    """Return a sensor as a joint of the drawing: in degrees where it is calibrated, else by its byte."""
+    """Return a sensor as a joint of the drawing: in degrees if it is calibrated, else as its byte."""
     name = session.sensors[number]
     for line in () if session.calibration is None else session.calibration.sensors:
         if line.name == name:
@@ -125,13 +125,13 @@ def _joint(number: int, session: Session) -> Calibration:
 
 @dataclass(frozen=True, slots=True)
 class PageAt:
-    """Where to serve the page of a collection."""
+    """The address at which to serve the page of a collection."""
 
     address: str
     token: str | None
 
     def serve(self, session: Session, taxonomy: Taxonomy, recording: Path) -> "StudiedPage":
-        """Serve it, and say where. Raises SettingError or SinkError where that cannot be."""
+        """Serve the page and print its address. Raises SettingError or SinkError if that is impossible."""
         page = GuidePage(
             self.address,
             token=self.token,
@@ -145,7 +145,7 @@ class PageAt:
 
 
 class StudiedPage:
-    """The page of a collection, with the recognition so far: worked out anew after each round, in another process."""
+    """The page of a collection, with the accuracy so far: computed after each round, in another process."""
 
     def __init__(self, page: GuidePage, recording: Path, round_trials: int) -> None:
         self._page, self._recording, self._round = page, recording, round_trials
@@ -153,11 +153,11 @@ class StudiedPage:
         self._studied = -1
 
     def press(self, now_us: int, guide: Guide) -> None:
-        """Press what was pressed on a page."""
+        """Pass the keys pressed on a page to the guide."""
         self._page.press(now_us, guide)
 
     def show(self, now_us: int, guide: Guide, devices: Any) -> None:
-        """Show where `guide` stands, and begin or end what is worked out."""
+        """Show the guide's state, and start or finish the computation."""
         self._page.show(now_us, guide, devices)
         self._fetch()
         if self._aside.busy or guide.done < 2 or guide.done == self._studied:
@@ -170,7 +170,7 @@ class StudiedPage:
         try:
             found = self._aside.fetch()
         except BrokenExecutor as wrong:
-            self._page.tell({"problem": f"the recognition so far could not be worked out: {wrong}"})
+            self._page.tell({"problem": f"the accuracy so far could not be computed: {wrong}"})
             return
         if found is not None:
             self._page.tell({"problem": "", **to_builtins(found)})

@@ -1,4 +1,4 @@
-"""`thenar import`: a table of labelled grasps, or recordings, into a .grasps file."""
+"""`thenar import`: convert a table of labelled grasps, or recordings, into a .grasps file."""
 
 import os
 import shlex
@@ -35,21 +35,21 @@ if TYPE_CHECKING:
 @click.argument("tables", metavar="TABLE", type=existing_file, nargs=-1, required=True)
 @click.option("-o", "--output", type=OutputFile(".grasps"), required=True, help="The .grasps file to write.")
 @overwrite_flag
-@click.option("--columns", type=existing_file, help="columns.toml: what each column of the table is.")
-@click.option("--stream", is_flag=True, help="Recordings: a row every 10 ms with its time, not one a trial.")
-@click.option("-y", "--yes", is_flag=True, help="Import what was found without --columns, and do not ask.")
+@click.option("--columns", type=existing_file, help="columns.toml: the meaning of each column of the table.")
+@click.option("--stream", is_flag=True, help="Import recordings as a row with its time every 10 ms, not one per trial.")
+@click.option("-y", "--yes", is_flag=True, help="Accept the detected columns without asking.")
 @json_flag
 def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream: bool, yes: bool) -> None:
     """Import TABLE (.csv, .tsv, .txt, .xlsx, .parquet, .h5, .mat, .arff or .npz) as labelled grasps.
 
-    Without --columns, it finds what each column is, shows that with reasons, and writes it to a columns.toml next to
-    the output, to be corrected; on a terminal it then asks whether to go on.
+    Without --columns, the command detects the meaning of each column, shows it with reasons, and writes it to a
+    columns.toml next to the output, for you to correct; on a terminal it then asks whether to continue.
 
-    Malformed cells and unknown labels stop the import, naming their rows and columns; what is merely odd (constant
-    switches, rows that two subjects share, ...) is counted in warnings.
+    Malformed cells and unknown labels stop the import, which names their rows and columns. Merely odd data (constant
+    switches, rows shared by two subjects, ...) are counted in warnings.
 
-    Recordings of `thenar record` (.mcap) say themselves what is in them; several, of several subjects, become one set.
-    With --stream they become whole movements: a grasp is held while the hand stays as it was captured.
+    Recordings of `thenar record` (.mcap) describe themselves; several, also of several subjects, become one set. With
+    --stream they become whole movements: a grasp counts as held while the hand stays as it was captured.
 
     \b
     Example:
@@ -71,7 +71,7 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream
 
 
 def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport]":
-    """Import the table in `path` as its columns are found to be, if that is agreed to."""
+    """Import the table in `path` with the detected columns, if the user agrees."""
     from thenar.compiler.recordings.errors import ColumnsError
     from thenar.compiler.recordings.importer import import_table
     from thenar.compiler.recordings.propose import propose_file
@@ -81,25 +81,25 @@ def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport
     asked = not yes and os.isatty(0) and not wants_json()
     if not wants_json():
         _print_proposal(proposal)
-    if proposal.lacks and asked and click.confirm("Is each row a trial of its own?"):
+    if proposal.lacks and asked and click.confirm("Is each row a separate trial?"):
         proposal = proposal.independent()
     written = _write(proposal.toml(), output.parent)
-    other = "" if written.name == "columns.toml" else "; columns.toml is there already, and is used with --columns only"
-    echo(f"{written}: what was found{other}", err=wants_json())
+    other = "" if written.name == "columns.toml" else "; columns.toml exists already, and is used only with --columns"
+    echo(f"{written}: the detected columns{other}", err=wants_json())
     replacing = ["--overwrite"] if output.exists() else []
     again = shlex.join(["thenar", "import", str(path), "-o", str(output), *replacing, "--columns", str(written)])
     if proposal.lacks:
         raise ColumnsError(f"{proposal.lacks}: do so in {written}, then run: {again}")
-    if asked and not click.confirm("Import it so?"):
+    if asked and not click.confirm("Import with these columns?"):
         raise ColumnsError(f"nothing was imported: correct {written}, then run: {again}")
     if not yes and not asked:
-        raise ColumnsError(f"nobody could be asked whether this is right: look over {written}, then run: {again}")
+        raise ColumnsError(f"nobody confirmed the columns on a terminal: review {written}, then run: {again}")
     with progress(f"importing {path.name}"):
         return import_table(read, proposal.columns)
 
 
 def _write(text: str, folder: Path) -> Path:
-    """Write a columns.toml into `folder` under the first name that is free, or has this text; return its path."""
+    """Write a columns.toml into `folder` under the first name that is free or holds this text; return its path."""
     from thenar.runtime.files import write_atomically
 
     paths = (folder / f"columns{f'-{number}' if number > 1 else ''}.toml" for number in count(1))
@@ -117,7 +117,7 @@ def _print_proposal(proposal: "Proposal") -> None:
 
     for remark in proposal.remarks:
         echo(remark)
-    rows = table(("columns", "read as", "why"), title="What was found")
+    rows = table(("columns", "read as", "why"), title="Detected columns")
     for role in proposal.roles:
         rows.add_row(listed(role.columns), role.role, role.reason)
     out().print(rows)

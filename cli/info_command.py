@@ -1,4 +1,4 @@
-"""`thenar info`: what a .grasps file holds."""
+"""`thenar info`: summarise a .grasps file."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 @click.command("info")
 @click.argument("grasps", type=existing_file)
-@click.option("--plot", type=picture_file, help="Also draw it: a .png or .svg file to write.")
+@click.option("--plot", type=picture_file, help="Also draw the summary to this .png or .svg file.")
 @overwrite_flag
 @json_flag
 def command(grasps: Path, plot: Path | None) -> None:
-    """Tell what GRASPS, a .grasps file, holds: counts, balance, odd columns and rows, and how separable it is.
+    """Summarise GRASPS, a .grasps file: counts, balance, odd columns and rows, and how separable it is.
 
-    Rows in which nothing is held count in no rate. The ceiling is the rate of the best possible memory: no classifier
-    that sees only these inputs is right more often on these rows. The neighbour rate is that of frames by the nearest
-    frame of another trial, with joints in standard deviations.
+    Rows with nothing held count in no accuracy. The ceiling is the accuracy of a perfect memory: no classifier that
+    sees only these inputs is more accurate on these rows. The nearest-neighbour accuracy classifies each frame by the
+    nearest frame of another trial, with joints in standard deviations.
 
     \b
     Example:

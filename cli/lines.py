@@ -1,4 +1,4 @@
-"""Lines on stdout and stderr: whatever the names in them hold, no terminal obeys it and no encoding fails on it."""
+"""Lines on stdout and stderr, safe for terminals and encodings whatever the names in them hold."""
 
 import re
 import sys
@@ -9,37 +9,37 @@ import click
 
 from thenar.drivers.names import printable
 
-# What stays as it is: lines may be several, and tabs part their columns.
+# Left as it is: text may have several lines, and tabs separate columns.
 _LAYOUT = re.compile(r"([\n\t])")
-# What JSON does not escape, and a terminal or an encoding may not take.
+# Left unescaped by JSON, but perhaps unsafe for a terminal or an encoding.
 _DOUBTFUL = re.compile(r"[^\n -~]")
 
 
 def shown(text: str) -> str:
-    """Return `text` for a terminal: characters without a glyph escaped as in Python, except line breaks and tabs."""
+    """Return `text` for a terminal, with characters without a glyph escaped as in Python, except newlines and tabs."""
     if text.isprintable():
         return text
     return "".join(part if part in ("\n", "\t") else printable(part) for part in _LAYOUT.split(text))
 
 
 def echo(text: str, *, err: bool = False) -> None:
-    """Print `text` and a line break on stdout, or with `err` on stderr."""
-    # Left to choose, click writes UTF-8 to a stream that is ASCII.
+    """Print `text` and a newline on stdout, or with `err` on stderr."""
+    # By default, click writes UTF-8 to a stream that is ASCII.
     click.echo(shown(text), file=sys.stderr if err else sys.stdout)
 
 
 def echo_json(text: str) -> None:
-    """Print a JSON document on stdout, as `json_shown` has it."""
+    """Print a JSON document on stdout, escaped by `json_shown`."""
     click.echo(json_shown(text, getattr(sys.stdout, "encoding", None) or "utf-8"), file=sys.stdout)
 
 
 def json_shown(text: str, encoding: str) -> str:
-    """Return the JSON document `text`, with JSON's escapes for characters without a glyph or outside `encoding`."""
+    """Return the JSON document `text`, with JSON escapes for characters without a glyph or outside `encoding`."""
     return _DOUBTFUL.sub(lambda found: _in_json(found[0], encoding), text)
 
 
 def escape_the_unencodable() -> None:
-    r"""Let stdout and stderr write what their encoding lacks as "\u2603", in place of ending the command."""
+    r"""Make stdout and stderr write unencodable characters as "\u2603" instead of failing."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             with suppress(ValueError):  # closed

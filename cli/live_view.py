@@ -1,4 +1,4 @@
-"""The live terminal view of `thenar run`: the grasp, how far to trust it, and how the devices fare."""
+"""The live terminal view of `thenar run`: the grasp, its confidence, and the state of the devices."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -26,11 +26,11 @@ _SHOWN = 6
 class LiveView:
     """Draws the newest grasp ten times a second, in place.
 
-    A thread of its own does: a terminal that is held (Ctrl-S), slow or gone holds up nobody else.
+    It draws in a separate thread: a terminal that is held (Ctrl-S), slow or closed delays nothing else.
     """
 
     def __init__(self, console: Console, status: bool = False) -> None:
-        """With `status`, reports of the glove's health are drawn below the devices."""
+        """Draw health reports of the glove below the devices if `status`."""
         self._status = status
         self._live = Live(console=console, transient=True, auto_refresh=False)
         self._newest: _Shown | None = None
@@ -57,12 +57,12 @@ class LiveView:
         health: HealthReport | None = None,
         progress: Progress | None = None,
     ) -> None:
-        """Draw this next, unless something newer comes first; the devices are asked for then."""
+        """Draw this next, unless something newer arrives first; the devices are queried then."""
         self._newest = grasp, devices, health, progress
 
     def _draw(self) -> None:
         shown = None
-        # Ends with the terminal, too.
+        # The thread also ends when the terminal closes.
         with suppress(OSError):
             while not self._closing.wait(_REDRAW_S):
                 newest = self._newest
@@ -80,7 +80,7 @@ def drawn(
     wrong: Sequence[Quarantined] = (),
     progress: Progress | None = None,
 ) -> RenderableType:
-    """Return the picture of one moment."""
+    """Return the view of one moment."""
     table = Table.grid(padding=(0, 2))
     table.add_row("grasp", Text(grasp.grasp, style=_STYLES[grasp.health]))
     table.add_row("", f"{_bar(grasp.probability)} {grasp.probability:5.1%}")
@@ -118,7 +118,7 @@ def _ms(age_us: int | None) -> str:
 
 
 def health_lines(report: HealthReport | None) -> tuple[str, ...]:
-    """Return how the glove fares, in lines; nothing that is well has one, but the rates."""
+    """Return the glove's health in lines; only problems get a line, apart from the rates."""
     if report is None:
         return ()
     found = {
@@ -129,7 +129,7 @@ def health_lines(report: HealthReport | None) -> tuple[str, ...]:
     }
     rates = f"switches {report.switch_hz:.0f}/s, glove {report.glove_hz:.0f}/s; {report.frames} frames"
     share = f", {report.changing} changing, {report.degraded} degraded, {report.unknown} unknown"
-    late = f", {report.overflowed} frames not taken in time" if report.overflowed else ""
+    late = f", {report.overflowed} frames missed" if report.overflowed else ""
     lines = [rates + share + late, *(f"{what}: {', '.join(names)}" for what, names in found.items() if names)]
     for device in report.devices:
         counts = ", ".join(f"{count.name} {count.value}" for count in device.counts if count.value)

@@ -1,4 +1,4 @@
-"""`thenar merge`: several .grasps files of one glove into one."""
+"""`thenar merge`: merge several .grasps files of one glove."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from .lines import echo
 
 
 class Merged(Struct, frozen=True):
-    """What was written: the set, and what is in it."""
+    """The written set, and its counts."""
 
     output: str
     sets: int
@@ -27,14 +27,14 @@ class Merged(Struct, frozen=True):
 @click.option(
     "--each",
     type=click.Choice(["subject", "session", "object"]),
-    help="The rows of each file are a subject, a session or an object of their own, called as the file is.",
+    help="Treat each file as a separate subject, session or object, named after the file.",
 )
 @json_flag
 def command(sets: tuple[Path, ...], output: Path, each: str | None) -> None:
-    """Merge SETs of one glove: the same switches and joints, one taxonomy, or taxonomies of your own.
+    """Merge SETs of one glove: the same switches and joints, and one taxonomy, or taxonomies of your own.
 
-    A trial that is in two of the files stops the merge, since its rows would be taken for frames of one grasp; --each
-    tells the files apart.
+    A trial found in two of the files stops the merge, because its rows would be mistaken for frames of one grasp;
+    --each keeps the files distinct.
 
     \b
     Example:

@@ -1,4 +1,4 @@
-"""`thenar monitor`: the page of a run elsewhere, or of a recording."""
+"""`thenar monitor`: show the page of a run elsewhere, or of a recording."""
 
 from pathlib import Path
 
@@ -16,18 +16,18 @@ from .web_options import HERE, say_page, token_for, web_token_option
     "--build",
     metavar="BUILD",
     type=existing_folder,
-    help="The build that runs there, or that a recording is scored by.",
+    help="The build used by that run, or to score the recording with.",
 )
-@click.option("--web", metavar="ADDRESS", default=HERE, show_default=True, help="Where the page is.")
+@click.option("--web", metavar="ADDRESS", default=HERE, show_default=True, help="Address of the page.")
 @web_token_option
 def command(source: str, build: Path | None, web: str, web_token: bool) -> None:
     """Show a run elsewhere, or a recording, on a page in the browser.
 
-    ADDRESS is where that run publishes: tcp:HOST:PORT or unix:PATH, as its --sink has it. With ?detail there and
-    --build here the page shows switches, joints and all types' probabilities as well. What is cut is opened again.
+    ADDRESS is where that run publishes: tcp:HOST:PORT or unix:PATH, as in its --sink. With ?detail there and --build
+    here, the page also shows switches, joints and the probabilities of all types. A lost connection is reopened.
 
-    RECORDING is an .mcap file: the page goes to any moment of it, plays it, and shows what was labelled beside what was
-    recognised; with --build also the hand as it was, and the other types' probabilities.
+    RECORDING is an .mcap file: the page jumps to any moment, plays from there, and shows the labels next to the
+    predictions; with --build also the hand at that moment, and the other types' probabilities.
 
     SIGINT, SIGTERM and SIGHUP end it, with exit code 0.
 

@@ -1,4 +1,4 @@
-"""Options of several commands: the placement methods and the trainers, read from their registries."""
+"""Options shared by several commands: the placement methods and the trainers, read from their registries."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
@@ -36,12 +36,12 @@ method_list = ListOf("method", _methods, none=True)
 
 
 class _Scene(click.ParamType[str]):
-    """A shipped scene's name, or a file."""
+    """The name of a shipped scene, or a file."""
 
     name = "scene"
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """Complete the names of shipped scenes, and of files."""
+        """Complete the names of shipped scenes and of files."""
         from thenar.simulator.scenes import shipped
 
         names = [CompletionItem(name) for name in shipped() if name.startswith(incomplete)]
@@ -52,13 +52,13 @@ scene_name = _Scene()
 
 
 def method_option(destination: str = "method", default: str = "id3") -> Callable[[Command], Command]:
-    """Return the option --method, whose value, None where it is not given, the command takes as `destination`."""
+    """Return the option --method; the command takes its value as `destination`, None if it is not given."""
     help_text = f"How switches are chosen: see below.  [default: {default}]"
     return click.option("--method", destination, type=method_name, metavar="NAME", help=help_text)
 
 
 keep_option = click.option(
-    "--keep", type=click.IntRange(1), metavar="M", help="How many switches to keep: for methods that take it."
+    "--keep", type=click.IntRange(1), metavar="M", help="Number of switches to keep, for methods that take it."
 )
 levels_option = click.option(
     "--levels",
@@ -75,7 +75,7 @@ prune_option = click.option(
     metavar="S",
     default=0,
     show_default=True,
-    help="Prune ID3's tree: nodes of fewer than S rows decide nothing.",
+    help="Prune ID3's tree: nodes with fewer than S rows are not split.",
 )
 
 
@@ -84,18 +84,18 @@ def _names(_: click.Context, __: click.Parameter, text: str | None) -> tuple[str
 
 
 def limit_options(command: Command) -> Command:
-    """Add the options that say what a placement must obey, and --robust."""
+    """Add the options that limit a placement, and --robust."""
     for option in (
         click.option(
             "--robust",
             is_flag=True,
-            help="Choose elements for the loss of the worst one; train on rows with lost inputs.",
+            help="Choose elements that minimise the worst single loss; train on rows with lost inputs.",
         ),
         click.option(
             "--budget-us",
             type=Number(0),
             metavar="US",
-            help="Limit the time of a scan of the kept elements, and of a record of the kept joints.",
+            help="Limit the scan time of the kept elements, and the record time of the kept joints.",
         ),
         click.option(
             "--at-most",
@@ -118,21 +118,21 @@ def limit_options(command: Command) -> Command:
 
 
 def warn_of_budget(budget_us: float | None, joints: Sequence[str], glove: "GloveWiring | None") -> None:
-    """Say what `--budget-us` cannot limit."""
+    """Warn about time that `--budget-us` cannot limit."""
     from thenar.compiler.placement.ports import record_times_us
 
     if budget_us is not None and joints and not record_times_us(joints, glove):
         warning(
-            "--budget-us limits the scan of switches and taxels alone: how long reading joints takes is known of a "
-            "CyberGlove's, and these are not"
+            "--budget-us limits only the scan of switches and taxels: the reading time of joints is known only for a "
+            "CyberGlove, and these joints are not one's"
         )
 
 
 class WithMethods(click.Command):
-    """A command whose help ends with all placement methods, by the option that says how many switches they keep."""
+    """A command whose help ends with all placement methods, grouped by the option that sets how many they keep."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write each method's name and what it does."""
+        """Write each method's name and description."""
         from thenar.compiler.placement.methods.base import METHODS
 
         super().format_epilog(ctx, formatter)
@@ -147,26 +147,26 @@ class WithMethods(click.Command):
 
 
 def _remarks(method: "Method") -> str:
-    """Return what a user has to know besides, in brackets."""
+    """Return further remarks for the user, in brackets."""
     remarks = [] if method.ours else ["baseline"]
     remarks += [f"pip install {method.install}"] if method.install else []
     return f" ({'; '.join(remarks)})" if remarks else ""
 
 
 class _TrainerOption(click.Option):
-    """Its help, which is only made when it is asked for, says what each trainer is."""
+    """Its help describes each trainer, and is only made when requested."""
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         from thenar.compiler.trainers.base import TRAINERS
 
         names = ", ".join(f"{trainer.name} ({trainer.what})" for trainer in TRAINERS.values())
-        chosen = f"; {AUTO}: chosen by folds of the training rows, of those that take the settings given"
-        self.help = f"What makes the model: {names}{chosen if self.default == AUTO else ''}."
+        chosen = f"; {AUTO}: chosen by folds of the training rows, among those that take the given settings"
+        self.help = f"What trains the model: {names}{chosen if self.default == AUTO else ''}."
         return super().get_help_record(ctx)
 
 
 class _SettingOption(click.Option):
-    """Its help shows as its default what a trainer takes where it is not given, and not that it has no value."""
+    """Its help shows the trainer's default, although the option itself has none."""
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         record = super().get_help_record(ctx)
@@ -174,14 +174,14 @@ class _SettingOption(click.Option):
 
 
 def trainer_option(default: str) -> Callable[[Command], Command]:
-    """Return the option --trainer; where AUTO is its default, the trainer and its settings can be chosen."""
+    """Return the option --trainer; if its default is AUTO, the trainer and its settings can be chosen."""
     kind = OneOf("trainer", lambda: (AUTO, *_trainers()) if default == AUTO else _trainers())
     return click.option("--trainer", type=kind, default=default, show_default=True, cls=_TrainerOption)
 
 
 class Training(WithMethods):
-    """A command with `trainer_option`: an option for each setting of a trainer follows it, without those that the
-    command has itself. The trainers are imported when the options are asked for, not when the command is defined.
+    """A command with `trainer_option`, followed by an option for each setting of a trainer that the command does not
+    define itself. The trainers are imported when the options are needed, not when the command is defined.
     """
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
@@ -202,8 +202,8 @@ class Training(WithMethods):
 
 
 class Grouped(Training):
-    """A command whose help shows its options in `groups`, by title, settings after the trainer; the rest in a last
-    one.
+    """A command whose help shows its options in `groups`, by title: the settings follow the trainer, and a last group
+    holds the rest.
     """
 
     def __init__(self, *args: Any, groups: Mapping[str, tuple[str, ...]], **named: Any) -> None:
@@ -225,10 +225,9 @@ class Grouped(Training):
 
 
 def asked_settings(context: click.Context, asked: dict[str, Any]) -> dict[str, Any]:
-    """Take what the options of a `Training` command say of the trainer out of `asked`; return the trainer, and the
-    settings that are given.
+    """Remove the trainer's options from `asked` and return the trainer and its given settings.
 
-    Raises UsageError for a setting that is given to a trainer that takes none of that name.
+    Raises UsageError for a setting that the given trainer does not have.
     """
     from thenar.compiler.trainers.base import TRAINERS
 
@@ -241,7 +240,7 @@ def asked_settings(context: click.Context, asked: dict[str, Any]) -> dict[str, A
         if name in own:
             found |= {} if value is None else {name: value}
         elif context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
-            raise click.UsageError(f"--{name.replace('_', '-')} is no setting of --trainer {trainer}: leave it out.")
+            raise click.UsageError(f"--{name.replace('_', '-')} is not a setting of --trainer {trainer}: leave it out.")
     return found
 
 
@@ -255,18 +254,18 @@ def _option(setting: "Setting", chosen: bool) -> click.Option:
         kind = click.INT if ends == (None, None) else click.IntRange(low, high)
     what, _, default = setting.what.partition("  [default: ")
     default = "chosen" if chosen else default.rstrip("]") if setting.default is None else str(setting.default)
-    # Without a value it is not given.
+    # Without a value, click treats the option as not given.
     decls, shown = [f"--{setting.name.replace('_', '-')}", setting.name], default or False
     return _SettingOption(decls, type=kind, show_default=shown, help=what)
 
 
 layout_option = click.option(
-    "--layout", type=existing_file, help="Your glove: a drawing (.svg) or a list (.toml) of where its switches lie."
+    "--layout", type=existing_file, help="Your glove's switch positions: a drawing (.svg) or a list (.toml)."
 )
 
 
 def hand_of(layout: Path | None) -> "HandShape":
-    """Return the glove in the file `layout`, else the one that thenar draws. Raises MapError."""
+    """Return the glove in the file `layout`, or the one that thenar draws. Raises MapError."""
     if layout is None:
         from thenar.simulator.handmaps.handmap import hand_map
 
@@ -277,17 +276,17 @@ def hand_of(layout: Path | None) -> "HandShape":
 
 
 def fitted_hand(layout: Path | None, names: Sequence[str], length_mm: float | None) -> "HandShape | None":
-    """Return the hand with the switches `names`; None where nobody knows where they lie.
+    """Return the hand with the switches `names`, or None if their positions are unknown.
 
-    Raises UsageError for a length that cannot be given to it, MapError for a layout without one of them.
+    Raises UsageError for a length that does not apply, MapError for a layout that lacks one of the switches.
     """
     hand = hand_of(layout)
     if layout is not None and length_mm is not None:
-        raise click.UsageError("--hand-length: the switches of a --layout lie where it says; leave one of them out")
+        raise click.UsageError("--hand-length cannot scale the switches of a --layout: leave one of them out")
     if layout is not None:
         hand.numbers_of(names)
     elif length_mm is not None and hand.fitted(names) is None:
         raise click.UsageError(
-            "--hand-length is of the hand that thenar draws, and these switches are not on it: give a --layout instead"
+            "--hand-length scales the hand that thenar draws, and these switches are not on it: use --layout instead"
         )
     return hand.fitted(names, length_mm)

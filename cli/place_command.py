@@ -1,4 +1,4 @@
-"""`thenar place`: which switches to keep."""
+"""`thenar place`: choose the switches to keep."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """What the user asked for."""
+    """The user's options."""
 
     grasps: Path
     method: str | None
@@ -76,21 +76,25 @@ class _Asked:
 
     @property
     def chosen_by(self) -> "Method":
-        """The method asked for, or the usual one."""
+        """The requested method, or the usual one."""
         from thenar.compiler.placement.methods.base import BEST, METHODS, PAPERS
 
         return METHODS.named(self.method or (BEST if self.population else PAPERS))
 
     def check(self) -> None:
-        """Raise UsageError if the options do not go together."""
+        """Raise UsageError if options conflict."""
         from thenar.compiler.placement.methods.base import PAPERS
 
         method = self.chosen_by
         tree = method.name == PAPERS
         for wrong, reason in (
-            (wants_json() and self.show_tree, "--tree is for people and --json for machines: take one of them"),
-            (self.show_tree and not tree, "--tree prints the tree of the paper's ID3 alone"),
+            (wants_json() and self.show_tree, "--tree is for people and --json for machines: give one of them"),
+            (self.show_tree and not tree, "--tree prints the tree of the paper's ID3 only: leave it out"),
             (self.draw is not None and not (tree or self.population), "--draw draws ID3's tree, or a --population"),
+            (
+                self.exact and self.population,
+                "--exact judges one placement and --population looks for one: take one of them",
+            ),
             (
                 self.exact and self.population,
                 "--exact judges one placement, --population looks for one: take one of them",
@@ -104,8 +108,8 @@ class _Asked:
                 self.population and (self.limited or self.robust),
                 "--population looks for the placement of many subjects: it takes no limits and no --robust",
             ),
-            (self.layout is not None and self.apart_mm is None, "--layout says where switches lie, for --apart-mm"),
-            (self.joints and tree, "--joints is for other methods than the paper's ID3"),
+            (self.layout is not None and self.apart_mm is None, "--layout gives positions for --apart-mm: add that"),
+            (self.joints and tree, "--joints is for methods other than the paper's ID3"),
         ):
             if wrong:
                 raise click.UsageError(reason)
@@ -114,17 +118,17 @@ class _Asked:
             from thenar.compiler.placement.methods.base import METHODS
 
             heeding = ", ".join(name for name, each in METHODS.items() if each.uses_ports)
-            raise click.UsageError(f"--glove says what scans cost: take it with a --method that weighs that: {heeding}")
+            raise click.UsageError(f"--glove gives the scan costs: use it with a --method that weighs them: {heeding}")
         keep_apart(self.grasps, self.glove, self.draw, self.output)
 
     @property
     def limited(self) -> bool:
-        """Whether the placement must obey anything."""
+        """Whether the placement has any limits."""
         given = (self.apart_mm, self.at_most, self.budget_us)
         return bool(self.keep_these or self.never) or any(each is not None for each in given)
 
     def limits(self, grasp_set: "GraspSet") -> "Limits | None":
-        """Return what the placement must obey."""
+        """Return the limits of the placement."""
         from thenar.compiler.placement.constraints import Limits
         from thenar.runtime.manifest import Options
 
@@ -148,7 +152,7 @@ class _Asked:
         return None if self.glove is None else load_harness(self.glove)
 
     def ports(self, grasp_set: "GraspSet") -> "PortCosts | None":
-        """Return what reading each switch costs."""
+        """Return the reading cost of each switch."""
         from thenar.compiler.placement.ports import ports_of_whole_glove
         from thenar.runtime.scanning.plan import unwired
 
@@ -156,7 +160,7 @@ class _Asked:
         lacking = [] if harness is None else unwired(harness, grasp_set.element_names)
         if lacking:
             raise click.UsageError(
-                f"{self.glove} has no place for {min(lacking)!r} of {self.grasps}: name the whole glove's glove.toml."
+                f"{self.glove} does not wire {min(lacking)!r} of {self.grasps}: name the whole glove's glove.toml."
             )
         return ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
 
@@ -207,12 +211,14 @@ class _Asked:
     type=existing_file,
     help="A glove.toml: the costs of its ports, for methods that weigh them.  [default: MCP23017]",
 )
-@click.option("--exact", is_flag=True, help="Also print how far the placement is from the best of the same size.")
-@click.option("--population", is_flag=True, help="Choose one placement for a population of subjects.")
+@click.option("--exact", is_flag=True, help="Also print the gap between the placement and the best of the same size.")
+@click.option("--population", is_flag=True, help="Choose one standard placement for many subjects.")
 @jobs_option("Worker processes of --population.")
 @click.option("--tree", "show_tree", is_flag=True, help="Also print ID3's tree.")
-@click.option("--draw", type=picture_file, help="Also draw ID3's tree, or a population's accuracy: .svg or .png.")
-@click.option("-o", "--output", type=OutputFile(".json"), help="Also store the placement: a .json file to write.")
+@click.option(
+    "--draw", type=picture_file, help="Also draw ID3's tree, or a population's accuracy: an .svg or .png file."
+)
+@click.option("-o", "--output", type=OutputFile(".json"), help="Also store the placement as JSON.")
 @overwrite_flag
 @json_flag
 def command(**options: Any) -> None:
@@ -249,7 +255,7 @@ def command(**options: Any) -> None:
 
 
 def _print(placement: "Placement") -> None:
-    """Print the table of switches, what they are worth, and remarks on how they were found."""
+    """Print the table of switches, their value, and remarks on how they were found."""
     title = "Placement" if placement.study is None else "Standard placement"
     if placement.tree is not None:
         switches = table(("switch", "name", "gain, bits", "cumulative share"), title=title)
@@ -280,7 +286,7 @@ def _sentences(placement: "Placement") -> Iterator[str]:
         )
         yield from _of_tree(placement, tree)
     else:
-        yield f"{kept} {share}{', beside the joints' if placement.joints else ''}. {placement.how}"
+        yield f"{kept} {share}{', in addition to the joints' if placement.joints else ''}. {placement.how}"
     if taxels := {kept.number for kept in placement.switches if kept.above is not None}:
         levels = sum(kept.above is not None for kept in placement.switches)
         yield f"{counted(levels, 'level')} of {counted(len(taxels), 'taxel')}: a taxel is converted once"
@@ -295,9 +301,9 @@ def _kind(placement: "Placement") -> str:
 
 
 def _of_tree(placement: "Placement", tree: "Tree") -> Iterator[str]:
-    """Yield what should not pass in silence: why nothing was decided, or decided without a gain."""
+    """Yield the reasons if nothing was decided, or something was decided without a gain."""
     if placement.entropy_bits == 0:
-        yield "all rows are of one grasp type: there is nothing to tell apart"
+        yield "all rows are of one grasp type: there is nothing to distinguish"
     elif placement.rows < tree.min_samples:
         yield f"no decision was made: the {placement.rows} rows are fewer than S = {tree.min_samples}"
     yield from tree.remarks("switch")
@@ -305,15 +311,15 @@ def _of_tree(placement: "Placement", tree: "Tree") -> Iterator[str]:
 
 def _of_exact(exact: "Exactly", m: int) -> Iterator[str]:
     if not exact.pairs:
-        yield "all rows are of one grasp type: there is nothing to tell apart"
+        yield "all rows are of one grasp type: there is nothing to distinguish"
         return
     yield (
         f"of {exact.pairs:,} pairs of rows of different grasp types, {exact.alike / exact.pairs:.3%} look alike in "
-        f"these {m} switches: no classifier tells them apart"
+        f"these {m} switches: no classifier distinguishes them"
     )
     best = f"the best {m} switches"
     if exact.proved:
-        yield f"{best} leave {exact.best_found / exact.pairs:.3%}, which is proved"
+        yield f"{best} leave {exact.best_found / exact.pairs:.3%}, which is proved optimal"
     else:
         yield (
             f"{best} found leave {exact.best_found / exact.pairs:.3%}; no {m} switches leave less than "
@@ -324,26 +330,26 @@ def _of_exact(exact: "Exactly", m: int) -> Iterator[str]:
 
 
 def _of_study(kept: str, study: "Standard") -> Iterator[str]:
-    from thenar.compiler.placement.drawing import BETTERED
+    from thenar.compiler.placement.drawing import REFINED
 
     yield (
-        f"{kept}, chosen by {study.method}, {BETTERED[study.aim]}: this did best within the subjects learnt from. "
-        f"Learnt again from {study.rows} rows of all {study.subjects} subjects"
+        f"{kept}, chosen by {study.method}, {REFINED[study.aim]}: this did best within the training subjects. "
+        f"Trained again on {study.rows} rows of all {study.subjects} subjects"
     )
     yield (
-        "bettered: the switches chosen last exchanged for the next ones, where half of the subjects learnt from then "
-        "recognise the other half better. Counting badly served subjects more often was tried on 80 simulated hands, "
-        "gained no more than another draw of rows did, and is not done"
+        "refined: the switches chosen last are exchanged for the next ones if half of the training subjects then "
+        "predict the other half better. Counting badly served subjects more often was tried on 80 simulated hands; "
+        "it gained no more than redrawing the rows, and is not done"
     )
 
 
 def _print_served(study: "Standard") -> None:
-    """Print how held-out subjects are served."""
-    from thenar.compiler.placement.drawing import BETTERED
+    """Print the accuracy on held-out subjects."""
+    from thenar.compiler.placement.drawing import REFINED
 
     columns = ("subjects", "placement", "mean, %", "worst tenth, %", "lowest, %")
-    served = table(columns, title=f"Trials recognised of {study.held_out} held-out subjects (new subject)")
+    served = table(columns, title=f"Accuracy on trials of {study.held_out} held-out subjects (new subject)")
     for point in study.curve:
         rates = (point.served.mean, point.served.worst_tenth, point.served.lowest)
-        served.add_row(str(point.subjects), BETTERED[point.aim], *(f"{100 * rate:.1f}" for rate in rates))
+        served.add_row(str(point.subjects), REFINED[point.aim], *(f"{100 * rate:.1f}" for rate in rates))
     out().print(served)

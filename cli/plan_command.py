@@ -1,4 +1,4 @@
-"""`thenar plan`: how the hands of a scene hold objects that nobody planned yet."""
+"""`thenar plan`: plan how the hands of a scene hold objects that have no postures yet."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 @click.command("plan")
 @click.argument("scene", type=scene_name)
 @click.option(
-    "-o", "--output", type=OutputFile(".json"), required=True, metavar="POSTURES.json", help="The file to write."
+    "-o", "--output", type=OutputFile(".json"), required=True, metavar="POSTURES.json", help="Postures to write."
 )
 @overwrite_flag
-@click.option("--anew", is_flag=True, help="Plan everything, also what is planned already.")
+@click.option("--anew", is_flag=True, help="Plan everything, also objects that are already planned.")
 @jobs_option()
 @json_flag
 def command(scene: str, output: Path, anew: bool, jobs: int) -> None:
-    """Plan how hands of all lengths in SCENE hold each of its objects: a TOML file, or a shipped scene by its name.
+    """Plan how hands of all lengths in SCENE hold each of its objects; SCENE is a TOML file, or a shipped scene's name.
 
-    Shipped objects are planned already. To use the postures, a scene names the file: postures = "POSTURES.json".
+    Shipped objects are already planned. To use the postures, name the file in a scene: postures = "POSTURES.json".
 
     \b
     Example:

@@ -19,7 +19,7 @@ from .web_options import say_page
 
 
 class Sensors(Protocol):
-    """What a glove says of itself."""
+    """A glove's description of itself."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -27,7 +27,7 @@ class Sensors(Protocol):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is odd about it, in sentences."""
+        """Its oddities, in sentences."""
 
 
 def calibrate_on_page(
@@ -39,10 +39,10 @@ def calibrate_on_page(
     token: str | None,
     written: Callable[[PoseGuide], str],
 ) -> str:
-    """Lead through the poses on a page, and return what `written` says, which is called when all are taken.
+    """Lead through the poses on a page; call `written` when all are taken, and return its result.
 
-    Raises click.Abort if the user leaves, SettingError or SinkError where the page cannot be served, and what `read`
-    and `written` raise.
+    Raises click.Abort if the user leaves, SettingError or SinkError if the page cannot be served, and the errors of
+    `read` and `written`.
     """
     for note in info.notes:
         err().print(note, soft_wrap=True)
@@ -70,7 +70,7 @@ def calibrate_on_page(
     return said
 
 
-# How hand.js draws a hand of which nothing is asked, and what a pose needs besides to look like itself, in degrees.
+# The pose in which hand.js draws an idle hand, and further angles that a pose needs to be recognisable, in degrees.
 _RELAXED = {
     "thumb_rotation": 20.0,
     "thumb_abduction": 25.0,
@@ -85,7 +85,7 @@ _BESIDES = {
 
 
 def drawn_poses() -> tuple[HandDrawing, dict[str, list[float]]]:
-    """Return a hand with the joints of a CyberGlove of 22 sensors, and their angles in each pose."""
+    """Return a hand with the joints of a CyberGlove with 22 sensors, and their angles in each pose."""
     joints = [Calibration(at, name, "deg", 0, 0.0, 90, 90.0) for at, name in enumerate(SENSORS_22)]
     hand = HandDrawing(view="", placed=False, radius_mm=1.0, switches=(), taxels=(), joints=drawn_joints(joints))
     pictures = {}

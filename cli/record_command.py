@@ -1,4 +1,4 @@
-"""`thenar record`: guided collection of labelled grasps."""
+"""`thenar record`: collect labelled grasps, with guidance."""
 
 import secrets
 from pathlib import Path
@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 @click.option("--glove", type=existing_file, required=True, help="The harness, a glove.toml.")
 @click.option("--taxonomy", default="kamakura14", show_default=True, help="kamakura14, cutkosky16, feix33 or own.")
 @click.option("--subject", required=True, help="Name of the subject.")
-@click.option("--objects", type=existing_file, help="objects.toml: the objects of each grasp type.")
+@click.option("--objects", type=existing_file, help="objects.toml: the objects for each grasp type.")
 @click.option("--repetitions", type=click.IntRange(1), default=100, show_default=True, help="Trials per grasp type.")
 @click.option(
     "--countdown",
     type=Number(0, 3600),
     default=3.0,
     show_default=True,
-    help="Seconds before a grasp is captured.",
+    help="Countdown before a grasp is captured, seconds.",
 )
 @click.option(
     "--none/--no-none",
     default=None,
-    help="Record the empty hand too: open, approaching, releasing, moving idly.  [default: none]",
+    help="Also record the empty hand: open, approaching, releasing, moving idly.  [default: none]",
 )
 @click.option("--seed", type=seed_range, help="Seed of the trial order.  [default: random]")
 @web_options
@@ -51,13 +51,13 @@ def command(
     web_token: bool,
     output: Path,
 ) -> None:
-    """Record labelled grasps: which one to take is shown, in random order, and counted down to.
+    """Record labelled grasps: the command shows which grasp to take, in random order, with a countdown.
 
-    As often as each grasp type the empty hand is recorded, moving for two seconds, so that a build learns when nothing
-    is held; --no-none leaves that out.
+    The empty hand is recorded as often as each grasp type, moving for two seconds, so that a build learns when nothing
+    is held; --no-none omits this.
 
-    Everything that the devices deliver goes into OUTPUT with the ending .mcap. Whatever ends the collection, the same
-    command goes on where it stopped; each time it ends, all trials accepted so far are in OUTPUT.
+    All device data goes into OUTPUT with the ending .mcap. However the collection ends, the same command continues it;
+    each time it ends, all trials accepted so far are in OUTPUT.
 
     \b
     Example:
@@ -76,9 +76,7 @@ def command(
     recording = output.with_suffix(".mcap")
     keep_apart(glove, objects, output, recording)
     if output.exists() and not recording.exists():
-        raise click.UsageError(
-            f"{output} is there, and was not collected into {recording.name}, which is not: name another --output"
-        )
+        raise click.UsageError(f"{output} exists, but its recording {recording.name} does not: name another --output")
     if taxonomy == "own" and objects is None:
         raise click.UsageError("--taxonomy own takes its grasp types from an objects.toml: name it with --objects")
     harness = load_harness(glove)
@@ -109,7 +107,7 @@ def command(
 
 
 def _resumed(journal: "Journal", wanted: "Collection", seed: int | None) -> "Collection":
-    """Return the collection to go on with, which must be the one that was begun."""
+    """Return the collection to continue, which must match the one that was begun."""
     from msgspec.structs import asdict, replace
 
     from thenar.drivers.errors import SettingError
@@ -121,14 +119,14 @@ def _resumed(journal: "Journal", wanted: "Collection", seed: int | None) -> "Col
     for name, value in asdict(wanted).items():
         if value != getattr(begun, name):
             raise SettingError(
-                f"{journal.path} was begun with other {name} than asked for now{_both(getattr(begun, name), value)}: "
-                "go on as it was begun, or name another --output"
+                f"{journal.path} was begun with a different value of {name}{_both(getattr(begun, name), value)}: "
+                "use the original options, or name another --output"
             )
     return wanted
 
 
 def _both(begun: object, wanted: object) -> str:
-    """Return the two values, where they are short enough to be told."""
+    """Return the two values if they are short enough to print."""
     from thenar.runtime.names import shortened
 
     return f" ({shortened(str(begun))}, not {shortened(str(wanted))})" if isinstance(begun, str | int) else ""
@@ -139,12 +137,12 @@ def _write(recording: Path, output: Path, accepted: int, planned: int) -> None:
     from thenar.compiler.text import none_words
 
     if not accepted:
-        echo(f"no trial was accepted: {output} is not written; the same command goes on")
+        echo(f"no trial was accepted: {output} is not written; run the same command to continue")
         return
     with progress(f"importing {recording.name}"):
         grasp_set, report = import_recordings([recording])
     grasp_set.save(output)
     for finding in report.warnings:
         warning(finding.message)
-    rest = "" if accepted == planned else "; the same command goes on"
+    rest = "" if accepted == planned else "; run the same command to continue"
     echo(f"{output}: {len(grasp_set)} grasps{none_words(report.none)}; {accepted} of {planned} trials are done{rest}")

@@ -1,4 +1,4 @@
-"""`thenar run`: the runtime's recogniser, live on a glove or on recorded frames."""
+"""`thenar run`: recognise grasps live on a glove, or in recorded frames."""
 
 import errno
 import os
@@ -45,13 +45,13 @@ if TYPE_CHECKING:
 
 
 class _SinkOption(click.Option):
-    """Its help, which is only made when it is asked for, lists all kinds of sinks, those of other packages too."""
+    """Its help lists all kinds of sinks, including those of other packages, and is only made when requested."""
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         from thenar.runtime.sinks import SINKS
 
         kinds = "; ".join(f"{kind.spelling}, {kind.help}" for kind in SINKS.values())
-        self.help = f"Where grasps go: {kinds}. May be repeated."
+        self.help = f"Where grasps are sent: {kinds}. Repeatable."
         return super().get_help_record(ctx)
 
 
@@ -66,7 +66,7 @@ class _SinkOption(click.Option):
     type=click.IntRange(1),
     default=10_000,
     show_default=True,
-    help="Time from one row of a .grasps set to the next.",
+    help="Time between two rows of a .grasps set.",
 )
 @click.option(
     "--sink",
@@ -76,37 +76,40 @@ class _SinkOption(click.Option):
     cls=_SinkOption,
 )
 @click.option(
-    "--preshape", metavar="NAME", help="Preshapes to send along: barrett_bh8, parallel_gripper or a .toml file."
+    "--preshape", metavar="NAME", help="Preshapes to send with grasps: barrett_bh8, parallel_gripper or a .toml file."
 )
 @click.option(
     "--change-while-held",
     is_flag=True,
-    help="Let the preshape change while something is held, and not only after nothing was.",
+    help="Let the preshape change while something is held, not only after nothing was held.",
 )
 @click.option(
     "--task", metavar="task.json", type=existing_file, help="Follow a task of thenar teach: its steps, and deviations."
 )
 @click.option(
-    "--record", metavar="FILE.mcap", type=OutputFile(".mcap"), help="Record the raw frames, and what came of them."
+    "--record", metavar="FILE.mcap", type=OutputFile(".mcap"), help="Record the raw frames and the predictions."
 )
 @overwrite_flag
 @web_options
 @click.option(
-    "--recordings", type=OutputFolder(), metavar="FOLDER", help="Where the page records.  [default: recordings]"
+    "--recordings",
+    type=OutputFolder(),
+    metavar="FOLDER",
+    help="Folder for recordings of the page.  [default: recordings]",
 )
-@click.option("--full-scan", is_flag=True, help="Read all ports in every scan, even when the rest cannot matter.")
-@click.option("--status", is_flag=True, help="Once a second, how the glove fares: in the view, and to all sinks.")
+@click.option("--full-scan", is_flag=True, help="Read all ports in every scan, even if the rest cannot matter.")
+@click.option("--status", is_flag=True, help="Report the glove's health once a second, in the view and to all sinks.")
 @click.option("--frames", metavar="N", type=click.IntRange(1), help="Stop after N frames.")
 @click.option("--lead", type=Number(0), help="Lead in score units that a new grasp type needs.")
-@click.option("--dwell-ms", type=Number(0, 10_000), help="Time for which it has to keep the lead.")
+@click.option("--dwell-ms", type=Number(0, 10_000), help="Time for which a new grasp type must keep the lead.")
 @click.option("--max-lost", type=Number(0, 1), help="Share of the build's weight that may be missing.")
 @click.option(
     "--grace-ms",
     type=Number(0, 10_000),
-    help="Age up to which a late record of the CyberGlove serves.  [default: four periods, at least 60]",
+    help="Maximum age of a late CyberGlove record.  [default: four periods, at least 60]",
 )
-@click.option("--no-quarantine", is_flag=True, help="Use inputs that are stuck, chatter or drift all the same.")
-@click.option("--error-rate", type=Number(0, 1), help="Decide by a sequential test of this error rate instead.")
+@click.option("--no-quarantine", is_flag=True, help="Use inputs even if they are stuck, chatter or drift.")
+@click.option("--error-rate", type=Number(0, 1), help="Decide by a sequential test with this error rate instead.")
 @click.option("--spacing-ms", type=Number(0, 10_000), help="Minimum spacing of frames in the sequential test.")
 @click.option(
     "--lag-ms", type=Number(0, 10_000), help="Time after which the state of a segment is final.  [default: 150]"
@@ -136,11 +139,11 @@ def command(
     spacing_ms: float | None,
     lag_ms: float | None,
 ) -> None:
-    """Recognise grasps: on the glove that --glove describes, or in the frames that --replay holds.
+    """Recognise grasps: live on the glove that --glove describes, or in the recorded frames of --replay.
 
-    Live, a terminal shows the grasp and how far to trust it; into a pipe or a file goes one JSON line a frame. Devices
-    may come and go: what is missing makes the answer "degraded", and "unknown" when too little is left. SIGINT, SIGTERM
-    and SIGHUP end a run cleanly, with exit code 0.
+    Live, a terminal shows the grasp and its confidence; a pipe or a file gets one JSON line per frame. Devices may be
+    disconnected and connected again: missing inputs make the state "degraded", or "unknown" if too few are left.
+    SIGINT, SIGTERM and SIGHUP end a run cleanly, with exit code 0.
 
     \b
     Example:
@@ -152,7 +155,7 @@ def command(
         thenar run build/ --replay set.grasps --sink jsonl:grasps.jsonl --preshape parallel_gripper
     """
     if (glove is None) == (replay is None):
-        raise click.UsageError("name a glove to run on (--glove) or frames to run through (--replay), one of them")
+        raise click.UsageError("name either a glove to run on (--glove) or recorded frames (--replay)")
     from thenar.runtime import Build
     from thenar.runtime.task import TaskFollower
 
@@ -195,7 +198,7 @@ _POLICY = ("lead", "dwell_ms", "max_lost", "grace_ms", "no_quarantine", "error_r
 
 
 def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
-    """Raise UsageError about an option that would change nothing here."""
+    """Raise UsageError for an option that would have no effect."""
     if click.get_current_context().params["preshape"] is None:
         _refuse("without --preshape", "change_while_held")
     if click.get_current_context().params["web"] is None:
@@ -203,12 +206,12 @@ def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
     if glove is not None:
         _refuse("on a glove", "period_us")
     elif replay is not None and replay.suffix == ".mcap":
-        _refuse("for a recording, which says when its frames came", "period_us", *_LIVE)
+        _refuse("for a recording, which has the times of its frames", "period_us", *_LIVE)
     else:
         held = ("change_while_held", "task")
-        _refuse("for a set of grasps, each row of which is recognised by itself", *held, *_LIVE, *_POLICY)
+        _refuse("for a set of grasps, each row of which is classified alone", *held, *_LIVE, *_POLICY)
     if click.get_current_context().params["error_rate"] is not None:
-        _refuse("beside --error-rate, whose test decides by itself", "lead", "dwell_ms")
+        _refuse("with --error-rate, whose test decides alone", "lead", "dwell_ms")
     else:
         _refuse("without --error-rate", "spacing_ms")
 
@@ -217,7 +220,7 @@ def _refuse(where: str, *names: str) -> None:
     context = click.get_current_context()
     for option in context.command.params:
         if option.name in names and context.get_parameter_source(option.name) is not ParameterSource.DEFAULT:
-            raise click.UsageError(f"{option.opts[0]} changes nothing {where}: leave it out")
+            raise click.UsageError(f"{option.opts[0]} has no effect {where}: leave it out")
 
 
 def _us(ms: float | None) -> int | None:
@@ -225,7 +228,7 @@ def _us(ms: float | None) -> int | None:
 
 
 def _policy(asked: dict[str, Any]) -> "Policy | None":
-    """Return the usual policy with what was `asked` for in its place; None if nothing was."""
+    """Return the usual policy with the `asked` values in it, or None if there are none."""
     from thenar.runtime.policy import Policy
 
     given = {name: value for name, value in asked.items() if value is not None}
@@ -253,7 +256,7 @@ def _run_live(
     status: bool,
     **asked: Any,
 ) -> None:
-    """Run until a signal comes, or so many frames are published."""
+    """Run until a signal arrives, or the given number of frames is published."""
     from thenar.runtime import Glove
 
     from .ending import ended_by_signals
@@ -281,7 +284,7 @@ def _run_live(
 
 
 def _look_on(glove: "Glove", view: "LiveView | None", page: "LivePage | None", frames: int | None) -> None:
-    """Let the glove run, and once a second look how it fares."""
+    """Let the glove run, and check its health once a second."""
     said, health = dict[str, str](), None
     for moment in islice(glove, frames):
         if page is not None:
@@ -297,15 +300,15 @@ def _look_on(glove: "Glove", view: "LiveView | None", page: "LivePage | None", f
 
 
 def _say_news(glove: "Glove", health: "HealthReport", said: dict[str, str]) -> None:
-    """Say on stderr how devices, recording and inputs in quarantine fare, once each time that it changes."""
+    """Print the state of devices, recording and quarantined inputs on stderr whenever it changes."""
     from thenar.runtime.live.sources import NOT_YET
 
     news = {device.name: device.error or "connected" for device in health.devices}
     if glove.recorder is not None and glove.recorder.failure:
         news["recording"] = glove.recorder.failure
     news |= {wrong.name: wrong.what for wrong in health.quarantined}
-    # Devices stay in the news.
-    news |= {name: "behaves again" for name in said if name not in news}
+    # Devices are always reported.
+    news |= {name: "works again" for name in said if name not in news}
     for name, state in news.items():
         if said.get(name) != state and state != NOT_YET:
             _say(of_device(name, state))
@@ -313,7 +316,7 @@ def _say_news(glove: "Glove", health: "HealthReport", said: dict[str, str]) -> N
 
 
 def _nobody_listens(reports: "Sequence[SinkReport]") -> bool:
-    """Return whether every reader went away for good (`| head`)."""
+    """Return whether every reader has gone for good (`| head`)."""
     return bool(reports) and all(report.over for report in reports)
 
 
@@ -326,13 +329,13 @@ def _say_what_was_lost(reports: "Sequence[SinkReport]") -> None:
 
 
 def _spoilt(reports: "Sequence[SinkReport]") -> bool:
-    """Return whether a sink did not do what was asked of it, by more than a reader's leaving."""
+    """Return whether a sink failed, other than by a reader's leaving."""
     gone = os.strerror(errno.EPIPE)
     return any(report.over and report.error != gone for report in reports)
 
 
 def _say(line: str) -> None:
-    """Say it on stderr, where that is still there: a terminal that was closed is told nothing."""
+    """Print a line on stderr, if that is still open: the terminal may have been closed."""
     with suppress(OSError):
         echo(line, err=True)
 
@@ -357,10 +360,10 @@ def _replay_recording(
     policy: "Policy | None",
     follower: "TaskFollower | None",
 ) -> None:
-    """Recognise the frames of a live recording again, at the times at which they were recognised then.
+    """Recognise the frames of a live recording again, at their original times.
 
-    They go to the sinks as the live run sent them, without any as JSON lines to stdout; on stderr, how many came out as
-    they did then.
+    Send them to the sinks as the live run did, or as JSON lines to stdout if there are none; on stderr, print how many
+    match the recording.
     """
     from thenar.runtime.live.replay import moments
     from thenar.runtime.sinks.jsonl import encode
@@ -384,8 +387,8 @@ def _replay_set(
     frames: int | None,
     period_us: int,
 ) -> None:
-    """Recognise every row of a set of grasps by itself, each for the sinks, without any as a JSON line on stdout; on
-    stderr, the rate.
+    """Classify every row of a set of grasps alone and send it to each sink, or as a JSON line to stdout if there is
+    none; on stderr, print the accuracy.
     """
     import msgspec
 
@@ -411,10 +414,10 @@ def _replay_set(
             publish(grasp, None)
     rows = len(grasp_set)
     correct = sum(map(eq, found, grasp_set.grasps.tolist()))
-    echo(f"{correct} of {rows} frames recognised as recorded ({correct / max(rows, 1):.1%})", err=True)
+    echo(f"{correct} of {rows} frames predicted correctly ({correct / max(rows, 1):.1%})", err=True)
     if (trials := len(set(grasp_set.trial_ids.tolist()))) < rows:
         correct = _trials_recognised(grasp_set, found)
-        echo(f"{correct} of {trials} trials, each as most of its frames are ({correct / trials:.1%})", err=True)
+        echo(f"{correct} of {trials} trials by majority of their frames ({correct / trials:.1%})", err=True)
 
 
 def _trials_recognised(grasp_set: "GraspSet", found: list[str]) -> int:
@@ -423,12 +426,12 @@ def _trials_recognised(grasp_set: "GraspSet", found: list[str]) -> int:
     from thenar.compiler.samples import decided
 
     _, first, trial = np.unique(grasp_set.trial_ids, return_index=True, return_inverse=True)
-    names, answers = np.unique(found, return_inverse=True)
-    return int(np.count_nonzero(names[decided(answers[np.newaxis], trial)[0]] == grasp_set.grasps[first]))
+    names, predicted = np.unique(found, return_inverse=True)
+    return int(np.count_nonzero(names[decided(predicted[np.newaxis], trial)[0]] == grasp_set.grasps[first]))
 
 
 def _rows(build: "Build", grasp_set: "GraspSet", period_us: int) -> "Iterator[LiveGrasp]":
-    """Yield what is recognised in each row. Both clocks begin with the set."""
+    """Yield the prediction for each row. Both clocks begin with the set."""
     from thenar.compiler.artifact.verify_firmware import select_inputs
     from thenar.runtime.published import LiveGrasp
 
@@ -458,8 +461,8 @@ def _published(
     line: "Callable[[LiveGrasp, Preshape | None], bytes]",
     follower: "TaskFollower | None" = None,
 ) -> "Iterator[Callable[[LiveGrasp, Moment | None], None]]":
-    """Yield what publishes a replayed grasp with its preshape, and news of a task: to sinks, which wait for their
-    readers, or without any as a `line` on stdout. At the end say what was lost, with exit code 1.
+    """Yield a function that publishes a replayed grasp with its preshape, and news of a task: to sinks, which wait for
+    their readers, or without any as a `line` on stdout. At the end report losses, with exit code 1.
     """
     from thenar.runtime.sinks import Fanout, open_sink
     from thenar.runtime.sinks.jsonl import encode_task

@@ -1,4 +1,4 @@
-"""`thenar segment`: when which grasp began and ended."""
+"""`thenar segment`: find when each grasp began and ended."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,9 +33,7 @@ _SHOWN = 20
 
 
 class Segmented(Struct, frozen=True):
-    """What was found: the segments, in how many seconds of how many streams; and where truth is known, F1 at 10, 25 and
-    50 % of overlap.
-    """
+    """The segments, the streams and their seconds, and F1 at 10, 25 and 50 % of overlap if the truth is known."""
 
     segments: "tuple[FoundSegment, ...]"
     streams: int
@@ -50,15 +48,15 @@ class Segmented(Struct, frozen=True):
     "-o",
     "--output",
     type=OutputFile(*_ENDINGS),
-    help="Write the segments there: a table (.csv), a document of ELAN (.eaf), or annotations (.mcap).",
+    help="Write the segments as a table (.csv), an ELAN document (.eaf), or annotations (.mcap).",
 )
 @click.option(
     "--lag-ms",
     type=Number(min=0, max=10_000),
     help="Decide live, with this lag. [default: from the whole recording, which is exact]",
 )
-@click.option("--picture", type=OutputFile(".svg", ".png"), help="Draw the segments there, with the true ones above.")
-@click.option("--transitions", type=OutputFile(".json"), help="Count there which type follows which.")
+@click.option("--picture", type=OutputFile(".svg", ".png"), help="Draw the segments below the true ones.")
+@click.option("--transitions", type=OutputFile(".json"), help="Count which type follows which, as JSON.")
 @overwrite_flag
 @json_flag
 def command(
@@ -69,11 +67,11 @@ def command(
     picture: Path | None,
     transitions: Path | None,
 ) -> None:
-    """Find when each grasp of FILE begins and ends: whole movements (.grasps), or a recording (.mcap) of
-    what BUILD reads.
+    """Find when each grasp of FILE begins and ends: whole movements (.grasps), or a recording (.mcap) of the inputs of
+    BUILD.
 
-    A segment is one row: start and end in seconds, grasp type, and the mean probability of that type in its frames.
-    Between segments nothing is held. Where FILE says what was held, the truth is drawn above, and F1 is printed.
+    Each segment is one row: start and end in seconds, grasp type, and the mean probability of that type in its frames.
+    Between segments nothing is held. If FILE holds the true labels, they are drawn above and F1 is printed.
 
     \b
     Example:
@@ -127,7 +125,7 @@ def _print(found: Segmented) -> None:
         out().print(grid)
     more = len(found.segments) - _SHOWN
     if more > 0:
-        echo(f"and {more:,} more, which -o FILE.csv and --json have")
+        echo(f"and {more:,} more: list them all with -o FILE.csv or --json")
     streams = counted(found.streams, "stream")
     echo(f"{counted(len(found.segments), 'segment')} in {found.seconds:,.1f} s of {streams}")
     if found.f1 is not None:

@@ -1,4 +1,4 @@
-"""`thenar simulate`: a scene in, a set of grasps out, and what each of its effects does and costs."""
+"""`thenar simulate`: a scene in, a set of grasps out, with the effect and cost of each simulation step."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -36,36 +36,36 @@ if TYPE_CHECKING:
     from thenar.simulator.scenes.scene import Rest, Scene
 
 _MODES = ("--output", "--explain", "--ablate", "--list")
-_SHOWN = 10  # unsettled repetitions that are named one by one
-_OWN = "dim"  # how own steps look
+_SHOWN = 10  # unsettled repetitions that are listed individually
+_OWN = "dim"  # style of the scene-independent steps
 
 
 @click.command("simulate")
 @click.argument("scene", type=scene_name, required=False)
 @click.option(
-    "-o", "--output", type=OutputFile(".grasps"), metavar="SET.grasps", help="Simulate, and write the set there."
+    "-o", "--output", type=OutputFile(".grasps"), metavar="SET.grasps", help="Simulate, and write the set here."
 )
 @overwrite_flag
-@click.option("--explain", is_flag=True, help="Only say which steps would run, in which order, and what each costs.")
-@click.option("--ablate", is_flag=True, help="Remove each effect in turn: what that does to recognition and time.")
-@click.option("--list", "listing", is_flag=True, help="Only list the scenes that are shipped.")
+@click.option("--explain", is_flag=True, help="Only list the steps that would run, in order, and the cost of each.")
+@click.option("--ablate", is_flag=True, help="Remove each effect in turn, and show the change in accuracy and time.")
+@click.option("--list", "listing", is_flag=True, help="Only list the shipped scenes.")
 @click.option("--repetitions", type=click.IntRange(1, 100_000), help="Trials per grasp type and subject.")
 @click.option(
     "--more",
     metavar="N",
     type=click.IntRange(1, 100_000),
-    help="N fresh grasps of each type by each subject instead: the same hands, habits and glove, trials that go on.",
+    help="Simulate N new grasps per type and subject instead: the same hands, habits and glove, later trials.",
 )
 @click.option(
     "--seed",
     type=seed_range,
-    help="Draw everything anew: habits, calibrations, the glove's parts, all grasps. The sizes of the hands stay.",
+    help="Redraw everything random: habits, calibrations, the glove's parts, all grasps. Hand sizes stay.",
 )
-@click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Only this subject; may be given again.")
+@click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Simulate only this subject; repeatable.")
 @click.option(
     "--rest",
     type=click.Choice(("relaxed", "flat")),
-    help="Return to this open hand between grasps, for the scene's rest_ms. The scene records whole movements.",
+    help="Return to this open hand between grasps, for the scene's rest_ms; needs a scene of whole movements.",
 )
 @click.option("--keep-unsettled", is_flag=True, help="Keep repetitions in which the hand did not come to rest.")
 @jobs_option("Worker processes. The set does not depend on it.")
@@ -84,9 +84,9 @@ def command(
     keep_unsettled: bool,
     jobs: int,
 ) -> None:
-    """Simulate SCENE: a TOML file, or a shipped scene by its name.
+    """Simulate SCENE: a TOML file, or a shipped scene's name.
 
-    The same scene gives the same set on any machine and any number of cores. Whatever comes out is simulated.
+    The same scene gives the same set on any machine and any number of cores. All data is labelled as simulated.
 
     \b
     Example:
@@ -120,10 +120,10 @@ def command(
 
 
 def _check_modes(scene: str | None, given: tuple[object, ...], *, keep_unsettled: bool) -> None:
-    """Raise UsageError unless exactly one thing is asked for, with what it needs."""
+    """Raise UsageError unless exactly one mode is given, with the options that it needs."""
     asked = [name for name, value in zip(_MODES, given, strict=True) if value]
     if len(asked) != 1:
-        raise click.UsageError(f"say one of {', '.join(_MODES)}")
+        raise click.UsageError(f"choose one mode: {', '.join(_MODES)}")
     if (asked == ["--list"]) != (scene is None):
         raise click.UsageError(
             "name a scene: a TOML file, or a shipped one (thenar simulate --list)"
@@ -131,12 +131,12 @@ def _check_modes(scene: str | None, given: tuple[object, ...], *, keep_unsettled
             else f"--list shows all shipped scenes: leave out {scene}"
         )
     if keep_unsettled and asked != ["--output"]:
-        raise click.UsageError("--keep-unsettled is about the set that --output writes")
+        raise click.UsageError("--keep-unsettled changes the set that --output writes: name it, or leave this out")
 
 
 @contextmanager
 def _located(name: str) -> Iterator[None]:
-    """Say of what is wrong with a scene in which file and line it stands."""
+    """Add file and line to errors of a scene."""
     from thenar.simulator.errors import SceneError
     from thenar.simulator.scenes.decode import located
 
@@ -161,11 +161,11 @@ def _print_scenes(scenes: "list[Shipped]") -> None:
 
 
 def _print_report(report: "Report", path: Path) -> None:
-    """Print what came out, by grasp type and by step, and warn of what did not settle."""
+    """Print the grasps by type and the cost of each step, and warn of grasps that did not settle."""
     console = out()
     fresh = f"after repetition {report.done}, " if report.done else ""
     none = report.rows - sum(grasp.rows for grasp in report.grasps)
-    free = f" (in {none} nothing is held)" if none else ""
+    free = f" ({none} with nothing held)" if none else ""
     console.print(
         f"{path}: {report.rows} rows{free}, simulated: scene {report.scene}, seed {report.seed}, {fresh}"
         f"{len(report.subjects)} subject(s), {report.repetitions} grasps in {report.seconds:.1f} s"
@@ -173,14 +173,14 @@ def _print_report(report: "Report", path: Path) -> None:
     console.print()
     console.print(_grasps(report))
     if report.lost_frames:
-        console.print(f"{report.lost_frames} frames did not arrive; what is read then is what arrived last")
+        console.print(f"{report.lost_frames} frames were lost; the frame received before is used in their place")
     console.print()
     console.print(_steps(report.steps))
     _warn_of_unsettled(report)
 
 
 def _table(title: str, *columns: str) -> Table:
-    """Return a table whose first column is a name, and is never cut."""
+    """Return a table whose first column is a name and never truncated."""
     made = table(columns, columns[1:], Text(title, "bold"))
     made.title_justify = "left"
     made.columns[0].no_wrap = True
@@ -234,21 +234,21 @@ def _steps(steps: "tuple[StepReport, ...]") -> Table:
 def _warn_of_unsettled(report: "Report") -> None:
     if not report.unsettled:
         return
-    what = "kept as asked" if report.kept_unsettled else "left out of the set (--keep-unsettled keeps them)"
+    what = "kept as requested" if report.kept_unsettled else "left out of the set (--keep-unsettled keeps them)"
     console = err()
     count = f"{len(report.unsettled)} of {report.repetitions} grasps"
-    warning(f"{count} cannot be trusted, and are {what}:")
+    warning(f"{count} did not settle, and are {what}:")
     for one in report.unsettled[:_SHOWN]:
         console.print(
             f"  subject {one.subject}, {one.grasp} with {one.object}, repetition {one.repetition}: {one.why}",
             soft_wrap=True,
         )
     if len(report.unsettled) > _SHOWN:
-        console.print(f"  and {len(report.unsettled) - _SHOWN} more, which --json names")
+        console.print(f"  and {len(report.unsettled) - _SHOWN} more: --json lists them all")
 
 
 def _print_explanation(explanation: "Explanation") -> None:
-    """Print the steps of a scene in the order in which they run, what each does and costs, and what to expect."""
+    """Print the steps of a scene in order, the function and cost of each, and the expected run time."""
     console = out()
     steps = _table(
         f"Steps of scene {explanation.scene}, in order (own: a step that every scene has)",
@@ -275,18 +275,18 @@ def _print_explanation(explanation: "Explanation") -> None:
 
 
 def _expected(explanation: "Explanation") -> str:
-    frames = "every frame" if explanation.timed else "one frame a grasp, as no effect lives in time"
+    frames = "every frame" if explanation.timed else "one frame per grasp, since no effect depends on time"
     wire = ", sent and received as bytes" if explanation.on_wire else ""
     return (
         f"simulated: {frames}{wire}\n"
         f"measured here on {explanation.measured} grasps of {explanation.conditions} conditions: "
         f"{explanation.us_a_grasp:.0f} us a grasp on one core; {explanation.repetitions} grasps on "
-        f"{explanation.workers} core(s) should take about {explanation.expected_s:.1f} s, and the start of processes"
+        f"{explanation.workers} core(s) should take about {explanation.expected_s:.1f} s plus the start of processes"
     )
 
 
 def _print_ablation(ablation: "Ablation") -> None:
-    """Print what each effect does to the recognition rates and to the time."""
+    """Print the effect of each step on accuracy and time."""
     from thenar.simulator.pipeline.effect import EFFECTS
     from thenar.simulator.running.pipeline import DEFAULT_CONTACT
 
@@ -302,8 +302,8 @@ def _print_ablation(ablation: "Ablation") -> None:
         variants.add_row(Text(variant.without or "(nothing)"), *cells, *_times(variant, whole), str(variant.unsettled))
     console.print(variants)
     console.print(
-        f"LogitBoost of {ablation.rounds} rounds on all switches, all joints and both, {ablation.folds} folds within "
-        "each subject; rates in %, with 95 % intervals;\n"
+        f"LogitBoost with {ablation.rounds} rounds on all switches, all joints and both, {ablation.folds} folds within "
+        "each subject; accuracies in %, with 95 % intervals;\n"
         "changes in percentage points, of grasps that settled with and without; time of a few grasps, best of several"
     )
     for variant in ablation.variants:

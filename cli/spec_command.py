@@ -1,4 +1,4 @@
-"""`thenar spec`: the reduced glove of a build, ready to cut, sew, solder and run."""
+"""`thenar spec`: specify the reduced glove of a build, ready to cut, sew, solder and run."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,11 +21,13 @@ _WIRING = "glove.toml"
 
 @click.command("spec")
 @click.argument("build", type=existing_folder)
-@click.option("--hand-length", type=Number(100, 300), metavar="MM", help="From wrist to middle fingertip.")
+@click.option("--hand-length", type=Number(100, 300), metavar="MM", help="Length from wrist to middle fingertip.")
 @layout_option
-@click.option("--glove", type=existing_file, help="The glove.toml of its wiring.  [default: a new one is proposed]")
+@click.option("--glove", type=existing_file, help="The glove.toml of its wiring.  [default: propose a new one]")
 @click.option("--board", type=existing_file, help="The board.toml of the scanner board that reads the switches.")
-@click.option("-o", "--output", type=OutputFolder(), help="Also write the files: a folder; a spec there is replaced.")
+@click.option(
+    "-o", "--output", type=OutputFolder(), help="Also write the files to this folder, replacing a spec there."
+)
 @json_flag
 def command(
     build: Path,
@@ -35,7 +37,7 @@ def command(
     board: Path | None,
     output: Path | None,
 ) -> None:
-    """Describe the reduced glove of a BUILD: where its switches lie, how they are wired, what to buy, what to expect.
+    """Specify the reduced glove of a BUILD: switch positions, wiring, parts to buy, and expected performance.
 
     The files are the pattern at 1:1 as SVG and DXF, lists of switches, wires and materials, a netlist for KiCad, and
     glove.toml.
@@ -66,7 +68,7 @@ def command(
 
 
 def _harness(folder: Path, loaded: "Build", glove: Path | None, board: Path | None) -> "Harness | None":
-    """Return the wiring that was named, the one of the board, or the one that the build holds; None for a new one."""
+    """Return the named wiring, the board's, or the one in the build; None for a new one."""
     from thenar.runtime.harness.loading import load_harness, parse_harness
 
     if glove is not None:
@@ -82,7 +84,7 @@ def _harness(folder: Path, loaded: "Build", glove: Path | None, board: Path | No
 
 
 def _board_pins(path: Path, manifest: "Manifest") -> "BoardPins":
-    """Return how the board in a `board.toml` reaches its keys."""
+    """Return the pins by which the board of a `board.toml` reads its keys."""
     from dataclasses import replace
 
     from thenar.compiler.firmware.board import check_switches, key_names, keys_of, load_board
@@ -105,7 +107,7 @@ def _board_pins(path: Path, manifest: "Manifest") -> "BoardPins":
 
 
 def _print(spec: "SpecSummary", written: str) -> None:
-    """Print what `spec.json` holds, for people, and which files were written."""
+    """Print the content of `spec.json` for people, and the names of the written files."""
     from thenar.compiler.glove.lists import expectations
 
     console = out()

@@ -1,4 +1,4 @@
-"""`thenar split`: a .grasps file into one for each subject, object or session."""
+"""`thenar split`: split a .grasps file by subject, object or session."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from .lines import echo
 
 
 class Part(Struct, frozen=True):
-    """A file that was written: the subject, object or session that it holds, and its number of grasps."""
+    """A written file: its subject, object or session, and its number of grasps."""
 
     name: str
     output: str
@@ -19,14 +19,14 @@ class Part(Struct, frozen=True):
 
 @click.command("split")
 @click.argument("grasps", metavar="SET.grasps", type=existing_file)
-@click.option("--by", type=click.Choice(["subject", "object", "session"]), required=True, help="What a file is of.")
 @click.option(
-    "-o", "--output", metavar="DIR", type=OutputFolder(), required=True, help="The folder to write files into."
+    "--by", type=click.Choice(["subject", "object", "session"]), required=True, help="Write one file for each."
 )
+@click.option("-o", "--output", metavar="DIR", type=OutputFolder(), required=True, help="Folder to write the files to.")
 @click.option("--overwrite", is_flag=True, help="Replace files of the same names; other files stay.")
 @json_flag
 def command(grasps: Path, by: str, output: Path, overwrite: bool) -> None:
-    """Split SET.grasps: one file for each subject, object or session, all of them written or none.
+    """Split SET.grasps into one file per subject, object or session; either all files are written or none.
 
     \b
     Example:

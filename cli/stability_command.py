@@ -1,4 +1,4 @@
-"""`thenar stability`: every hard case, the truth it is held against, and the error."""
+"""`thenar stability`: run every hard numerical case, and compare it with the truth."""
 
 from collections.abc import Iterable
 from importlib.util import find_spec
@@ -15,12 +15,12 @@ from .common import OneOf, OutputFile, jobs_option, json_flag, out, overwrite_fl
 if TYPE_CHECKING:
     from thenar.stability.report import CaseReport, Check, Listed, Report
 
-# What a run, and a page, import sooner or later: better to say at once that it is not there than once in each case.
+# Packages that a run, or a page, imports at some point: better reported missing once at the start than in each case.
 _NEEDED = ("mpmath", "joblib", "scipy", "sklearn")
 _NEEDED_FOR_A_PAGE = ("jinja2", "matplotlib")
-_HEADS = ("check", "held against", "tried", "worst error", "bound", "verdict")
+_HEADS = ("check", "reference", "tried", "worst error", "bound", "verdict")
 _NUMBERS = ("tried", "worst error")
-_CHECK, _REFERENCE = 0, 1  # the columns of words, which take what the others leave
+_CHECK, _REFERENCE = 0, 1  # the columns of words, which share the remaining width
 _NARROWEST = 8
 _GAP = 2
 
@@ -35,18 +35,18 @@ def _names() -> Iterable[str]:
 @click.argument("cases", nargs=-1, metavar="[CASE]...", type=OneOf("case", _names))
 @click.option("--full", is_flag=True, help="Try more and harder inputs, such as 10,000 rounds of boosting: minutes.")
 @click.option("--list", "listing", is_flag=True, help="Only list the cases, and what could go wrong in each.")
-@jobs_option("Worker processes; they change no result.")
+@jobs_option("Worker processes. The result does not depend on it.")
 @click.option(
-    "-o", "--output", type=OutputFile(".html"), metavar="PAGE.html", help="Write a page with table and pictures there."
+    "-o", "--output", type=OutputFile(".html"), metavar="PAGE.html", help="Write a page with the table and pictures."
 )
 @overwrite_flag
 @json_flag
 def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int, output: Path | None) -> int:
-    """Run the hard cases: what could go wrong with the numbers, the truth they are held against, and the worst error.
+    """Run the hard cases: what could go wrong numerically, the truth each is compared with, and the worst error.
 
-    Without a CASE, all of them. The truth is worked out again at 60 digits, independently of the product, or is a fact
+    Without a CASE, run all of them. The truth is recomputed with 60 digits, independently of the product, or is a fact
     that must hold exactly. Exits with 1 if an error exceeds its bound. A run of all cases, and a page, also show Weka's
-    own answers under two settings of its JVM, where java and Weka 3.6 are installed.
+    results under two settings of its JVM, if java and Weka 3.6 are installed.
 
     \b
     Example:
@@ -63,7 +63,7 @@ def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int, output
         show(listed(cases), _print_list)
         return 0
     for name in (*_NEEDED, *(_NEEDED_FOR_A_PAGE if output is not None else ())):
-        # Not imported: how matplotlib is, compiler/pictures.py says.
+        # Not imported here: compiler/pictures.py configures matplotlib.
         if find_spec(name) is None:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
     return _run(cases, full=full, jobs=jobs, output=output)
@@ -75,9 +75,9 @@ def _run(cases: tuple[str, ...], *, full: bool, jobs: int, output: Path | None) 
 
     with progress("hard cases") as report:
         found = run(cases, full=full, jobs=jobs, progress=report)
-    with progress("beside Weka"):
-        beside = beside_weka() if cases == NAMES or output is not None else None
-    result = Report(full, found, beside, all(case.holds for case in found))
+    with progress("comparing with Weka"):
+        weka = beside_weka() if cases == NAMES or output is not None else None
+    result = Report(full, found, weka, all(case.holds for case in found))
     if output is not None:
         _write(result, jobs, output)
     show(result, _print)
@@ -104,7 +104,7 @@ def _print_list(cases: "list[Listed]") -> None:
 
 
 def _print(report: "Report") -> None:
-    """Print a table of each case under what could go wrong in it, what Weka said, and the sum: what fails, if any."""
+    """Print a table for each case, headed by what could go wrong, then Weka's results and the failures, if any."""
     from thenar.stability.report import besides, failures, legend, summary
 
     console = out()
@@ -112,7 +112,7 @@ def _print(report: "Report") -> None:
     for case in report.cases:
         _print_case(console, case, widths)
     if report.beside is not None:
-        console.print(Text("beside Weka", "bold"))
+        console.print(Text("compared with Weka", "bold"))
         for line in besides(report.beside):
             console.print(line)
         console.print()
@@ -150,7 +150,7 @@ def _cells(check: "Check") -> tuple[Text, ...]:
 
 
 def _widths(report: "Report", room: int) -> tuple[int, ...]:
-    """Return the widths of the columns, the same for all cases: words wrap where they must, and nothing is cut."""
+    """Return the widths of the columns, the same for all cases: words wrap, and nothing is truncated."""
     columns = list(
         zip(_HEADS, *(map(str, _cells(check)) for case in report.cases for check in case.checks), strict=True)
     )
@@ -159,7 +159,7 @@ def _widths(report: "Report", room: int) -> tuple[int, ...]:
     widths = [min(_NARROWEST, words[_CHECK]), min(_NARROWEST, words[_REFERENCE]), *words[2:]]
     others = range(_REFERENCE + 1, len(_HEADS))
     left = room - _GAP * (len(_HEADS) - 1) - sum(widths)
-    # First no word is broken, then no number; what is left goes to the words, three parts of five to the check.
+    # First break no word, then no number; the rest goes to the words, three fifths of it to the check.
     aims = [(_CHECK, words[_CHECK]), (_REFERENCE, words[_REFERENCE]), *((column, whole[column]) for column in others)]
     spare = max(0, left - sum(max(0, aim - widths[column]) for column, aim in aims))
     aims += [(_CHECK, words[_CHECK] + 3 * spare // 5), (_REFERENCE, whole[_REFERENCE]), (_CHECK, whole[_CHECK])]

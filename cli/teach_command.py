@@ -1,4 +1,4 @@
-"""`thenar teach`: the task that several demonstrations have in common."""
+"""`thenar teach`: learn the task that several demonstrations have in common."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,24 +34,22 @@ if TYPE_CHECKING:
     "--output",
     type=OutputFile(".json"),
     required=True,
-    help="The task to write; a behaviour tree of the same name (.xml) is written with it.",
+    help="The task to write; a behaviour tree with the same name (.xml) is written too.",
 )
 @click.option(
     "--preshape", metavar="NAME", help="The preshapes of the steps: barrett_bh8, parallel_gripper or a .toml file."
 )
-@click.option(
-    "--transitions", type=existing_file, help="Which type follows which elsewhere, as thenar segment counts it."
-)
+@click.option("--transitions", type=existing_file, help="Counts of which type follows which, from thenar segment.")
 @overwrite_flag
 @json_flag
 def command(
     demonstrations: tuple[Path, ...], build: Path, output: Path, preshape: str | None, transitions: Path | None
 ) -> None:
-    """Find the sequence of grasps that demonstrations have in common: recordings (.mcap) of what BUILD reads, or
-    sets of whole movements (.grasps), each stream of which is one.
+    """Find the sequence of grasps that demonstrations share. They are recordings (.mcap) of the inputs of BUILD,
+    or sets of whole movements (.grasps), each stream of which counts as one.
 
-    A grasp is a step if most of the demonstrations have it there. A step has its preshape, the median of each joint,
-    for how long it was held, and which types may follow. `thenar run --task` follows it.
+    A grasp becomes a step if most demonstrations have it at that place. A step has its preshape, the median of each
+    joint, its duration, and the types that may follow. Use `thenar run --task` to follow the task.
 
     \b
     Example:
@@ -67,7 +65,7 @@ def command(
 
     tree = output.with_suffix(".xml")
     if tree.exists() and not overwrites(click.get_current_context()):
-        raise click.UsageError(f"{tree} is there already: --overwrite replaces it")
+        raise click.UsageError(f"{tree} already exists: add --overwrite to replace it")
     keep_apart(*demonstrations, transitions, output, tree)
     loaded = Build.load(build)
     preshapes = None if preshape is None else load_preshapes(preshape)

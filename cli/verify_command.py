@@ -1,4 +1,4 @@
-"""`thenar verify`: is what runs what was trained?"""
+"""`thenar verify`: check that the deployed tables match the trained model."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,29 +32,29 @@ def _kinds() -> tuple[str, ...]:
     "--firmware",
     type=ListOf("target", _kinds),
     default=(),
-    help="Also compile the classifier for these, and run it there or in a simulator.",
+    help="Also compile the classifier for these targets, and run it there or in a simulator.",
 )
 @click.option(
     "--faults",
     is_flag=True,
-    help="Print the accuracy that each fault leaves: lost or stuck inputs, dead ports.",
+    help="Print the accuracy under each fault: lost or stuck inputs, dead ports.",
 )
 @json_flag
 def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bool) -> int:
-    """Send every row through ensemble, float tables and integer tables, and hold the differences against their bounds.
+    """Classify every row with ensemble, float tables and integer tables, and check the differences against bounds.
 
-    The worst that integers can do is not looked for among the rows: it is worked out, over every frame there is.
+    The worst integer error is not searched for among the rows: it is calculated over all possible frames.
 
-    With --firmware, every score, grasp type, margin and probability of the compiled classifiers is held against
-    Python's: on every row, on 10,000 random frames and on all extreme ones. host runs with sanitizers; avr on the
-    smaller of ATmega328P and ATmega2560 that holds the build, in simavr; cortex-m on an M0+ and an M4, riscv on an
-    RV32IMAC, xtensa on an LX106, in qemu.
+    With --firmware, every score, grasp type, margin and probability of the compiled classifiers is compared with
+    Python's: on every row, on 10,000 random frames and on all extreme ones. host runs with sanitizers; avr runs in
+    simavr on an ATmega328P, or on an ATmega2560 if the build does not fit; cortex-m on an M0+ and an M4, riscv on an
+    RV32IMAC and xtensa on an LX106 run in qemu.
 
-    With --faults, every fault is put to every row: each input lost, and its row standing in, and stuck at each of its
-    values; each port, chip and board of the build's scan map dead; and any two inputs lost.
+    With --faults, every fault is applied to every row: each input lost, with and without its substitute row; each input
+    stuck at each of its values; each port, chip and board of the build's scan map dead; and any two inputs lost.
 
-    Exits with 1 if a bound does not hold or an answer differs. The recordings need not be those that the build was
-    compiled from.
+    Exits with 1 if a bound does not hold or a result differs. The recordings may be others than those that the build
+    was compiled from.
 
     \b
     Example:
@@ -66,10 +66,10 @@ def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bo
     from thenar.compiler.recordings.graspset import GraspSet
 
     if faults and firmware:
-        raise click.UsageError("--faults counts what the tables recognise, --firmware compiles them: take one of them.")
+        raise click.UsageError("--faults measures the tables and --firmware compiles them: give one of them.")
     grasp_set = GraspSet.load(recordings)
     if faults:
-        with progress("putting faults to rows") as report:
+        with progress("applying faults to rows") as report:
             counted = verify_faults(build, grasp_set, report)
         show(counted, _print_faults)
         return 0
@@ -98,18 +98,18 @@ def _print(found: "Verification") -> None:
     if found.scan is not None:
         console.print(
             f"scan map: {found.scan.mean_read:.2f} of {found.scan.ports} ports read on average until a row is decided; "
-            f"rows that change class by that: {found.scan.changed}"
+            f"rows that change class because of that: {found.scan.changed}"
         )
     whose = "rows trained on" if found.same_recordings else "rows of other recordings"
     for counted in found.recognised:
         rate = f"{100 * counted.rate:.1f} % [{100 * counted.low:.1f}, {100 * counted.high:.1f}]"
         console.print(
-            f"recognised by the integers, {whose}: {rate}, {counted.integers:,} of {counted.total:,} {counted.unit}; "
-            f"by the ensemble {counted.ensemble:,}"
+            f"accuracy of the integers, {whose}: {rate}, {counted.integers:,} of {counted.total:,} {counted.unit}; "
+            f"of the ensemble {counted.ensemble:,}"
         )
     if (none := found.nothing_held) is not None:
-        empty = f", and of {none.detected:,} of {none.empty:,} rows of nothing held" if none.empty else ""
-        console.print(f"nothing held, it says of {none.missed:,} of {none.grasps:,} rows of grasps{empty}")
+        empty = f", and for {none.detected:,} of {none.empty:,} rows of nothing held" if none.empty else ""
+        console.print(f"nothing held, predicted for {none.missed:,} of {none.grasps:,} rows of grasps{empty}")
     if found.independent:
         console.print(INDEPENDENT)
     console.print(f"rows that change class: {len(found.changed)}")
@@ -126,7 +126,7 @@ def _print(found: "Verification") -> None:
 def _print_faults(found: "FaultCheck") -> None:
     worst = found.worst
     numbers = ("lost, %", "points less", "stuck, %")
-    lines = table(("input", *numbers, "at"), numbers, "Trials recognised with one input lost, or stuck at its worst")
+    lines = table(("input", *numbers, "at"), numbers, "Accuracy on trials with one input lost, or stuck at its worst")
     for each in sorted(found.inputs, key=lambda each: each.lost):
         rates = (f"{100 * count / worst.total:.1f}" for count in (each.lost, worst.correct - each.lost, each.stuck))
         lines.add_row(each.name, *rates, each.value)
@@ -142,29 +142,29 @@ def _print_faults(found: "FaultCheck") -> None:
 def _print_worst(console: "Console", worst: "WorstCase") -> None:
     frame = f"{len(worst.closed)} switches closed, codes {' '.join(map(str, worst.codes)) or 'none'}"
     console.print(
-        f"worst frame there is: {worst.leader} loses {worst.loss:.3f} steps of its lead over {worst.competitor}, "
+        f"worst possible frame: {worst.leader} loses {worst.loss:.3f} steps of its lead over {worst.competitor}, "
         f"allowed {worst.bound:.3f} ({frame})"
     )
     console.print(
-        f"margin above {worst.safe_margin:.3f} steps, all that the worst frames ask for: "
+        f"margin above {worst.safe_margin:.3f} steps, which covers the worst frames: "
         f"{worst.covered} rows, of which {worst.covered_changed} change class"
     )
     console.print(
-        "furthest sum there is, whole or with inputs missing: "
+        "largest possible sum, with or without missing inputs: "
         f"{worst.reach} for {worst.reaching}, allowed {worst.limit}"
     )
 
 
 def verdict(found: "FirmwareVerification | None") -> str:
-    """Return what to do where verification does not hold: a new build answers no better where C and Python differ."""
+    """Return the advice for a failed verification: a new build does not help where C and Python differ."""
     if found is not None and any(check.differing or check.misnamed for check in found.checks):
-        what = "the answers of C differ, which is a fault of thenar or of the compiler"
+        what = "the C results differ, which is a bug of thenar or of the compiler"
         return f"DOES NOT HOLD: {what}: report it, with the first frame shown"
     return "DOES NOT HOLD: compile the build again"
 
 
 def print_firmware(found: "FirmwareVerification") -> None:
-    """Say of each part whether it answers as Python does, and of the first frame in which it does not."""
+    """Print for each part whether its results match Python's, and the first frame in which they do not."""
     console = out()
     console.print(f"firmware, on {found.rows} rows, {found.extreme} extreme and {found.random} random frames:")
     for check in found.checks:
@@ -192,7 +192,7 @@ def _outcome(check: "TargetCheck") -> str:
     counted = "" if check.worst is None else f", at most {check.worst} {check.unit}"
     stack = "" if check.stack is None else f" and {check.stack} bytes of stack"
     what = "score, grasp type, margin and probability" if check.shares else "score and grasp type"
-    return f"every {what} of {check.frames} frames is Python's{counted}{stack}"
+    return f"every {what} of {check.frames} frames matches Python's{counted}{stack}"
 
 
 def _print_difference(first: "Difference") -> None:

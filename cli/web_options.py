@@ -1,4 +1,4 @@
-"""The options of commands that serve a page, and what they say of it."""
+"""The options of commands that serve a page, and the messages about it."""
 
 import click
 
@@ -9,7 +9,7 @@ HERE = "127.0.0.1:8080"
 web_token_option = click.option(
     "--web-token",
     is_flag=True,
-    help="Show the page only to who has its whole address; needed where other machines reach it.",
+    help="Show the page only to those with its full address; required if other machines can reach it.",
 )
 
 
@@ -26,12 +26,12 @@ def web_options(command: Command) -> Command:
 
 
 def token_for(web_token: bool) -> str | None:
-    """Return the token of a page, a new one, if it shall have one."""
+    """Return a new token for a page, or None if it needs none."""
     from thenar.runtime.web.guard import new_token
 
     return new_token() if web_token else None
 
 
 def say_page(url: str) -> None:
-    """Say where the page is."""
+    """Print the address of the page."""
     err().print(f"thenar: the page is at {url}", soft_wrap=True)

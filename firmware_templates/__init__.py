@@ -1,1 +1,1 @@
-"""Templates of the C99 firmware that a build is turned into."""
+"""Templates of the C99 firmware generated from a build."""

@@ -1,4 +1,4 @@
-"""A template of C and values in, text out."""
+"""Rendering of a template with values to text."""
 
 from functools import lru_cache
 from importlib.metadata import version
@@ -18,22 +18,22 @@ def _environment() -> "Environment":
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
-        autoescape=False,  # C and make know no HTML
+        autoescape=False,  # neither C nor make is HTML
         auto_reload=False,
     )
 
 
 @lru_cache(maxsize=1)
 def _version() -> str:
-    """Return our version, which takes half a millisecond to find."""
+    """Return our version; it is cached, since the lookup takes half a millisecond."""
     return version("thenar")
 
 
 def render(template: str, **values: object) -> str:
     """Return the text of the template `template`, a path below this package that ends in ".j2".
 
-    A template may say where its text is from: `origin`. Raises jinja2's UndefinedError where it asks for a value that
-    is not given.
+    Templates may use `origin`, a line that names the version and the template. Raises jinja2's UndefinedError if a
+    template uses a value that is not given.
     """
     origin = f"thenar {_version()}, template {template}."
     return _environment().get_template(template).render(origin=origin, **values)

@@ -1,4 +1,4 @@
-"""The live side: a build folder in, grasp types out. Imports with the base dependencies alone."""
+"""The live side: a build folder in, grasp types out. Imports with the base dependencies only."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING
@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from .errors import BuildError, FrameError, SealError, ThenarError
     from .glove import Glove
 
-# Names are imported when they are first used: devices take as long as all the rest, and --help needs none of them.
+# Names are imported on first use: devices take as long to import as everything else, and --help needs none of them.
 _HOMES = {
     "Build": ".build",
     "BuildError": ".errors",

@@ -1,4 +1,4 @@
-"""A build folder, loaded: `build.json` says what the tables mean, `tables.bin` holds them, `scan.json` how to read."""
+"""A loaded build folder: `build.json` describes the tables, `tables.bin` holds them, `scan.json` the reading order."""
 
 import hashlib
 from dataclasses import dataclass
@@ -28,12 +28,12 @@ MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME = "build.json", "tables.bin
 
 @dataclass(frozen=True, slots=True)
 class Recognition:
-    """What was recognised in a frame, and how surely.
+    """The prediction for a frame, and its confidence.
 
-    probability is the softmax of the scores of all answers, of nothing held too where the build may refuse a frame, as
-    it is published; a board's, in integers and of the grasp types alone, is that of `Build.softmax`. margin is the lead
-    over the second best in integer steps; degraded says that a switch or a joint was missing and its mean contribution
-    was added for it.
+    probability is the published softmax of the scores of all classes, including nothing held if the build may refuse a
+    frame; a board's probability, in integers and of the grasp types only, is that of `Build.softmax`. margin is the
+    lead over the second best in integer steps; degraded says that a switch or a joint was missing and its mean
+    contribution was added instead.
     """
 
     grasp: str
@@ -46,22 +46,22 @@ class Build:
     """A recogniser for single frames, integer arithmetic only.
 
     A frame is `bits` (s,), the kept switches in the order of `manifest.switches`, and `codes` (j,), the joints in the
-    order of `manifest.joints`. Of equal scores the first grasp type wins. `scan` is how to read the kept switches, None
-    where the build was compiled for no harness. `scorer` is what all that score frames of this build share,
-    and `softmax` makes of scores the probabilities that a board gives, in 65535ths. `none` is
-    the class of frames in which nothing is held, None where no row trained on showed that; then `rejector` says which
-    frames are refused, None where none is, and `none_leads` by how much none leads one that is not, and one that is.
+    order of `manifest.joints`. Of equal scores the first grasp type wins. `scan` is the scan map of the kept switches,
+    None if the build was compiled for no harness. `scorer` is shared by all users of the scores, and `softmax` converts
+    scores to a board's probabilities, in 65535ths. `none` is the class of frames in which nothing is held, None if no
+    training row showed that; then `rejector` decides which frames are refused, None if none is, and `none_leads` holds
+    the leads of none for a frame that is not refused and for one that is.
     """
 
     __slots__ = ("grasps", "manifest", "none", "none_leads", "rejector", "scan", "scorer", "softmax", "tables")
 
     def __init__(self, manifest: Manifest, tables: IntegerTables, scan: ScanMap | None = None) -> None:
-        """Put together what belongs together. Raises BuildError if they describe different builds."""
+        """Combine the parts of a build. Raises BuildError if they describe different builds."""
         named = len(manifest.grasps), len(manifest.switches), len(manifest.joints)
         held = tables.n_classes, tables.n_switches, tables.n_joints
         if named != held:
             raise BuildError(
-                f"{MANIFEST_NAME} names {named[0]} grasp types, {named[1]} switches and {named[2]} joints, "
+                f"{MANIFEST_NAME} names {named[0]} grasp types, {named[1]} switches and {named[2]} joints, but "
                 f"{TABLES_NAME} holds {held[0]}, {held[1]} and {held[2]}: compile the build again"
             )
         if scan is not None:
@@ -92,7 +92,7 @@ class Build:
         proved = manifest.proof.scale, manifest.proof.bound
         if proved != (tables.scale, tables.bound):
             raise BuildError(
-                f"{where / MANIFEST_NAME} proves a scale of {proved[0]!r} and a bound of {proved[1]}, {TABLES_NAME} "
+                f"{where / MANIFEST_NAME} has a scale of {proved[0]!r} and a bound of {proved[1]}, but {TABLES_NAME} "
                 f"has {tables.scale!r} and {tables.bound}: compile the build again"
             )
         return cls(manifest, tables, _load_scan(where, manifest))
@@ -103,10 +103,10 @@ class Build:
 
     def classify(self, bits: ArrayLike, codes: ArrayLike) -> str:
         """Return the grasp type of one frame, "none" if nothing is held. Raises FrameError."""
-        lanes = self._answers(self.scorer.lanes(bits, codes), bits, codes)
+        lanes = self._all_scores(self.scorer.lanes(bits, codes), bits, codes)
         return self.manifest.answers[lanes.index(max(lanes))]
 
-    def _answers(
+    def _all_scores(
         self,
         lanes: tuple[int, ...],
         bits: ArrayLike,
@@ -114,7 +114,7 @@ class Build:
         lost_switches: ArrayLike = False,
         lost_joints: ArrayLike = False,
     ) -> tuple[int, ...]:
-        """Return the scores of all answers: with one of none, if the build may refuse the frame."""
+        """Return the scores of all classes, with one for none if the build may refuse the frame."""
         if self.rejector is None:
             return lanes
         n_switches, n_joints = self.tables.n_switches, self.tables.n_joints
@@ -130,7 +130,7 @@ class Build:
         lost_switches: ArrayLike | None = None,
         lost_joints: ArrayLike | None = None,
     ) -> Recognition:
-        """Return what is recognised in one frame by itself, and how surely.
+        """Return the prediction for a single frame, and its confidence.
 
         Parameters
         ----------
@@ -139,9 +139,9 @@ class Build:
         codes : array of int, shape (j,)
             The joints' codes, 0 to 65535.
         lost_switches : array of bool, shape (s,), optional
-            The switches that could not be read; whatever `bits` says of them, their mean contribution is added.
+            The switches that could not be read; their mean contribution is added, whatever `bits` says.
         lost_joints : array of bool, shape (j,), optional
-            The same of joints.
+            The same for joints.
 
         Raises
         ------
@@ -149,13 +149,13 @@ class Build:
             If the frame does not fit the build.
         """
         if lost_switches is None and lost_joints is None:
-            lanes, degraded = self._answers(self.scorer.lanes(bits, codes), bits, codes), False
+            lanes, degraded = self._all_scores(self.scorer.lanes(bits, codes), bits, codes), False
         else:
             switches = np.zeros(self.tables.n_switches, bool) if lost_switches is None else lost_switches
             joints = np.zeros(self.tables.n_joints, bool) if lost_joints is None else lost_joints
             lanes = self.scorer.lanes_without(bits, codes, switches, joints)
             degraded = bool(np.any(switches) or np.any(joints))
-            lanes = self._answers(lanes, bits, codes, switches, joints)
+            lanes = self._all_scores(lanes, bits, codes, switches, joints)
         second, best = sorted(lanes)[-2:]
         winner = lanes.index(best)
         probability = softmax(lanes, winner, self.tables.scale)
@@ -167,7 +167,7 @@ def _mask(flags: ArrayLike) -> Mask:
 
 
 def load_manifest(folder: Path) -> Manifest:
-    """Return what the `build.json` in `folder` says. Raises BuildError."""
+    """Return the content of the `build.json` in `folder`. Raises BuildError."""
     path = folder / MANIFEST_NAME
     return manifest_from_bytes(read_member(path, manifest_file.MAX_BYTES), str(path))
 

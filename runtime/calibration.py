@@ -1,12 +1,12 @@
-"""A CyberGlove's calibration, and what it makes of a record's bytes: the joint codes of a build, and angles in rad.
+"""A CyberGlove's calibration, which converts a record's bytes to the joint codes of a build and to angles in rad.
 
 The two points of a calibration are bytes and values. A build codes a value v as
 
     code = code_a + (v - value_a) / step,   step = (value_b - value_a) / (code_b - code_a)
 
-by the two points that its recordings were coded by. So the two bytes have codes, and a straight line gives all other
-bytes theirs (`code_line`). Importing recordings and the C of firmware work out the same: a live byte gets the code that
-a recorded one got.
+by the two points by which its recordings were coded. So the two bytes have codes, and a straight line gives the codes
+of all other bytes (`code_line`). Importing recordings and the firmware's C calculate the same: a live byte gets the
+code that a recorded one got.
 """
 
 import math
@@ -30,20 +30,20 @@ from .toml_struct import convert
 _BYTES = 256
 # The unit of recorded bytes that are not calibrated.
 _RAW = "raw"
-# A CyberGlove never sends 0: it ends a record.
+# A CyberGlove never sends 0, which ends a record.
 _RAW_CODES = range(1, _BYTES)
 
 
 def load_calibration(path: Path) -> GloveCalibration:
-    """Return the calibration that `thenar calibrate` wrote. Raises SettingError with file, line and key."""
+    """Return the calibration written by `thenar calibrate`. Raises SettingError with file, line and key."""
     source = read_source(path, SettingError)
     return convert(source, (), source.tables(), GloveCalibration)
 
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """What the bytes of a stream's joints mean where it is not calibrated: the numbers that it sends, which are in the
-    unit of the recordings.
+    """The meaning of the bytes of an uncalibrated stream's joints: the numbers that it sends, in the unit of the
+    recordings.
     """
 
     sensors: tuple[SensorCalibration, ...]
@@ -53,21 +53,21 @@ Meaning = GloveCalibration | Numbers | None
 
 
 def numbers_of(ranges: Mapping[str, tuple[float, float]]) -> Numbers:
-    """Return what bytes mean of a stream whose joints have these ranges."""
+    """Return the meaning of the bytes of a stream whose joints have these ranges."""
     return Numbers(tuple(SensorCalibration(name, 1, low, 255, high) for name, (low, high) in ranges.items()))
 
 
 class CodeTables:
-    """The joints of a build as look-ups into a record's bytes. The last record's codes are kept: switches come several
-    times as often as records do. `lost` are the joints whose bytes in it are 0: nothing was measured.
+    """The joints of a build as lookup tables for a record's bytes. The last record's codes are kept, because switches
+    are read several times per record. `lost` are the joints whose bytes in it are 0: nothing was measured.
     """
 
     __slots__ = ("_last", "_last_codes", "_pick", "_sensors", "_tables", "lost")
 
     def __init__(self, joints: Sequence[Calibration], sensor_names: Sequence[str], calibration: Meaning = None) -> None:
-        """Take the joints as the build's manifest has them, and the sensors' names in wire order.
+        """Take the joints in the order of the build's manifest, and the sensors' names in wire order.
 
-        Raises SettingError if the glove lacks a joint, or if its bytes cannot be turned into the build's codes.
+        Raises SettingError if the glove lacks a joint, or if its bytes cannot be converted to the build's codes.
         """
         self._sensors = len(sensor_names)
         places = [place_of(joint.name, sensor_names) for joint in joints]
@@ -78,13 +78,13 @@ class CodeTables:
         self.lost: Mask = 0
 
     def codes(self, sensors: bytes) -> list[int]:
-        """Return the codes of the build's joints, in its order, not to be changed. Raises FrameError for a record of
+        """Return the codes of the build's joints, in its order; do not modify them. Raises FrameError for a record of
         another length.
         """
         if sensors == self._last:
             return self._last_codes
         if len(sensors) != self._sensors:
-            raise FrameError(f"a CyberGlove record of {len(sensors)} sensors, {self._sensors} are named")
+            raise FrameError(f"a CyberGlove record has {len(sensors)} sensors, but {self._sensors} are named")
         self._last, self._last_codes = sensors, list(map(getitem, self._tables, picked := self._pick(sensors)))
         whole = all(picked)
         self.lost = (
@@ -96,8 +96,8 @@ class CodeTables:
 class Joints:
     """The newest record of a CyberGlove as the codes of a build's joints, for one thread.
 
-    A record counts for two of its periods. After that it is late, and serves until it is `grace_us` old. One of a glove
-    that is not plugged into its box holds no measurement.
+    A record is current for two of its periods. After that it is late, but is used until it is `grace_us` old. A record
+    of a glove that is not plugged into its box holds no measurement.
     """
 
     __slots__ = ("_coded", "_codes", "_grace_us", "_last", "_longest_us", "_wanted", "newest")
@@ -110,7 +110,7 @@ class Joints:
         period_us: int | None,
         grace_us: int = 0,
     ) -> None:
-        """Take what `CodeTables` takes, and how often records should come; None: there is no CyberGlove.
+        """Take the arguments of `CodeTables`, and the period of records; None: there is no CyberGlove.
 
         Raises SettingError if the CyberGlove cannot serve the build.
         """
@@ -121,7 +121,7 @@ class Joints:
         self._codes = None if period_us is None else CodeTables(joints, sensor_names, calibration)
 
     def codes(self, now_us: int, frame: GloveFrame | None) -> list[int] | None:
-        """Take the newest record that came; return the joints' codes, None while they are lost. Raises FrameError."""
+        """Take the newest record; return the joints' codes, None while they are lost. Raises FrameError."""
         if not self._wanted:
             return []
         if self._codes is None:
@@ -141,14 +141,14 @@ class Joints:
         return 0 if self._codes is None or not self._last else self._codes.lost
 
     def late(self, now_us: int) -> bool:
-        """Return whether the codes are of a late record."""
+        """Return whether the codes are from a late record."""
         return self._wanted and now_us > self.newest.expires_us
 
 
 class AngleReader:
-    """Turns a record's sensor bytes into angles: a table of 256 angles a sensor, made once.
+    """Converts a record's sensor bytes to angles, by a table of 256 angles per sensor, made once.
 
-    `sensor_names` are the record's, in wire order; sensors that the calibration does not know are left out.
+    `sensor_names` are the record's, in wire order; sensors missing from the calibration are left out.
     """
 
     __slots__ = ("_names", "_pick", "_tables")
@@ -156,13 +156,13 @@ class AngleReader:
     def __init__(
         self, sensor_names: Sequence[str], calibration: GloveCalibration, read: Sequence[str] | None = None
     ) -> None:
-        """Raise SettingError if the calibration, which is in degrees, knows none of the sensors; of which `read` are
+        """Raise SettingError if the calibration, which is in degrees, has none of the sensors; only `read` are
         measured, None: all.
         """
         known = {sensor.name: sensor for sensor in calibration.sensors if read is None or sensor.name in read}
         found = [(number, known[name]) for number, name in enumerate(sensor_names) if name in known]
         if not found:
-            raise SettingError("the calibration knows none of the glove's sensors: it is of another glove")
+            raise SettingError("the calibration has none of the glove's sensors: it is for another glove")
         self._names = tuple(sensor.name for _, sensor in found)
         self._pick = _picker([number for number, _ in found])
         self._tables = [tuple(math.radians(sensor.value(raw)) for raw in range(_BYTES)) for _, sensor in found]
@@ -173,14 +173,14 @@ class AngleReader:
 
 
 def _picker(places: Sequence[int]) -> Callable[[bytes], tuple[int, ...]]:
-    """Return what picks the bytes at these places, and the first of them once more: of a single one itemgetter makes no
-    tuple.
+    """Return a function that picks the bytes at these places, then the first again: for a single place itemgetter
+    returns no tuple.
     """
     return itemgetter(*places, *places[:1]) if places else lambda _sensors: ()
 
 
 def place_of(joint: str, sensor_names: Sequence[str]) -> int:
-    """Return which of the sensors a joint of a build is. Raises SettingError if the glove has none of that name."""
+    """Return the sensor index of a joint of a build. Raises SettingError if the glove has no such sensor."""
     if joint in sensor_names:
         return list(sensor_names).index(joint)
     raise SettingError(
@@ -190,13 +190,13 @@ def place_of(joint: str, sensor_names: Sequence[str]) -> int:
 
 
 def codes_of_bytes(joint: Calibration, calibration: Meaning) -> tuple[int, ...]:
-    """Return the code of each byte, 0 to 255, of the sensor of `joint`. Raises SettingError where there is none."""
+    """Return the code of each byte, 0 to 255, of the sensor of `joint`. Raises SettingError if there is none."""
     if calibration is None or (isinstance(calibration, Numbers) and joint.unit == _RAW):
         return _raw(joint)
     if isinstance(calibration, GloveCalibration) and calibration.unit != joint.unit:
         raise SettingError(
-            f"the glove is calibrated in {calibration.unit!r}, joint {joint.name!r} of the build is in {joint.unit!r}: "
-            "compile recordings in that unit"
+            f"the glove is calibrated in {calibration.unit!r}, joint {joint.name!r} of the build in {joint.unit!r}: "
+            "compile recordings in the calibration's unit"
         )
     lines = {line.name: line for line in calibration.sensors}
     if joint.name not in lines:

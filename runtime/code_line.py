@@ -1,7 +1,7 @@
-"""From a raw reading to a code, in integers alone: the same number in Python and in the C of firmware.
+"""From a raw reading to a code, with integers only: the same number in Python and in the firmware's C.
 
-A calibration says which codes the readings of two points have. Between them, and beyond, runs a straight line. What
-lies midway between two codes gets the even one. The codes of the two points are rounded once, to 2^-24 of a code.
+A calibration gives the codes of two readings. A straight line runs between them and beyond. A value midway between two
+codes gets the even one. The codes of the two points are rounded once, to 2^-24 of a code.
 """
 
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ from thenar.drivers.errors import SettingError
 from .manifest import Calibration
 
 HIGHEST_CODE = 65535
-# Readings are integers from -65535 to 65535; those beyond count as the nearest.
+# Readings are integers from -65535 to 65535; readings beyond count as the nearest.
 FARTHEST = 65535
-# Bits of a point's code behind the point, and the most that it has before it: so all fits into 64 bits.
+# Fraction bits of a point's code, and the most integer bits: so all fits into 64 bits.
 FRACTION, _WHOLE = 24, 20
 
 
 class Point(NamedTuple):
-    """A reading, and the code that it has, in 2^-24 of a code."""
+    """A reading and its code, in 2^-24 of a code."""
 
     reading: int
     code: int
@@ -28,9 +28,9 @@ class Point(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class CodeLine:
-    """The line through two points, whose codes are held to `least` to `most`.
+    """The line through two points, with codes clipped to `least` to `most`.
 
-    Raises ValueError if the two have one reading, or lie further apart than the C can hold.
+    Raises ValueError if the two have the same reading, or are further apart than the C can hold.
     """
 
     a: Point
@@ -57,15 +57,15 @@ class CodeLine:
 def code_point(coded: Calibration, value: float) -> int:
     """Return the code that a build gives to a value of a joint or a taxel, in 2^-24 of a code.
 
-    Raises SettingError where that is none, or lies far beyond all codes.
+    Raises SettingError if there is none, or if it is far beyond all codes.
     """
     try:
         step = (coded.value_b - coded.value_a) / (coded.code_b - coded.code_a)
         code = coded.code_a + (value - coded.value_a) / step
     except ZeroDivisionError:
-        raise SettingError(f"the two points of {coded.name!r} in the build are no line: compile it again") from None
+        raise SettingError(f"the two points of {coded.name!r} in the build make no line: compile it again") from None
     if not isfinite(code):
-        raise SettingError(f"the calibration of {coded.name!r} is no number: calibrate the glove again")
+        raise SettingError(f"the calibration of {coded.name!r} is not a number: calibrate the glove again")
     if abs(code) >= 1 << _WHOLE:
         raise SettingError(
             f"the calibration of {coded.name!r} has {value:g} {coded.unit} at one of its points, which is far beyond "
@@ -75,5 +75,5 @@ def code_point(coded: Calibration, value: float) -> int:
 
 
 def code_line(coded: Calibration, a: tuple[int, float], b: tuple[int, float]) -> CodeLine:
-    """Return the line through two readings and their values, in the unit that a build codes. Raises SettingError."""
+    """Return the line through two readings and their values, in the unit of the build. Raises SettingError."""
     return CodeLine(Point(a[0], code_point(coded, a[1])), Point(b[0], code_point(coded, b[1])))

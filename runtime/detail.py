@@ -1,4 +1,4 @@
-"""What a grasp came of, as people look at it: closed switches, joints in their unit, the probability of every type."""
+"""The details of a grasp for people: closed switches, joints in their unit, the probability of every type."""
 
 import math
 from collections.abc import Sequence
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 class Detail(msgspec.Struct, frozen=True):
     """A moment.
 
-    closed         a character a kept switch, in the build's order: "1" closed, "0" open
-    unread         "1" for those that were left unread, of which `closed` says nothing
+    closed         a character per kept switch, in the build's order: "1" closed, "0" open
+    unread         "1" for those that were left unread, for which `closed` means nothing
     joints         the value of each joint of the build, in its unit; None while they are lost
-    probabilities  of every answer of the build, in its order, by the newest frame of which nothing was left unread;
-                   None while too little can be read
+    probabilities  of every class of the build, in order, from the newest frame without unread inputs; None while too
+                   little can be read
     """
 
     closed: str
@@ -30,7 +30,7 @@ class Detail(msgspec.Struct, frozen=True):
 
 
 class Details:
-    """Says what the moments of a run of `build` came of."""
+    """Makes the details of the moments of a run of `build`."""
 
     def __init__(self, build: "Build") -> None:
         self._switches, self._scale = build.tables.n_switches, build.tables.scale
@@ -41,7 +41,7 @@ class Details:
         ]
 
     def __call__(self, moment: "Moment") -> Detail:
-        """Return what a moment came of."""
+        """Return the details of a moment."""
         frame = moment.switches
         return Detail(
             closed=self._bits(0 if frame is None else frame.closed),

@@ -1,4 +1,4 @@
-"""What can go wrong between a build folder, a glove, a recording and a recognised grasp."""
+"""Errors between a build folder, a glove, a recording and a recognised grasp."""
 
 from thenar.drivers.errors import ThenarError
 
@@ -6,11 +6,11 @@ __all__ = ["BuildError", "FrameError", "HarnessError", "McapError", "SealError",
 
 
 class SealError(ThenarError, ValueError):
-    """A sealed file is not what it claims to be: foreign, truncated, altered, oversized or of a newer format."""
+    """A sealed file is not valid: foreign, truncated, altered, oversized or of a newer format."""
 
 
 class BuildError(ThenarError, ValueError):
-    """A build folder cannot be used as it stands."""
+    """A build folder cannot be used as it is."""
 
 
 class FrameError(ThenarError, ValueError):
@@ -18,8 +18,8 @@ class FrameError(ThenarError, ValueError):
 
 
 class HarnessError(ThenarError, ValueError):
-    """A harness cannot be as its file says, or does not fit the build; the message names file, line and key."""
+    """A harness is invalid or does not fit the build; the message names file, line and key."""
 
 
 class McapError(ThenarError, ValueError):
-    """A recording cannot be read: no MCAP, none of thenar's, or altered. The message names the file and the byte."""
+    """A recording cannot be read: not MCAP, not from thenar, or altered. The message names the file and the byte."""

@@ -11,19 +11,18 @@ __all__ = ["is_special", "open_file", "read_file", "sync_folder", "write_atomica
 
 
 def write_atomically(path: Path, data: bytes, mode: int = 0o666) -> None:
-    """Write `data` to `path`: temporary file beside it, fsync, rename, fsync of the folder.
+    """Write `data` to `path`: temporary file in the same folder, fsync, rename, fsync of the folder.
 
-    A reader sees the old file or the new one, never a part; after a kill or a full disk the old one is still there.
-    The file's mode is `mode` without the bits of the umask.
-    Raises OSError as the operating system gives it, with `path` as its file; also where `path` is a device or a pipe,
-    which a rename would replace.
+    A reader sees the old file or the new one, never a part; after a kill or a full disk the old one is still there. The
+    file's mode is `mode` without the bits of the umask. Raises OSError as the operating system gives it, with `path` as
+    its file; also if `path` is a device or a pipe, which a rename would replace.
     """
     if is_special(path):
         raise OSError(errno.EINVAL, "is a device or a pipe, not a file that could be replaced", str(path))
     try:
         _write_beside_and_rename(path, data, mode)
     except OSError as reason:
-        # The user has never heard of the temporary file.
+        # The user does not know the temporary file.
         raise OSError(reason.errno, reason.strerror, str(path)) from reason
 
 
@@ -46,7 +45,7 @@ def _write_beside_and_rename(path: Path, data: bytes, mode: int) -> None:
 
 
 def is_special(path: Path) -> bool:
-    """Return whether something is there that is neither a file nor a folder, such as /dev/null."""
+    """Return whether the path is neither a file nor a folder, such as /dev/null."""
     return path.exists() and not path.is_file() and not path.is_dir()
 
 

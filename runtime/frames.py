@@ -1,7 +1,7 @@
-"""What devices deliver: the newest state of the switches, the newest record of the glove, each with its own time.
+"""The data from devices: the newest state of the switches and the newest record of the glove, each with its time.
 
-Times are integer microseconds of the host's monotonic clock, which no change of the date can step. A set of switches is
-one Python integer: bit k is switch k of the list that was asked for (a build's kept switches, in the build's order).
+Times are integer microseconds of the host's monotonic clock, which no change of the date affects. A set of switches is
+one Python integer: bit k is switch k of the requested list (a build's kept switches, in the build's order).
 """
 
 from collections.abc import Iterable
@@ -22,8 +22,8 @@ def now_us() -> int:
 
 @dataclass(frozen=True, slots=True)
 class GloveFrame:
-    """One record of the CyberGlove: when its last byte came in, its sensors' bytes in wire order, and its status byte
-    where the glove sends one.
+    """One record of the CyberGlove: arrival time of its last byte, its sensors' bytes in wire order, and its status
+    byte if the glove sends one.
     """
 
     time_us: int
@@ -42,11 +42,11 @@ class SwitchFrame:
 
     time_us  when the last port was read
     closed   which switches are closed
-    lost     which could not be read (their bits in `closed` mean nothing): a port is silent
-    unread   which were left unread, because with the joints of `glove` (None: lost) the leader could not be overtaken
-             any more; joined with another frame of the glove, nothing would be certain
-    glove    the glove's frame to join this one with, where the scan could have ended by it; None: the newest
-    taxels   the codes of the harness's taxels, in its order, None for those that were not read; None: none was
+    lost     which could not be read, because a port is silent (their bits in `closed` mean nothing)
+    unread   which were left unread, because with the joints of `glove` (None: lost) the leader could no longer be
+             overtaken; combined with another frame of the glove, nothing would be certain
+    glove    the glove's frame to combine this one with, if the scan could have ended because of it; None: the newest
+    taxels   the codes of the harness's taxels, in order, None for those that were not read; None: none was
     """
 
     time_us: int
@@ -57,20 +57,20 @@ class SwitchFrame:
     taxels: tuple[int | None, ...] | None = None
 
 
-# A frame counts for so many of its periods: one more may be late, two may not.
+# A frame is current for this many of its periods: one more may be late, two may not.
 PERIODS = 2
 F = TypeVar("F", SwitchFrame, GloveFrame)
 
 
 class Newest(Generic[F]):
-    """The newest frame of a device, and the last moment at which it counts, which is fixed when it arrives.
+    """The newest frame of a device, and its expiry, which is fixed when it arrives.
 
-    A frame that claims to be of the future is taken to be of the moment at which it came: whatever a device's clock
-    says, a frame ages from then on.
+    A frame with a time in the future gets its arrival time: whatever a device's clock says, a frame ages from then on.
+
 
     frame       None before the first
     time_us     when it was read; -1 before the first
-    expires_us  until when it counts
+    expires_us  its expiry
     """
 
     __slots__ = ("expires_us", "frame", "time_us")
@@ -80,11 +80,11 @@ class Newest(Generic[F]):
         self.time_us = self.expires_us = -1
 
     def take(self, frame: F, now_us: int, longest_us: int) -> None:
-        """Take what came in by now: the same frame again, or another, which counts for `longest_us` from the time at
-        which it was read; one older than the newest is dropped.
+        """Take a frame that has arrived by now: the same again, or another, which is current for `longest_us` from its
+        reading time; one older than the newest is dropped.
         """
         last = self.frame
-        # Times first: to compare all of two frames takes longer, and they seldom are the same.
+        # Times first: comparing whole frames takes longer, and they are seldom equal.
         if last is not None and frame.time_us == last.time_us and frame == last:
             return
         time_us = min(frame.time_us, now_us)
@@ -92,14 +92,14 @@ class Newest(Generic[F]):
             self.frame, self.time_us, self.expires_us = frame, time_us, time_us + longest_us
 
     def fresh(self, now_us: int) -> F | None:
-        """Return the newest frame, None once it has expired."""
+        """Return the newest frame, or None once it has expired."""
         return self.frame if now_us <= self.expires_us else None
 
 
 class Rewired:
-    """Turns a set of a device's bits into a set of switches: bit by bit where `pairs` (bit, switch) say so.
+    """Converts a set of a device's bits to a set of switches, as given by `pairs` (bit, switch).
 
-    Calling it costs a look-up as long as nothing changes: a hand rests for many scans.
+    A call costs a lookup as long as nothing changes: a hand rests for many scans.
     """
 
     __slots__ = ("_last", "_pairs", "_turned", "targets")
@@ -118,8 +118,8 @@ class Rewired:
 
 
 class Pauses:
-    """Notes which switches are read, and for how long the others have not been: of a switch that is read again after a
-    pause, nothing that was read before it says anything.
+    """Tracks which switches are read, and how long the others have not been: for a switch that is read again after a
+    pause, earlier readings say nothing.
     """
 
     __slots__ = ("_away", "_known", "pause_us")
@@ -130,7 +130,7 @@ class Pauses:
         self._away: list[tuple[int, Mask]] = []
 
     def over(self, time_us: int, known: Mask) -> Mask:
-        """Return which of the switches that are read now were not read for longer than `pause_us`."""
+        """Return the switches that are read now but were not read for longer than `pause_us`."""
         over, away = 0, []
         for since_us, switches in self._away:
             if time_us - since_us > self.pause_us:

@@ -1,4 +1,4 @@
-"""`Glove`: a glove that recognises grasps, as an iterator of what it publishes."""
+"""`Glove`: a glove that recognises grasps, as an iterator of published moments."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
@@ -34,74 +34,74 @@ _REPORT_US = 1_000_000
 
 
 class Feed(Protocol):
-    """Where frames come from: the devices of the harness, as a rule."""
+    """The origin of frames: usually the devices of the harness."""
 
     def take(self) -> Taken:
         """Return the newest frames, and all that arrived since the last call, after waiting for something new."""
 
 
 class Glove:
-    """A glove that recognises grasps: an iterator of the moments that it publishes, without an end.
+    """A glove that recognises grasps: an endless iterator of published moments.
 
-    Devices may come and go: what is missing makes an answer "degraded", and "unknown" when too little is left. Whenever
-    a device has delivered something, and when something has become too old, there is a moment.
+    Devices may be disconnected and connected again: missing inputs make the health "degraded", and "unknown" when too
+    few are left. There is a moment whenever a device has delivered something, and when something has expired.
 
     Parameters
     ----------
     build : Build, str or path
-        What recognises: a build, or its folder.
+        The recogniser: a build, or its folder.
     harness : Harness, str or path
-        How the glove is wired: a harness, or its `glove.toml`.
+        The glove's wiring: a harness, or its `glove.toml`.
     policy : Policy, optional
-        When a grasp type is decided on, and when too much is missing.
+        The rules of when a grasp type is decided on, and when too much is missing.
     preshapes : str or path, optional
-        Preshapes of a robot's hand: a table that ships, "barrett_bh8" or "parallel_gripper", or a file of your own.
+        Preshapes of a robot's hand: a shipped table, "barrett_bh8" or "parallel_gripper", or a file of your own.
     change_while_held : bool
-        Whether the preshape may change while something is held. Otherwise that takes nothing held in between, where the
-        build was trained with rows of that.
+        Whether the preshape may change while something is held. Otherwise it changes only after nothing was held, if
+        the build was trained with such rows.
     sinks : sequence of str or Sink
-        Where each moment goes besides: "unix:/run/grasps", as `thenar run --sink` spells them.
+        Further receivers of each moment: "unix:/run/grasps", as `thenar run --sink` spells them.
     record : str or path, optional
-        A new .mcap file for the raw frames and what came of them.
+        A new .mcap file for the raw frames and the predictions.
     recordable : bool
         Whether recordings may begin later (`new_recording`): all sensors are read, as for `record`.
     full_scan : bool
-        Whether every scan reads all ports, even when the rest cannot matter.
+        Whether every scan reads all ports, even if the rest cannot matter.
     task : str or path, optional
-        A task of `thenar teach`: sinks get how far the hand has come in it, whenever that changes.
+        A task of `thenar teach`: sinks get the hand's progress in it, whenever it changes.
     status : bool
         Whether sinks get a report of the glove's health once a second, and whenever a device comes or goes.
     stop : threading.Event, optional
         Ends the iteration when it is set.
     feed : Feed, optional
-        Where frames come from in place of the harness's devices, which are then left alone.
+        The origin of frames instead of the harness's devices, which are then not opened.
 
     Attributes
     ----------
     frames : int
-        How many moments there were.
+        The number of moments so far.
     system : System
-        The build and the harness, put together.
+        The build and the harness, combined.
     sources : Sources
         The devices.
     recorder : Recorder or None
-        What writes the recording.
+        The writer of the recording.
     follower : TaskFollower or None
-        What follows the hand through `task`: its `progress` says where it is.
+        The follower of the hand through `task`; `progress` is its state.
     health : HealthReport or None
-        How the glove fares, worked out anew once a second, and whenever a device comes or goes, or an input is
-        quarantined or taken back.
+        The glove's health, updated once a second, and whenever a device comes or goes, or an input is quarantined or
+        released.
     lacking : str
-        A sentence on grasp types for which `preshapes` names none; "" if there are none.
+        A sentence on grasp types that have no preshape in `preshapes`; "" if there are none.
 
     Raises
     ------
     BuildError, HarnessError, PreshapeError, SettingError
-        If one of them cannot be used, or they do not fit each other. Nothing is opened before.
+        If one of them is invalid, or they do not fit each other. Nothing is opened before.
     SinkError, OSError
         On entering the context, if a sink or the recording cannot be opened.
     SettingError
-        While iterating, if a device can never work as the harness says.
+        While iterating, if a device can never work as configured in the harness.
 
     Examples
     --------
@@ -138,7 +138,7 @@ class Glove:
         self.frames, self.lacking = 0, ""
         self.health: HealthReport | None = None
         self.recorder: Recorder | None = None
-        # A recording is to be learnt from: it holds all sensors.
+        # A recording is for training: it holds all sensors.
         whole = recordable or record is not None
         devices = system.sources(full_scan=full_scan, all_sensors=whole)
         self._recognizer, self.sources = system.recognizer(), devices
@@ -186,8 +186,8 @@ class Glove:
         return self
 
     def __next__(self) -> Moment:
-        """Return the next moment. What is recorded is in the order in which it was used: the frames that came in, then
-        the grasp that came of the newest of them; so a replay of the recording gives the same grasps.
+        """Return the next moment. Recordings are in the order of use: the frames that arrived, then the grasp predicted
+        from the newest of them; so a replay of the recording gives the same grasps.
         """
         if self.stop.is_set():
             raise StopIteration
@@ -213,29 +213,29 @@ class Glove:
         return moment
 
     def new_recording(self, path: Path) -> Recorder:
-        """Return a recording of this glove that has begun. Only the thread that iterates may set it as `recorder`, or
-        take it away; whoever made it closes it.
+        """Return a running recording of this glove. Only the thread that iterates may set it as `recorder`, or remove
+        it; its creator closes it.
 
-        Raises SettingError where the file exists, OSError as the operating system gives it.
+        Raises SettingError if the file exists, OSError as the operating system gives it.
         """
         return Recorder(path, self._session(), marks=self._recordable)
 
     @property
     def has_preshapes(self) -> bool:
-        """Whether a robot's hand is told what to do."""
+        """Whether a robot's hand is controlled."""
         return self._selector is not None
 
     def devices(self) -> tuple[DeviceHealth, ...]:
-        """Return how every device fares now."""
+        """Return the current state of every device."""
         return self.sources.health()
 
     def reports(self) -> tuple[SinkReport, ...]:
-        """Return how every sink is doing."""
+        """Return the state of every sink."""
         return self._fanout.reports()
 
     def _with_record(self, taken: Taken) -> Taken:
-        """Return what was taken, with a record of the joints where they come on demand and the switches cannot decide
-        without: it is asked for, and awaited for as long as records count.
+        """Return the frames, with a record of the joints if they come on demand and the switches cannot decide without:
+        it is requested, and awaited for as long as records are current.
         """
         if self.feed is not self.sources:
             return taken
@@ -247,7 +247,7 @@ class Glove:
         return taken
 
     def _leave_out(self, now: int) -> None:
-        """Let no scan end early by what is quarantined, and say so at once."""
+        """Let no scan end early because of quarantined inputs, and report them at once."""
         quarantine = self._recognizer.quarantine
         if quarantine.found != self._quarantined:
             self._quarantined, self._due_us = quarantine.found, now

@@ -1,8 +1,8 @@
-"""`hand.json`: where a build's inputs lie on the hand, for pages that draw it (pages/hand.js).
+"""`hand.json`: the positions of a build's inputs on the hand, for pages that draw it (pages/hand.js).
 
-Places are in mm, x to the right and y up, on the glove laid flat: a right hand, palm up, or as a layout has it. Where
-nobody knows them, switches and taxels stand in a grid, in the build's order, and `placed` says so. Its bytes are
-canonical: fields in the order of the structs below, without blanks, one newline at the end. `build.json` holds its
+Positions are in mm, x to the right and y up, on the glove laid flat: a right hand, palm up, or as in a layout. If they
+are unknown, switches and taxels are placed in a grid, in the build's order, and `placed` is false. Its bytes are
+canonical: fields in the order of the structs below, without spaces, one newline at the end. `build.json` holds its
 SHA-256; builds of older versions have no such file, and are drawn as a grid.
 """
 
@@ -22,7 +22,7 @@ from .names import fault, shortened
 HAND_NAME = "hand.json"
 SCHEMA = 1
 MAX_BYTES = 4 << 20
-# Of the grid: there is room for a name under each place.
+# Spacing of the grid: it leaves room for a name under each place.
 _COLUMNS, _PITCH_MM, _RADIUS_MM = 4, (50.0, 22.0), 3.0
 _MOST_POINTS = 1 << 16
 
@@ -34,7 +34,7 @@ Lines = Annotated[tuple[Line, ...], Meta(max_length=1024)]
 _DIGITS = {name: name for name in ("thumb", "index", "middle", "ring", "little")}
 _DIGITS |= {"pinky": "little", "pinkie": "little"}
 _OUTWARD = ("middle", "index", "ring", "thumb", "little")
-# Words in a joint's name, and what it moves; the first that is found counts.
+# Words in a joint's name, and the movement each means; the first match counts.
 _MOVES = {
     **dict.fromkeys(("abduction", "adduction", "abd", "spread"), "abduction"),
     **dict.fromkeys(("rotation", "roll", "opposition", "cmc", "tmj", "tm"), "rotation"),
@@ -49,7 +49,7 @@ _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
 
 class Spot(Struct, frozen=True, forbid_unknown_fields=True):
-    """A name and where it is written."""
+    """A name and its position."""
 
     name: Name
     x_mm: Length
@@ -57,23 +57,23 @@ class Spot(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class DrawnSwitch(Spot, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A switch of the glove, and which kept one it is, counted from 0 in the build's order; None: it is not kept."""
+    """A switch of the glove, and its index among the kept ones, from 0 in the build's order; None: it is not kept."""
 
     bit: Count | None = None
 
 
 class DrawnTaxel(Spot, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A taxel of the glove, and its kept levels: the code above which each is closed, rising, and which kept switch of
-    the build it is.
+    """A taxel of the glove, and its kept levels: the code above which each is closed, ascending, and its index among
+    the kept switches of the build.
     """
 
     levels: tuple[tuple[Code, Count], ...] = ()
 
 
 class DrawnJoint(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A joint of the build, counted from 0 in its order, with the least and the most of its values, in its unit.
+    """A joint of the build, counted from 0 in its order, with the least and the greatest of its values, in its unit.
 
-    digit  "thumb" to "little", "palm" or "wrist"; "" where the name does not say
+    digit  "thumb" to "little", "palm" or "wrist"; "" if the name does not say
     moves  "rotation", "abduction", "mcp", "pip", "dip", "ip", "curl" (all of a digit), "arch", "pitch" or "yaw"
     """
 
@@ -89,9 +89,9 @@ class DrawnJoint(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=
 class HandDrawing(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The content of `hand.json`.
 
-    view       what one sees, in words
-    placed     whether the places are those on the glove
-    radius_mm  of the circle that stands for a switch
+    view       a description of the view
+    placed     whether the positions are those on the glove
+    radius_mm  of the circle drawn for a switch
     outline    points along the edge of the hand; strips: closed lines, creases: open lines; labels: names of digits
     """
 
@@ -109,7 +109,7 @@ class HandDrawing(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 def load_hand(folder: Path, manifest: Manifest) -> HandDrawing:
-    """Return the drawing in the build's folder; a grid where the build has none.
+    """Return the drawing in the build's folder, or a grid if the build has none.
 
     Raises BuildError, naming the file, if it is missing, damaged, or of another build.
     """
@@ -125,7 +125,7 @@ def hand_to_bytes(hand: HandDrawing) -> bytes:
 
 
 def hand_from_bytes(data: bytes, manifest: Manifest, what: str = HAND_NAME) -> HandDrawing:
-    """Return what a `hand.json`, which messages call `what`, says of the build.
+    """Return the drawing in a `hand.json`, whose name in messages is `what`.
 
     Raises BuildError if it is oversized, no such document, of a newer schema, or of another build.
     """
@@ -136,7 +136,7 @@ def hand_from_bytes(data: bytes, manifest: Manifest, what: str = HAND_NAME) -> H
 
 
 def _contradictions(hand: HandDrawing, manifest: Manifest) -> Iterator[str]:
-    """Yield what it says that is not true of the build."""
+    """Yield the contradictions between the drawing and the build."""
     spots: tuple[Spot, ...] = (*hand.labels, *hand.switches, *hand.taxels)
     for name in (*(spot.name for spot in spots), *(joint.name for joint in hand.joints)):
         if reason := fault(name):
@@ -165,7 +165,7 @@ def grid_hand(manifest: Manifest, ranges: Sequence[tuple[int, int]] | None = Non
     places = {name: (wide * (at % _COLUMNS), -high * (at // _COLUMNS)) for at, name in enumerate(names)}
     taxels = tuple(switch.source for switch in manifest.switches if switch.threshold is not None)
     return HandDrawing(
-        view="switches and taxels in the order of the build; where they lie on the hand is not known" if names else "",
+        view="switches and taxels in the order of the build; their positions on the hand are unknown" if names else "",
         placed=False,
         radius_mm=_RADIUS_MM,
         switches=drawn_switches(manifest, {name: at for name, at in places.items() if name not in taxels}),
@@ -175,13 +175,13 @@ def grid_hand(manifest: Manifest, ranges: Sequence[tuple[int, int]] | None = Non
 
 
 def drawn_switches(manifest: Manifest, places: dict[str, tuple[float, float]]) -> tuple[DrawnSwitch, ...]:
-    """Return switches at their places, by name, as the build keeps them or does not."""
+    """Return switches at their positions, by name, and which of them the build keeps."""
     bits = {switch.name: bit for bit, switch in enumerate(manifest.switches) if switch.threshold is None}
     return tuple(DrawnSwitch(name, x, y, bits.get(name)) for name, (x, y) in places.items())
 
 
 def drawn_taxels(manifest: Manifest, places: dict[str, tuple[float, float]]) -> tuple[DrawnTaxel, ...]:
-    """Return taxels at their places, by name, with the levels that the build keeps."""
+    """Return taxels at their positions, by name, with the levels that the build keeps."""
     levels: dict[str, list[tuple[int, int]]] = {name: [] for name in places}
     for bit, switch in enumerate(manifest.switches):
         if switch.threshold is not None:
@@ -192,8 +192,8 @@ def drawn_taxels(manifest: Manifest, places: dict[str, tuple[float, float]]) -> 
 def drawn_joints(
     joints: Sequence[Calibration], ranges: Sequence[tuple[int, int]] | None = None
 ) -> tuple[DrawnJoint, ...]:
-    """Return joints with what their names say they move, from the lowest to the highest value that was seen: `ranges`
-    of codes; without them, those that the two points of their calibration have.
+    """Return joints with the movements that their names mean, from the lowest to the highest observed value: `ranges`
+    of codes; without them, the codes of the two points of their calibration.
     """
     found = []
     for number, joint in enumerate(joints):
@@ -209,7 +209,7 @@ def _value(joint: Calibration, code: int) -> float:
 
 
 def moved_by(name: str) -> tuple[str, str]:
-    """Return which digit a joint of this name is of, and what it moves there; ("", "") where the name does not say.
+    """Return the digit of a joint of this name, and its movement; ("", "") if the name does not say.
 
     An abduction between two digits moves the one that is further from the middle finger.
     """

@@ -1,4 +1,4 @@
-"""`build.json`: what a build is made of, from what, with which options and with what proof.
+"""`build.json`: the content of a build, its sources, its options and its verified bounds.
 
 Its bytes are canonical: fields in the order of the structs below, indented by two, one newline at the end; no date, no
 path, no host. `checksum` is the SHA-256 of those bytes with that field empty.
@@ -20,7 +20,7 @@ from .segmenting.model import SegmentModel
 SCHEMA = 1
 MAX_BYTES = 16 << 20
 
-AUTO, PAPERS_TRAINER = "auto", "logitboost"  # trainers: the one that is chosen, and the paper's
+AUTO, PAPERS_TRAINER = "auto", "logitboost"  # trainers: automatic choice, and the paper's
 
 Inputs = Literal["both", "switches", "joints"]
 TableBits = Literal[8, 16]
@@ -44,14 +44,14 @@ _T = TypeVar("_T")
 
 
 def _written(default: _T) -> _T:
-    """Return a field that has a default and is written all the same."""
+    """Return a field that has a default and is still written."""
     made: _T = field(default_factory=lambda: default)
     return made
 
 
 class Origin(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The recordings: SHA-256 of their content, number of rows, taxonomy, number of switches to choose from; what
-    simulated them, which recordings leave out; and whether each row is stated to be a trial of its own.
+    """The recordings: SHA-256 of their content, number of rows, taxonomy, number of switches to choose from; the
+    simulation that made them, absent for recordings; and whether each row is stated to be a separate trial.
     """
 
     fingerprint: Digest
@@ -63,7 +63,7 @@ class Origin(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 
 
 class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Every option of `thenar compile`, with its default; of those from `tolerance` on, defaults are left out.
+    """Every option of `thenar compile`, with its default; defaults from `tolerance` on are left out.
 
     Attributes
     ----------
@@ -75,31 +75,31 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     inputs : {"both", "switches", "joints"}
         Which of the recordings' inputs are used.
     folds, seed : int
-        Of the pooled cross-validation; 0 folds: no rate is measured but that of the rows trained on.
+        Folds and seed of the pooled cross-validation; 0 folds: only the accuracy on training rows is measured.
     by : {"trial", "subject", "object", "session"} or None
-        What the folds of the first rate leave out; None: a subject where there are several, and trials otherwise.
+        What the folds of the first accuracy leave out; None: a subject if there are several, else trials.
     table_bits : {16, 8}
         With 8, steps are coarse enough for firmware with 8-bit entries.
     placement, keep : str, int or None
-        The method that chooses the switches, and how many it keeps, where it is not pruned by S.
+        The method that chooses the switches, and how many it keeps, unless it is pruned by S.
     width : int
         No sum of the tables needs more bits, 4 to 16.
     trainer, settings : str, dict
-        What makes the model, and the settings that only it takes, by name. "auto": of the trainers that take the
-        settings given, the one that inner folds choose; with `rounds` that is LogitBoost.
+        The trainer, and its specific settings by name. "auto": of the trainers that take the given settings, the one
+        that inner folds choose; with `rounds` that is LogitBoost.
     levels : int or None
-        How many levels of a taxel there are to choose from, at most; None: as many as are usual.
+        Maximum number of levels of a taxel to choose from; None: the usual number.
     keep_joints : int or None
-        How many joints are kept, at most, chosen after the switches; None: all.
+        Maximum number of joints kept, chosen after the switches; None: all.
     robust : bool
         Choose and train for the worst single lost input.
     keep_these, never : tuple of str
-        Switches and taxels that are kept in any case, and that are not.
+        Switches and taxels that are always kept, and those that never are.
     apart_mm, at_most_taxels, budget_us : float, int, float; or None
-        The least distance of what is kept, the most taxels, and the most that a scan may take.
+        Minimum distance between kept elements, maximum number of taxels, and maximum scan time.
     refuse : float
-        The share of grasps that may be refused where no row shows that nothing is held; 0: none is. Builds of older
-        versions leave it out, and refuse nothing either.
+        The share of grasps that may be refused if no row has nothing held; 0: none is. Builds of older versions leave
+        it out, and refuse nothing either.
     """
 
     prune: Count = _written(0)
@@ -129,12 +129,12 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
 
 
 class Compared(Struct, frozen=True, forbid_unknown_fields=True):
-    """A way to train, as inner folds of the training rows saw it.
+    """A trainer with its settings, as evaluated on inner folds of the training rows.
 
-    correct  trials recognised, of `total` that were tested in them
-    error    the rate's standard error
+    correct  trials predicted correctly, of `total` tested ones
+    error    the accuracy's standard error
     loss     mean of -ln P(true type) over the trials
-    behind   by how much its rate lacks the best one's; behind_error: the standard error of that difference
+    behind   difference from the best accuracy; behind_error: the standard error of that difference
     rows     rows of its score tables, on average
     """
 
@@ -150,7 +150,7 @@ class Compared(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def rate(self) -> float:
-        """Recognised trials as a share of all."""
+        """Correctly predicted trials as a share of all."""
         return self.correct / self.total
 
     @property
@@ -176,11 +176,11 @@ def fit_name(trainer: str, settings: Mapping[str, float | str | None]) -> str:
 
 
 class Fitting(Struct, frozen=True, forbid_unknown_fields=True):
-    """The trainer that made the model, values for all its settings, and how they were chosen.
+    """The trainer of the model, values for all its settings, and how they were chosen.
 
-    of        what the rates of the inner folds are of; folds: how many there were
-    tried     how many ways to train were compared
-    compared  the best of each trainer, and the chosen one; empty where there was nothing to choose
+    of        what the accuracies of the inner folds measure; folds: their number
+    tried     number of candidates that were compared
+    compared  the best of each trainer, and the chosen one; empty if there was nothing to choose
     why       a sentence
     """
 
@@ -193,7 +193,7 @@ class Fitting(Struct, frozen=True, forbid_unknown_fields=True):
     why: str = ""
 
     def number(self, name: str) -> float:
-        """Return a setting that is a number; 0 where there is none of this name."""
+        """Return a setting that is a number; 0 if there is none of this name."""
         value = self.settings.get(name)
         return 0.0 if value is None or isinstance(value, str) else value
 
@@ -215,7 +215,7 @@ class Calibration(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Threshold(Struct, frozen=True, forbid_unknown_fields=True):
-    """A level of a taxel, what makes a switch of it: closed at codes above `code`. `value`, in the unit of `taxel`, is
+    """A level of a taxel, which makes it a switch: closed at codes above `code`. `value`, in the unit of `taxel`, is
     midway to the next code.
     """
 
@@ -225,9 +225,9 @@ class Threshold(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A kept switch: its column in the recordings, from 0, its name, and the information (bits) that it brought: to the
-    tree of ID3, or alone where another method chose it; of a taxel, which follow the switches, also the threshold. A
-    taxel may have several, each a switch with a name of its own.
+    """A kept switch: its column in the recordings, from 0, its name, and the information (bits) that it brought: to
+    ID3's tree, or alone if another method chose it; for a taxel, which follow the switches, also the threshold. A taxel
+    may have several, each a switch with a separate name.
 
     closed_least, closed_most  for each grasp type, in 255ths, the share of a subject's trials in which it is closed, of
                                the subject with the least and the most; "" in builds of older versions
@@ -244,12 +244,12 @@ class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 
     @property
     def source(self) -> str:
-        """The name of the column and of the glove's input: its own, or that of the taxel that it is a level of."""
+        """The name of the column and of the glove's input: its own, or that of the taxel whose level it is."""
         return self.name if self.threshold is None else self.threshold.taxel.name
 
     @property
     def closed(self) -> str:
-        """When a taxel is closed, in words: "closed above 0.41 N (codes above 83)"; of a switch ""."""
+        """When a taxel is closed, in words: "closed above 0.41 N (codes above 83)"; for a switch ""."""
         if self.threshold is None:
             return ""
         taxel, code = self.threshold.taxel, self.threshold.code
@@ -258,9 +258,9 @@ class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 
 
 class Proof(Struct, frozen=True, forbid_unknown_fields=True):
-    """What holds for the integers: no sum beyond `bound`, no score off by more than `error` steps, and therefore no
-    other grasp type wherever the ensemble's margin exceeds `safe_margin` steps: true of `covered` of the rows trained
-    on; `changed` of them have another grasp type than the ensemble gives.
+    """The verified bounds of the integers: no sum beyond `bound`, no score off by more than `error` steps, and
+    therefore no other grasp type if the ensemble's margin exceeds `safe_margin` steps: true for `covered` of the
+    training rows; `changed` of them get another grasp type than from the ensemble.
     """
 
     width: Annotated[int, Meta(ge=4, le=16)]
@@ -273,12 +273,12 @@ class Proof(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Recognised(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A recognition rate as counts, of trials (the majority of a trial's frames) or of frames.
+    """An accuracy as counts, of trials (the majority of a trial's frames) or of frames.
 
-    protocol  "training": of the rows trained on; "nested": of folds, the placement chosen anew in each; "honest": the
-              same, in builds of older versions, by the ensemble instead of the integers
-    folds     how many; seed: of those that are cut at random
-    of        what is new about the rows tested
+    protocol  "training": on the training rows; "nested": on folds, with the placement chosen anew in each; "honest":
+              the same, in builds of older versions, by the ensemble instead of the integers
+    folds     their number; seed: of those that are cut at random
+    of        what is new in the tested rows
     low, high the 95 % interval; None in builds of older versions
     """
 
@@ -299,7 +299,7 @@ class Recognised(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=
 
     @property
     def title(self) -> str:
-        """What it is of: "new subject", "pooled", or "rows trained on"."""
+        """Its subject: "new subject", "pooled", or "rows trained on"."""
         return "rows trained on" if self.protocol == "training" else self.of
 
     @property
@@ -315,8 +315,8 @@ class Recognised(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=
 
 
 class Detected(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """How surely a build says whether something is held: the share of trials or frames of grasps in which it says so,
-    `held`, and the share of those of nothing held in which it says that; None where the recordings have no such rows.
+    """How well a build detects whether something is held: the share of trials or frames of grasps detected as such,
+    `held`, and the share of those of nothing held detected as such; None if the recordings have no such rows.
     """
 
     held: Recognised
@@ -330,13 +330,13 @@ class Detected(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
 
 
 class Rejection(Struct, frozen=True, forbid_unknown_fields=True):
-    """What a build refuses that was trained on grasps alone: rejection.py says how.
+    """The rejection rules of a build that was trained on grasps only: see rejection.py.
 
-    share         of grasps not trained on that may be refused, as it was asked for
+    share         the requested share of new grasps that may be refused
     least_scores  for each grasp type the least score of a candidate, in steps
     closed        for each type the least and the most closed switches
-    ranges        for each type, of each joint the lowest and the highest code of nearly all rows trained on
-    outside       how many joints may lie outside their ranges
+    ranges        for each type, the lowest and the highest code of each joint in nearly all training rows
+    outside       the number of joints that may lie outside their ranges
     """
 
     share: Share
@@ -347,8 +347,8 @@ class Rejection(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Faulty(Struct, frozen=True, forbid_unknown_fields=True):
-    """A fault: what happens ("lost", "stuck closed", "stuck at codes 0 to 40", "lost with chip 1 of bus 1"), the names
-    of the inputs to which it does, and how many trials are recognised all the same.
+    """A fault: its kind ("lost", "stuck closed", "stuck at codes 0 to 40", "lost with chip 1 of bus 1"), the names of
+    the affected inputs, and the number of trials that are still predicted correctly.
     """
 
     what: Name
@@ -357,11 +357,11 @@ class Faulty(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Faults(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The worst fault of each kind on the rows trained on, in trials: of `total`, `correct` are recognised without one.
+    """The worst fault of each kind on the training rows, in trials: of `total`, `correct` are right without a fault.
 
-    lost   one input lost, for which its row stands in; stuck: one input stuck at a value
-    dead   all levels of a taxel lost, all on a port, a chip or a scanner board, where a wiring is known, or all joints
-    pair   two inputs lost; None of one input, and of so many that pairs were not looked at
+    lost   one input lost and replaced by its mean row; stuck: one input stuck at a value
+    dead   all levels of a taxel lost, all on a port, a chip or a scanner board, if a wiring is known, or all joints
+    pair   two inputs lost; None for one input, and for so large a number that pairs were not evaluated
     """
 
     total: Annotated[int, Meta(ge=1, le=2**53)]
@@ -390,15 +390,15 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     """The content of `build.json`.
 
     stopped_after    rounds after which the tolerance ended the training; left out if it did not
-    zero_gain_nodes  decisions of the placement's tree at which no switch gained anything alone; left out if there are
+    zero_gain_nodes  decisions of the placement's tree at which no switch alone gained anything; left out if there are
                      none
-    scan_sha256      of scan.json; left out where the build was compiled for no harness
+    scan_sha256      of scan.json; left out if the build was compiled for no harness
     hand_sha256      of hand.json; None in builds of older versions
-    fitting          how the fit was chosen; left out where the options leave no choice
-    faults           what faults of inputs leave of the rows trained on; None in builds of older versions
-    detection        how surely the build says whether something is held, of the rows trained on and of folds
-    rejection        what is refused; None where NONE is one of the grasps, or nothing is refused
-    segments         costs of segments that were learnt from streams; None: there were none to learn from
+    fitting          how the fit was chosen; left out if the options leave no choice
+    faults           accuracy under faults of inputs, on the training rows; None in builds of older versions
+    detection        how well the build detects whether something is held, on the training rows and on folds
+    rejection        the rejection rules; None if NONE is one of the grasps, or nothing is refused
+    segments         costs of segments learnt from streams; None: there were none to learn from
     """
 
     schema: int
@@ -425,23 +425,23 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
 
     @property
     def answers(self) -> tuple[str, ...]:
-        """What a frame may be called: the grasps, and NONE where that may be and is none of them."""
+        """The possible predictions for a frame: the grasps, and NONE if that is possible and not among them."""
         return self.grasps if self.rejection is None else (*self.grasps, NONE)
 
     @property
     def segmenting(self) -> SegmentModel:
-        """The costs of segments: those that were learnt, or the usual ones."""
+        """The costs of segments: the learnt ones, or the usual ones."""
         has_none = self.grasps[-1] == NONE
         return self.segments or SegmentModel.usual(len(self.grasps) - has_none, has_none, self.proof.scale)
 
     @property
     def fit(self) -> Fitting:
-        """The trainer and its settings, as they were chosen or given."""
+        """The trainer and its settings, as chosen or given."""
         if self.fitting is not None:
             return self.fitting
         asked = self.options
         given: dict[Name, Given | None] = {"max_bins": asked.max_bins, **asked.settings}
-        # Of other trainers, older versions wrote the first two as well.
+        # For other trainers, older versions wrote the first two as well.
         if asked.trainer not in (AUTO, PAPERS_TRAINER):
             return Fitting(asked.trainer, given)
         boosted = {name: getattr(asked, name) for name in ("rounds", "shrinkage", "tolerance")}
@@ -449,12 +449,12 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
 
     @property
     def headline(self) -> Recognised | None:
-        """The rate to expect of new grasps; None where none was measured."""
+        """The accuracy to expect on new grasps; None if none was measured."""
         return next((rate for rate in self.rates if rate.protocol != "training"), None)
 
     @property
     def nothing_held(self) -> tuple[str, ...]:
-        """What it says of hands that hold nothing, and what that is worth, in words."""
+        """How hands that hold nothing are predicted, and how well, in words."""
         if self.grasps[-1] == NONE:
             first = "nothing held: a class of the tables"
         elif self.rejection is not None:
@@ -469,12 +469,12 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
 
     @property
     def detected(self) -> Detected | None:
-        """How surely it says of new grasps whether something is held; None where that was not measured."""
+        """How well it detects on new grasps whether something is held; None if that was not measured."""
         return next((each for each in self.detection if each.held.protocol != "training"), None)
 
 
 class _SchemaVersion(Struct, frozen=True):
-    """What is read of a JSON file first: whether the rest can be understood."""
+    """The first part read from a JSON file: whether the rest can be understood."""
 
     schema: int
 
@@ -485,7 +485,7 @@ def manifest_to_bytes(manifest: Manifest) -> bytes:
 
 
 def manifest_from_bytes(data: bytes, what: str = "build.json") -> Manifest:
-    """Return what a `build.json`, which messages call `what`, says.
+    """Return the manifest in a `build.json`, whose name in messages is `what`.
 
     Raises BuildError if it is oversized, no such document, of a newer schema, or altered.
     """
@@ -498,7 +498,7 @@ def manifest_from_bytes(data: bytes, what: str = "build.json") -> Manifest:
 
 
 def _contradictions(manifest: Manifest) -> Iterator[str]:
-    """Yield what the manifest says of itself that cannot all be true."""
+    """Yield the contradictions within the manifest."""
     for kind, names in (
         ("grasp types", manifest.grasps),
         ("switches", tuple(switch.name for switch in manifest.switches)),
@@ -589,7 +589,7 @@ def _wrong_names(kind: str, names: Iterable[str], longest: int = LONGEST_NAME) -
 
 
 def decode_document(data: bytes, kind: type[_T], what: str, called: str, largest: int, newest: int) -> _T:
-    """Return a JSON document of a build, which messages call `what`, and what it is `called`.
+    """Return a JSON document of a build, whose name in messages is `what`, and whose kind is `called`.
 
     Raises BuildError if it has more than `largest` bytes, is no such document, or of a schema beyond `newest`.
     """

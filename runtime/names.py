@@ -1,4 +1,4 @@
-"""Names: the rule for them, and how messages show, list and suggest them."""
+"""Names: their rules, and how messages show, list and suggest them."""
 
 import difflib
 from collections.abc import Sequence
@@ -21,12 +21,12 @@ __all__ = [
 
 SHOWN = 5
 _CODE_DIGITS = 5
-# At most this many names are compared with one that is not among them.
+# At most this many names are compared with an unknown one.
 MOST_COMPARED = 1000
 
 
 def nearest(name: str, names: Sequence[str]) -> str:
-    """Return " (did you mean ...?)" with the names most like `name`, or the first of `names` when none is near."""
+    """Return " (did you mean ...?)" with the names most like `name`, or the first of `names` if none is near."""
     near = difflib.get_close_matches(name[:LONGEST_SHOWN], names[:MOST_COMPARED], n=3, cutoff=0.5)
     if near:
         return f" (did you mean {' or '.join(map(repr, near))}?)"
@@ -34,9 +34,9 @@ def nearest(name: str, names: Sequence[str]) -> str:
 
 
 def list_names(names: Sequence[str], count: int | None = None) -> str:
-    """Return the first few names and how many more of `count` there are: "a, b, c, d, e and 7 more".
+    """Return the first few names and the number of further ones out of `count`: "a, b, c, d, e and 7 more".
 
-    `names` need hold no more than the first SHOWN when their `count` is given.
+    `names` need only hold the first SHOWN if their `count` is given.
     """
     total = len(names) if count is None else count
     more = f" and {total - SHOWN} more" if total > SHOWN else ""
@@ -44,11 +44,11 @@ def list_names(names: Sequence[str], count: int | None = None) -> str:
 
 
 def level_name(taxel: str, code: int) -> str:
-    """Return the name of a level: of the bit that says whether a taxel's code is above `code`."""
+    """Return the name of a level: of the bit that is set if a taxel's code is above `code`."""
     return f"{taxel}>{code}"
 
 
 def taxel_and_code(level: str) -> tuple[str, int] | None:
-    """Return the taxel and the code in the name of a level, as `level_name` makes it; None where it is none."""
+    """Return the taxel and the code in the name of a level, as made by `level_name`, or None for other names."""
     taxel, _, code = level.rpartition(">")
     return (taxel, int(code)) if taxel and code.isascii() and code.isdecimal() and len(code) <= _CODE_DIGITS else None

@@ -1,17 +1,17 @@
-"""How deep a TOML or JSON text nests, and how long its numbers are: checked before its parser runs.
+"""Limits on the nesting depth and number length of TOML and JSON texts, checked before their parsers run.
 
-The parsers call themselves for every level, and turn digits into a number in quadratic time. Both scans are linear.
+The parsers recurse at every level, and convert digits to numbers in quadratic time. Both scans here are linear.
 """
 
 import re
 
-# Lists and tables in each other, and parts of a dotted key. TOML's time grows with both.
+# Nested lists and tables, and parts of a dotted key. TOML's parsing time grows with both.
 DEEPEST_TOML = 10
 DEEPEST_JSON = 64
 # Digits of a number: one fewer than the patterns look for. Python itself refuses to write more than 4,300.
 LONGEST_NUMBER = 1000
 
-# Every quantifier is possessive: an unclosed text is passed once, not tried from every quote in it.
+# Every quantifier is possessive: an unclosed text is scanned once, not tried again from every quote in it.
 _TOML = re.compile(
     r"""\#[^\n]*+|\"\"\"(?:[^"\\]++|\\.|"(?!""))*+(?:\"\"\")?+|'''(?:[^']++|'(?!''))*+(?:''')?+
     |"(?:[^"\\\n]++|\\.)*+"?+|'[^'\n]*+'?+|(?P<mark>[][{}=,.\n])|(?P<long>(?<![\w+-])[\w+-]{1001})""",
@@ -21,7 +21,7 @@ _JSON = re.compile(rb'"(?:[^"\\]++|\\.)*+"?+|(?P<mark>[][{}])|(?P<long>(?<![0-9]
 
 
 def check_toml(text: str) -> None:
-    """Raise ValueError where `text` nests deeper than DEEPEST_TOML or holds a number longer than LONGEST_NUMBER."""
+    """Raise ValueError if `text` nests deeper than DEEPEST_TOML or holds a number longer than LONGEST_NUMBER."""
     depth = dots = 0
     for found in _TOML.finditer(text):
         mark = found["mark"]
@@ -37,7 +37,7 @@ def check_toml(text: str) -> None:
 
 
 def check_json(data: bytes) -> None:
-    """Raise ValueError where `data` nests deeper than DEEPEST_JSON or holds a number longer than LONGEST_NUMBER."""
+    """Raise ValueError if `data` nests deeper than DEEPEST_JSON or holds a number longer than LONGEST_NUMBER."""
     depth = 0
     for found in _JSON.finditer(data):
         mark = found["mark"]

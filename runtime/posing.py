@@ -1,7 +1,7 @@
-"""Guided calibration of a glove's sensors as a state machine: which pose is next, what a key means, when it is taken.
+"""Guided calibration of a glove's sensors as a state machine: the next pose, the meaning of keys, the time of capture.
 
-No terminal, no device and no clock in here: records, keys and the time come in. What a pose is worth, and the lines
-that the poses make, are those of drivers/calibration.py.
+It has no terminal, device or clock: records, keys and the time come in. drivers/calibration.py judges poses and makes
+the lines from them.
 """
 
 from collections.abc import Sequence
@@ -17,14 +17,14 @@ from thenar.drivers.calibration import (
     problems,
 )
 
-# Pressing the key shakes the hand, and records from before it are still on their way.
+# Pressing the key shakes the hand, and earlier records are still on their way.
 SETTLE_US = 150_000
-# A byte at an end of its range says nothing of how far the joint went beyond.
+# A byte at an end of its range does not show how far the joint went beyond.
 _ENDS = (1, 255)
 
 
 class PoseStage(Enum):
-    """Where a calibration stands: before a pose is held, while it is, in doubt about one, with all taken, or over."""
+    """The stage of a calibration: before a pose, holding it, in doubt about it, all taken, or over."""
 
     READY = "ready"
     HELD = "held"
@@ -34,7 +34,7 @@ class PoseStage(Enum):
 
 
 class PoseKey(Enum):
-    """What the keys mean: go on, take the pose before again, keep a doubtful one, leave."""
+    """The meanings of keys: continue, take the previous pose again, keep a doubtful one, leave."""
 
     ACCEPT = "accept"
     BACK = "back"
@@ -45,10 +45,10 @@ class PoseKey(Enum):
 class PoseGuide:
     """Leads through the poses of sensors called `names`.
 
-    stage     where it stands; `left`: whether it is over because somebody left
+    stage     the current stage; `left`: whether it is over because the user left
     raw       the newest bytes of the sensors; None before the first
-    problems  what speaks against the pose that was held last, in sentences
-    taken     what the poses gave
+    problems  the objections to the last pose, in sentences
+    taken     the results of the poses
     step      counts every change of stage
     """
 
@@ -73,25 +73,25 @@ class PoseGuide:
         return self.poses[min(len(self.taken), len(self.poses) - 1)]
 
     def offered(self) -> dict[PoseKey, str]:
-        """Return the keys that do something now, and what they do."""
+        """Return the keys that are active now, and their effects."""
         words: dict[PoseStage, dict[PoseKey, str]] = {
             PoseStage.READY: {PoseKey.ACCEPT: "I hold it: take it"},
-            PoseStage.DOUBTED: {PoseKey.ACCEPT: "hold it again", PoseKey.KEEP: "keep it all the same"},
+            PoseStage.DOUBTED: {PoseKey.ACCEPT: "hold it again", PoseKey.KEEP: "keep it anyway"},
             PoseStage.DONE: {PoseKey.ACCEPT: "write the calibration"},
         }
         found = dict(words.get(self.stage, {}))
         if self.taken and self.stage in (PoseStage.READY, PoseStage.DONE):
-            found[PoseKey.BACK] = "back to the pose before"
+            found[PoseKey.BACK] = "back to the previous pose"
         if self.stage is not PoseStage.OVER:
             found[PoseKey.QUIT] = "leave, and write nothing"
         return found
 
     def seconds_left(self, now_us: int) -> float:
-        """Return for how long the pose is to be held still."""
+        """Return how long the pose must still be held."""
         return max(0, self._settled_us + self._hold_us - now_us) / 1e6 if self.stage is PoseStage.HELD else 0.0
 
     def take(self, now_us: int, raw: bytes) -> None:
-        """Take a record, a byte a sensor; where the pose has been held for long enough, judge it."""
+        """Take a record, one byte per sensor; if the pose has been held long enough, judge it."""
         self.raw = raw
         for place, byte in enumerate(raw):
             self._low[place], self._high[place] = min(self._low[place], byte), max(self._high[place], byte)
@@ -108,7 +108,7 @@ class PoseGuide:
             self._keep()
 
     def press(self, now_us: int, key: PoseKey) -> None:
-        """Do what `key` asks for, if it means anything now."""
+        """Carry out `key`, if it is active now."""
         if key not in self.offered():
             return
         if key is PoseKey.QUIT:
@@ -126,10 +126,10 @@ class PoseGuide:
             self._become(PoseStage.READY if self.stage is PoseStage.DOUBTED else PoseStage.OVER)
 
     def states(self) -> list[str]:
-        """Return what is wrong with each sensor now, in a few words; "" where nothing is.
+        """Return the fault of each sensor now, in a few words; "" if there is none.
 
-        One at an end of its range is saturated. One whose byte was the same in all records so far, though a pose that
-        moves it was taken, is dead.
+        A sensor at an end of its range is saturated. A sensor is dead if its byte was the same in all records so far,
+        although a pose that moves it was taken.
         """
         moved = {name for pose, _ in zip(self.poses, self.taken, strict=False) for name in pose.degrees}
         found = []
@@ -143,7 +143,7 @@ class PoseGuide:
         return found
 
     def calibration(self, subject: str) -> GloveCalibration:
-        """Return the lines that the poses make; all must be taken."""
+        """Return the calibration from the poses, all of which must be taken."""
         return calibration(self.names, self.taken[0], list(zip(self.poses[1:], self.taken[1:], strict=True)), subject)
 
     def _keep(self) -> None:

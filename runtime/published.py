@@ -1,11 +1,11 @@
-"""What is published, to terminals, files, sockets and robots: every frame's grasp, and how the glove fares."""
+"""The data published to terminals, files, sockets and robots: every frame's grasp, and the glove's health."""
 
 from typing import Literal
 
 import msgspec
 
 UNKNOWN = "unknown"
-# Nothing is held: the type that every taxonomy has besides its own.
+# Nothing is held: a type that every taxonomy has in addition to its own.
 NONE = "none"
 
 Health = Literal["ok", "changing", "degraded", "unknown"]
@@ -13,23 +13,22 @@ State = Literal["none", "forming", "held", "releasing"]
 
 
 class LiveGrasp(msgspec.Struct, frozen=True, omit_defaults=False):
-    """What is recognised now, and how far to trust it.
+    """The current prediction and its confidence.
 
-    time_us       host's monotonic clock when this was worked out; unix_us: the same moment as the date has it
+    time_us       host's monotonic clock when this was calculated; unix_us: the same moment in Unix time
     number        counts the frames of this run from 0
-    grasp         the grasp type decided on, "unknown" while too little can be read and before a sequential test ends
+    grasp         the decided grasp type, "unknown" while too little can be read and before a sequential test ends
     candidate     the best grasp type of this frame alone
     probability   of `grasp` in this frame (softmax of the scores); 0 when unknown
     margin        lead of the candidate over the second best, in integer steps
     health        "ok": everything is read, `grasp` was decided on whole frames, and the candidate does not lead it by
                   the lead that a change takes (policy.py) or more. "changing": everything is read, but the candidate
-                  leads `grasp` by that much, and the change has not dwelt yet; or no sequential test has ended yet.
-                  "degraded": means stood in for something that is lost, or the glove's record is late. "unknown": too
-                  much is lost
+                  leads `grasp` by that much, and the dwell time has not passed; or no sequential test has ended yet.
+                  "degraded": means replace lost inputs, or the glove's record is late. "unknown": too much is lost
     switch_age_us, glove_age_us   how old the newest frames are; None before the first, or without such a device
     latency_us    from the newer of both frames to this moment
     lost          names of the switches and joints that are missing
-    state         "none": nothing is held. "forming": a segment of a grasp type begins, but may yet turn out otherwise.
+    state         "none": nothing is held. "forming": a segment of a grasp type begins, but may still be revoked.
                   "held": it has begun. "releasing": it seems to end
     segment       counts the segments of a grasp type of this run from 1; 0 before the first
     segment_type  the type of the segment, "none" between segments
@@ -64,14 +63,14 @@ class JointAngles(msgspec.Struct, frozen=True):
 
 
 class Count(msgspec.Struct, frozen=True):
-    """How often something happened: CRC errors, resynchronisations, frames lost."""
+    """The number of times that something happened: CRC errors, resynchronisations, frames lost."""
 
     name: str
     value: int
 
 
 class DeviceHealth(msgspec.Struct, frozen=True):
-    """A device: whether it is there, what is or was wrong last, and what its driver counts."""
+    """A device: whether it is connected, its current or last error, and its driver's counters."""
 
     name: str
     connected: bool
@@ -80,15 +79,15 @@ class DeviceHealth(msgspec.Struct, frozen=True):
 
 
 class Drift(msgspec.Struct, frozen=True):
-    """By how many codes a joint has drifted."""
+    """The number of codes by which a joint has drifted."""
 
     joint: str
     codes: int
 
 
 class Quarantined(msgspec.Struct, frozen=True):
-    """An input that is read and yet wrong, why ("stuck closed", "stuck open", "chattering", "drifting"), and whether it
-    is `used` all the same: because too much would be lost without it, or because the policy says so.
+    """An input that is read but wrong, why ("stuck closed", "stuck open", "chattering", "drifting"), and whether it is
+    still `used`: because too much would be lost without it, or because the policy says so.
     """
 
     name: str
@@ -98,7 +97,7 @@ class Quarantined(msgspec.Struct, frozen=True):
     @property
     def what(self) -> str:
         """Both in words: "stuck closed, treated as lost"."""
-        return f"{self.reason}, {'used all the same' if self.used else 'treated as lost'}"
+        return f"{self.reason}, {'still used' if self.used else 'treated as lost'}"
 
 
 class HealthReport(msgspec.Struct, frozen=True):
@@ -108,10 +107,10 @@ class HealthReport(msgspec.Struct, frozen=True):
     chattering                 switches that changed more often in the last second than a hand can
     drifting                   joints whose codes have moved since the first minute
     switch_hz, glove_hz        frames per second over the last whole second
-    frames, changing, degraded, unknown  how many grasps were published so far, and how many of them with that health
-    overflowed                 frames that came in and were not taken in time: a recording lacks them
-    devices                    as their drivers have it
-    quarantined                inputs that are treated as lost, because they are read and yet wrong
+    frames, changing, degraded, unknown  numbers of grasps published so far, in all and with that health
+    overflowed                 frames that arrived but were not taken in time: a recording lacks them
+    devices                    as reported by their drivers
+    quarantined                inputs treated as lost, because they are read but wrong
     """
 
     time_us: int

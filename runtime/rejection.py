@@ -1,10 +1,10 @@
-"""Refusing: a frame unlike all that a build was trained on is none of its grasp types, it shows that nothing is held.
+"""Rejection: a frame unlike all training frames of a build has none of its grasp types, so nothing is held.
 
-A frame is refused for its candidate, the grasp type of the largest score, if that score is below the least of the type,
-if fewer or more switches are closed than the type's least and most, or if more joints than `outside` lie beyond the
-type's ranges. All of that are integers: Python and C refuse the same frames. What is lost is left out: a lost or unread
-switch may be closed or open, a lost joint lies within, and the score is judged only of frames of which nothing is lost
-or unread.
+A frame is refused for its candidate, the grasp type with the largest score, in three cases: that score is below the
+type's minimum; fewer or more switches are closed than the type's minimum and maximum; or more joints than `outside` are
+beyond the type's ranges. All of these are integers, so Python and C refuse the same frames. Lost inputs are left out: a
+lost or unread switch may be closed or open, a lost joint lies within, and the score is judged only in frames without
+lost or unread inputs.
 """
 
 import math
@@ -18,20 +18,20 @@ from .manifest import Rejection
 from .scores import LANE_OFFSET
 
 _LEAST_SHARE, _EVEN = 1e-9, 0.5
-# By so many steps none trails in a frame that is not refused: no sum of scores comes near.
+# In a frame that is not refused, none trails by this many steps: no sum of scores comes near.
 _NEVER = -(1 << 40)
 
 
 def none_leads(rejection: Rejection, scale: float) -> tuple[int, int]:
-    """Return by how many of `scale` steps a unit none leads the best score where a frame is not refused, and where it
-    is: there by ln((1 - share) / share), where a share of grasps is refused.
+    """Return the lead of none over the best score, at `scale` steps per unit, for a frame that is not refused and for
+    one that is: there ln((1 - share) / share), where `share` is the share of grasps that are refused.
     """
     share = max(rejection.share, _LEAST_SHARE)
     return _NEVER, math.ceil(scale * math.log((1 - share) / share)) if share < _EVEN else 1
 
 
 class Rejector:
-    """Says of live frames whether a build refuses them."""
+    """Decides whether a build refuses a live frame."""
 
     __slots__ = ("_closed", "_least", "_outside", "_ranges")
 
@@ -54,7 +54,7 @@ class Rejector:
         Parameters
         ----------
         lanes : sequence of int
-            The K scores, each 2^15 too high, as `Scorer.lanes` has them.
+            The K scores, each 2^15 too high, as in `Scorer.lanes`.
         closed, lost, unread : int
             Masks of the kept switches that are closed, lost, and left unread.
         codes : sequence of int or None

@@ -21,24 +21,24 @@ from .frames import Mask
 from .tables import HIGHEST_CODE, IntegerTables
 
 LANE_OFFSET = 1 << 15
-# Switches are looked up eight at a time: a byte of a mask is the place of its sum of rows.
+# Switches are looked up eight at a time: a byte of a mask indexes its sum of rows.
 _EIGHT = 8
-# Of how many classes answers of `reach` are kept, over all answers: some 2 MB.
+# Number of classes of `reach` results kept in total: about 2 MB.
 _KEPT = 1 << 16
-# A sensor's byte has no more codes than these; a finer stream uses them again and again.
+# A sensor's byte has no more codes than these; a finer stream reuses the entries.
 _MOST_CODES = 1 << 12
 
 
 class Scorer:
-    """The tables of a build, arranged for one frame at a time. A build makes one, which all that score frames share.
+    """The tables of a build, arranged for one frame at a time. A build makes one, shared by all users of its scores.
 
     start                       bias and offset: the sum of no rows
     switch_rows, switch_means   s rows
     joint_means                 j rows
-    joint_rows, thresholds      j lists: a row per bin, and the codes that part the bins; distances of a slope are bins
-    joints_lost                 what all joints add while they are lost
-    size, unpack                of a sum that began with `start`: its bytes, and what makes K scores of them, each 2^15
-                                too high
+    joint_rows, thresholds      j lists: a row per bin, and the codes between the bins; distances of a slope are bins
+    joints_lost                 the contribution of all joints while they are lost
+    size, unpack                for a sum that began with `start`: its bytes, and the function that makes K scores of
+                                them, each 2^15 too high
     """
 
     def __init__(self, tables: IntegerTables) -> None:
@@ -54,7 +54,7 @@ class Scorer:
         self.joint_rows = [_packed(rows, offsets) for _, rows in binned]
         self.thresholds: list[list[int]] = [thresholds.tolist() for thresholds, _ in binned]
         self._by_code = [*map(_RowsByCode, self.thresholds, self.joint_rows)]
-        # Of a set of unread switches: the joints are unread as well, and scored as if they were lost.
+        # For a set of unread switches: the joints are unread as well, and scored as if they were lost.
         self.joints_bit: Mask = 1 << tables.n_switches
         self._pairs = [
             (
@@ -70,12 +70,12 @@ class Scorer:
 
     @cached_property
     def row_sums(self) -> list[list[int]]:
-        """For every eight switches the sums of the rows of all sets of them, by the byte that such a set is."""
+        """The sums of the rows of every set of eight switches, indexed by the set's byte."""
         return _sums(self.switch_rows)
 
     @cached_property
     def mean_sums(self) -> list[list[int]]:
-        """The same of the mean rows."""
+        """The same for the mean rows."""
         return _sums(self.switch_means)
 
     def lanes(self, bits: ArrayLike, codes: ArrayLike) -> tuple[int, ...]:
@@ -85,7 +85,7 @@ class Scorer:
         return self.unpack(total.to_bytes(self.size, "little"))
 
     def joint_sum(self, codes: Sequence[int], lost: Mask = 0) -> int:
-        """Return the sum of what all joints' codes add, of those that are lost the mean."""
+        """Return the sum of the contributions of all joints' codes, with the mean for lost ones."""
         if lost:
             there = [not lost >> joint & 1 for joint in range(len(codes))]
             rows = map(getitem, self._by_code, codes)
@@ -103,7 +103,7 @@ class Scorer:
     def lanes_without(
         self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
     ) -> tuple[int, ...]:
-        """Return what `lanes` does, with the mean row in place of every switch and joint that the masks call lost."""
+        """Return `lanes`, with the mean row for every switch and joint that the masks mark as lost."""
         switches, joints = _flags(bits, len(self.switch_rows), "switches"), self._codes(codes)
         lost_bits = _flags(lost_switches, len(self.switch_rows), "lost switches")
         lost_codes = _flags(lost_joints, len(self.thresholds), "lost joints")
@@ -116,15 +116,15 @@ class Scorer:
         array = np.asarray(codes)
         expected = len(self.thresholds)
         if array.shape != (expected,):
-            raise FrameError(f"a frame with codes of shape {array.shape}, the build has {expected} joints")
+            raise FrameError(f"a frame has codes of shape {array.shape}, but the build has {expected} joints")
         values: list[int] = array.tolist()
         if array.dtype != np.uint16 and values:
             _check_codes(array, values)
         return values
 
     def _reach(self, leader: int, unread: Mask) -> tuple[int, ...]:
-        """Return the `reaches` of a leader as plain integers, kept for those that come again and again; with
-        those of the joints where `unread` has the bit `joints_bit`.
+        """Return the `reaches` of a leader as plain integers, cached for repeated sets; with those of the joints if
+        `unread` has the bit `joints_bit`.
         """
         switches = [number for number in range(self.tables.n_switches) if unread >> number & 1]
         found = reaches(self.tables, leader, switches)
@@ -135,7 +135,7 @@ class Scorer:
 
 
 class _RowsByCode(dict[int, int]):
-    """The rows of a joint by its codes: a code is looked for among the thresholds the first time that it comes."""
+    """The rows of a joint by its codes: a code is looked up among the thresholds on first use."""
 
     __slots__ = ("_rows", "_thresholds")
 
@@ -154,8 +154,8 @@ def reaches(tables: IntegerTables, leader: int, switches: Sequence[int]) -> NDAr
 
     A switch adds nothing when open, its row when closed, its mean row when lost. So against a leader l, an unread
     switch s can bring class r at most  max(0, row_sr - row_sl, mean_sr - mean_sl)  closer, and several switches at most
-    the sum of these: each is free to do its worst. For one rival that sum is reached, by some state of the switches; so
-    it is not only a bound, but the most there is. The leader's own is 0.
+    the sum of these, since each is independent. For a single class that sum is reached, by some state of the switches;
+    so it is the exact maximum, not only a bound. The leader's own is 0.
     """
     both = (rows[list(switches)].astype(np.int64) for rows in (tables.switch_rows, tables.switch_means))
     closed, lost = (rows - rows[:, leader, np.newaxis] for rows in both)
@@ -164,9 +164,9 @@ def reaches(tables: IntegerTables, leader: int, switches: Sequence[int]) -> NDAr
 
 
 def joint_reaches(tables: IntegerTables, leader: int) -> NDArray[np.int64]:
-    """Return, for every class (K,), the most steps by which all joints, scored as if they were lost, can bring it
-    closer to class `leader` once they are read: whatever their codes are, or lost indeed, which adds nothing. Each is
-    free to do its worst in one of its bins: it is the most there is.
+    """Return, for every class (K,), the most steps by which reading all joints, scored so far as if they were lost, can
+    bring it closer to class `leader`: whatever their codes are, or with joints really lost, which adds nothing. Each is
+    independent and may be at its worst bin: it is the exact maximum.
     """
     found = np.zeros(tables.n_classes, np.int64)
     for unit in tables.units:
@@ -177,11 +177,11 @@ def joint_reaches(tables: IntegerTables, leader: int) -> NDArray[np.int64]:
 
 
 class LiveScores:
-    """The scores of live frames, kept up by what changes: the same numbers as a frame added up whole.
+    """The scores of live frames, updated incrementally: the same numbers as a whole frame's sum.
 
-    Three sums of packed rows, each worked out anew when what it is of changes; at first every switch is open and every
-    joint lost. A switch adds its row while it is closed, its mean row while it is lost; a joint adds the row of its
-    code's bin, its mean row while it is lost. So `lanes` are exactly `Scorer.lanes_without` of the same state.
+    Three sums of packed rows, each recalculated when its inputs change; at first every switch is open and every joint
+    lost. A switch adds its row while it is closed, its mean row while it is lost; a joint adds the row of its code's
+    bin, its mean row while it is lost. So `lanes` are exactly `Scorer.lanes_without` of the same state.
     """
 
     __slots__ = ("_closed", "_codes", "_dull", "_joints", "_lost", "_scorer", "_silent", "_there")
@@ -196,7 +196,7 @@ class LiveScores:
         self._joints = scorer.joints_lost
 
     def joints(self, codes: Sequence[int] | None, lost: Mask = 0) -> None:
-        """Take the codes of all joints, and which of them are lost; None: all are. Raises FrameError."""
+        """Take the codes of all joints, and which are lost; None: all are. Raises FrameError."""
         taken = None if codes is None else tuple(codes)
         if taken == self._codes and lost == self._dull:
             return
@@ -204,14 +204,14 @@ class LiveScores:
         if taken is None:
             self._joints = scorer.joints_lost
         elif len(taken) != len(scorer.thresholds):
-            raise FrameError(f"{len(taken)} codes, the build has {len(scorer.thresholds)} joints")
+            raise FrameError(f"a frame has {len(taken)} codes, but the build has {len(scorer.thresholds)} joints")
         else:
             self._joints = scorer.joint_sum(taken, lost)
         self._codes, self._dull = taken, lost
 
     def lanes(self, closed: Mask, lost: Mask = 0) -> tuple[int, ...]:
-        """Return the K scores, each 2^15 too high, of a state of all switches; bits of `closed` that are lost mean
-        nothing. Raises FrameError.
+        """Return the K scores, each 2^15 too high, for a state of all switches; bits of `closed` that are lost are
+        ignored. Raises FrameError.
         """
         scorer = self._scorer
         if (closed | lost) >> len(scorer.switch_rows):
@@ -228,15 +228,15 @@ class LiveScores:
 
 def softmax(scores: Sequence[int], number: int, scale: float, total: float | None = None) -> float:
     """Return the softmax of `scores` (K,), in steps of 1 / `scale`, for class `number`; it cannot overflow. `total`:
-    their `odds`, where they are known.
+    their `odds`, if known.
 
-    It is worked out only to be published: no decision rests on it.
+    It is calculated only to be published: no decision depends on it.
     """
     return math.exp((scores[number] - max(scores)) / scale) / (odds(scores, scale) if total is None else total)
 
 
 def odds(scores: Sequence[int], scale: float) -> float:
-    """Return the sum of all classes' odds to the best one."""
+    """Return the sum of all classes' odds relative to the best one."""
     best, total = max(scores), 0.0
     for score in scores:
         total += math.exp((score - best) / scale)
@@ -244,7 +244,7 @@ def odds(scores: Sequence[int], scale: float) -> float:
 
 
 def _packed(rows: NDArray[np.int16], offsets: int) -> list[int]:
-    """Return every row as one integer. `offsets` is 2^15 in each lane, taken off again; 0 leaves it in."""
+    """Return every row as one integer. `offsets` is 2^15 in each lane, subtracted again; 0 leaves it in."""
     lanes = (rows.astype(np.int32) + LANE_OFFSET).astype("<u2")
     return [int.from_bytes(row.tobytes(), "little") - offsets for row in lanes]
 
@@ -267,16 +267,16 @@ def _sum(switches: Mask, sums: Sequence[Sequence[int]]) -> int:
 def _flags(flags: ArrayLike, expected: int, what: str) -> list[bool]:
     array = np.asarray(flags)
     if array.shape != (expected,):
-        raise FrameError(f"a frame with {what} of shape {array.shape}, the build has {expected}")
+        raise FrameError(f"a frame has {what} of shape {array.shape}, but the build has {expected}")
     values: list[bool] = array.tolist()
     if array.dtype != np.bool_ and any(value not in (0, 1) for value in values):
-        raise FrameError(f"{what} are 0 or 1, this frame has {next(v for v in values if v not in (0, 1))!r}")
+        raise FrameError(f"{what} must be 0 or 1, but this frame has {next(v for v in values if v not in (0, 1))!r}")
     return values
 
 
 def _check_codes(array: NDArray[np.generic], values: list[int]) -> None:
     if array.dtype.kind not in "iu":
-        raise FrameError(f"joint codes are integers, this frame has {array.dtype}")
+        raise FrameError(f"joint codes must be integers, but this frame has {array.dtype}")
     if min(values) < 0 or max(values) > HIGHEST_CODE:
         wrong = next(value for value in values if not 0 <= value <= HIGHEST_CODE)
-        raise FrameError(f"joint codes are 0 to {HIGHEST_CODE}, this frame has {wrong}")
+        raise FrameError(f"joint codes must be 0 to {HIGHEST_CODE}, but this frame has {wrong}")

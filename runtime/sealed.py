@@ -1,4 +1,4 @@
-"""The envelope of every binary file that thenar writes: what it is, its format, its length, its checksum.
+"""The envelope of every binary file that thenar writes: its kind, its format, its length, its checksum.
 
     offset  bytes  meaning
     0       8      kind, ASCII, e.g. b"THNRGRSP"
@@ -8,7 +8,7 @@
     24      32     SHA-256 of bytes 0..23 followed by the payload
     56      ...    payload
 
-Nothing of the payload is looked at before kind, version, length and checksum have been found right.
+The payload is not read before kind, version, length and checksum have been checked.
 """
 
 import hashlib
@@ -29,7 +29,7 @@ def seal(kind: bytes, version: int, payload: bytes) -> bytes:
 def unseal(data: bytes, kind: bytes, newest: int, what: str) -> tuple[int, bytes]:
     """Return (format version, payload) of a sealed file.
 
-    `newest` is the highest format version the caller reads, `what` how messages call the file, e.g. "set.grasps".
+    `newest` is the highest format version that the caller reads, `what` the file's name in messages, e.g. "set.grasps".
     Raises SealError saying which of kind, version, length or checksum is wrong.
     """
     if data[:8] != kind[: len(data)] or not data:

@@ -8,8 +8,8 @@ import math
 from collections.abc import Sequence
 
 _STEPS = 64  # of an octave
-_OCTAVES = 16  # from here on a power is nothing
-_WHOLE = 65535  # what is certain
+_OCTAVES = 16  # beyond this a power counts as 0
+_WHOLE = 65535  # certainty
 
 POWERS = tuple(round(2 ** (15 - step / _STEPS)) for step in range(_STEPS + 1))
 

@@ -3,9 +3,9 @@
     score_k = bias_k + sum over switches s of bits_s * switch_rows[s, k] + sum over joints a of joint_rows[a][bin_a, k]
               + sum over slopes l of distance_l * row_l[k] + sum over pairs p of joints rows_p[bin_a, bin_b, k]
 
-where bin_a is the number of thresholds of joint a below its code, and distance_l how far its joint's code lies from the
-middle of a range (`Slope`). Distances and their rows are int8, everything else is int16, and no partial sum, in any
-order, leaves int16: `IntegerTables` proves it when it is made, so a table that could overflow cannot be loaded.
+where bin_a is the number of thresholds of joint a below its code, and distance_l is the distance of its joint's code
+from the middle of a range (`Slope`). Distances and their rows are int8, everything else is int16, and no partial sum,
+in any order, leaves int16: `IntegerTables` checks this when made, so a table that could overflow cannot be loaded.
 
 The payload of `tables.bin`, inside the envelope of `sealed.py`, all little-endian (K classes, s switches, j joints):
 
@@ -18,19 +18,19 @@ The payload of `tables.bin`, inside the envelope of `sealed.py`, all little-endi
     16      2 j         T_a: number of thresholds of each joint, uint16
             2 K         bias, int16
             2 s K       switch_rows, int16, a row of K per switch
-            2 s K       switch_means, int16: what stands in for a missing switch
-            2 j K       joint_means, int16: what stands in for a missing joint
+            2 s K       switch_means, int16: replaces a missing switch
+            2 j K       joint_means, int16: replaces a missing joint
             2 sum T     thresholds, uint16, joint after joint, strictly increasing within a joint
             2 sum(T+1)K joint_rows, int16, joint after joint, bin after bin, a row of K each
 
-Tables with n > 0 slopes are of format 2, in which offset 6 holds n, and in which follow
+Tables with n > 0 slopes are of format 2: offset 6 holds n, and these follow
 
             8 n         joint, low, high, uint16, and gain, int16, of each slope
             K n         rows, int8, a row of K per slope
 
-Tables with n > 0 pairs of joints, and no slopes, are of format 3, in which offset 6 holds n, and in which follow
+Tables with n > 0 pairs of joints, and no slopes, are of format 3: offset 6 holds n, and these follow
 
-            8 n         the joints a < b of each pair, and how many thresholds T_a and T_b it has for them, uint16
+            8 n         the joints a < b of each pair, and its numbers of thresholds T_a and T_b, uint16
             2 sum T     thresholds, uint16, pair after pair, a's before b's
             2 sum R K   rows, int16, pair after pair, R = (T_a + 1)(T_b + 1): a's bins one by one, in each b's; K a row
 """
@@ -51,18 +51,18 @@ PLAIN, SLOPED, PAIRED = 1, 2, 3  # formats
 LIMIT = 32767
 MAX_CLASSES, MAX_SWITCHES, MAX_JOINTS = 1024, 4096, 256
 MAX_BYTES = 16 << 20
-# Steps per unit of score. At the finest the least safe margin, 2 steps, is still more than what the ensemble takes for
-# a tie (stumps.TIE): a row that is safe is never one that the ensemble decided by the number of the class.
+# Steps per unit of score. At the finest scale the least safe margin, 2 steps, is still more than the ensemble's tie
+# tolerance (stumps.TIE): a safe row is never one that the ensemble decided by the number of the class.
 COARSEST_SCALE, FINEST_SCALE = 2.0**-64, 2.0**30
 _COUNTS = struct.Struct("<HHHHd")
 _SLOPE = struct.Struct("<HHHh")
 _PAIR = struct.Struct("<HHHH")
 HIGHEST_CODE = 65535
-# The most that a range of codes may come to: a distance from its middle, and its negative, are one byte.
+# Largest scaled range of codes: a distance from its middle, and its negative, must fit one byte.
 WIDEST = 254
 COARSE = 256
 LOST = -1
-# What two joints of a pair can say together, each bin of one with each of the other: of more no bound is worked out.
+# Largest number of bin combinations of a pair: no bound is calculated for more.
 _MOST_CELLS = 1 << 20
 
 Rows = NDArray[np.int16]
@@ -70,7 +70,7 @@ Rows = NDArray[np.int16]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pair:
-    """What two joints add together: a row for each bin of the one and each of the other, of integers or floats.
+    """The joint contribution of two joints: a row for each bin of one and each of the other, of integers or floats.
 
     joints (a, b), a < b; thresholds (T_a,) and (T_b,) uint16, strictly increasing; rows (T_a + 1, T_b + 1, K). A joint
     that is missing counts as code 0 here.
@@ -81,7 +81,7 @@ class Pair:
     rows: NDArray[Any]
 
     def of(self, codes: NDArray[np.integer]) -> NDArray[Any]:
-        """Return what the codes (n, j) of all joints add, (n, K)."""
+        """Return the contribution of the codes (n, j) of all joints, (n, K)."""
         one, other = (np.searchsorted(t, codes[:, a]) for a, t in zip(self.joints, self.thresholds, strict=True))
         rows: NDArray[Any] = self.rows[one, other]
         return rows
@@ -89,10 +89,10 @@ class Pair:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slope:
-    """What a joint adds in proportion to its code: row (K,) int8 times the code's distance from the middle.
+    """A joint's contribution in proportion to its code: row (K,) int8 times the code's distance from the middle.
 
-    A code is taken between `low` and `high`. How far it lies above low is multiplied by 2^gain, or divided and rounded
-    down where `gain` is negative: 0 to `most`, at most 254. The distance is that less `zero`. Raises BuildError.
+    A code is clipped to `low` to `high`. Its distance from low is multiplied by 2^gain, or divided and rounded down if
+    `gain` is negative: 0 to `most`, at most 254. The distance is that minus `zero`. Raises BuildError.
     """
 
     joint: int
@@ -103,19 +103,21 @@ class Slope:
 
     def __post_init__(self) -> None:
         if not (0 <= self.low < self.high <= HIGHEST_CODE and -16 <= self.gain <= 7 and 0 < self.most <= WIDEST):
-            raise BuildError(f"a slope from code {self.low} to {self.high} with gain {self.gain} fits no byte")
+            raise BuildError(
+                f"a slope from code {self.low} to {self.high} with gain {self.gain} does not fit a byte: compile again"
+            )
 
     def _gained(self, above: int) -> int:
         return above << self.gain if self.gain > 0 else above >> -self.gain
 
     @property
     def most(self) -> int:
-        """What the highest code comes to."""
+        """The scaled value of the highest code."""
         return self._gained(self.high - self.low)
 
     @property
     def zero(self) -> int:
-        """What the middle comes to, where nothing is added."""
+        """The scaled value of the middle, where nothing is added."""
         return (self.most + 1) // 2
 
     def distances(self, codes: NDArray[np.integer]) -> NDArray[np.int64]:
@@ -125,7 +127,7 @@ class Slope:
         return gained - self.zero
 
     def of(self, codes: NDArray[np.integer]) -> NDArray[np.int64]:
-        """Return what codes (n,) of the joint add, (n, K)."""
+        """Return the contribution of the joint's codes (n,), (n, K)."""
         return self.distances(codes)[:, np.newaxis] * self.row.astype(np.int64)
 
 
@@ -176,18 +178,18 @@ class IntegerTables:
 
     @property
     def bound(self) -> int:
-        """The largest absolute value that any partial sum, in any order, with any inputs or missing ones, can take."""
+        """The largest absolute value of any partial sum, in any order, with any inputs or missing ones."""
         return max(int(_furthest(self, +1).max()), int(_furthest(self, -1).max()))
 
     @property
     def units(self) -> tuple[tuple[int, ...], ...]:
-        """The joints, those of a pair together: what one of these adds is nothing to the others."""
+        """The joints, with those of a pair together: the contributions of different units are independent."""
         paired = {joint: pair.joints for pair in self.pairs for joint in pair.joints}
         return tuple(sorted({paired.get(joint, (joint,)) for joint in range(self.n_joints)}))
 
     @property
     def grid(self) -> int:
-        """What all rows of switches and bins are multiples of, where joints have slopes: 256 if they are, else 1."""
+        """The common factor of all rows of switches and bins, if joints have slopes: 256 if they share it, else 1."""
         rows = [self.switch_rows, *(rows for rows in self.joint_rows if len(rows) > 1)]
         return COARSE if self.slopes and not any((each % COARSE).any() for each in rows) else 1
 
@@ -203,9 +205,9 @@ class IntegerTables:
         return next((slope for slope in self.slopes if slope.joint == joint), None)
 
     def choices(self, joint: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return codes (c,) at which what a joint adds is the most and the least in each bin, and its terms (t, c, K).
+        """Return codes (c,) at which a joint's contribution is greatest and least in each bin, and its terms (t, c, K).
 
-        They are one, the row of the bin, or two, that and what the slope adds.
+        The terms are one, the row of the bin, or two, that and the slope's contribution.
         """
         thresholds, rows = self.thresholds[joint].astype(np.int64), self.joint_rows[joint].astype(np.int64)
         slope = self.slope_of(joint)
@@ -216,7 +218,7 @@ class IntegerTables:
         return codes, np.stack([rows[np.searchsorted(thresholds, codes)], slope.of(codes)])
 
     def all_choices(self, unit: tuple[int, ...]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return all that a unit's joints can say, codes or LOST (c, joints), and the terms of each (t, c, K).
+        """Return all states of a unit's joints, codes or LOST (c, joints), and the terms of each (t, c, K).
 
         The last is that all of them are lost.
         """
@@ -240,18 +242,18 @@ class IntegerTables:
 
     @property
     def jointless(self) -> NDArray[np.int64]:
-        """The bias and what all joints add while they are lost, (K,)."""
+        """The bias plus the contribution of all joints while they are lost, (K,)."""
         lost = [self.all_choices(unit)[1].sum(axis=0)[-1] for unit in self.units]
         found: NDArray[np.int64] = np.sum([self.bias.astype(np.int64), *lost], axis=0)
         return found
 
     def steps_of(self, joint: int) -> NDArray[np.int64]:
-        """Return the codes after which what a joint adds changes, in order: its thresholds, and those in its pair."""
+        """Return the codes after which a joint's contribution changes, in order: its thresholds, and its pair's."""
         paired = (t for pair in self.pairs for a, t in zip(pair.joints, pair.thresholds, strict=True) if a == joint)
         return np.unique(np.concatenate([self.thresholds[joint], *paired])).astype(np.int64)
 
     def binned(self, joint: int) -> tuple[NDArray[np.uint16], Rows]:
-        """Return the thresholds of a joint and its rows, as they would be if each distance of its slope were a bin."""
+        """Return the thresholds of a joint and its rows, as if each distance of its slope were a bin."""
         thresholds, rows, slope = self.thresholds[joint], self.joint_rows[joint], self.slope_of(joint)
         if slope is None:
             return thresholds, rows
@@ -262,7 +264,7 @@ class IntegerTables:
         return steps, whole.astype(np.int16)
 
     def joint_sums(self, codes: NDArray[np.uint16]) -> NDArray[np.int32]:
-        """Return the bias and what the joints' codes (n, j) add, (n, K)."""
+        """Return the bias plus the contribution of the joints' codes (n, j), (n, K)."""
         # No partial sum leaves int16, so nothing overflows here.
         sums = np.repeat(self.bias[np.newaxis].astype(np.int32), len(codes), axis=0)
         for column, thresholds, rows in zip(codes.T, self.thresholds, self.joint_rows, strict=True):
@@ -275,7 +277,7 @@ class IntegerTables:
 
 
 def _furthest(tables: IntegerTables, sign: int) -> NDArray[np.int64]:
-    """Return, per class, the most that the rows can add up to in the direction of `sign`; (K,)."""
+    """Return, per class, the largest possible sum of the rows in the direction of `sign`; (K,)."""
     reach = np.maximum(sign * tables.bias.astype(np.int64), 0)
     switches = np.stack([tables.switch_rows, tables.switch_means]).astype(np.int64)
     reach += np.maximum(sign * switches, 0).max(axis=0).sum(axis=0)
@@ -351,8 +353,8 @@ def payload_bytes(
     n_slopes: int = 0,
     pairs: Sequence[tuple[int, int]] = (),
 ) -> int:
-    """Return the length of the payload of tables of so many classes and switches; `thresholds` of each joint, and of
-    both joints of `pairs`.
+    """Return the payload length of tables with `n_classes` and `n_switches`; `thresholds` of each joint, and of both
+    joints of `pairs`.
     """
     rows = 1 + 2 * n_switches + sum(2 + count for count in thresholds) + sum((a + 1) * (b + 1) for a, b in pairs)
     words = len(thresholds) + sum(thresholds) + sum(a + b for a, b in pairs) + n_classes * rows
@@ -381,10 +383,10 @@ def tables_to_bytes(tables: IntegerTables) -> bytes:
 
 
 def tables_from_bytes(data: bytes, what: str = "tables.bin") -> IntegerTables:
-    """Return the tables of a `tables.bin`, which messages call `what`.
+    """Return the tables of a `tables.bin`, whose name in messages is `what`.
 
-    Raises SealError for a file that is foreign, truncated, altered or newer, BuildError for one whose content does not
-    add up. Every count is held against the length before anything is allocated.
+    Raises SealError for a file that is foreign, truncated, altered or newer, BuildError for one with inconsistent
+    content. Every count is checked against the length before anything is allocated.
     """
     if len(data) > MAX_BYTES:
         raise BuildError(f"{what} has {len(data)} bytes, a build has at most {MAX_BYTES}")

@@ -1,7 +1,7 @@
-"""A task: the grasps that demonstrations have in common, in their order, and how far a hand has come in it.
+"""A task: the grasps that demonstrations have in common, in order, and a hand's progress in it.
 
-What follows when a segment begins, lasts or ends is a function of the task, of the step and of the segment alone, so a
-replay of a recording gives the same steps. A grasp that is no step's may be a detour: a type that was seen to follow.
+The progress when a segment begins, lasts or ends depends only on the task, the step and the segment, so a replay of a
+recording gives the same steps. A grasp that is not a step's may be a detour: a type that was seen to follow.
 """
 
 from pathlib import Path
@@ -27,11 +27,11 @@ class Step(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     grasp      its type
     shown      how many demonstrations have it here
-    preshape   what the robot's hand takes, by its name in the table of preshapes; None: the table has none, or none was
-               given
-    joints     what each joint reads, by name: the median of the demonstrations' medians
-    median_s, spread_s  for how long it was held: the median, and the median distance from it
-    limit_s    what is held longer deviates; as taught, twice the longest that was shown
+    preshape   the preshape of the robot's hand, by its name in the table of preshapes; None: the table has none, or no
+               table was given
+    joints     the reading of each joint, by name: the median of the demonstrations' medians
+    median_s, spread_s  how long it was held: the median, and the median distance from it
+    limit_s    a grasp held longer deviates; as taught, twice the longest shown
     then       types that may follow, as shown, the next step's first; none after the last
     """
 
@@ -46,11 +46,11 @@ class Step(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class Task(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What `thenar teach` writes: task.json.
+    """The content of task.json, written by `thenar teach`.
 
-    build           checksum of the build that recognised the demonstrations; its types are those of the steps
+    build           checksum of the build that recognised the demonstrations; the steps have its types
     demonstrations  names of their files, or of the subjects and sessions of a set
-    preshapes       the table that the steps' preshapes are of
+    preshapes       the table with the steps' preshapes
     units           of the joints, by name
     first           types with which demonstrations begin, the first step's first
     """
@@ -69,29 +69,29 @@ class Task(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         if strange := [step.grasp for step in self.steps if step.grasp not in grasps]:
             raise SettingError(
                 f"task {shortened(self.name)}: the build does not recognise {list_names(tuple(dict.fromkeys(strange)))}"
-                ": take the build that it was taught with"
+                ": use the build that the task was taught with"
             )
 
 
 def load_task(path: Path) -> Task:
-    """Return the task of a task.json. Raises SettingError that names the file and what is wrong, OSError."""
+    """Return the task of a task.json. Raises SettingError that names the file and the fault, OSError."""
     data = read_file(path, _LARGEST, SettingError)
     try:
         return msgspec.json.decode(data, type=Task)
     except (msgspec.DecodeError, UnicodeDecodeError) as wrong:
-        raise SettingError(f"{path} is no task of `thenar teach`: {wrong}") from None
+        raise SettingError(f"{path} is not a task of `thenar teach`: {wrong}") from None
 
 
 class Progress(Struct, frozen=True):
-    """How far a hand has come in a task.
+    """A hand's progress in a task.
 
-    step       the number of the newest step that was begun, from 1; 0 before the first; of `steps`
+    step       the number of the last step that began, from 1; 0 before the first; of `steps`
     grasp      the type that is held now, "none" between grasps
     expected   types that may come next, the next step's first; none after the last step
-    deviation  of the newest grasp. "unexpected": its type is no later step's, and was never shown here. "skipped": it
-               is a later step's than the next. "too long": it is held longer than the step's limit
-    detail     the deviation in a sentence, "" without one
-    done       whether the last step was begun and is over
+    deviation  of the newest grasp. "unexpected": its type is in no later step, and was never shown here. "skipped": it
+               belongs to a step after the next. "too long": it is held longer than the step's limit
+    detail     the deviation in a sentence, "" if there is none
+    done       whether the last step has begun and ended
     """
 
     step: int
@@ -104,7 +104,7 @@ class Progress(Struct, frozen=True):
 
     @property
     def text(self) -> str:
-        """In a line: where the hand is, what comes next, and what deviates."""
+        """The progress in one line: the step, the next types, and any deviation."""
         said = "task is done" if self.done else f"step {self.step} of {self.steps}"
         said += f", {self.grasp} held" if self.grasp != NONE else ""
         said += f"; next {self.expected[0]}" if self.expected else ""
@@ -113,7 +113,7 @@ class Progress(Struct, frozen=True):
 
 
 class ProgressLine(Progress, frozen=True, tag_field="kind", tag="task"):
-    """The fields of `Progress`, as a line of JSON has them."""
+    """The fields of `Progress`, as a line of JSON."""
 
 
 def _at(task: Task, step: int, grasp: str = NONE, deviation: Deviation = "", detail: str = "") -> Progress:
@@ -122,12 +122,12 @@ def _at(task: Task, step: int, grasp: str = NONE, deviation: Deviation = "", det
 
 
 def begun(task: Task, step: int, grasp: str) -> Progress:
-    """Return the progress when a segment of type `grasp` begins, `step` steps having begun before."""
+    """Return the progress when a segment of type `grasp` begins after `step` steps."""
     left = [each.grasp for each in task.steps[step:]]
     if grasp in left[:1]:
         return _at(task, step + 1, grasp)
     if step and grasp == task.steps[step - 1].grasp:
-        return _at(task, step, grasp)  # taken up again
+        return _at(task, step, grasp)  # resumed
     if grasp in left:
         skipped = left[: left.index(grasp)]
         return _at(task, step + len(skipped) + 1, grasp, "skipped", f"skipped: {', '.join(skipped)}")
@@ -139,7 +139,7 @@ def begun(task: Task, step: int, grasp: str) -> Progress:
 
 
 class TaskFollower:
-    """Follows a hand through a task, by the segments that are published."""
+    """Follows a hand through a task, using the published segments."""
 
     __slots__ = ("_segment", "_told", "progress", "task")
 
@@ -149,13 +149,13 @@ class TaskFollower:
 
     @classmethod
     def of(cls, path: Path, grasps: tuple[str, ...]) -> "TaskFollower":
-        """Load a task for a build that recognises `grasps`. Raises SettingError where it is none for it, OSError."""
+        """Load a task for a build that recognises `grasps`. Raises SettingError if it does not fit, OSError."""
         task = load_task(path)
         task.check(grasps)
         return cls(task)
 
     def update(self, grasp: LiveGrasp) -> Progress | None:
-        """Return the progress at the first moment, and where a later one changes it."""
+        """Return the progress at the first moment, and whenever it changes."""
         before = self.progress
         if grasp.state in ("held", "releasing"):
             self._hold(grasp)

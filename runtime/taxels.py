@@ -1,13 +1,13 @@
-"""Taxels live: raw counts of a converter in, levels out, as bits; the calibration of taxels, and their baselines.
+"""Live taxels: convert raw counts to levels, as bits; the calibration of taxels, and their baselines.
 
-A calibration says what a taxel's counts are at rest and when it is pressed, so a count means a value. A build codes
-values by the two points that its recordings were coded by. Both are straight lines, so every level, closed at codes
-above a threshold, is closed above (or below) one count of this glove. `count_limit` finds that count once; live, only
-integers are compared, and a level is decided as it was in the recordings.
+A calibration gives a taxel's counts at rest and when pressed, and so the value of any count. A build codes values by
+the two points by which its recordings were coded. Both are straight lines, so every level, closed at codes above a
+threshold, is closed above (or below) one count of this glove. `count_limit` finds that count once; live, only integers
+are compared, and a level is decided as in the recordings.
 
-The counts of pads of resistive rubber and of fabric wander with temperature, moisture and wear. While a taxel is at
-rest, its baseline follows its counts: by a bounded rate, within bounds of the calibrated rest, and never while it is
-pressed nor shortly after. What the baseline has moved is taken off every count.
+The counts of resistive rubber and fabric pads drift with temperature, moisture and wear. While a taxel is at rest, its
+baseline follows its counts at a bounded rate, within bounds of the calibrated rest, and never while the taxel is
+pressed or shortly after. The movement of the baseline is subtracted from every count.
 """
 
 from bisect import bisect_left
@@ -35,25 +35,25 @@ COUNTS = 65536
 Raw = Annotated[int, Meta(ge=0, lt=COUNTS)]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 TaxelFault = Literal["", "silent", "open wire", "saturated"]
-# A level: the limit of its counts (see `count_limit`), and the number of the build's switch that it is.
+# A level: the limit of its counts (see `count_limit`), and the number of its switch in the build.
 Level = tuple[int, int]
 
-# Counts of which the median is a press; what moves by less than so many was not moved.
+# Number of counts whose median is a press; a taxel that moves by fewer counts was not pressed.
 _IN_A_ROW, _LEAST_TRAVEL = 5, 10
 
-# Parts of a count in which a baseline moves: a share of the span in thousandths, a minute in microseconds.
+# Units in which a baseline moves, as fractions of a count: a span's thousandths, a minute's microseconds.
 _MINUTE_US = 60_000_000
 _PARTS = 1000 * _MINUTE_US
-# A taxel that was not read for longer has not been watched: its baseline moves no further than in this time.
+# A taxel that was not read for longer was not watched: its baseline moves no further than in this time.
 _LONGEST_US = 100_000
 # Converters miss their ends by a few counts: 1 of 1023, 7 of 4095.
 _END_SHIFT = 9
 
 
 class TaxelLine(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The straight line of one taxel: its counts with nothing on it mean 0, and those of a press mean `value`.
+    """The straight line of one taxel: its counts at rest mean 0, and those of a press mean `value`.
 
-    Raises SettingError if both are one count, or the value is none that a press can have.
+    Raises SettingError if both are the same count, or if no press can have the value.
     """
 
     name: Annotated[str, Meta(min_length=1)]
@@ -65,24 +65,24 @@ class TaxelLine(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=T
         if reason := fault(self.name):
             raise SettingError(f"taxel {shortened(repr(self.name))} {reason}")
         if self.rest == self.press:
-            raise SettingError(f"{self.name!r}: rest and press are both {self.rest}, which makes no line")
+            raise SettingError(f"{self.name!r}: rest and press are both {self.rest} counts: calibrate it again")
         if not (isfinite(self.value) and 1e-9 <= self.value <= 1e9):
-            raise SettingError(f"{self.name!r}: the value of a press is a number above 0, not {self.value}")
+            raise SettingError(f"{self.name!r}: the value of a press must be a number above 0, not {self.value}")
 
     def at(self, raw: int) -> float:
         """Return the value at a count."""
         return (raw - self.rest) * (self.value / (self.press - self.rest))
 
     def codes(self, coded: Calibration) -> CodeLine:
-        """Return the line from counts to the codes of a build. Raises SettingError if there is none."""
+        """Return the line from counts to the codes of a build. Raises SettingError if none exists."""
         return code_line(coded, (self.rest, 0.0), (self.press, self.value))
 
 
 class TaxelCalibration(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, rename={"taxels": "taxel"}):
     """The lines of a glove's taxels, each named once, in any order, and the unit of their values.
 
-    The unit "press" says that 1 is the press of the calibration, whatever force it had. Raises SettingError if a taxel
-    is named twice.
+    In the unit "press", 1 is the press of the calibration, whatever its force. Raises SettingError if a taxel is named
+    twice.
     """
 
     subject: str = ""
@@ -98,7 +98,7 @@ class TaxelCalibration(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
             raise SettingError(f"calibrated twice: {list_names(twice)}: keep one of each")
 
     def line(self, name: str) -> TaxelLine | None:
-        """Return the line of a taxel; None where it was not calibrated."""
+        """Return the line of a taxel, or None if it was not calibrated."""
         return next((line for line in self.taxels if line.name == name), None)
 
     def to_toml(self) -> str:
@@ -107,23 +107,23 @@ class TaxelCalibration(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class TaxelSettings(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
-    """`[taxels]` of glove.toml: the calibration, and how baselines are followed. Shares are of a taxel's span, which is
-    what lies between rest and press.
+    """`[taxels]` of glove.toml: the calibration, and how baselines are followed. Shares are of a taxel's span, from
+    rest to press.
 
     Parameters
     ----------
     calibration : str, optional
-        Path of the file that `thenar calibrate --taxels` wrote; relative paths count from the folder of glove.toml.
+        Path of the file written by `thenar calibrate --taxels`, relative to the folder of glove.toml.
     baseline : bool
-        Whether baselines are followed. Without a calibration none are.
+        Whether baselines are followed; without a calibration none is.
     window : float
         A taxel within this share of its baseline, or below it, is at rest.
     drift : float
-        The most that a baseline may leave the calibrated rest.
+        Maximum distance of a baseline from the calibrated rest.
     per_minute : float
-        The most that a baseline moves in a minute.
+        Maximum movement of a baseline per minute.
     settle_s : float
-        For how long a taxel must have rested before its baseline moves: pads creep back after a press.
+        Time for which a taxel must have rested before its baseline moves: pads creep back after a press.
     """
 
     calibration: Annotated[str, Meta(min_length=1)] | None = None
@@ -135,7 +135,7 @@ class TaxelSettings(Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
 
 
 def calibration_of(settings: TaxelSettings) -> TaxelCalibration | None:
-    """Return the calibration that the settings name; None where they name none. Raises as `load_taxel_calibration`."""
+    """Return the calibration that the settings name, or None. Raises as `load_taxel_calibration`."""
     return None if settings.calibration is None else load_taxel_calibration(Path(settings.calibration))
 
 
@@ -150,8 +150,8 @@ def learnt_lines(
 ) -> tuple[TaxelLine, ...]:
     """Return the lines of the taxels that moved, from counts at rest and counts while each was pressed once.
 
-    The rest is the median; the press is the median of five counts in a row that lies furthest from it, so that a glitch
-    is none. What moved less than three times as far as the counts wandered at rest was not pressed.
+    The rest is the median; the press is the median of five consecutive counts that is furthest from it, so that no
+    glitch counts. A taxel that moved less than three times its variation at rest was not pressed.
     """
     lines = []
     for place, name in enumerate(names):
@@ -168,12 +168,12 @@ def learnt_lines(
 
 
 def count_limit(threshold: Threshold, calibration: TaxelCalibration | None) -> int:
-    """Return where this glove's counts close a level.
+    """Return the limit at which this glove's counts close a level.
 
-    A limit from 0 on closes the level at counts above it. A negative one closes it at counts whose complement `~count`
-    is above it, that is, at counts below `~limit`: recordings and glove are wired the other way round.
+    A limit of 0 or more closes the level at counts above it. A negative one closes it at counts whose complement
+    `~count` is above it, that is, at counts below `~limit`: recordings and glove are wired with opposite polarity.
 
-    Raises SettingError if the taxel's counts cannot be turned into the build's codes.
+    Raises SettingError if the taxel's counts cannot be converted to the build's codes.
     """
     coded = threshold.taxel
     line = None if calibration is None else calibration.line(coded.name)
@@ -182,8 +182,8 @@ def count_limit(threshold: Threshold, calibration: TaxelCalibration | None) -> i
         return threshold.code
     if calibration.unit != coded.unit:
         raise SettingError(
-            f"taxels are calibrated in {calibration.unit!r}, {coded.name!r} of the build is in {coded.unit!r}: "
-            "compile recordings in that unit"
+            f"taxels are calibrated in {calibration.unit!r}, but {coded.name!r} of the build is in {coded.unit!r}: "
+            "compile recordings in the calibration's unit"
         )
     rising = (coded.code_b > coded.code_a) == ((coded.value_b > coded.value_a) == (line.press > line.rest))
     codes = line.codes(coded)
@@ -243,7 +243,7 @@ class _Baseline:
         self._rested_us = 0
 
     def follow(self, time_us: int, raw: int) -> int:
-        """Take a sound count; return by how many counts the baseline has left the calibrated rest."""
+        """Take a valid count; return by how many counts the baseline has left the calibrated rest."""
         if self._read_us is None:
             self._read_us = self._rested_us = time_us
         passed = min(max(time_us - self._read_us, 0), _LONGEST_US)
@@ -259,20 +259,20 @@ class _Baseline:
 
 
 class Taxels:
-    """The taxels of one device: what its channels say, as levels of a build. For one thread.
+    """The taxels of one device: converts its channels to levels of a build. For one thread.
 
     names        of the taxels, channel by channel
     levels       of each taxel: limits of its counts (see `count_limit`), with the numbers of the build's switches
-    calibration  rest and press of each taxel, in counts. Of a taxel without, no baseline is followed, and no end of the
-                 converter is a fault: nobody knows at which of them it rests
+    calibration  rest and press of each taxel, in counts. Without it, a taxel's baseline is not followed, and no end of
+                 the converter is a fault, since its rest may be at either end
     settings     how baselines are followed
-    highest      the converter's highest count; None: its ends are not looked at
+    highest      the converter's highest count; None: its ends are not checked
 
     owned   the switches of all levels
-    counts  of each taxel when it was read last, what its baseline has moved taken off; None: it has a fault
-    faults  what was wrong with each taxel when it was read last. An end of the converter is a fault where neither the
-            rest, drifted as far as it may, nor the press of the calibration is near it: on the side of the rest an open
-            wire, on the side of the press saturation
+    counts  the last count of each taxel, minus the movement of its baseline; None: it has a fault
+    faults  the fault of each taxel at its last reading. An end of the converter is a fault if neither the rest, with
+            its maximum drift, nor the press of the calibration is near it: an open wire on the side of the rest,
+            saturation on the side of the press
     drifts  by how many counts each baseline has left the calibrated rest
     """
 
@@ -297,7 +297,7 @@ class Taxels:
         self.drifts = [0] * len(self.names)
 
     def read(self, time_us: int, codes: Sequence[int | None]) -> tuple[Mask, Mask]:
-        """Take the counts of all channels (None: it could not be read); return the closed levels, and the lost ones."""
+        """Take the counts of all channels (None: unreadable); return the closed levels and the lost ones."""
         closed = lost = 0
         for place, raw in enumerate(codes):
             low, high, at_low, at_high = self._ends[place]
@@ -324,11 +324,11 @@ class Taxels:
 def _ends(
     line: TaxelLine | None, settings: TaxelSettings, highest: int | None
 ) -> tuple[int, int, TaxelFault, TaxelFault]:
-    """Return at and below, and at and above which counts a taxel has a fault, and which."""
+    """Return the count at and below which, and the one at and above which, a taxel has a fault, and the faults."""
     if line is None or highest is None:
         return -1, COUNTS, "", ""
     span, margin, rising = abs(line.press - line.rest), highest >> _END_SHIFT, line.press > line.rest
-    # Where a sound taxel can be by itself: drifted from its rest, pressed as firmly as it was calibrated.
+    # The range of a sound taxel: drifted from its rest, pressed as firmly as it was calibrated.
     below_rest, above_press = round(span * (settings.drift + settings.window)), round(span * settings.window)
     least, most = (
         (line.rest - below_rest, line.press + above_press)

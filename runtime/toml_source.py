@@ -1,4 +1,4 @@
-"""A TOML file with its lines: an error names its line and its keys. All TOML that thenar reads is read here."""
+"""A TOML file with its lines: errors name line and keys. All TOML that thenar reads is read here."""
 
 import codecs
 import re
@@ -14,12 +14,12 @@ from .files import read_file
 from .names import shortened
 from .nesting import check_toml
 
-# Bytes. A harness of 4,096 switches has a third of it; what can be longer is cheaper to refuse than to read.
+# Bytes. A harness of 4,096 switches takes a third of it; reading longer files costs more than rejecting them.
 LARGEST = 1_000_000
-# Characters of an error's reason, which may repeat what the file says.
+# Characters of an error's reason, which may quote the file.
 _LONGEST_REASON = 400
 
-# Where something stands: keys, and numbers in lists from 0.
+# A place in a file: keys, and list indices from 0.
 Place = tuple[str | int, ...]
 
 _TOKEN = re.compile(
@@ -31,16 +31,16 @@ _TOKEN = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class TomlText:
-    """The text of a TOML file, the name that messages call it by, and the kind of error that it raises."""
+    """The text of a TOML file, its name in messages, and the kind of error that it raises."""
 
     name: str
     text: str
     raises: type[ThenarError]
 
     def tables(self) -> dict[str, object]:
-        """Return the content of the file; raises its error, with the line, where it is no TOML or exceeds a limit."""
+        """Return the content of the file; raises its error, with the line, if it is not TOML or exceeds a limit."""
         if len(self.text) > LARGEST:
-            raise self.raises(f"{self.name} is longer than {LARGEST} characters, the most that is read of TOML")
+            raise self.raises(f"{self.name} is longer than {LARGEST} characters, the limit for TOML: shorten it")
         try:
             check_toml(self.text)
             return tomllib.loads(self.text)
@@ -48,13 +48,13 @@ class TomlText:
             raise self.raises(f"{self.name} is not valid TOML: {shortened(str(reason), _LONGEST_REASON)}") from reason
 
     def error(self, place: Place, reason: str) -> ThenarError:
-        """Return an error about what stands at `place`: "scene.toml, line 7: subjects[0].name: ..."."""
+        """Return an error about the entry at `place`: "scene.toml, line 7: subjects[0].name: ..."."""
         where = f"{spelled(place)}: " if place else ""
         shown = shortened(reason, _LONGEST_REASON)
         return self.raises(f"{self.name}, line {self.line(place)}: {where}{shown}")
 
     def line(self, place: Place) -> int:
-        """Return the line of `place`, counted from 1, or of the innermost table round it that is there."""
+        """Return the line of `place`, counted from 1, or of the innermost table around it that exists."""
         lines = _Lines(list(_tokens(self.text))).walk()
         return next(lines[place[:end]] for end in range(len(place), -1, -1) if place[:end] in lines)
 
@@ -62,7 +62,7 @@ class TomlText:
 def read_source(file: Traversable, raises: type[ThenarError]) -> TomlText:
     """Read a TOML file. Raises an error of the kind `raises` if it cannot be opened, is too large or not UTF-8."""
     try:
-        # What ships with thenar may lie in a zip, where no path leads.
+        # Files shipped with thenar may lie in a zip, which has no paths.
         data = read_file(file, LARGEST, raises) if isinstance(file, Path) else file.read_bytes()
         return TomlText(file.name, data.removeprefix(codecs.BOM_UTF8).decode(), raises)
     except UnicodeDecodeError as reason:
@@ -73,7 +73,7 @@ def read_source(file: Traversable, raises: type[ThenarError]) -> TomlText:
 
 
 def spelled(place: Place) -> str:
-    """Return `place` in TOML's words: ("subjects", 0, "name") is "subjects[0].name"."""
+    """Return `place` in TOML's notation: ("subjects", 0, "name") is "subjects[0].name"."""
     return "".join(f"[{key}]" if isinstance(key, int) else f".{shortened(key)}" for key in place).removeprefix(".")
 
 
@@ -88,7 +88,7 @@ def _tokens(text: str) -> Iterator[tuple[str, int]]:
 
 @dataclass(slots=True)
 class _Lines:
-    """Walks through the tokens of a valid TOML file and notes the line of every table, key and place in a list."""
+    """Walks through the tokens of a valid TOML file and records the line of every table, key and list entry."""
 
     tokens: list[tuple[str, int]]
     lines: dict[Place, int] = field(default_factory=lambda: {(): 1})
@@ -129,7 +129,7 @@ class _Lines:
         self._value(place)
 
     def _key(self, place: Place) -> Place:
-        """Pass a dotted key and note every table on its way; a list of tables on its way means the last one."""
+        """Pass a dotted key and record every table on its way; for a list of tables, the last one counts."""
         while True:
             token, line = self.tokens[self.next]
             self.next += 1
@@ -158,5 +158,5 @@ class _Lines:
 
 
 def _unquoted(key: str) -> str:
-    """Return what a bare or quoted key says."""
+    """Return the text of a bare or quoted key."""
     return next(iter(tomllib.loads(f"{key} = 0"))) if key[0] in "\"'" else key

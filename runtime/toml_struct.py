@@ -1,6 +1,6 @@
-"""Tables of a TOML file as msgspec structs; what is wrong is told in TOML's words, with what to write instead.
+"""Tables of a TOML file as msgspec structs; errors use TOML's terms and say what to write instead.
 
-Whatever is raised here is the error of the source that is read.
+All errors raised here are those of the source that is read.
 """
 
 import math
@@ -19,10 +19,10 @@ S = TypeVar("S", bound=msgspec.Struct)
 
 _TYPES = {"float": "a number", "int": "a whole number", "str": "text", "bool": "true or false", "array": "a list"}
 _TYPES |= {"object": "a table"}
-# What msgspec calls what a TOML file can hold.
+# msgspec's names for the types of TOML values.
 _KINDS = {float: "float", int: "int", str: "str", bool: "bool", list: "array", dict: "object"}
 _BOUNDS = {">=": "at least", "<=": "at most", ">": "above", "<": "below"}
-# What the last part of a key says about its value.
+# Units, by the last part of a key.
 _UNITS = {
     "mm": "lengths are in millimetres",
     "g": "masses are in grams",
@@ -46,7 +46,7 @@ _OTHER_UNITS = {
 
 
 def convert(source: TomlText, place: Place, table: object, kind: type[S]) -> S:
-    """Return `table`, which stands at `place` in `source`, as a struct. Raises about the first wrong key."""
+    """Return `table`, found at `place` in `source`, as a struct. Raises the error of the first wrong key."""
     keys = as_table(source, place, table)
     if kind.__struct_config__.forbid_unknown_fields:
         check_keys(source, place, keys, kind.__struct_encode_fields__)
@@ -71,14 +71,14 @@ def as_list(source: TomlText, place: Place, value: object) -> list[object]:
 
 
 def check_keys(source: TomlText, place: Place, table: Mapping[str, object], known: Collection[str]) -> None:
-    """Raise about the first key of `table` that is not among the `known` ones."""
+    """Raise the error of the first key of `table` that is not `known`."""
     for key in table:
         if key not in known:
             raise source.error((*place, key), _advice(key, known))
 
 
 def check_finite(source: TomlText, place: Place, value: object) -> None:
-    """Raise about the first number in `value`, or in anything it holds, that is not finite."""
+    """Raise the error of the first number in `value`, or inside it, that is not finite."""
     if isinstance(value, float) and not math.isfinite(value):
         raise source.error(place, f"must be a finite number, not {value}")
     inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
@@ -87,12 +87,12 @@ def check_finite(source: TomlText, place: Place, value: object) -> None:
 
 
 def _advice(key: str, known: Collection[str]) -> str:
-    """Return what to write instead of a key that is not known."""
+    """Return advice for an unknown key."""
     stem, _, unit = key.rpartition("_")
     same = [name for name in known if name.rpartition("_")[0] in (stem, key) and name.rpartition("_")[2] in _UNITS]
     same.sort(key=lambda name: unit.lower() not in _OTHER_UNITS[name.rpartition("_")[2]])
     if not same:
-        return f"there is no such key here{nearest(key, sorted(known))}"
+        return f"this key is unknown{nearest(key, sorted(known))}"
     return f"{_UNITS[same[0].rpartition('_')[2]]}: {same[0]}"
 
 
@@ -109,7 +109,7 @@ def _worded(source: TomlText, place: Place, table: dict[str, object], kind: type
 
 
 def _followed(path: str, table: object, sentence: str) -> tuple[Place, object]:
-    """Return where a path of msgspec's leads, and what stands there; which key of a dict it means, it does not say."""
+    """Return the place and the value that a path of msgspec leads to; it does not say which key of a dict it means."""
     inner: Place = ()
     value = table
     for name, number in re.findall(r"\.(\w+)|\[(\d+|\.{3})\]", path):
@@ -119,7 +119,7 @@ def _followed(path: str, table: object, sentence: str) -> tuple[Place, object]:
 
 
 def _first_of(table: object, sentence: str) -> str:
-    """Return the key of the first value in `table` that is of the kind that msgspec says it got."""
+    """Return the key of the first value in `table` of the kind that msgspec says it got."""
     got = sentence.partition(", got ")[2].strip("`")
     pairs: list[tuple[str, object]] = list(table.items()) if isinstance(table, dict) else []
     return next((key for key, value in pairs if _KINDS.get(type(value)) == got), pairs[0][0])
@@ -129,7 +129,7 @@ def _sentence(reason: str, value: object, kind: type[S], inner: Place) -> str:
     if found := re.fullmatch(r"Object missing required field `(.+)`", reason):
         return f"the key {found[1]} is missing"
     if found := re.fullmatch(r"Expected `(.+)`, got `.+`", reason):
-        # TOML has no null: what may be None is left out.
+        # TOML has no null: optional values are left out.
         wanted = " or ".join(_TYPES.get(name, name) for name in found[1].split(" | ") if name != "null")
         return f"must be {wanted}, not {_shown(value)}"
     if found := re.fullmatch(r"Expected `.+` ([<>]=?) (.+)", reason):
@@ -147,7 +147,7 @@ def _sentence(reason: str, value: object, kind: type[S], inner: Place) -> str:
 
 
 def _type_at(kind: type[S], inner: Place) -> inspect.Type:
-    """Return what must stand at `inner` of a table that becomes a `kind`."""
+    """Return the type required at `inner` of a table that becomes a `kind`."""
     found = inspect.type_info(kind)
     for key in inner:
         for member in _members(found):
@@ -161,12 +161,12 @@ def _type_at(kind: type[S], inner: Place) -> inspect.Type:
 
 
 def _members(allowed: inspect.Type) -> tuple[inspect.Type, ...]:
-    """Return the types of which a value may be one."""
+    """Return the types that a value may have."""
     return allowed.types if isinstance(allowed, inspect.UnionType) else (allowed,)
 
 
 def _shown(value: object) -> str:
-    """Return a value as it stands in TOML, or what kind of thing it is where that would be long."""
+    """Return a value as written in TOML, or its kind if that would be long."""
     if isinstance(value, dict):
         return "a table"
     if isinstance(value, list):

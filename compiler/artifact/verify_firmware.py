@@ -26,7 +26,7 @@ from ..firmware.choose import Fit, fit_for, smallest_fit
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Library
 from ..firmware.generate import LARGEST
 from ..firmware.layout import ports_of_scan
-from ..firmware.probes import Answers, Lost, Probes, extreme_frames, joined, lost_inputs, random_frames
+from ..firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, lost_inputs, random_frames
 from ..firmware.targets import TARGETS
 from ..firmware.targets import kinds as every_kind
 from ..recordings.graspset import GraspSet, Joint
@@ -235,18 +235,18 @@ class FirmwareTrial:
         shares = [softmax.probabilities(own)[n % len(own)] for n, own in enumerate(scores.tolist())]
         return np.stack([best - second, shares], axis=1)
 
-    def _misnamed(self, found: Answers) -> int | None:
+    def _misnamed(self, found: Predictions) -> int | None:
         if found.names is None:
             return None
         return sum(name != grasp for name, grasp in zip(found.names, self._build.grasps, strict=True))
 
-    def _run(self, fit: Fit, *, incremental: bool, lost: Lost | None) -> Answers:
+    def _run(self, fit: Fit, *, incremental: bool, lost: Lost | None) -> Predictions:
         layout, target = fit.choice.layout, fit.target
         files = target.sources(Library(LIBRARY_NAME, self._build.manifest, layout, target.avr))
         frames = layout.frame_bytes(self._frames.bits, self._frames.codes)
         return target.run(files, LIBRARY_NAME, layout, frames, incremental=incremental, lost=lost)
 
-    def _difference(self, frame: int, found: Answers, *, missing: bool) -> Difference:
+    def _difference(self, frame: int, found: Predictions, *, missing: bool) -> Difference:
         scores = self._scores_without if missing else self._scores
         described = self._build.manifest
         inputs = [*(switch.name for switch in described.switches), *(joint.name for joint in described.joints)]
@@ -276,7 +276,7 @@ class FirmwareTrial:
         return self._build.grasps[number] if number < len(self._build.grasps) else f"type {number}, which is unknown"
 
 
-def _said(found: Answers) -> NDArray[np.int64] | None:
+def _said(found: Predictions) -> NDArray[np.int64] | None:
     """Return the margins and probabilities of a program, (n, 2); None where they were not requested."""
     if found.margins is None or found.shares is None:
         return None

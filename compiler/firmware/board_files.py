@@ -24,7 +24,7 @@ from .words import Names, answers_of
 # in addition to its SCL periods, a reading, a byte of an ANALOG frame; and of a prediction, a lookup in it, and a class
 # of a lookup. The interrupts of a converter take less than a tenth.
 _SCAN, _KEY, _BUS_BYTE, _READING, _ANALOG_BYTE = 3000, 60, 110, 600, 80
-_ANSWER, _LOOKUP, _CLASS = 600, 40, 10
+_PREDICTION, _LOOKUP, _CLASS = 600, 40, 10
 _STATE = 100  # per state, of a tick of segments
 # Parts with an Arduino core count as an AVR at 16 MHz; none of them is slower, but their Wire takes longer.
 _WIRE_US = 200  # of a reading, in addition to its SCL periods
@@ -109,8 +109,8 @@ def shortest_scan_us(
         cycles += cycles // 10
     if recognises:
         lookups = tables.n_switches // 2 + tables.n_joints
-        answers = len(ports) if exits_early(board, ports) else 1
-        cycles += answers * (_ANSWER + lookups * (_LOOKUP + _CLASS * tables.n_classes))
+        predictions = len(ports) if exits_early(board, ports) else 1
+        cycles += predictions * (_PREDICTION + lookups * (_LOOKUP + _CLASS * tables.n_classes))
         cycles += _STATE * (tables.n_classes + 1) * segments
     return 50 * ceil((seconds + cycles / board.clock_hz) * 1e6 / 50)
 

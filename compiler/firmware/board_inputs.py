@@ -92,8 +92,8 @@ def expanders_file(board: Board, ports: Sequence[Port], switches: Sequence[str])
 
 
 def _write_row(write: Write) -> Row:
-    answer = _hexed(write.expect or b"\0")
-    return {"written": len(write.data), "bytes": _hexed(write.data), "expected": len(write.expect), "answer": answer}
+    reply = _hexed(write.expect or b"\0")
+    return {"written": len(write.data), "bytes": _hexed(write.data), "expected": len(write.expect), "reply": reply}
 
 
 def _reading(port: Port, wired: ChipWiring) -> Reading:

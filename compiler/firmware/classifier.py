@@ -21,19 +21,19 @@ from .sensors import Sensors, codes_files, sensors_of
 from .words import Names, answers_of, comment, identifiers, inputs_in_words, joint_in_words, string, switches_in_words
 
 _STARTS_PER_LINE = 4
-_HIGHEST = 65535  # no code is above it
+_HIGHEST = 65535  # the highest code
 
-# Portable C adds sums side by side in a word of 32 bits: two of 16 bits, or four of 8. Two 16-bit entries are one
-# integer, low + 65536 high, so words add up to the word of the sums, whatever was borrowed on the way; and so are four
-# 8-bit entries that are added up in 8 bits. Where 8-bit entries are added up in 16, of four 8-bit entries a, b, c, d
-# the even and the odd ones are added up apart, each with 16 bits of room: no sum of them is above 65535, for it is
-# the difference of two scores. The odd ones are not masked: (b, c, d) is 256 c more than b + 65536 d, and the sum of
-# all c, the upper half of the even sum, is subtracted once, in the end. Rows whose
-# largest entries add up to at most 255, a batch, are added as they are before they are taken apart.
+# Portable C adds several sums at once in a word of 32 bits: two of 16 bits, or four of 8. Two 16-bit entries are one
+# integer, low + 65536 high, so words add up to the word of the sums, whatever was borrowed on the way; the same holds
+# for four 8-bit entries that are summed in 8 bits. Where four 8-bit entries a, b, c, d are summed in 16, the even and
+# the odd ones are added separately, each with 16 bits of room: none of their sums exceeds 65535, since it is the
+# difference of two scores. The odd ones are not masked: (b, c, d) is 256 c more than b + 65536 d, and the sum of all
+# c, the upper half of the even sum, is subtracted once at the end. Rows whose largest entries add up to at most 255, a
+# batch, are added as they are before they are split.
 
 
 def portable_values(name: str, layout: Layout) -> dict[str, object]:
-    """Return what the templates of the portable C ask for."""
+    """Return the values for the templates of the portable C."""
     parts, biased, bits = layout.parts, layout.biased, layout.sum_bits
     lanes = _lanes(parts.width, biased, bits)
     n_lanes = max(lane for lane, _ in lanes) + 1
@@ -73,7 +73,7 @@ def avr_macros(width: int, entry_bits: int) -> list[str]:
 
 
 def _lanes(width: int, biased: bool, bits: int) -> list[tuple[int, int]]:
-    """Return for every class of a part the number of its word of sums, and the lowest bit of its sum in there."""
+    """Return for every class of a part the number of its word of sums, and the lowest bit of its sum in that word."""
     if biased:
         return [(2 * (k // 4) + k % 2, 16 if k % 4 >= 2 else 0) for k in range(width)]
     each = 32 // bits
@@ -136,17 +136,17 @@ def _arithmetic(lanes: int, biased: bool, shift: int) -> tuple[list[str], list[s
 
 
 def _started(lane: int, biased: bool, shift: int) -> bool:
-    """Return whether a sum begins with what it starts from, rather than that it is added in the end."""
-    # An even sum must not where it says what the odd one beside it took too much; one that is shifted must not either.
+    """Return whether a sum is initialised with its start value; otherwise the start value is added at the end."""
+    # An even sum that corrects the odd one after it starts from zero, and so does a sum that is shifted.
     return biased and lane % 2 == 1 and not shift
 
 
 def _finishing(lanes: int, biased: bool, shift: int) -> list[str]:
-    """Return the statements that make the words of two sums s0, s1... which rows have been added to."""
+    """Return the statements that make the words of two sums s0, s1... after all rows have been added."""
     if not biased:
         return [f"s{lane} += start[{lane}];" for lane in range(lanes)]
     finished = []
-    for lane in reversed(range(lanes)):  # an odd one before the even one beside it
+    for lane in reversed(range(lanes)):  # an odd one before the even one that precedes it
         text = f"s{lane} - ((s{lane - 1} >> 16) << 8)" if lane % 2 else f"s{lane}"
         if _started(lane, biased, shift):
             finished.append(f"s{lane} = {text};")
@@ -156,7 +156,7 @@ def _finishing(lanes: int, biased: bool, shift: int) -> list[str]:
 
 
 def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
-    """Return the expression of the number of one look-up's row, in lines."""
+    """Return the expression of the number of one lookup's row, in lines."""
     found = [f"{lookup.first_row}u"] if lookup.first_row else []
     if lookup.group is not None:
         fields = " | ".join(map(_field, layout.fields[lookup.group]))
@@ -181,7 +181,7 @@ def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
 
 
 def _field(field: Field) -> str:
-    """Return the expression of a field of a port's byte, at its place in the group's."""
+    """Return the expression of a field of a port's byte, shifted to its place in the group's byte."""
     by, mask = field.bit - field.to, ((1 << field.width) - 1) << field.to
     port = f"input->switches[{field.port}]"
     moved = f"((uint32_t){port} {'>>' if by > 0 else '<<'} {abs(by)})" if by else port
@@ -200,7 +200,7 @@ def _lane_words(rows: list[list[int]], lanes: Sequence[tuple[int, int]]) -> list
 
 
 def _distance(name: str, layout: Layout, at: int) -> str:
-    """Return the expression of the distance of a slope's code."""
+    """Return the expression for the distance of a slope's code."""
     slope = layout.tables.slopes[at]
     code = f"input->codes[{slope.joint}]"
     if layout.stores_distances:
@@ -223,14 +223,14 @@ def _after(first: int, place: str) -> str:
 
 
 LIBRARY_NAME = "glove"
-"""What the library is called unless it is named: its files are thenar_glove.h and so on, its functions alike."""
+"""The default name of the library: its files are thenar_glove.h and so on, its functions likewise."""
 FIRMWARE_NAME = "firmware"
 LIBRARY_FILES = tuple(
     f"thenar_{LIBRARY_NAME}{part}{ending}"
     for part in ("", "_tables", "_codes", "_segments")
     for ending in (".h", ".c", "_avr.S")
 )
-"""The folder of a build that carries the library, and what it may hold."""
+"""The folder of a build that contains the library, and the files that it may contain."""
 
 COLUMNS = 120
 _FOLDER = "classifier/"
@@ -239,7 +239,7 @@ _NUMBERS_PER_LINE = 16
 
 
 def table_lines(layout: Layout, names: Names) -> list[str]:
-    """Return the lines of the whole table: part after part, look-up after look-up."""
+    """Return the lines of the whole table: part after part, lookup after lookup."""
     lines = []
     for first in layout.parts.firsts:
         columns = slice(first, first + layout.parts.width)
@@ -287,7 +287,7 @@ def _closed(names: Sequence[str], byte: int) -> str:
 
 
 def _row_lines(row: Sequence[int], entry_bits: int, what: str) -> list[str]:
-    """Return one row of the table; the comment goes behind it, or before it where it is too long for that."""
+    """Return one row of the table; the comment follows it, or precedes it if it is too long."""
     at_once, macro = (2, "PAIR") if entry_bits == 16 else (4, "QUAD")
     digits = 6 if entry_bits == 16 else 4
     cells = []
@@ -307,12 +307,12 @@ def _row_lines(row: Sequence[int], entry_bits: int, what: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Library:
-    """The classifier that a target's files are made around: what it is called, what it is of, how it is laid out.
+    """The classifier for a target's files: its name, the names in it, and its layout.
 
     name   of its files and functions, thenar_NAME: one that words.check_name allows
-    avr    whether it adds up in an AVR's assembly there
+    avr    whether it adds rows in an AVR's assembly there
     notes  lines for the opening comments
-    glove  what is known of the sensors of a glove; None: nothing but what the build says
+    glove  the known sensors of a glove; None: only the names are known
     """
 
     name: str
@@ -334,14 +334,14 @@ class Library:
 
     @cached_property
     def whole(self) -> dict[str, str]:
-        """The classifier's files, what makes codes of readings, and the decoder of segments where the build has costs
-        of them.
+        """The classifier's files, those that convert readings to codes, and the decoder of segments where the build has
+        segment costs.
         """
         return self.files | self.codes | self.segments
 
     @cached_property
     def codes(self) -> dict[str, str]:
-        """The files of what makes codes of readings."""
+        """The files that convert readings to codes."""
         return codes_files(self.name, self.sensors, code_bits=self.layout.code_bits, avr=self.avr)
 
     @cached_property
@@ -352,7 +352,7 @@ class Library:
 
     @property
     def objects(self) -> str:
-        """What its sources are compiled to, for a Makefile."""
+        """The object files of its sources, for a Makefile."""
         return " ".join(path.rsplit(".", 1)[0] + ".o" for path in self.whole if path.endswith((".c", ".S")))
 
 
@@ -361,9 +361,9 @@ def classifier_files(
 ) -> dict[str, str]:
     """Return the texts of thenar_`name`.h and .c, and with `avr` of thenar_`name`_avr.S.
 
-    `name` is one that words.check_name allows, `names` are of the inputs and types of the tables in `layout`. With
-    `avr` the .c serves AVRs, where the .S adds, and all others; without it, all but AVRs. `notes` are lines for the
-    opening comments. Raises FirmwareError if the tables are beyond what an AVR can read.
+    `name` is one that words.check_name allows; `names` are those of the inputs and types of the tables in `layout`.
+    With `avr` the .c is for AVRs, where the .S adds, and for all others; without it, for all but AVRs. `notes` are
+    lines for the opening comments. Raises FirmwareError if the tables exceed what an AVR can read.
     """
     if avr:
         check_size(layout)
@@ -385,10 +385,10 @@ def _opening(name: str, names: Names, ending: str, notes: Sequence[str]) -> str:
     what = {
         ".h": f"Recognises {len(names.grasps)} grasp types from "
         f"{inputs_in_words(len(names.switches), len(names.joints))} of a glove.",
-        ".c": "integer arithmetic; the header says how it is used.",
-        "_tables.h": "what the library's own files know of the tables; no program needs it.",
+        ".c": "integer arithmetic; the header describes its use.",
+        "_tables.h": "definitions of the tables for the library's own files; programs do not need it.",
         "_tables.c": "the tables.",
-        "_avr.S": "the adding up, on an AVR.",
+        "_avr.S": "the addition of rows, on an AVR.",
     }[ending]
     made = (
         f"From the tables {names.tables_sha256[:16]}; thenar {version('thenar')}, "
@@ -422,13 +422,13 @@ def _common_values(name: str, names: Names, layout: Layout, avr: bool) -> dict[s
         "n_lookups": len(layout.lookups),
         "n_slopes": len(layout.tables.slopes),
         "relative": layout.tables.relative,
-        "nothing_held": len(answers) - 1 if (answers := answers_of(names))[-1] == NONE else None,
+        "nothing_held": len(outputs) - 1 if (outputs := answers_of(names))[-1] == NONE else None,
         "rejection": names.rejection,
     }
 
 
 def _unsigned(most: int) -> str:
-    """Return the type of numbers up to `most` itself, which says "none"."""
+    """Return the C type for 0..most; most itself means "none"."""
     return "uint8_t" if most <= 255 else "uint16_t"
 
 
@@ -474,7 +474,7 @@ def _rejection_lines(rejection: Rejection) -> dict[str, list[str]]:
 
 
 def _bin_lines(names: Names, joint: JointLayout) -> list[str]:
-    """Return what a joint's codes add to the number of a row as lines, and before them whose they are."""
+    """Return the contributions of a joint's codes to the number of a row, as lines, after a comment with its name."""
     name = names.joints[joint.number].name
     return [*remark(comment(f"{name}, from code {joint.first} on")), *number_lines(joint.bins.tolist())]
 
@@ -490,7 +490,7 @@ def _mean_lines(means: NDArray[np.int64]) -> list[str]:
 
 
 def _place_lines(layout: Layout) -> list[str]:
-    """Return for each switch the number of its port and the bit, eight on a line."""
+    """Return for each switch its port number and its bit, eight on a line."""
     pairs = [f"{{{port}, {1 << bit}}}," for port, bit in layout.places]
     return [_INDENT + " ".join(pairs[at : at + 8]) for at in range(0, len(pairs), 8)]
 
@@ -509,7 +509,7 @@ def _header_values(name: str, names: Names, layout: Layout) -> dict[str, list[st
 
 
 def _enumerators(prefix: str, named: Sequence[tuple[str, str]]) -> list[str]:
-    """Return the lines of enumerators, each with what it is; before it where it is too long to follow."""
+    """Return the lines of enumerators, each with its description; the description comes first if it is too long."""
     lines = []
     for number, (word, (_, what)) in enumerate(zip(identifiers([own for own, _ in named]), named, strict=True)):
         line, more = f"{prefix}_{word} = {number},", f" /**< {what} */"

@@ -1,9 +1,9 @@
-"""What a classifier costs: in portable C, which adds words of two sums, by a model that is rough but not too low.
+"""The cost of a classifier in portable C, which adds words of two sums, by a model that is rough but not too low.
 
-The model is fitted to what qemu counts of code by arm-none-eabi-gcc 12 with -O2, for 3 to 30 classes and 2 to 33
-look-ups, from the bytes of ports: 1 to 62 % above on an M0+, 1 to 42 % on an M4, most where classes or look-ups are
-few. In classify(), entries of 8 bits that are added up in 16 are faster than those of 16 bits where many rows fit in a
-batch, and slower where few do; in update() they are always slower, for each row is taken apart by itself.
+The model is fitted to the instructions that qemu counts for code by arm-none-eabi-gcc 12 with -O2, for 3 to 30 classes
+and 2 to 33 lookups, from the bytes of ports: 1 to 62 % above on an M0+, 1 to 42 % on an M4, most where classes or
+lookups are few. In classify(), entries of 8 bits that are added up in 16 are faster than those of 16 bits where many
+rows fit in a batch, and slower where few do; in update() they are always slower, since each row is split separately.
 Other compilers and cores differ.
 """
 
@@ -14,20 +14,20 @@ from .layout import MOST_INLINE, JointLayout, Layout
 
 Unit = Literal["cycles", "instructions", ""]
 
-NAME_BYTES = 16  # all names take as much room as the longest, and there is one more, which is empty
+NAME_BYTES = 16  # each name takes as much room as the longest, and there is one more, which is empty
 
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """What a classifier takes at most.
+    """The most that a classifier takes.
 
-    cycles          that classify() takes for any frame; elsewhere than on an AVR instructions
-    update_cycles   that update() takes, whatever has changed
+    cycles          of classify() for any frame; instructions except on an AVR
+    update_cycles   of update(), whatever has changed
     flash           bytes of all of it, with names of grasp types of up to 15 bytes, of C compiled with
                     -ffunction-sections -fdata-sections
-    flash_classify  of these, bytes that a program has which never calls update() and never says that an input is
-                    missing, where the linker leaves out what is not called (--gc-sections)
-    ram             bytes, stack included, whichever of the two is called
+    flash_classify  the part of these bytes in a program that never calls update() and never marks an input as missing,
+                    where the linker removes uncalled functions (--gc-sections)
+    ram             bytes, stack included, for either function
     """
 
     cycles: int
@@ -39,10 +39,17 @@ class Cost:
 
 @dataclass(frozen=True, slots=True)
 class Core:
-    """Instructions of an answer; of a class, and how many more where classes are added up in parts; of a look-up, and
-    of a joint in it; in each part of a look-up, and of a word of its entries; of a word of a batch of 8-bit entries
-    that is taken apart; in update() of a word of two or of four that is replaced, and more of four upper halves; of a
-    word of two sums that a slope adds to, and of one in update(); of a threshold that is compared.
+    """Instructions of the model, each per item.
+
+    fixed            of a prediction
+    a_class, in_parts          of a class; in addition where classes are added up in parts
+    lookup, found              of a lookup; of a joint in it
+    part, pair                 of a lookup in each part; of a word of its entries
+    quad                       of a word of a batch of 8-bit entries that is split
+    replaced_pair, replaced_quad, replaced_halves  of a word of two or of four that update() replaces; in addition for
+                               four upper halves
+    product, moved_product     of a word of two sums that a slope adds to; of one in update()
+    compared                   of a threshold that is compared
     """
 
     fixed: int
@@ -75,35 +82,35 @@ CORTEX_M4 = Core(
     replaced_quad=21,
     replaced_halves=0,
 )
-"""What other cores of 32 bits are taken to be like."""
+"""The assumed costs of other 32-bit cores."""
 
 
 # Of a class where four entries of 8 bits share a word.
 _BIASED_CLASS = 3
-_REPLACING, _REPLACING_PART = 10, 32  # of a row in update(), but for its words; more for each part but the first
-# More than for a code that is looked up directly: a byte clamped below and above, where it can lie there; a code of 16
+_REPLACING, _REPLACING_PART = 10, 32  # of a row in update(), without its words; more for each part but the first
+# In addition to a code that is looked up directly: a byte clamped below and above, where it can lie there; a code of 16
 # bits clamped; a code searched, and each step of the search.
 _BELOW, _ABOVE, _WIDE = 4, 2, 8
 _SEARCHED, _SEARCH_STEP = 16, 11
 # The distance of a code, looked up or not; in each part all but the products; and of each word of sums, at the end and
-# where entries are upper halves. In update(), the change of a distance; and of it in each part all but the words.
+# where entries are upper halves. In update(), the change of a distance; and in each part all but the words.
 _DISTANCE_KNOWN, _DISTANCE, _MULTIPLYING, _WORD, _HALVES, _CHANGED, _MOVING = 7, 14, 76, 2, 8, 5, 18
 
-# Of code; where classes are added up in parts, that takes more.
+# Of code; more where classes are added up in parts.
 _BYTES, _BYTES_PARTS, _BYTES_CLASS = 186, 432, 15
 _BYTES_WORD, _BYTES_QUAD, _BYTES_START = 7, 20, 41
 _BYTES_UPDATE, _BYTES_UPDATE_CLASS, _BYTES_UPDATE_PAIR, _BYTES_UPDATE_QUAD = 180, 10, 11, 40
 _BYTES_FINDING, _BYTES_PLACE = 9, 48
 _BYTES_JOINT, _BYTES_CLAMPED, _BYTES_COMPARED, _BYTES_SEARCHED = 11, 35, 11, 55
 _BYTES_MULTIPLYING, _BYTES_PRODUCT, _BYTES_DISTANCE = 150, 30, 24
-# Of what replaces missing inputs, beside the table of their means; instructions that take a field of a port's byte, and
-# that see that nothing is missing.
+# Of the code that replaces missing inputs, without the table of their means; instructions that extract a field of a
+# port's byte, and that check that nothing is missing.
 _BYTES_LOSING, _FIELD, _MISSING = 290, 3, 3
 _STACK = 128
 
 
 def word_cost(layout: Layout, core: Core) -> Cost:
-    """Return what the portable C takes on a core, roughly."""
+    """Return the estimated cost of the portable C on a core."""
     parts, classes = len(layout.parts.firsts), layout.tables.n_classes
     words, finding = _words(layout), sum(_finding(layout, joint, core) for joint in layout.joints)
     finding += _MISSING + _FIELD * sum(map(len, layout.fields))
@@ -113,15 +120,15 @@ def word_cost(layout: Layout, core: Core) -> Cost:
     adding += parts * len(layout.batches) * words * core.quad * layout.biased
     replacing = _REPLACING + _REPLACING_PART * (parts - 1) + parts * words * replaced
     a_class = core.a_class + _BIASED_CLASS * layout.biased + (core.in_parts if parts > 1 else 0)
-    answering = a_class * classes + finding + core.fixed
-    looking_up = len(layout.lookups) * core.lookup + answering
+    classifying = a_class * classes + finding + core.fixed
+    looking_up = len(layout.lookups) * core.lookup + classifying
     classify, update = looking_up + adding, looking_up + len(layout.lookups) * replacing
     multiplying, moving = _multiplying(layout, core)
     classify, update = classify + multiplying, update + moving
     flash = _flash(layout) + NAME_BYTES * (classes + 1)
     replaced_bytes = _BYTES_UPDATE_QUAD if layout.biased else _BYTES_UPDATE_PAIR
     update_flash = _BYTES_UPDATE + _BYTES_UPDATE_CLASS * classes + words * replaced_bytes
-    # It has code of its own that finds rows.
+    # update() has its own code to find rows.
     update_flash += _BYTES_FINDING * len(layout.lookups)
     update_flash += sum(
         _BYTES_PLACE if len(joint.bins) < 1 << layout.code_bits else _BYTES_JOINT for joint in layout.joints
@@ -131,7 +138,7 @@ def word_cost(layout: Layout, core: Core) -> Cost:
 
 
 def _multiplying(layout: Layout, core: Core) -> tuple[int, int]:
-    """Return the instructions that slopes take in classify(), where sums are in registers, and in update()."""
+    """Return the instructions of slopes in classify(), where sums are in registers, and in update()."""
     slopes, width, parts = len(layout.tables.slopes), layout.parts.width, len(layout.parts.firsts)
     if not slopes:
         return 0, 0
@@ -143,12 +150,12 @@ def _multiplying(layout: Layout, core: Core) -> tuple[int, int]:
 
 
 def _words(layout: Layout) -> int:
-    """Return how many words a row has."""
+    """Return the number of words in a row."""
     return -(-layout.parts.width * layout.entry_bits // 32)
 
 
 def _finding(layout: Layout, joint: JointLayout, core: Core) -> int:
-    """Return the instructions that a joint takes in finding a row."""
+    """Return the instructions of a joint in finding a row."""
     if joint.compared:
         steps = len(joint.thresholds)
         return core.found + (
@@ -163,14 +170,14 @@ def _finding(layout: Layout, joint: JointLayout, core: Core) -> int:
 
 
 def _flash(layout: Layout) -> int:
-    """Return the bytes of tables and code, update() left out, at most, roughly; the names of the grasp types come on
-    top.
+    """Return an upper estimate of the bytes of tables and code without update(); the names of the grasp types are added
+    to this.
     """
     parts, words, lookups = layout.parts, _words(layout), len(layout.lookups)
     rows = 4 * layout.n_rows * words * len(parts.firsts) + sum(len(joint.bins) for joint in layout.joints)
     places = layout.tables.n_switches * (2 if len(layout.ports) <= 255 else 4)
-    starts = 2 * len(parts.firsts) * (2 * parts.width + 8)  # of the sums, constant and as they are in the beginning
-    starts += 2 * layout.tables.n_classes + 4 * lookups  # scores, and rows added, in the beginning
+    starts = 2 * len(parts.firsts) * (2 * parts.width + 8)  # of the sums: constants and initial values
+    starts += 2 * layout.tables.n_classes + 4 * lookups  # initial scores, and rows added at first
     code = _BYTES + (_BYTES_PARTS if len(parts.firsts) > 1 else 0) + _BYTES_CLASS * parts.width
     code += words * ((_BYTES_WORD + 2 * layout.biased) * lookups + _BYTES_START)
     code += words * _BYTES_QUAD * len(layout.batches) if layout.biased else 0
@@ -193,10 +200,10 @@ def _joint_flash(layout: Layout, joint: JointLayout) -> int:
 
 
 def _ram(layout: Layout) -> int:
-    """Return the bytes of variables and stack, roughly."""
+    """Return the estimated bytes of variables and stack."""
     classes = layout.tables.n_classes
     lost = len(layout.ports) + -(-layout.tables.n_joints // 8) + 4
     frame = len(layout.ports) + layout.padding + layout.tables.n_joints * layout.code_bits // 8
-    rows = 2 * 4 * len(layout.lookups)  # pointers to those added, and in update() to those that are now
-    slopes = 4 * len(layout.tables.slopes)  # distances added, and in update() those that are now
+    rows = 2 * 4 * len(layout.lookups)  # pointers to the rows added and, in update(), to the new ones
+    slopes = 4 * len(layout.tables.slopes)  # the distances added and, in update(), the new ones
     return frame + 2 * classes + 4 * (classes + 6) + lost + rows + slopes + _STACK

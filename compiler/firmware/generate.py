@@ -1,7 +1,7 @@
-"""The files of a folder of firmware: of which tables, for what, doing what; and the folder, written whole.
+"""The files of a firmware folder, from tables, target and mode; the folder is written atomically.
 
-`SHA256SUMS`, which `sha256sum -c` reads, names what thenar has written. What it does not name, such as the objects of a
-compiler, is the user's, and stays.
+`SHA256SUMS`, which `sha256sum -c` reads, lists the files that thenar has written. Other files, such as a compiler's
+objects, belong to the user and are kept.
 """
 
 import hashlib
@@ -42,17 +42,17 @@ from .words import Names, check_name
 class Firmware:
     """Firmware of `tables` for `target`, one of TARGETS, in `mode`.
 
-    names        what grasp types, switches and joints are called: a build's manifest, or words.numbered(tables)
+    names        the names of grasp types, switches and joints: a build's manifest, or words.numbered(tables)
     mode         "classify": a library; "scan": a board that scans switches; "glove": one that also recognises
-    name         what its files and functions are called: lower-case letters, digits and _, at most 32
-    board        how the microcontroller is wired: needed by the modes scan and glove, and only by them
-    scan         how the build's harness is read, where it has one: a library takes its switches as they come from there
-    sensors      what is known of the glove whose readings a library converts; None: nothing but what the names say
+    name         of its files and functions: lower-case letters, digits and _, at most 32
+    board        how the microcontroller is wired; the modes scan and glove need it, the mode classify rejects it
+    scan         how the build's harness is read, if it has one: a library takes its switches from these readings
+    sensors      the known sensors of the glove whose readings a library converts; None: only the names are known
     flash        how many bytes of flash the classifier may take; None: half of the part's, three quarters where half
                  is too little
 
-    Raises FirmwareError where these do not go together, or the name cannot be one in C; MemberError if there is no
-    such target.
+    Raises FirmwareError where these are inconsistent, or the name cannot be used in C; MemberError if there is no such
+    target.
     """
 
     tables: IntegerTables
@@ -70,20 +70,20 @@ class Firmware:
         target = self._target
         if self.mode == "classify":
             if self.board is not None:
-                raise FirmwareError("the mode classify reads no board: leave the board out, or ask for scan or glove")
+                raise FirmwareError("the mode classify reads no board: leave the board out, or use scan or glove")
         elif self.mode not in target.modes:
             *others, last = (name for name, each in TARGETS.items() if self.mode in each.modes)
             able = f"{', '.join(others)} and {last}"
-            raise FirmwareError(f"the mode {self.mode} is written for {able}, not for {self.target}")
+            raise FirmwareError(f"the mode {self.mode} is available for {able}, not for {self.target}")
         elif self.board is None:
-            raise FirmwareError(f"the mode {self.mode} needs a board.toml: how the microcontroller is wired")
+            raise FirmwareError(f"the mode {self.mode} needs a board.toml that describes the microcontroller's wiring")
         elif self.mode == "glove" and len(keys_of(self.board, self.names.switches)) < len(self.names.switches):
             raise FirmwareError(
-                "the build keeps levels of taxels, which firmware of the mode glove does not read: take the mode scan, "
+                "the build keeps levels of taxels, which firmware of the mode glove cannot read: use the mode scan, "
                 "and recognise on the host"
             )
         elif self.board.part != target.part:
-            raise FirmwareError(f"the board has an {self.board.part}, the target {self.target} is {target.named}")
+            raise FirmwareError(f"the board has an {self.board.part}, but the target {self.target} is {target.named}")
 
     @property
     def _target(self) -> Target:
@@ -91,21 +91,21 @@ class Firmware:
 
     @cached_property
     def fit(self) -> Fit:
-        """The part that it is for, and the layout chosen for it. Raises FirmwareError if no layout fits."""
-        if self.mode == "scan":  # a board that only scans holds no classifier
+        """The part of the target, and the layout chosen for it. Raises FirmwareError if no layout fits."""
+        if self.mode == "scan":  # a board that only scans contains no classifier
             return smallest_fit(self.tables, flash=self.flash)
         return fit_for(self._target, self.tables, self.flash, self._ports)
 
     @property
     def _ports(self) -> Ports | None:
-        """How the switches come: eight keys of the board after eight, or as they are read of the build's harness."""
+        """The ports of the switches: eight consecutive keys of the board each, or readings of the build's harness."""
         if self.board is None:
             return ports_of_scan(self.scan)
         return key_ports(self.board, keys_of(self.board, self.names.switches))
 
     @property
     def segments(self) -> str:
-        """Whether the firmware of a glove follows segments, in words; "" where its build has no costs of them."""
+        """A sentence on whether the firmware of a glove follows segments; "" where its build has no segment costs."""
         return segments_in_words(self.board, self.names) if self.mode == "glove" and self.board is not None else ""
 
     def library(self, notes: Sequence[str] = ()) -> Library:
@@ -113,10 +113,10 @@ class Firmware:
         return Library(self.name, self.names, self.fit.choice.layout, self.fit.target.avr, tuple(notes), self.sensors)
 
     def files(self, notes: Sequence[str] | None = None) -> dict[str, str]:
-        """Return path -> text of the firmware; the same firmware and notes give the same.
+        """Return path -> text of the firmware; the result is deterministic.
 
-        notes are lines for the opening comment of the classifier's header, those of the fit unless given. Raises
-        FirmwareError where no layout fits, or the board cannot do what is asked of it.
+        notes are lines for the opening comment of the classifier's header, by default those of the fit. Raises
+        FirmwareError where no layout fits, or the board cannot do what the mode needs.
         """
         library = self.library(self.fit.notes() if notes is None else notes)
         return self._target.files(library) if self.board is None else self._of_board(self.board, library)
@@ -140,21 +140,22 @@ LARGEST = 64 << 20
 
 
 def write_folder(files: Mapping[str, str], folder: Path, *, overwrite: bool = False) -> Path:
-    """Write `files`, path below the folder -> text, as `folder`, with their sums; return the folder, resolved.
+    """Write `files`, path below the folder -> text, as `folder`, with their checksums; return the resolved folder.
 
-    With `overwrite` a folder that thenar wrote before is replaced, and what else is in it is kept. Killed, it leaves
-    the old folder or the new one. Raises FirmwareError where a folder is not empty and may not be overwritten, was not
-    written by thenar, or holds files of ours that were changed since, or others where ours are to be written.
+    With `overwrite` a folder that thenar wrote before is replaced; other files in it are kept. If the process is
+    killed, the folder is either the old or the new one. Raises FirmwareError where a folder is not empty and may not be
+    overwritten, was not written by thenar, or holds files of ours that were changed since, or the user's files where
+    ours are to be written.
     """
     target, _ = check_folder(folder, _users_files, FirmwareError)
     if not overwrite and target.exists() and any(target.iterdir()):
-        raise FirmwareError(f"{folder} holds firmware already: name another folder, or add --overwrite")
+        raise FirmwareError(f"{folder} already holds firmware: name another folder, or add --overwrite")
     content = {path: text.encode() for path, text in {**files, SUMS: sums(files)}.items()}
     return publish_folder(content, folder, _users_files, FirmwareError)
 
 
 def sums(files: Mapping[str, str]) -> str:
-    """Return what `sha256sum` prints of the files, in the order of their names."""
+    """Return the output of `sha256sum` for the files, in the order of their names."""
     return "".join(f"{_digest(text.encode())}  {path}\n" for path, text in sorted(files.items()))
 
 
@@ -163,12 +164,12 @@ def _digest(data: bytes) -> str:
 
 
 def _users_files(folder: Path) -> list[str]:
-    """Return the user's entries of the folder, in order. Raises FirmwareError if ours may not be replaced."""
+    """Return the user's entries of the folder, sorted. Raises FirmwareError if our files may not be replaced."""
     there = entries(folder)
     if not there:
         return []
     if SUMS not in there:
-        raise FirmwareError(f"{folder} is not empty and holds no firmware of thenar: name another folder")
+        raise FirmwareError(f"{folder} is not empty and was not written by thenar: name another folder")
     ours = _read_sums(folder / SUMS)
     for path in sorted(ours.keys() & set(there)):
         if _digest(read_file(folder / path, LARGEST, FirmwareError)) != ours[path]:

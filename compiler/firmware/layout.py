@@ -1,20 +1,20 @@
-"""How a build's integer tables lie in a microcontroller's flash: which switches share a look-up, how wide an entry is,
-how a joint's code becomes a row.
+"""The layout of a build's integer tables in a microcontroller's flash: which switches share a lookup, how wide an entry
+is, and how a joint's code selects a row.
 
-    score_k = start_k + sum over look-ups l of rows_l[n_l, k] + sum over slopes of distance * row[k]
+    score_k = start_k + sum over lookups l of rows_l[n_l, k] + sum over slopes of distance * row[k]
 
-where n_l is the byte of a group of switches, one bit per switch, or is added up from the codes of one or a few joints,
-or both. What a pair of joints adds is a look-up of both, besides those that they have alone. A frame holds the switches
-as they come, a byte for each port: eight wires of an expander, eight keys of a matrix, or eight kept switches in their
-order; a group is put together from fields of such bytes. Every row is the exact sum of its switches' and joints' rows,
-so the scores are those of `IntegerTables`, bit for bit. There are three kinds of entries:
+where n_l is the byte of a group of switches, one bit per switch, or a sum over the codes of one or a few joints, or
+both. A pair of joints is a lookup of both, in addition to those of each joint alone. A frame holds the switches as they
+are read, a byte for each port: eight wires of an expander, eight keys of a matrix, or eight kept switches in their
+order; a group is assembled from fields of such bytes. Every row is the exact sum of its switches' and joints' rows, so
+the scores are those of `IntegerTables`, bit for bit. There are three kinds of entries:
 
-    16 bits, added up in 16. They wrap around at will, for all scores fit; row 0 of a group of switches is zero, so that
+    16 bits, added up in 16. Sums may wrap around, since all scores fit; row 0 of a group of switches is zero, so that
              one switch's change is plus or minus row 2^bit.
-    8 bits,  added up in 8, just so, where the proved bound of all scores is at most 127.
-    8 bits,  added up in 16, where it is not: entries are what exceeds the least of their look-up and class, 0 to 255;
-             the leasts are part of `start`. Where tables have slopes and all these are multiples of 256 (`grid`),
-             entries are of their upper halves.
+    8 bits,  added up in 8 in the same way, where the proved bound of all scores is at most 127.
+    8 bits,  added up in 16, elsewhere: entries are offsets from the minimum of their lookup and class, 0 to 255; the
+             minima are part of `start`. Where tables have slopes and all offsets are multiples of 256 (`grid`), entries
+             are their upper halves.
 """
 
 from collections.abc import Iterable, Sequence
@@ -31,11 +31,11 @@ from thenar.runtime.tables import COARSE, IntegerTables
 
 from . import FirmwareError
 
-MOST_INLINE = 8  # thresholds are compared one by one; where there are more, they are searched
+MOST_INLINE = 8  # up to this number, thresholds are compared one by one; more are searched
 MOST_ROWS = 256  # a bin is one byte
-MOST_ENTRY = 255  # that a byte without a sign holds
+MOST_ENTRY = 255  # the largest unsigned byte
 MOST_BYTE = 127  # the largest bound of scores that are added up in a byte
-MOST_BINS = 256  # and so is what is left of a code when the first of a joint's bins is taken from it
+MOST_BINS = 256  # a code less the first code of a joint's bins is also one byte
 
 Bins = Literal["direct", "trimmed", "search"]
 Rows = NDArray[np.integer]
@@ -43,13 +43,13 @@ Rows = NDArray[np.integer]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointLayout:
-    """Joint `number`, and what its code adds to the number of a look-up's row: `weight` times the number of thresholds
+    """Joint `number`, and its contribution to the number of a lookup's row: `weight` times the number of thresholds
     that are not below the code, so that the highest codes add nothing.
 
     "direct": bins[code] for all 256 codes. "trimmed": bins[clamped code - first] from the first threshold to one beyond
-    the last. Both hold uint8 (n,) with the weight in them. "search": no bins, the thresholds are compared; and so are
-    few of them in "trimmed", where that is faster. Bins begin at byte `first_bin` of all bins, thresholds at
-    `first_step` of all that are compared.
+    the last. Both hold uint8 (n,), already multiplied by the weight. "search": no bins, the thresholds are compared;
+    "trimmed" also compares if there are few, where that is faster. Bins begin at byte `first_bin` of all bins,
+    thresholds at `first_step` of all compared thresholds.
     """
 
     number: int
@@ -67,18 +67,18 @@ class JointLayout:
 
     @property
     def most(self) -> int:
-        """What code 0 adds, and no code more."""
+        """The contribution of code 0, which is the largest."""
         return self.weight * len(self.thresholds)
 
     def places(self, codes: NDArray[np.uint16]) -> NDArray[np.int64]:
-        """Return what each code (n,) adds, found in the way that the firmware finds it."""
+        """Return the contribution of each code (n,), computed in the same way as in the firmware."""
         if self.compared:
             return self.weight * (len(self.thresholds) - np.searchsorted(self.thresholds, codes)).astype(np.int64)
         held = np.clip(codes.astype(np.int64), self.first, self.first + len(self.bins) - 1)
         return self.bins[held - self.first].astype(np.int64)
 
 
-# Up to so many thresholds of a byte are compared no slower than a code is clamped and looked up, and in less flash.
+# Comparing up to this many thresholds of a byte is no slower than clamping and looking up, and takes less flash.
 _COMPARED = 6
 
 
@@ -95,43 +95,43 @@ def _bins(thresholds: NDArray[np.uint16], weight: int, bins: Bins, code_bits: in
 
 
 def code_bits(tables: IntegerTables) -> int:
-    """Return the width of the codes, 8 where no joint's thresholds or slope tell codes above 254 apart, else 16."""
+    """Return the width of the codes: 8 where no joint's thresholds or slope distinguish codes above 254, else 16."""
     steps = [tables.steps_of(joint) for joint in range(tables.n_joints)]
     last = [int(each[-1]) + 1 for each in steps if len(each)] + [slope.high for slope in tables.slopes]
     return 16 if any(code > 255 for code in last) else 8
 
 
 def check_joints(tables: IntegerTables, bins: Bins) -> None:
-    """Raise FirmwareError if a joint's rows are more than a byte can number, or cannot be found by `bins`."""
+    """Raise FirmwareError if a joint has more rows than a byte can number, or `bins` cannot find them."""
     if bins == "direct" and code_bits(tables) == 16:
-        raise FirmwareError('codes have 16 bits: their rows are found by "trimmed" or "search", not "direct"')
+        raise FirmwareError('codes have 16 bits: find their rows by "trimmed" or "search", not by "direct"')
     own = list(enumerate(tables.thresholds))
     own += [each for pair in tables.pairs for each in zip(pair.joints, pair.thresholds, strict=True)]
     for number, steps in own:
         if len(steps) + 1 > MOST_ROWS:
             raise FirmwareError(
-                f"joint {number} has {len(steps) + 1} rows, firmware has at most {MOST_ROWS} a joint: "
+                f"joint {number} has {len(steps) + 1} rows, but firmware has at most {MOST_ROWS} a joint: "
                 "compile the build with fewer rounds or coarser codes"
             )
         if bins == "trimmed" and len(steps) and int(steps[-1]) - int(steps[0]) + 2 > MOST_BINS:
             raise FirmwareError(
-                f"the thresholds of joint {number} are {steps[0]} to {steps[-1]}: "
-                f'more than {MOST_BINS - 2} codes apart, their rows are found by "search"'
+                f"the thresholds of joint {number}, {steps[0]} to {steps[-1]}, are more than {MOST_BINS - 2} codes "
+                'apart: find their rows by "search"'
             )
 
 
 Ports = tuple[tuple[int, ...], ...]
-"""For each port the switches of its bits, bit 0 first, at most eight; NO_SWITCH where a bit shows none."""
+"""For each port the switches of its bits, bit 0 first, at most eight; NO_SWITCH for a bit without a switch."""
 NO_SWITCH = -1
 
 
 def consecutive(n_switches: int) -> Ports:
-    """Return the ports of switches that are wired to nothing known: eight after eight."""
+    """Return the ports of switches whose wiring is unknown: eight consecutive switches each."""
     return tuple(tuple(range(first, min(first + 8, n_switches))) for first in range(0, n_switches, 8))
 
 
 def ports_of(pairs: Iterable[tuple[int, int]]) -> Ports:
-    """Return the ports of an answer, or of a bitmap of keys, of which `pairs` say bit and switch; bytes that show no
+    """Return the ports of a chip's reply or of a bitmap of keys, given as `pairs` of bit and switch; bytes without a
     switch are left out.
     """
     ports: dict[int, list[int]] = {}
@@ -141,10 +141,10 @@ def ports_of(pairs: Iterable[tuple[int, int]]) -> Ports:
 
 
 def ports_of_scan(scan: ScanMap | None) -> Ports | None:
-    """Return the ports of a build that was compiled for a harness: its boards', then its readings', byte by byte."""
+    """Return the ports of a build compiled for a harness: those of its boards, then of its readings, byte by byte."""
     if scan is None:
         return None
-    # Levels are bits of nothing: a device compares, and gives them in the order of their codes.
+    # Levels are not bits of any port: a device compares them, and gives them in the order of their codes.
     levels = [[level[-1] for level in board] for board in (*scan.taxels, *(each.levels for each in scan.streams))]
     levels += [[switch for _, switch in port.levels] for port in scan.ports]
     boards = (*scan.scanners, *(stream.switches for stream in scan.streams))
@@ -154,7 +154,7 @@ def ports_of_scan(scan: ScanMap | None) -> Ports | None:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """`width` bits of the byte of a port, from `bit` on, which are those of a group from `to` on."""
+    """`width` bits of the byte of a port from `bit` on, which become the bits of a group from `to` on."""
 
     port: int
     bit: int
@@ -163,16 +163,16 @@ class Field:
 
 
 SMALLEST_GROUP, LARGEST_GROUP = 2, 8
-MOST_TABLE_ROWS = 65535  # their numbers are 16 bits wide
+MOST_TABLE_ROWS = 65535  # row numbers are 16 bits wide
 
 Adding = Literal["called", "unrolled"]
 
-_REGISTERS = 28  # that an AVR has for sums
+_REGISTERS = 28  # registers that an AVR has for sums
 
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Every part has `width` classes; part p begins at class firsts[p]. The last two overlap where K is no multiple."""
+    """Equal parts of `width` classes; part p begins at class firsts[p]. The last two overlap if K is no multiple."""
 
     width: int
     firsts: tuple[int, ...]
@@ -190,7 +190,7 @@ def parts_of(n_classes: int, sum_bits: int = 16) -> Parts:
 class Lookup:
     """One row added per frame, of `rows` (m, K), which begin at row `first_row` of the table.
 
-    Its number is the byte of the group of switches `group`, if there is one, plus what the codes of `joints` add.
+    Its number is the byte of the group of switches `group`, if there is one, plus the contributions of `joints`.
     """
 
     index: int
@@ -201,7 +201,7 @@ class Lookup:
 
     @property
     def zero_row(self) -> int:
-        """The number of the row that is added while all switches are open and all codes are 0."""
+        """The number of the row that is added when all switches are open and all codes are 0."""
         return sum(joint.most for joint in self.joints)
 
 
@@ -209,8 +209,8 @@ class Lookup:
 class Layout:
     """An arrangement of `tables` for K classes, s switches and j joints, each switch in one of `ports`.
 
-    groups[g] are the numbers of the switches of a group, bit 0 first; rows of look-ups are int16,
-    uint8 or int8, as entry_bits and sum_bits say; code_bits as the function of that name says; start (K,) int64.
+    groups[g] are the numbers of the switches of a group, bit 0 first; rows of lookups are int16, uint8
+    or int8 according to entry_bits and sum_bits; code_bits is that function's result; start (K,) int64.
     """
 
     tables: IntegerTables
@@ -226,17 +226,17 @@ class Layout:
 
     @property
     def biased(self) -> bool:
-        """Whether entries are what exceeds the least of their look-up and class."""
+        """Whether entries are offsets from the minimum of their lookup and class."""
         return self.entry_bits < self.sum_bits
 
     @property
     def entry_shift(self) -> int:
-        """How far entries are shifted before they are added: 8 where they are upper halves, else 0."""
+        """The left shift of entries before they are added: 8 where they are upper halves, else 0."""
         return 8 if self.entry_bits == 8 and self.tables.grid == COARSE else 0
 
     @property
     def stores_distances(self) -> bool:
-        """Whether portable C looks the distances of slopes' codes up, as it does bins."""
+        """Whether portable C looks up the distances of slopes' codes, like bins."""
         return self.bins == "direct" and self.code_bits == 8
 
     @property
@@ -251,9 +251,7 @@ class Layout:
 
     @cached_property
     def parts(self) -> Parts:
-        """How the classes that are added up are divided among passes: all, or all but the last, where the others are
-        relative to it.
-        """
+        """The passes that add up the classes: all classes, or all but the last, where the others are relative to it."""
         return parts_of(self.tables.n_classes - self.tables.relative, self.sum_bits)
 
     @cached_property
@@ -263,8 +261,8 @@ class Layout:
 
     @cached_property
     def batches(self) -> list[list[int]]:
-        """The look-ups, in their order, in batches: where entries are smaller than sums, those whose rows add up to
-        what an entry holds, whichever rows they are; else all of them.
+        """The lookups in batches, in order: where entries are narrower than sums, those whose rows always add up to a
+        value that fits in an entry; else one batch of all.
         """
         found: list[list[int]] = []
         held = np.zeros(self.tables.n_classes, np.int64)
@@ -280,7 +278,7 @@ class Layout:
 
     @property
     def n_rows(self) -> int:
-        """Rows of all look-ups together."""
+        """The number of rows of all lookups together."""
         return sum(len(lookup.rows) for lookup in self.lookups)
 
     @property
@@ -298,7 +296,7 @@ class Layout:
 
     @cached_property
     def fields(self) -> tuple[tuple[Field, ...], ...]:
-        """What each group's byte is put together from: bits that follow each other in one port are one field."""
+        """The fields that form each group's byte; consecutive bits in one port are one field."""
         places, found = self.places, []
         for numbers in self.groups:
             fields: list[Field] = []
@@ -320,12 +318,12 @@ class Layout:
 
     @property
     def means(self) -> NDArray[np.int64]:
-        """What each switch, then each joint, adds to the scores while it is missing, beyond what 0 adds: (s + j, K)."""
+        """The contribution (s + j, K) of each switch, then each joint, while it is missing, relative to that of 0."""
         return _means(self.tables)
 
     @property
     def narrow_means(self) -> bool:
-        """Whether a byte holds each of the `means`."""
+        """Whether each of the `means` fits in a byte."""
         return bool((np.abs(self.means) <= MOST_BYTE).all())
 
     def group_bytes(self, bits: NDArray[np.bool_]) -> NDArray[np.uint8]:
@@ -336,7 +334,7 @@ class Layout:
         return packed
 
     def scores(self, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.int64]:
-        """Return the scores (n, K) of the switches (n, s) and codes (n, j), as the firmware adds them up."""
+        """Return the scores (n, K) of the switches (n, s) and codes (n, j), added up as in the firmware."""
         scores = np.tile(self.start, (len(bits), 1))
         groups = self.group_bytes(bits).astype(np.int64)
         for lookup in self.lookups:
@@ -348,9 +346,9 @@ class Layout:
         return scores if self.sum_bits == 16 else scores.astype(np.int8).astype(np.int64)
 
     def frame_bytes(self, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.uint8]:
-        """Return what the firmware's input structure holds, (n, F): ports, padding, codes (little-endian).
+        """Return the contents of the firmware's input structure, (n, F): ports, padding, codes (little-endian).
 
-        Where a code has 8 bits, codes above 255 become 255: no threshold tells them apart.
+        Where a code has 8 bits, codes above 255 become 255: no threshold distinguishes them.
         """
         padding = np.zeros((len(bits), self.padding), np.uint8)
         if self.code_bits == 8:
@@ -369,12 +367,12 @@ def _means(tables: IntegerTables) -> NDArray[np.int64]:
 
 
 Shared = tuple[int | None, tuple[int, ...]]
-"""A look-up: the number of a group of switches or None, and those of joints; pairs are numbered after all joints."""
+"""A lookup: the number of a group of switches or None, and those of joints; pairs are numbered after all joints."""
 
 
 def seen_by(tables: IntegerTables, number: int) -> tuple[tuple[int, NDArray[np.uint16]], ...]:
-    """Return the joints that a number in `Shared` names, and their thresholds: a joint itself, or those of a pair; none
-    without thresholds.
+    """Return the joints that a number in `Shared` refers to, and their thresholds: one joint, or the two of a pair;
+    empty without thresholds.
     """
     if number < tables.n_joints:
         joints: Iterable[tuple[int, NDArray[np.uint16]]] = ((number, tables.thresholds[number]),)
@@ -402,18 +400,18 @@ def arrange(
 ) -> Layout:
     """Return `tables` with the switches in groups of at most `group_size` (2 to 8), in the order of `ports`.
 
-    There are as few groups as that size allows, or `n_groups` where given: more look-ups and less flash. They are as
-    even as can be, and none is of two ports where as few can do without. Where no wiring is known, `ports` are left
-    out, and switches follow each other by number. What `shared` names shares look-ups, none of which sees a joint
-    twice; every other group, every pair and every other joint that has thresholds has one of its own. Raises
-    FirmwareError if the tables cannot be laid out so: 8-bit entries for look-ups that span more than 255 steps, more
-    than 256 rows in a look-up, "direct" for codes of 16 bits, "trimmed" for thresholds further apart than 254 codes, no
-    inputs at all.
+    There are as few groups as that size allows, or `n_groups` where given: more lookups and less flash. Groups are as
+    even as possible, and none spans two ports if the same number of groups can avoid that. Without known wiring,
+    `ports` are left out, and switches are taken by number. The groups and joints in `shared` share lookups, none of
+    which uses a joint twice; every other group, every pair and every other joint with thresholds has a separate lookup.
+    Raises FirmwareError if the tables cannot be laid out like this: 8-bit entries for lookups that span more than 255
+    steps, more than 256 rows in a lookup, "direct" for codes of 16 bits, "trimmed" for thresholds further apart than
+    254 codes, no inputs at all.
     """
     if tables.n_switches + tables.n_joints == 0:
-        raise FirmwareError("the build looks at no switch and no joint: there is nothing to make firmware of")
+        raise FirmwareError("the build uses no switch and no joint: compile it with at least one input")
     if entry_bits not in (8, 16):
-        raise FirmwareError(f"entries of {entry_bits} bits: firmware has 8 or 16")
+        raise FirmwareError(f"entries of {entry_bits} bits: choose 8 or 16")
     check_joints(tables, bins)
     coarse = tables.grid if entry_bits == 8 else 1
     ports = consecutive(tables.n_switches) if ports is None else ports
@@ -436,8 +434,8 @@ def arrange(
         for number in numbers:
             rows = (_falling(tables, number)[:, np.newaxis] + rows).reshape(-1, tables.n_classes)
         if len(rows) > MOST_ROWS:
-            raise FirmwareError(f"a look-up of {len(rows)} rows: firmware has at most {MOST_ROWS}")
-        what = f"the look-up of switch group {group}" if group is not None else "the look-up of joints"
+            raise FirmwareError(f"a lookup of {len(rows)} rows: firmware has at most {MOST_ROWS}; share fewer inputs")
+        what = f"the lookup of switch group {group}" if group is not None else "the lookup of joints"
         what += f" {', '.join(str(joint.number) for joint in joints)}" if joints else ""
         least = rows.min(axis=0) if entry_bits < sum_bits else 0 * rows[0]
         made.append(
@@ -456,7 +454,7 @@ def arrange(
 
 
 def _falling(tables: IntegerTables, number: int) -> NDArray[np.int64]:
-    """Return the rows that a joint adds, or a pair, of which the first joint's bins come one by one; from the last."""
+    """Return the rows that a joint or a pair adds, from the last; a pair's first joint contributes bin after bin."""
     if number < tables.n_joints:
         return tables.joint_rows[number][::-1].astype(np.int64)
     rows = tables.pairs[number - tables.n_joints].rows.astype(np.int64)
@@ -464,7 +462,7 @@ def _falling(tables: IntegerTables, number: int) -> NDArray[np.int64]:
 
 
 def _all_shared(tables: IntegerTables, n_groups: int, shared: Sequence[Shared]) -> list[Shared]:
-    """Return all look-ups: `shared`, every other group and every other joint with thresholds, groups first."""
+    """Return all lookups: `shared`, every other group and every other joint with thresholds, groups first."""
     taken = {group for group, _ in shared}
     placed = {number for _, numbers in shared for number in numbers}
     alone: list[Shared] = [(group, ()) for group in range(n_groups) if group not in taken]
@@ -474,13 +472,15 @@ def _all_shared(tables: IntegerTables, n_groups: int, shared: Sequence[Shared]) 
 
 def _grouped(ports: Ports, group_size: int, n_groups: int | None) -> tuple[tuple[int, ...], ...]:
     if not SMALLEST_GROUP <= group_size <= LARGEST_GROUP:
-        raise FirmwareError(f"groups of {group_size} switches: {SMALLEST_GROUP} to {LARGEST_GROUP} share a look-up")
+        raise FirmwareError(f"groups of {group_size} switches: use {SMALLEST_GROUP} to {LARGEST_GROUP} in a lookup")
     shown = [[number for number in port if number != NO_SWITCH] for port in ports]
     switches = [*chain(*shown)]
     fewest = -(-len(switches) // group_size)
     count = fewest if n_groups is None else n_groups
     if not fewest <= count <= len(switches):
-        raise FirmwareError(f"{count} groups of at most {group_size} for {len(switches)} switches: {fewest} or more")
+        raise FirmwareError(
+            f"{count} groups of at most {group_size} for {len(switches)} switches: use {fewest} groups or more"
+        )
     within = [part for port in shown for part in _even(port, -(-len(port) // group_size))]
     return tuple(within if len(within) == count else _even(switches, count))
 
@@ -490,7 +490,7 @@ def _even(numbers: Sequence[int], count: int) -> list[tuple[int, ...]]:
 
 
 def _group_sums(tables: IntegerTables, numbers: Sequence[int]) -> NDArray[np.int64]:
-    """Return the sum of the rows of every subset of switches, in the order of the bytes that say which: (2^n, K)."""
+    """Return the sum of the rows of every subset of switches, in the order of the bytes that encode it: (2^n, K)."""
     sums = np.zeros((1, tables.n_classes), np.int64)
     for number in numbers:
         sums = np.vstack([sums, sums + tables.switch_rows[number]])
@@ -504,6 +504,6 @@ def _entries(rows: NDArray[np.int64], entry_bits: int, sum_bits: int, what: str)
         return rows.astype(np.int8)
     if rows.max() > MOST_ENTRY:
         raise FirmwareError(
-            f"{what} spans {rows.max()} steps, an 8-bit entry holds {MOST_ENTRY}: compile the build with --table-bits 8"
+            f"{what} spans {rows.max()} steps, but an 8-bit entry holds {MOST_ENTRY}: compile with --table-bits 8"
         )
     return rows.astype(np.uint8)

@@ -1,4 +1,4 @@
-"""What a classifier takes on its part, compiled and run in a simulator of it, beside the bounds of the cost model."""
+"""The measured cost of a classifier on its part, compiled and run in a simulator, next to the cost model's bounds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,23 +9,23 @@ from .choose import Fit
 from .classifier import Library
 from .costs import NAME_BYTES, Unit
 from .layout import Layout
-from .probes import Answers, Probes, changing_frames, extreme_frames, joined, random_frames
+from .probes import Predictions, Probes, changing_frames, extreme_frames, joined, random_frames
 from .targets import Target
 from .tools import STRICT, call, find, workshop
 
 _RANDOM = 2000
-# What stands in a section of its own can be left out where nothing calls it.
+# The linker can remove uncalled code only if it has a separate section.
 _SECTIONS = ("-ffunction-sections", "-fdata-sections")
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What a classifier took: its slowest frame in `unit`, by classify() and by update(), bytes of stack (None where
-    not measured), flash and RAM.
+    """The measured cost of a classifier: its slowest frame in `unit`, by classify() and by update(), bytes of stack
+    (None where not measured), flash and RAM.
 
-    flash is that of the whole, flash_classify what is left of it in a program that never calls update() and never
-    says that an input is missing. The numbers that begin with most_ are those of the cost model: bounds on an AVR,
-    where RAM is with the stack, and elsewhere `rough`.
+    flash is the total, flash_classify the part of it in a program that never calls update() and never marks an input as
+    missing. The numbers that begin with most_ are those of the cost model: bounds on an AVR, where RAM includes the
+    stack, and elsewhere `rough`.
     """
 
     part: str
@@ -53,7 +53,7 @@ class Measured:
 
     @property
     def note(self) -> str:
-        """What was measured, as a sentence."""
+        """The measurements, as a sentence."""
         bound = "expected about" if self.rough else "bound"
         stack = "" if self.stack is None else f" and {self.stack} of stack"
         return (
@@ -66,26 +66,26 @@ class Measured:
 
 
 def measure(library: Library, fit: Fit) -> Measured:
-    """Compile a classifier, run the frames that should take longest, and return what the slowest took.
+    """Compile a classifier, run the frames that should take longest, and return the measured maxima.
 
-    Raises FirmwareError where a tool is missing, or for a part on which nobody counts.
+    Raises FirmwareError where a tool is missing, or for a part whose simulator does not count.
     """
     target, layout, cost = fit.target, fit.choice.layout, fit.choice.cost
     if not target.own_layout:
-        raise FirmwareError("on no microcontroller that is simulated here the classifier fits: nothing can be measured")
+        raise FirmwareError("the classifier fits none of the simulated microcontrollers: nothing can be measured")
     if lack := target.missing():
         raise FirmwareError(f"firmware for {target.part} cannot be measured here: {lack}")
     tried = joined(slow_frames(layout), random_frames(layout.tables, _RANDOM, seed=1))
-    answers = run_counted(library, target, tried)
+    predictions = run_counted(library, target, tried)
     updated = run_counted(library, target, joined(changing_frames(layout.tables), tried), incremental=True)
     flash, flash_classify, ram = _size(library, target)
     long_names = _more_for_names(library.names.grasps)
     return Measured(
         part=target.counted_on,
-        time=answers.most,
+        time=predictions.most,
         update_time=updated.most,
-        unit=answers.unit,
-        stack=None if answers.stack is None or updated.stack is None else max(answers.stack, updated.stack),
+        unit=predictions.unit,
+        stack=None if predictions.stack is None or updated.stack is None else max(predictions.stack, updated.stack),
         flash=flash,
         flash_classify=flash_classify,
         ram=ram,
@@ -99,22 +99,22 @@ def measure(library: Library, fit: Fit) -> Measured:
 
 
 def slow_frames(layout: Layout) -> Probes:
-    """Return the frame that takes longest by the model, and extreme ones, should the model be wrong."""
+    """Return the frame that takes longest by the model, and extreme ones in case the model is wrong."""
     bits, codes = worst_frame(layout)
     return joined(Probes(bits.reshape(1, -1), codes.reshape(1, -1)), extreme_frames(layout.tables))
 
 
-def run_counted(library: Library, target: Target, frames: Probes, *, incremental: bool = False) -> Answers:
-    """Return what a classifier answers on a target that counts what answers take; raises FirmwareError elsewhere."""
+def run_counted(library: Library, target: Target, frames: Probes, *, incremental: bool = False) -> Predictions:
+    """Return the predictions and their cost on a target that counts it; raise FirmwareError elsewhere."""
     sent = library.layout.frame_bytes(frames.bits, frames.codes)
-    answers = target.run(library.files, library.name, library.layout, sent, incremental=incremental)
-    if answers.cost is None:
+    predictions = target.run(library.files, library.name, library.layout, sent, incremental=incremental)
+    if predictions.cost is None:
         raise FirmwareError(f"nothing was counted on {target.part}")
-    return answers
+    return predictions
 
 
 def _more_for_names(grasps: Sequence[str]) -> int:
-    """Return the bytes by which long names exceed those that the cost model allows for."""
+    """Return the bytes by which long names exceed the size assumed by the cost model."""
     longest = 1 + max(len(grasp.encode()) for grasp in grasps)
     return max(0, longest - NAME_BYTES) * (len(grasps) + 1)
 
@@ -123,7 +123,7 @@ def _size(library: Library, target: Target) -> tuple[int, int, int]:
     """Return the bytes of flash of the compiled files, of flash where only classify() is called, and of RAM."""
     if target.compiler is None or target.size is None:
         raise FirmwareError(
-            f"the target {target.name} names no compiler and no program `size`: nothing can be measured"
+            f"the target {target.name} has no compiler or no program `size` here: nothing can be measured"
         )
     sources = sorted(path for path in library.files if path.endswith((".c", ".S")))
     name = f"thenar_{library.name}"
@@ -133,11 +133,11 @@ def _size(library: Library, target: Target) -> tuple[int, int, int]:
     with workshop({**library.files, "glove.c": glove}) as folder:
         compiling = [find(target.compiler), *target.flags]
         call([*compiling, *STRICT, *_SECTIONS, "-c", *sources, "glove.c"], folder)
-        # Variables that are common have no place, and no size for `size`, until they are linked.
+        # Common variables have no address, and no size for `size`, until they are linked.
         objects = [path.rsplit(".", 1)[0] + ".o" for path in (*sources, "glove.c")]
         linked = [*compiling, "-r", "-nostdlib", f"-Wl,-d,--gc-sections,-e,{name}_classify,-u,glove", *objects, *called]
         call([*linked, *rest, "-o", "whole.elf"], folder)
         call([*linked, "-o", "classify.elf"], folder)
-        told = call([find(target.size), "whole.elf", "classify.elf"], folder).decode().splitlines()[1:]
-    (text, data, bss), (less_text, less_data, _) = (map(int, line.split()[:3]) for line in told)
+        sizes = call([find(target.size), "whole.elf", "classify.elf"], folder).decode().splitlines()[1:]
+    (text, data, bss), (less_text, less_data, _) = (map(int, line.split()[:3]) for line in sizes)
     return text + data, less_text + less_data, data + bss

@@ -1,8 +1,8 @@
-"""A build whose joints are coded in any way, as the same build for the bytes that one hand's CyberGlove sends.
+"""Conversion of a build with any joint codes to the same build for the bytes of one hand's CyberGlove.
 
-Recordings of several hands share one scale of codes; the runtime turns a hand's bytes into codes by its calibration,
-and then codes into bins. Firmware does both at once: the bin of a byte is the bin of its code, so every answer stays
-what it was, and thresholds that no byte parts fall away.
+Recordings of several hands share one scale of codes; the runtime converts a hand's bytes to codes by its calibration,
+and then codes to bins. Firmware does both at once: the bin of a byte is the bin of its code, so every prediction stays
+the same, and thresholds that separate no two bytes are dropped.
 """
 
 from collections.abc import Sequence
@@ -24,14 +24,16 @@ BYTES = 256
 
 
 def on_bytes(tables: IntegerTables, codes: Sequence[Sequence[int]]) -> IntegerTables:
-    """Return tables whose joint codes are bytes: those of byte b are what `tables` gives for codes[joint][b].
+    """Return tables whose joint codes are bytes: byte b gives the result of `tables` for codes[joint][b].
 
     codes holds, for each joint, the code of each of the 256 bytes (runtime.calibration.codes_of_bytes); byte 0, which
-    no glove sends, is code 0 to a pair, as a missing joint is. Raises FirmwareError where they are not that many.
+    no glove sends, is code 0 to a pair, like a missing joint. Raises FirmwareError if their number differs.
     """
     if [len(joint) for joint in codes] != [BYTES] * tables.n_joints:
-        raise FirmwareError(f"codes of {BYTES} bytes are needed for each of {tables.n_joints} joints")
-    # A slope stays one where bytes are codes; elsewhere each byte has the row of its code.
+        raise FirmwareError(
+            f"each of the {tables.n_joints} joints needs the codes of {BYTES} bytes: calibrate all of them"
+        )
+    # A slope is kept where bytes are codes; elsewhere each byte has the row of its code.
     kept = tuple(slope for slope in tables.slopes if np.array_equal(codes[slope.joint], np.arange(BYTES)))
     of_bytes = replace(tables, slopes=tuple(slope for slope in tables.slopes if slope not in kept))
     pairs = [_joint(of_bytes, number, np.asarray(joint, np.uint16)) for number, joint in enumerate(codes)]
@@ -55,7 +57,7 @@ def _pair(pair: Pair, codes: Sequence[Sequence[int]]) -> Pair:
 def _joint(
     tables: IntegerTables, joint: int, codes: NDArray[np.uint16]
 ) -> tuple[NDArray[np.uint16], NDArray[np.int16]]:
-    """Return thresholds and rows of one joint: a threshold after each byte whose successor falls into another bin."""
+    """Return thresholds and rows of one joint: a threshold after each byte whose successor is in another bin."""
     thresholds, rows = tables.binned(joint)
     bins = np.searchsorted(thresholds, codes)
     last = np.flatnonzero(bins[1:] != bins[:-1])
@@ -66,9 +68,9 @@ _FIRST, _LAST = 1, 255  # what a CyberGlove can send
 
 
 def for_one_hand(build: Build, calibration: GloveCalibration) -> Build:
-    """Return `build` for the raw bytes of the glove that `calibration` is of: each byte is answered as its code was.
+    """Return `build` for the raw bytes of the glove that `calibration` describes: each byte is treated as its code.
 
-    Raises SettingError where the calibration lacks a joint of the build, or is in another unit.
+    Raises SettingError where the calibration lacks a joint of the build, or has another unit.
     """
     joints, rejection = build.manifest.joints, build.manifest.rejection
     codes = [codes_of_bytes(joint, calibration) for joint in joints]
@@ -81,6 +83,6 @@ def for_one_hand(build: Build, calibration: GloveCalibration) -> Build:
 
 
 def byte_range(limits: tuple[int, int], codes: Sequence[int]) -> tuple[int, int]:
-    """Return the bytes whose codes lie within the limits, from the first to the last: codes rise or fall with bytes."""
+    """Return the range of bytes whose codes are within the limits; codes are monotonic in the bytes."""
     within = [byte for byte in range(_FIRST, _LAST + 1) if limits[0] <= codes[byte] <= limits[1]]
     return (within[0], within[-1]) if within else (_LAST, 0)

@@ -1,6 +1,6 @@
-"""Frames that a compiled classifier is held against, in bytes, and what it answers; and a few of each as C.
+"""Test frames for a compiled classifier, in bytes, the predictions for them, and a few of both as C.
 
-Frames are extreme ones, all of a kind, and random ones. With those in C a folder of firmware tests itself.
+Some frames are extreme, and the others are random. With the C a firmware folder tests itself.
 """
 
 import hashlib
@@ -26,14 +26,14 @@ Lost = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Answers:
-    """The answers to n frames: scores (n, K) int16, classes (n,) the first best of them.
+class Predictions:
+    """The predictions for n frames: scores (n, K) int16, and classes (n,), the first of the best.
 
     margins, shares  the lead over the second best (n,), and the probability of one class each (n,), in 65535ths: of
-                     class 0 in frame 0, 1 in frame 1 and so on, in turn; None where they were not asked
-    cost   what each answer took, (n,) in `unit`; None where nothing was counted (unit "")
-    stack  bytes of stack that an answer needs; None where it was not measured
-    names  of the K types, as the program gave them; None where it was not asked
+                     class 0 in frame 0, 1 in frame 1 and so on, cyclically; None where not requested
+    cost   the cost of each prediction (n,) in `unit`; None where nothing was counted (unit "")
+    stack  bytes of stack that a prediction needs; None where not measured
+    names  of the K types, as the program returned them; None where not requested
     """
 
     scores: NDArray[np.int16]
@@ -47,7 +47,7 @@ class Answers:
 
     @property
     def most(self) -> int:
-        """What the slowest answer took, where it was counted."""
+        """The cost of the slowest prediction, 0 where nothing was counted."""
         return 0 if self.cost is None else int(self.cost.max())
 
 
@@ -55,11 +55,11 @@ def check_frames(frames: Frames, layout: Layout) -> None:
     """Raise FirmwareError unless `frames` is uint8 (n, F)."""
     size = layout.frame_size
     if frames.dtype != np.uint8 or frames.ndim != 2 or frames.shape[1] != size:
-        raise FirmwareError(f"frames are {frames.dtype} {frames.shape}, this layout takes uint8 (n, {size})")
+        raise FirmwareError(f"frames are {frames.dtype} {frames.shape}, but this layout takes uint8 (n, {size})")
 
 
 def names_in(printed: bytes, layout: Layout) -> tuple[tuple[str, ...], bytes]:
-    """Return the names of the K types that a program printed first, each with a zero behind it, and the rest.
+    """Return the names of the K types that a program printed first, each followed by a zero, and the rest.
 
     Raises FirmwareError if there are fewer.
     """
@@ -69,9 +69,9 @@ def names_in(printed: bytes, layout: Layout) -> tuple[tuple[str, ...], bytes]:
     return tuple(name.decode(errors="replace") for name in names), rest
 
 
-def answers_from(printed: bytes, frames: Frames, layout: Layout) -> Answers:
-    """Return the answers that a program printed: for each frame K scores, a class, a margin and a probability, 16 bits
-    each, little-endian.
+def answers_from(printed: bytes, frames: Frames, layout: Layout) -> Predictions:
+    """Return the predictions that a program printed: for each frame K scores, a class, a margin and a probability, 16
+    bits each, little-endian.
 
     Raises FirmwareError unless there is one for every frame.
     """
@@ -79,40 +79,41 @@ def answers_from(printed: bytes, frames: Frames, layout: Layout) -> Answers:
     if len(printed) != 2 * size * len(frames):
         raise FirmwareError(f"the program printed {len(printed)} bytes for {len(frames)} frames of {2 * size} bytes")
     words = np.frombuffer(printed, "<u2").astype(np.uint16).reshape(len(frames), size)
-    return Answers(words[:, :classes].view(np.int16), *words[:, classes:].T)
+    return Predictions(words[:, :classes].view(np.int16), *words[:, classes:].T)
 
 
 def record_files(
     name: str,
     layout: Layout,
     machine: Literal["host", "bare", "avr"],
-    answer: Literal["classify", "update"],
+    function: Literal["classify", "update"],
     *,
     lost: bool = False,
 ) -> dict[str, str]:
-    """Return the files, name -> text, of the program that answers frames with the function `answer` of `name`.
+    """Return the files, name -> text, of the program that calls `function` of the classifier `name` for every frame.
 
     For classify() it writes the ports' bytes into the input; for update() it calls set_switch() for every switch. With
-    `lost`, frames come as `with_lost` makes them.
+    `lost`, frames have the format of `with_lost`.
     """
-    values = record_values(name, layout, answer, lost=lost)
+    values = record_values(name, layout, function, lost=lost)
     files = {"main.c": render(f"checking/{machine}_main.c.j2", **values)}
     if machine == "avr" and not lost:
         return files
-    values["places"] = [f"{{{port}, {bit}}}" for port, bit in layout.places] if answer == "update" else []
+    values["places"] = [f"{{{port}, {bit}}}" for port, bit in layout.places] if function == "update" else []
     return files | {"record.h": render("checking/record.h.j2", **values, named=machine != "avr")}
 
 
 def record_values(
-    name: str, layout: Layout, answer: Literal["classify", "update"], *, lost: bool = False
+    name: str, layout: Layout, function: Literal["classify", "update"], *, lost: bool = False
 ) -> dict[str, Any]:
-    """Return what the template of a program asks for that takes frames and gives answers by `answer`, in any language.
+    """Return the values for the template of a program, in any language, that calls `function` for every frame.
 
-    It reads the file "frames" and writes the file "answers", or stdin and stdout: names, and what `answers_from` reads.
+    It reads the file "frames" and writes the file "predictions", or stdin and stdout: first the names, then the input
+    of `answers_from`.
     """
     return {
         "name": name,
-        "answer": answer,
+        "function": function,
         "lost_bytes": _lost_bytes(layout) if lost else 0,
         "classes": len(layout.start),
         "ports": len(layout.ports),
@@ -125,8 +126,8 @@ def record_values(
     }
 
 
-def answers_in(printed: bytes, frames: Frames, layout: Layout) -> Answers:
-    """Return the answers that a program wrote, and before them the names. Raises FirmwareError as the other two do."""
+def answers_in(printed: bytes, frames: Frames, layout: Layout) -> Predictions:
+    """Return the predictions that a program wrote after the names. Raises FirmwareError like its two parts."""
     names, rest = names_in(printed, layout)
     return replace(answers_from(rest, frames, layout), names=names)
 
@@ -136,7 +137,7 @@ def _lost_bytes(layout: Layout) -> int:
 
 
 def with_lost(frames: Frames, lost: Lost | None) -> Frames:
-    """Return the frames (n, F), before each of them a bit for each input, switches first, that is `lost` (n, s + j)."""
+    """Return the frames (n, F), each preceded by a bit for each input that is `lost` (n, s + j), switches first."""
     return frames if lost is None else np.hstack([np.packbits(lost, axis=1, bitorder="little"), frames])
 
 
@@ -162,13 +163,13 @@ def joined(*frames: Probes) -> Probes:
 
 
 def extreme_frames(tables: IntegerTables) -> Probes:
-    """Return every frame that is extreme in one way while all else is at one end.
+    """Return every frame that is extreme in one way while all other inputs are at one end.
 
     Switches: all open, all closed, each closed alone, each open alone; every one of these with all joints at 0, and
     with all at the highest code. Joints: each at every code at which its row changes, and at the last one before, at 0
     and at the highest; with the others at 0 and all switches open, and with the others at the highest and all closed.
     So there are 4 (s + 1) + 2 (sum of the joints' `turns`) frames. The highest code is 255, or 65535 where thresholds
-    are that high.
+    exceed 255.
     """
     s, j, top = tables.n_switches, tables.n_joints, _top(tables)
     alone = np.eye(s, dtype=bool)
@@ -184,8 +185,8 @@ def extreme_frames(tables: IntegerTables) -> Probes:
 
 
 def changing_frames(tables: IntegerTables) -> Probes:
-    """Return 40 frames of which each changes every input from the one before: of neighbouring switches one opens and
-    the other closes, and joints go from 0 to the highest code or back.
+    """Return 40 frames, each with every input changed from the one before: of neighbouring switches one opens and the
+    other closes, and joints alternate between 0 and the highest code.
     """
     odd = np.arange(_CHANGING)[:, np.newaxis] % 2
     bits = np.arange(tables.n_switches) % 2 == odd
@@ -195,8 +196,8 @@ def changing_frames(tables: IntegerTables) -> Probes:
 def random_frames(tables: IntegerTables, n: int, seed: int) -> Probes:
     """Return n frames, the same for a seed on any machine.
 
-    Switches close with a probability of a frame's own. Codes of even frames are drawn from all there are, of odd ones
-    from those at which a joint's row changes, so that changes of several joints meet.
+    Each frame has a separate probability of closed switches. Codes of even frames are drawn from the whole range, of
+    odd ones from those at which a joint's row changes, so that changes of several joints coincide.
     """
     random, top = np.random.Generator(np.random.PCG64(seed)), _top(tables)
     bits = random.random((n, tables.n_switches)) < random.random((n, 1))
@@ -208,8 +209,8 @@ def random_frames(tables: IntegerTables, n: int, seed: int) -> Probes:
 
 
 def lost_inputs(tables: IntegerTables, n: int, seed: int) -> Lost:
-    """Return which inputs, switches first, are missing in n frames (n, s + j): in even ones one alone, each in turn, in
-    odd ones each with a probability of the frame's own, and in the last all.
+    """Return the missing inputs, switches first, of n frames (n, s + j): in even frames a single one, each in turn, in
+    odd frames each with a probability that varies by frame, and in the last frame all.
     """
     random, inputs = np.random.Generator(np.random.PCG64(seed)), tables.n_switches + tables.n_joints
     lost = random.random((n, inputs)) < random.random((n, 1))
@@ -219,8 +220,8 @@ def lost_inputs(tables: IntegerTables, n: int, seed: int) -> Lost:
 
 
 def turns(tables: IntegerTables, joint: int) -> NDArray[np.uint16]:
-    """Return, in order, 0, each threshold of a joint and the code after it, and the highest code; and where it has a
-    slope, codes about its ends and some between.
+    """Return, in order, 0, each threshold of a joint, the code after it, and the highest code; for a joint with a
+    slope, also codes near its ends and some between.
     """
     thresholds, slope = tables.steps_of(joint), tables.slope_of(joint)
     codes = np.concatenate([[0, _top(tables)], thresholds, thresholds + 1])
@@ -235,17 +236,17 @@ def _top(tables: IntegerTables) -> int:
     return _BYTE if code_bits(tables) == 8 else _WORD
 
 
-DRAWN = 16  # frames beside the two extreme ones
+DRAWN = 16  # frames in addition to the two extreme ones
 CHECKS = DRAWN + 2
 _WIDTH = 120
 
 
 def check_header(name: str, layout: Layout, grasps: Sequence[str]) -> str:
-    """Return the text of thenar_NAME_check.h: frames, their answers, the types' names, and a function that compares."""
+    """Return thenar_NAME_check.h: frames, the expected predictions, the types' names, and a function that compares."""
     frames = self_test_frames(layout)
     what = ("every switch open, lowest codes", "every switch closed, highest codes", *DRAWN * ("drawn",))
-    answers = layout.scores(frames.bits, frames.codes)
-    rows = zip(what, np.packbits(frames.bits, axis=1, bitorder="little"), frames.codes, answers, strict=True)
+    predictions = layout.scores(frames.bits, frames.codes)
+    rows = zip(what, np.packbits(frames.bits, axis=1, bitorder="little"), frames.codes, predictions, strict=True)
     checks = [_check(*row) for row in rows]
     values = {"name": name, "upper": name.upper(), "classes": len(layout.start), "count": len(checks)}
     inputs = {"switches": layout.tables.n_switches, "joints": layout.tables.n_joints}
@@ -255,7 +256,7 @@ def check_header(name: str, layout: Layout, grasps: Sequence[str]) -> str:
 def self_test_frames(layout: Layout) -> Probes:
     """Return the frames: the two extreme ones, then drawn ones, whose codes are those at which a joint's row changes.
 
-    They are drawn from a hash: the same build has the same ones with every release of numpy.
+    They are drawn from a hash: the same build has the same frames with every release of numpy.
     """
     s, turning = layout.tables.n_switches, [turns(layout.tables, joint) for joint in range(layout.tables.n_joints)]
     draws = _drawn(DRAWN, s + len(turning))
@@ -272,7 +273,7 @@ def _drawn(rows: int, columns: int) -> NDArray[np.uint16]:
 def _check(
     what: str, closed: NDArray[np.uint8], codes: NDArray[np.uint16], scores: NDArray[np.int64]
 ) -> dict[str, object]:
-    """Return what a frame is, the lines of its members' initialisers, and of its answer's."""
+    """Return a frame's description, and the lines of the initialisers of its members and of its scores."""
     members = ([f"{byte:#04x}" for byte in closed.tolist()], [str(code) for code in codes.tolist()])
     return {
         "what": what,
@@ -283,5 +284,5 @@ def _check(
 
 
 def _wrapped(words: list[str], indent: int) -> list[str]:
-    """Return the words as lines of an initialiser that stands `indent` columns in."""
+    """Return the words as lines of an initialiser that is indented by `indent` columns."""
     return wrap(", ".join(words), _WIDTH - indent)

@@ -1,8 +1,8 @@
-"""The portable C of a scanner board: frames, protocol, debouncing, and when a scan may stop.
+"""The portable C of a scanner board: frames, protocol, debouncing, and the early exit of a scan.
 
-The C does no input or output: bytes in, bytes out, times as arguments. It is the same as `drivers.scanner_protocol`,
-`drivers.emulated.scanner_board.ScannerBoard`, `drivers.debounce.Debouncer` and `runtime.scanning.decided.EarlyExit`,
-byte for byte, given the same scans, times and received bytes.
+The C does no input or output: it takes bytes and times as arguments and returns bytes. It matches
+`drivers.scanner_protocol`, `drivers.emulated.scanner_board.ScannerBoard`, `drivers.debounce.Debouncer` and
+`runtime.scanning.decided.EarlyExit` byte for byte, given the same scans, times and received bytes.
 """
 
 from collections.abc import Sequence
@@ -18,13 +18,13 @@ from thenar.runtime.tables import IntegerTables
 from . import FirmwareError
 from .words import comment
 
-# What a HEARTBEAT of a frame whose length is one byte has room for.
+# The capacity of a HEARTBEAT in a frame whose length is one byte.
 MOST_KEYS = 1960
 _FOREVER_US, _LONGEST_DEBOUNCE_US, _MOST_BOARDS, _MOST_PLACES = (1 << 32) - 1, 0xFFFF, (1 << 32) - 1, 0xFFFF
 _MOST_PORTS = 256
 # No score leads another by as much: sums are -32767 to 32767.
 _NEVER = 0xFFFF
-# Of lines of numbers and names, before they are indented.
+# For lines of numbers and names, before they are indented.
 _WIDTH = 100
 
 _PORTABLE = ("thenar_time.h", *(f"thenar_{part}.{end}" for part in ("frames", "debounce", "board") for end in "hc"))
@@ -32,13 +32,13 @@ _PORTABLE = ("thenar_time.h", *(f"thenar_{part}.{end}" for part in ("frames", "d
 
 @dataclass(frozen=True, slots=True)
 class BoardConfig:
-    """What `thenar_config.h` says of a board; the fields are those of the protocol's HELLO.
+    """The contents of `thenar_config.h`; the fields are those of the protocol's HELLO.
 
-    rows, columns  of its keys, one row: wired directly      diodes  whether the keys of a matrix have any
+    rows, columns  of its keys, one row: wired directly      diodes  whether the keys of a matrix have diodes
     board          its number                                scan_us from scan to scan, at least `fastest_us`
     state_us, heartbeat_us  from frame to frame, 0: none     press_us, release_us  debouncing, 0: none
-    channels       of its converter: with any it speaks version 2 of the protocol; code_bits: of a code
-    segments       whether it tells of segments
+    channels       of its converter: with any it uses version 2 of the protocol; code_bits: of a code
+    segments       whether it reports segments
 
     Raises FirmwareError where a value is out of its field's range, or there are more keys than `MOST_KEYS`.
     """
@@ -61,20 +61,20 @@ class BoardConfig:
         for name, (least, most) in _RANGES.items():
             value = getattr(self, name)
             if not least <= value <= most:
-                raise FirmwareError(f"{name} of the board is {value}: it is {least} to {most}")
+                raise FirmwareError(f"{name} of the board is {value}: it must be {least} to {most}")
         if self.keys > MOST_KEYS:
-            raise FirmwareError(f"the board has {self.rows} x {self.columns} keys: it can tell of {MOST_KEYS}")
+            raise FirmwareError(f"the board has {self.rows} x {self.columns} keys: it can report at most {MOST_KEYS}")
         if self.scan_us < self.fastest_us:
-            raise FirmwareError(f"scan_us of the board is {self.scan_us}: it scans every {self.fastest_us} us at most")
+            raise FirmwareError(f"scan_us of the board is {self.scan_us}: it must be at least {self.fastest_us} us")
 
     @property
     def kept(self) -> int:
-        """How much of a payload from the host is kept: a SET_RATE, or a SET_CHANNELS of all channels."""
+        """The number of payload bytes kept from the host: a SET_RATE, or a SET_CHANNELS of all channels."""
         return max(SetRate.LAYOUT.size, SetChannels.LAYOUT.size + (self.channels + 7) // 8)
 
     @property
     def keys(self) -> int:
-        """How many keys there are."""
+        """The number of keys."""
         return self.rows * self.columns
 
 
@@ -94,7 +94,7 @@ _RANGES = {
 
 
 def protocol_files(config: BoardConfig) -> dict[str, str]:
-    """Return name -> text of the C of a board: configuration, frames, debouncing and protocol."""
+    """Return name -> text of a board's C files: configuration, frames, debouncing and protocol."""
     return {
         "thenar_config.h": render("board/thenar_config.h.j2", config=config),
         **{name: render(f"board/{name}.j2", config=config) for name in _PORTABLE},
@@ -107,18 +107,20 @@ def decided_files(
     """Return name -> text of thenar_NAME_decided.h and .c.
 
     name    C identifier of the build                        grasps  names of its K classes
-    ports   the switches of each port, in the order in which ports are read; all switches of the build are in one
+    ports   the switches of each port, in the order in which ports are read; each switch of the build is in one of them
 
     Raises FirmwareError where there are no ports, more than 256, or a switch is in none; SettingError where a switch is
-    in two, or is none of the build's.
+    in two, or is not in the build.
     """
     masks = [sum(1 << switch for switch in port) for port in ports]
     scorer = Scorer(tables)
     early = EarlyExit(scorer, masks)
     if not 1 <= len(ports) <= _MOST_PORTS:
-        raise FirmwareError(f"a scan of {len(ports)} ports: early exit is for 1 to {_MOST_PORTS}")
+        raise FirmwareError(f"a scan of {len(ports)} ports: early exit needs 1 to {_MOST_PORTS}")
     if missing := (1 << tables.n_switches) - 1 & ~sum(masks):
-        raise FirmwareError(f"no port reads switch {missing.bit_length() - 1}: early exit needs all of the build's")
+        raise FirmwareError(
+            f"no port reads switch {missing.bit_length() - 1}: early exit needs every switch of the build"
+        )
     names = [comment(grasp) for grasp in grasps]
     values = {
         "name": name,
@@ -135,7 +137,7 @@ def decided_files(
 
 
 def _hurdles(scorer: Scorer, unread: int, grasps: Sequence[str]) -> list[dict[str, object]]:
-    """Return by how many steps each leader must be ahead of every class, in lines of C."""
+    """Return the required lead of each leader over every class, in steps, as lines of C."""
     rows: list[dict[str, object]] = []
     for leader, grasp in enumerate(grasps):
         steps = [

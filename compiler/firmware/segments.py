@@ -8,16 +8,16 @@ from thenar.runtime.segmenting.model import SegmentModel
 from . import FirmwareError
 
 LAG_US = 150_000
-# An AVR's assembly reaches this many states from one pointer, and multiplies by one byte.
+# An AVR's assembly can address this many states from one pointer, and multiplies by one byte.
 _MOST_ASSEMBLED, _MOST_GAIN, _MOST_STATES = 15, 255, 255
 
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """What it costs, and where it waits until it has lasted long enough: a ring, and a place in its rows.
+    """A state's cost, and where it waits until it has lasted long enough: a ring, and a place in its rows.
 
-    Assembly that goes from state to state finds its ring where it is not that of the state before, and turns the ring
-    where no later state finds it.
+    Assembly that iterates over the states finds a state's ring if it differs from the previous state's, and advances
+    the ring at the last state that uses it.
     """
 
     enter: int
@@ -33,7 +33,7 @@ class _State:
 
 @dataclass(frozen=True, slots=True)
 class _Ring:
-    """The rows in which states of the same shortest duration wait: places `begin` to `end`, `width` a row."""
+    """The rows in which states with the same shortest duration wait: places `begin` to `end`, `width` per row."""
 
     begin: int
     end: int
@@ -43,10 +43,10 @@ class _Ring:
 def segment_files(name: str, model: SegmentModel, *, avr: bool) -> dict[str, str]:
     """Return the texts of thenar_`name`_segments.h and .c, and with `avr` of the assembly where there is one.
 
-    They go with the classifier's, of the same name. Raises FirmwareError if there are too many states.
+    They extend the classifier of the same name. Raises FirmwareError if there are too many states.
     """
     if model.n_types >= _MOST_STATES:
-        raise FirmwareError(f"{model.n_types} grasp types: segments are decoded in C of {_MOST_STATES - 1} at most")
+        raise FirmwareError(f"{model.n_types} grasp types: the segment decoder in C takes at most {_MOST_STATES - 1}")
     states, rings = _laid_out(model)
     assembled = avr and len(states) <= _MOST_ASSEMBLED and model.gain <= _MOST_GAIN
     limit = -(-model.most * 256 // model.gain) << model.shift
@@ -78,7 +78,7 @@ def segment_files(name: str, model: SegmentModel, *, avr: bool) -> dict[str, str
 
 
 def segmenter_bytes(model: SegmentModel) -> int:
-    """Return how many bytes of RAM the decoder's `thenar_NAME_segmenter` takes on an AVR."""
+    """Return the bytes of RAM of the decoder's `thenar_NAME_segmenter` on an AVR."""
     K, rings, lag = model.n_types, len({least for least in model.least if least > 1}), _lag(model)
     waiting = sum(least - 1 for least in model.least)
     return 4 * (K + 1) + 12 + 2 * max(rings, 1) + 2 * max(waiting, 1) + (4 + 2 * -(-(K + 1) // 8)) * lag
@@ -106,7 +106,7 @@ def _laid_out(model: SegmentModel) -> tuple[list[_State], list[_Ring]]:
     for k, least in enumerate(model.least):
         change = (model.enter[k], model.direct[k], model.leave[k]) if k < K else (0, 0, 0)
         place, later = model.least[:k].count(least), any(number > k and each == least for number, each in found.items())
-        # What all states cost alike decides nothing; what is less is added modulo 2^16.
+        # Only differences between states matter, so the usual cost is subtracted; smaller ones wrap modulo 2^16.
         stay = (model.stay[k] - usual) % 65536
         states.append(_State(*change, stay, least, numbers.get(least, 0), place, k in found, k in found and not later))
     return states, rings

@@ -1,7 +1,7 @@
-"""What the readings of joints and taxels mean on a board: the lines by which they become codes, and their C.
+"""The meaning of the readings of joints and taxels on a board: the lines that convert them to codes, and their C.
 
-A build says what its codes mean, and which of them two poses of a joint have. What a sensor reads in these poses is of
-the glove: its `glove.toml` and its calibrations say it, or the program that runs on the board.
+A build defines its codes, and which codes two poses of a joint have. A sensor's readings in these poses depend on the
+glove: its `glove.toml` and its calibrations give them, or the program that runs on the board.
 """
 
 from collections.abc import Sequence
@@ -35,11 +35,11 @@ class Grid:
 
     @property
     def steps(self) -> int:
-        """How many steps lie between the two."""
+        """The number of steps between the two."""
         return self.last - self.first
 
     def code(self, reading: int) -> int:
-        """Return the code of a number, as `runtime.sources.rows` has it."""
+        """Return the code of a number, as in `runtime.sources.rows`."""
         ends = Point(self.low, 0), Point(self.high, self.steps << FRACTION)
         return self.first + CodeLine(*ends, least=0, most=self.steps).code(reading)
 
@@ -49,9 +49,9 @@ class Sensor:
     """A joint, or a taxel.
 
     codes     of the two points that a calibration measures, in 2^-24 of a code
-    says      what they are: "0 deg" and "90 deg"
-    readings  what is read at them, as `grid` codes it; None where that is not known
-    grid      what codes the numbers of a stream first; None where readings are used as they are
+    says      descriptions of the two points: "0 deg" and "90 deg"
+    readings  at the two points, as `grid` codes them; None where unknown
+    grid      codes the numbers of a stream first; None where readings are used directly
     """
 
     name: str
@@ -61,7 +61,7 @@ class Sensor:
     grid: Grid | None = None
 
     def code(self, reading: int) -> int:
-        """Return the code of a reading, which is known: the same as the C's."""
+        """Return the code of a known sensor's reading: the same as in C."""
         assert self.readings is not None
         first, second = map(Point, self.readings, self.codes)
         return CodeLine(first, second).code(reading if self.grid is None else self.grid.code(reading))
@@ -80,29 +80,29 @@ class Sensors:
 
     @property
     def every(self) -> tuple[Sensor, ...]:
-        """All of them, in the order of their numbers."""
+        """All sensors, in the order of their numbers."""
         return (*self.joints, *self.taxels)
 
     @property
     def sorts(self) -> str:
-        """What they are, in words: "joints, then taxels"."""
+        """The kinds of sensors, in words: "joints, then taxels"."""
         return ", then ".join(["joints"] * bool(self.joints) + ["taxels"] * bool(self.taxels))
 
     @property
     def known(self) -> bool:
-        """Whether it is known what every one reads."""
+        """Whether the readings of all sensors are known."""
         return all(sensor.readings is not None for sensor in self.every)
 
     @property
     def on_pins(self) -> bool:
-        """Whether every one is known by the numbers that a board sends of it: those of its pins."""
+        """Whether all sensors are known in the units that a board sends: those of its pins."""
         return self.known and all(sensor.grid is not None for sensor in self.every)
 
 
 def sensors_of(names: Names, harness: Harness | None = None, calibration: GloveCalibration | None = None) -> Sensors:
-    """Return the sensors of a build, as far as a glove's `harness` and the `calibration` of its joints know them.
+    """Return the sensors of a build, with the readings known from a glove's `harness` and its joints' `calibration`.
 
-    Raises SettingError where these do not fit the build, FirmwareError where a stream's ranges are no whole numbers.
+    Raises SettingError where these do not match the build, FirmwareError where a stream's ranges are not whole numbers.
     """
     device = None if harness is None else harness.joint_device
     if calibration is None and harness is not None and harness.calibration is not None:
@@ -188,14 +188,14 @@ def _grid(name: str, limits: Range, first: int, last: int) -> Grid:
     whole = float(low).is_integer() and float(high).is_integer()
     if not whole or max(abs(low), abs(high), abs(high - low)) > FARTHEST:
         raise FirmwareError(
-            f"the range of {name!r} in glove.toml, {low:g} to {high:g}, is not of whole numbers within {FARTHEST}: "
-            "a board converts the counts of its own converter; give that range"
+            f"the range of {name!r} in glove.toml, {low:g} to {high:g}, must be whole numbers within {FARTHEST}: "
+            "a board converts its converter's counts; give their range"
         )
     return Grid(int(low), int(high), first, last)
 
 
 def codes_files(name: str, sensors: Sensors, *, code_bits: int, avr: bool) -> dict[str, str]:
-    """Return the texts of thenar_`name`_codes.h and .c, which go with the classifier; none of a build of switches."""
+    """Return the texts of thenar_`name`_codes.h and .c, which extend the classifier; empty for a build of switches."""
     if not sensors.every:
         return {}
     values = {

@@ -1,7 +1,7 @@
-"""The compiled classifier on an AVR in libsimavr: every frame, its cycles, and the stack it takes.
+"""The compiled classifier on an AVR in libsimavr: the predictions for all frames, their cycles, and the stack needed.
 
-The programs that run AVR code are linked to libsimavr, which is under the GPL 3, and so are no part of the product:
-`verify` and the tests build them from the sources in a checkout of thenar, when they are first needed.
+The programs that run AVR code are linked to libsimavr, which is under the GPL 3, so they are not part of the product:
+`verify` and the tests build them from the sources in a checkout of thenar on first use.
 """
 
 import atexit
@@ -19,16 +19,16 @@ import numpy as np
 from . import FirmwareError
 from .assembly import FLAGS, glove_size
 from .layout import Layout
-from .probes import Answers, Frames, Lost, check_frames, record_files, with_lost
+from .probes import Frames, Lost, Predictions, check_frames, record_files, with_lost
 from .tools import AVR_COMPILER, HOST_COMPILER, STRICT, Tool, call, find, lacking, workshop
 
-_CLOCK_HZ = 16_000_000  # of the simulated time, in which nothing is counted
+_CLOCK_HZ = 16_000_000  # of the simulated time, which is not measured
 _MAKE: Tool = (("make",), "make")
-_WORDS = 6  # bytes of an answer after the scores: type, margin, probability
+_WORDS = 6  # bytes of a prediction after the scores: type, margin, probability
 
 
 def missing() -> str | None:
-    """Return what keeps AVR code from being run here, and what to install; None if nothing does."""
+    """Return why AVR code cannot be run here, and what to install; None if it can."""
     if gone := lacking(AVR_COMPILER, HOST_COMPILER, _MAKE):
         return gone
     try:
@@ -39,10 +39,10 @@ def missing() -> str | None:
 
 
 def harness(program: str) -> Path:
-    """Return the path of the harness's `program`, compiled at most once a process.
+    """Return the path of the harness's `program`, compiled at most once per process.
 
-    Its sources stand in the folder $THENAR_SIMAVR, else in tests/simavr of the checkout that this file belongs to.
-    Raises FirmwareError if they are not there or do not compile.
+    Its sources are in the folder $THENAR_SIMAVR, by default tests/simavr of the checkout that contains this file.
+    Raises FirmwareError if they are missing or do not compile.
     """
     return _built(_sources(), program)
 
@@ -89,25 +89,25 @@ def run(
     *,
     incremental: bool = False,
     lost: Lost | None = None,
-) -> Answers:
-    """Return what the classifier `name` in `files` (file name -> text, for AVR) answers to frames (n, F).
+) -> Predictions:
+    """Return the predictions of the classifier `name` in `files` (file name -> text, for AVR) for frames (n, F).
 
     `cost` is the cycles from the first instruction of thenar_NAME_classify to the end of its return, without the call;
-    `stack` the most that any frame took, the return address included.
+    `stack` the maximum of all frames, the return address included.
 
-    incremental  each answer comes from update(), the change since the frame before, instead of classify()
-    lost         (n, s + j) inputs that are missing in each frame: neither cycles nor stack are those of an answer then,
-                 and margin and probability are asked for as well
+    incremental  each prediction comes from update(), given the change since the previous frame, instead of classify()
+    lost         (n, s + j) inputs that are missing in each frame: cycles and stack are not measured then, and margin
+                 and probability are returned as well
 
-    Raises FirmwareError if compiler or simulator are missing, or the files do not compile without any warning or do not
-    fit, or the program does not answer.
+    Raises FirmwareError if compiler or simulator are missing, the files do not compile without warnings or do not fit,
+    or the program returns no predictions.
     """
     check_frames(frames, layout)
-    answer: Literal["classify", "update"] = "update" if incremental else "classify"
+    function: Literal["classify", "update"] = "update" if incremental else "classify"
     command = [find(AVR_COMPILER), *STRICT, *flags]
     program = harness("simavr_classify")
-    main = record_files(name, layout, "avr", answer, lost=lost is not None)
-    sent, function = with_lost(frames, lost), answer if lost is None else "answer"
+    main = record_files(name, layout, "avr", function, lost=lost is not None)
+    sent, entry = with_lost(frames, lost), function if lost is None else "predict"
     with workshop({**files, **main}) as folder:
         sources = sorted(path for path in (*files, *main) if path.endswith((".c", ".S")))
         call([*command, *sources, "-o", "classifier.elf"], folder)
@@ -119,10 +119,10 @@ def run(
             given = _symbol(found, f"thenar_{name}_record", sent.shape[1])
             said = _symbol(found, f"thenar_{name}_said", size)
         spans = f"{given:#x}:{sent.shape[1]}", f"{said:#x}:{size}"
-        places = (hex(_symbol(found, symbol)) for symbol in (f"thenar_{name}_{function}", "_end"))
+        places = (hex(_symbol(found, symbol)) for symbol in (f"thenar_{name}_{entry}", "_end"))
         printed = call([str(program), part, str(_CLOCK_HZ), "classifier.elf", *places, *spans], folder, sent.tobytes())
-    answers = _answers(printed, len(frames), layout, words=0 if lost is None else _WORDS)
-    return answers if lost is None else replace(answers, cost=None, unit="", stack=None)
+    predictions = _answers(printed, len(frames), layout, words=0 if lost is None else _WORDS)
+    return predictions if lost is None else replace(predictions, cost=None, unit="", stack=None)
 
 
 def _symbols(folder: Path) -> dict[str, tuple[int, int]]:
@@ -133,28 +133,28 @@ def _symbols(folder: Path) -> dict[str, tuple[int, int]]:
 
 
 def _symbol(found: Mapping[str, tuple[int, int]], name: str, size: int | None = None) -> int:
-    """Return the address of a symbol, which has `size` bytes where that is given. Raises FirmwareError."""
+    """Return the address of a symbol of `size` bytes, if given. Raises FirmwareError if it is missing or differs."""
     if name not in found:
         raise FirmwareError(f"the compiled program has no {name}")
     address, held = found[name]
     if size not in (None, held):
-        raise FirmwareError(f"{name} has {held} bytes in the compiled program, its layout says {size}")
+        raise FirmwareError(f"{name} has {held} bytes in the compiled program, but {size} in its layout")
     return address
 
 
-def _answers(printed: bytes, frames: int, layout: Layout, *, words: int) -> Answers:
-    """Return the answers; `words` bytes say type, margin and probability, where these were asked."""
+def _answers(printed: bytes, frames: int, layout: Layout, *, words: int) -> Predictions:
+    """Return the predictions; `words` is the size of type, margin and probability, 0 where these were not requested."""
     classes = len(layout.start)
     said = [("said", "<u2", (words // 2,))] if words else []
     counted = [("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")]
     record = np.dtype([("scores", "<i2", (classes,)), *said, *counted])
     if len(printed) != frames * record.itemsize:
-        raise FirmwareError(f"the simulator gave {len(printed)} bytes for {frames} frames of {record.itemsize}")
+        raise FirmwareError(f"the simulator gave {len(printed)} bytes for {frames} frames of {record.itemsize} bytes")
     records = np.frombuffer(printed, record)
-    # A class of one byte comes back in r24; what r25 holds then means nothing.
+    # A class of one byte is returned in r24; r25 is then undefined.
     grasps = records["grasp"] if classes > 256 else records["grasp"] & 0xFF
     stack = int(records["stack"].max()) if frames else None
-    return Answers(
+    return Predictions(
         records["scores"].astype(np.int16),
         grasps.astype(np.uint16),
         margins=records["said"][:, 1].astype(np.uint16) if words else None,

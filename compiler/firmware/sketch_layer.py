@@ -1,4 +1,4 @@
-"""The firmware of a part under Arduino's core, below the portable one: a sketch, with Serial or Wi-Fi to the host."""
+"""The layer for parts with an Arduino core, below the portable firmware: a sketch, and Serial or Wi-Fi to the host."""
 
 from collections.abc import Mapping, Sequence
 
@@ -15,7 +15,7 @@ __all__ = ["base_files", "bus_files", "channels_files", "folder", "joints_files"
 
 _CHARGE_US = 100
 _WIRE_MS, _FREEING_US = 2, 110
-# What a core is asked for in its own words: pins of the bus and of UARTs, a radio that does not sleep, a random number.
+# Core-specific calls: pins of the bus and of UARTs, disabling the radio's sleep, a random number.
 _BUS = {
     "esp32": ("(void)Wire.begin((int)SDA_PIN, (int)SCL_PIN);",),
     "rp2040": ("(void)Wire.setSDA(SDA_PIN);", "(void)Wire.setSCL(SCL_PIN);", "Wire.begin();"),
@@ -39,7 +39,7 @@ _RANDOM = {"esp32": "esp_random()", "rp2040": "rp2040.hwrand32()"}
 
 
 def base_files(board: Board, about: str) -> dict[str, str]:
-    """Return name -> text of the sketch, the clock, and the host's line."""
+    """Return name -> text of the sketch, the clock, and the host line."""
     part, wifi = board.part, board.wifi
     if wifi is None:
         what = "bytes of a serial port"
@@ -60,7 +60,7 @@ def base_files(board: Board, about: str) -> dict[str, str]:
 
 
 def keys_files(board: Board, switches: Sequence[str]) -> dict[str, str]:
-    """Return name -> text of what reads switches on pins or in a matrix."""
+    """Return name -> text of the files that read switches on pins or in a matrix."""
     matrix = board.matrix
     if matrix is None:
         keys = [
@@ -80,7 +80,7 @@ def keys_files(board: Board, switches: Sequence[str]) -> dict[str, str]:
 
 
 def bus_files(board: Board) -> dict[str, str]:
-    """Return name -> text of the master of the I2C bus."""
+    """Return name -> text of the I2C bus master."""
     sda, scl = map(_number, _part(board).twi)
     hz = board.bus.clock_hz
     # A reading is two transfers, and each may wait.
@@ -104,7 +104,7 @@ def uart_files(board: Board, number: int, baud: int) -> dict[str, str]:
 
 
 def joints_files(name: str, board: Board, joints: Sequence[Calibration]) -> dict[str, str]:
-    """Return name -> text of what reads joints on the converter."""
+    """Return name -> text of the files that read joints on the converter."""
     part = _part(board)
     rows = [
         {"name": comment(joint.name), "channel": channel, "pin": part.converter[channel]}
@@ -115,7 +115,7 @@ def joints_files(name: str, board: Board, joints: Sequence[Calibration]) -> dict
 
 
 def channels_files(board: Board) -> dict[str, str]:
-    """Return name -> text of what reads taxels on the converter; nothing for a board without."""
+    """Return name -> text of the files that read taxels on the converter; empty for a board without taxels."""
     taxels, part = board.taxels, _part(board)
     if taxels is None:
         return {}
@@ -131,10 +131,10 @@ def channels_files(board: Board) -> dict[str, str]:
 
 
 def folder(name: str, board: Board, mode: Mode, files: Mapping[str, str]) -> dict[str, str]:
-    """Return path -> text of the whole folder: the sketch in one of its own name, as Arduino asks, and the rest."""
+    """Return path -> text of the whole folder: the sketch in a folder of the same name, as Arduino requires."""
     part, sketch = _part(board), f"thenar_{name}_{mode}"
-    beside = {"glove.toml": files["glove.toml"]}
-    inside = {f"{sketch}.ino" if path == _SKETCH else path: text for path, text in files.items() if path not in beside}
+    outside = {"glove.toml": files["glove.toml"]}
+    inside = {f"{sketch}.ino" if path == _SKETCH else path: text for path, text in files.items() if path not in outside}
     values = {
         "sketch": sketch,
         "part": part,
@@ -142,11 +142,11 @@ def folder(name: str, board: Board, mode: Mode, files: Mapping[str, str]) -> dic
         "host_name": host_name(board),
         "does": "scans the switches" if mode == "scan" else "scans the switches and recognises",
     }
-    beside |= {path: _text(path, **values) for path in ("platformio.ini", "README.md")}
-    return {**{f"{sketch}/{path}": text for path, text in inside.items()}, **beside}
+    outside |= {path: _text(path, **values) for path in ("platformio.ini", "README.md")}
+    return {**{f"{sketch}/{path}": text for path, text in inside.items()}, **outside}
 
 
-_SKETCH = "sketch"  # the sketch's own file, which is called as its folder
+_SKETCH = "sketch"  # the main file of the sketch, which is named after its folder
 
 
 def _text(file: str, /, **values: object) -> str:

@@ -1,4 +1,4 @@
-"""Compilers and emulators: found, run for a limited time, in a folder that does not outlive their use."""
+"""Compilers and emulators: finding them and running them, with a time limit, in a temporary folder."""
 
 import os
 import shutil
@@ -11,10 +11,10 @@ from tempfile import TemporaryDirectory
 from . import FirmwareError
 
 LIMIT_S = 300.0
-# Every C file of ours is held to these.
+# All of our C files are compiled with these.
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-pedantic")
 
-# The first of the programs that is installed is the one used; the packages are Debian's.
+# The first installed program of each tuple is used; the packages are Debian's.
 Tool = tuple[tuple[str, ...], str]
 HOST_COMPILER: Tool = (("gcc", "clang"), "gcc")
 AVR_COMPILER: Tool = (("avr-gcc",), "gcc-avr avr-libc")
@@ -31,7 +31,7 @@ XTENSA_EMULATOR: Tool = (("qemu-system-xtensa",), "qemu-system-misc")
 
 
 def lacking(*tools: Tool) -> str | None:
-    """Return which of the tools are not installed and which packages bring them, None if all are there."""
+    """Return which of the tools are not installed and which packages contain them, None if all are installed."""
     gone = [tool for tool in tools if not any(map(shutil.which, tool[0]))]
     if not gone:
         return None
@@ -40,7 +40,7 @@ def lacking(*tools: Tool) -> str | None:
 
 
 def find(tool: Tool) -> str:
-    """Return the path of the first program of `tool` that is installed. Raises FirmwareError."""
+    """Return the path of the first installed program of `tool`. Raises FirmwareError if there is none."""
     for name in tool[0]:
         if path := shutil.which(name):
             return path
@@ -49,7 +49,7 @@ def find(tool: Tool) -> str:
 
 @contextmanager
 def workshop(files: Mapping[str, str | bytes]) -> Iterator[Path]:
-    """Give a new folder with `files`, path below it -> content; it is removed however the block is left.
+    """Create a temporary folder with `files`, path below it -> content; it is removed at the end of the block.
 
     Raises FirmwareError if they cannot be written.
     """
@@ -63,7 +63,7 @@ def _new_folder() -> TemporaryDirectory[str]:
     try:
         return TemporaryDirectory(prefix="thenar-")
     except OSError as wrong:
-        raise FirmwareError(f"there is no temporary folder: {wrong.strerror}; $TMPDIR names another place") from None
+        raise FirmwareError(f"no temporary folder: {wrong.strerror}; set $TMPDIR to another place") from None
 
 
 def _write(path: Path, content: bytes) -> None:
@@ -75,9 +75,9 @@ def _write(path: Path, content: bytes) -> None:
 
 
 def call(command: Sequence[str], folder: Path, given: bytes = b"", limit_s: float = LIMIT_S) -> bytes:
-    """Run `command` in `folder` with `given` on its standard input; return what it printed.
+    """Run `command` in `folder` with `given` on its standard input; return its output.
 
-    Raises FirmwareError if it ends with an error, with the beginning of what it said, or not within `limit_s`.
+    Raises FirmwareError with the beginning of its messages if it ends with an error or not within `limit_s`.
     """
     program = Path(command[0]).name
     english = os.environ | {"LC_ALL": "C"}
@@ -86,10 +86,10 @@ def call(command: Sequence[str], folder: Path, given: bytes = b"", limit_s: floa
             command, cwd=folder, input=given, capture_output=True, timeout=limit_s, env=english, check=False
         )
     except subprocess.TimeoutExpired:
-        raise FirmwareError(f"{program} had not ended after {limit_s:g} s and was stopped: it hangs") from None
+        raise FirmwareError(f"{program} was stopped, since it had not ended after {limit_s:g} s") from None
     except OSError as wrong:
         raise FirmwareError(f"{program} cannot be started: {wrong.strerror}") from None
     if done.returncode:
         said = (done.stderr or done.stdout).decode(errors="replace").strip()
-        raise FirmwareError(f"{program} ended with {done.returncode}: {said[:2000] or 'it said nothing'}")
+        raise FirmwareError(f"{program} ended with {done.returncode}: {said[:2000] or 'without a message'}")
     return done.stdout

@@ -1,4 +1,4 @@
-"""Words of a build as words of C: names, comments and string literals, whatever characters they are made of."""
+"""Names of a build in generated code: as C identifiers, comments and string literals, whatever characters they have."""
 
 import hashlib
 import re
@@ -20,7 +20,7 @@ _LONGEST_NAME = 32
 
 
 class Names(Protocol):
-    """What firmware says of a build besides its tables. A Manifest is one, and `numbered(tables)`."""
+    """The names and models of a build other than its tables. A Manifest has them, and so has `numbered(tables)`."""
 
     @property
     def grasps(self) -> tuple[str, ...]:
@@ -34,12 +34,12 @@ class Names(Protocol):
 
     @property
     def joints(self) -> tuple[Calibration, ...]:
-        """The joints in the order of the tables, and what their codes mean."""
+        """The joints in the order of the tables, and the meaning of their codes."""
         ...
 
     @property
     def tables_sha256(self) -> str:
-        """The digest of the tables that all was made from."""
+        """The digest of the tables."""
         ...
 
     @property
@@ -49,23 +49,23 @@ class Names(Protocol):
 
     @property
     def rejection(self) -> Rejection | None:
-        """What is refused, if anything is."""
+        """The rejection model, if there is one."""
         ...
 
     @property
     def segments(self) -> SegmentModel | None:
-        """The costs of segments, where it has learnt any."""
+        """The costs of segments, if the build has learnt them."""
         ...
 
 
 def answers_of(names: Names) -> tuple[str, ...]:
-    """Return what a frame may be called: the grasp types, and that nothing is held where that is none of them."""
+    """Return the possible predictions for a frame: the grasp types, and "none" if the build can reject frames."""
     return names.grasps if names.rejection is None else (*names.grasps, NONE)
 
 
 @dataclass(frozen=True, slots=True)
 class Numbered:
-    """Names of nothing but numbers, for tables that belong to no build: see `numbered`."""
+    """Names that are only numbers, for tables without a build: see `numbered`."""
 
     grasps: tuple[str, ...]
     switches: tuple[Switch, ...]
@@ -89,16 +89,16 @@ def numbered(tables: IntegerTables) -> Numbered:
 
 
 def check_name(name: str) -> None:
-    """Raise FirmwareError unless `name` can be what files and functions of C are called: thenar_NAME."""
+    """Raise FirmwareError unless `name` is valid in names of C files and functions: thenar_NAME."""
     if not re.fullmatch(rf"[a-z][a-z0-9_]{{0,{_LONGEST_NAME - 1}}}", name):
         raise FirmwareError(
-            f"{name!r} cannot be the name: it takes lower-case letters a to z, digits and _, a letter first, "
-            f"at most {_LONGEST_NAME}"
+            f"{name!r} cannot be the name: use lower-case letters a to z, digits and _, a letter first, "
+            f"at most {_LONGEST_NAME} characters"
         )
 
 
 def identifiers(texts: Sequence[str]) -> list[str]:
-    """Return for each text the end of an identifier of C, in capitals, unlike all others: "index tip" is INDEX_TIP."""
+    """Return for each text a unique suffix for C identifiers, in capitals: "index tip" is INDEX_TIP."""
     found: dict[str, None] = {}
     for number, text in enumerate(texts):
         plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().upper()
@@ -110,13 +110,13 @@ def identifiers(texts: Sequence[str]) -> list[str]:
 
 
 def inputs_in_words(switches: int, joints: int) -> str:
-    """Return how many inputs there are, leaving out what there is none of: "31 switches and 1 joint"."""
+    """Return the numbers of inputs in words, without zeros: "31 switches and 1 joint"."""
     counts = ((switches, "switch", "switches"), (joints, "joint", "joints"))
     return " and ".join(f"{count} {one if count == 1 else more}" for count, one, more in counts if count)
 
 
 def joint_in_words(joint: Calibration) -> str:
-    """Return a joint and what its codes mean: "thumb: code 0 = 0 deg, 255 = 90 deg"."""
+    """Return a joint and the meaning of its codes: "thumb: code 0 = 0 deg, 255 = 90 deg"."""
     if joint.unit == "raw":
         return f"{joint.name}: the glove's own codes"
     first, last = ((joint.code_a, joint.value_a), (joint.code_b, joint.value_b))
@@ -124,7 +124,7 @@ def joint_in_words(joint: Calibration) -> str:
 
 
 def switches_in_words(numbers: Sequence[int]) -> str:
-    """Return which switches these are: "switches 3 to 7", or each where they do not follow each other."""
+    """Return the switches in words: "switches 3 to 7", or a list where they are not consecutive."""
     first, last = numbers[0], numbers[-1]
     if list(numbers) == list(range(first, last + 1)):
         return f"switches {first} to {last}" if last > first else f"switch {first}"
@@ -132,19 +132,19 @@ def switches_in_words(numbers: Sequence[int]) -> str:
 
 
 def comment(text: str) -> str:
-    """Return `text` in one line of ASCII that can stand inside a C comment: it neither ends nor opens one."""
+    """Return `text` in one line of ASCII that is safe inside a C comment: it neither ends nor opens one."""
     escaped = "".join(char if " " <= char <= "~" else _escape(char) for char in text)
-    # A backslash at the end of a line, or the trigraph for one, would continue a comment of the // kind.
+    # A backslash at the end of a line, or the trigraph for one, would continue a // comment.
     return escaped.replace("*/", "* /").replace("/*", "/ *").replace("??/", "? ?/")
 
 
 def markdown(text: str) -> str:
-    """Return `text` in one line of ASCII that Markdown shows as it is, and takes for nothing else."""
+    """Return `text` in one line of ASCII that Markdown shows literally."""
     return re.sub(r"([\\`*_{}\[\]<>()#!|&~])", r"\\\1", comment(text))
 
 
 def string(text: str) -> str:
-    """Return the literal of C that is `text` in UTF-8."""
+    """Return the C literal of `text` in UTF-8."""
     return '"' + "".join(_in_literal(byte) for byte in text.encode()) + '"'
 
 

@@ -24,9 +24,9 @@ from ..workers import in_workers
 
 # Bytes; a frontier of the largest set makes a few million calls.
 LARGEST = 1 << 30
-HEADER = b'{"thenar":"store of results","schema":3}\n'
+HEADER = b'{"thenar":"store of results","schema":4}\n'
 # Older forms of calls and results, which cannot be looked up any more.
-OLD_HEADERS = (HEADER.replace(b"3}", b"1}"), HEADER.replace(b"3}", b"2}"))
+OLD_HEADERS = tuple(b'{"thenar":"store of answers","schema":%d}\n' % n for n in (1, 2, 3))  # codespell:ignore answers
 
 # Where a function runs: on the cluster, if there is one; in workers on this machine, whose tools it uses; in this very
 # process, because it measures this machine, whose name is then part of the cache key.
@@ -138,7 +138,7 @@ class Store:
         self.renewed = False
         self._path = path
         self._scope = scope.encode()
-        self._answers: dict[str, bytes] = {}
+        self._results: dict[str, bytes] = {}
         if is_special(path):
             raise StoreError(f"{path} is a device or a pipe: name a file")
         with _opened(path):
@@ -162,7 +162,7 @@ class Store:
 
     def __len__(self) -> int:
         """Return the number of results, of all scopes."""
-        return len(self._answers)
+        return len(self._results)
 
     def close(self) -> None:
         """Write everything to disk and unlock the file for other runs. May be called again."""
@@ -173,7 +173,7 @@ class Store:
 
     def get(self, question: bytes, kind: type[R]) -> R | None:
         """Return the result, or None if there is none that decodes as `kind`, and it must be computed."""
-        data = self._answers.get(self._key(question))
+        data = self._results.get(self._key(question))
         if data is None:
             return None
         try:
@@ -186,7 +186,7 @@ class Store:
         key, data = self._key(question), msgspec.json.encode(result)
         line = _Line(key, _crc(key, data), msgspec.Raw(data))
         self._append(msgspec.json.encode(line) + b"\n")
-        self._answers[key] = data
+        self._results[key] = data
 
     def _key(self, question: bytes) -> str:
         return blake2b(self._scope + b"\0" + question, digest_size=16).hexdigest()
@@ -215,7 +215,7 @@ class Store:
         data = bytes(read.result)
         if read.crc != _crc(read.key, data):
             return False
-        self._answers[read.key] = data
+        self._results[read.key] = data
         return True
 
     def _append(self, data: bytes) -> None:

@@ -129,20 +129,20 @@ def _check(point: Point, grasp_set: GraspSet, what: str) -> None:
     if not set(grasp_set.element_names).issuperset(name for name, _ in levels):
         raise FrontierError(f"{what} keeps switches that the recordings do not have: run thenar frontier on these")
     if setting.inputs != "joints" and setting.placement.method not in METHODS:
-        raise FrontierError(f"{what} takes a method that is not there: {shortened(repr(setting.placement.method))}")
+        raise FrontierError(f"{what} has an unknown method: {shortened(repr(setting.placement.method))}")
     least = 1 if setting.inputs != "joints" and METHODS[setting.placement.method].by_number else 0
     if not (setting.placement.parameter.is_integer() and setting.placement.parameter >= least):
         raise FrontierError(
-            f"{what} takes {setting.placement.parameter} for its method: it is a whole number from {least} on"
+            f"{what} has {setting.placement.parameter} as its method's parameter: it must be an integer from {least} on"
         )
     if setting.trainer not in TRAINERS:
-        raise FrontierError(f"{what} takes a trainer that is not there: {shortened(repr(setting.trainer))}")
+        raise FrontierError(f"{what} has an unknown trainer: {shortened(repr(setting.trainer))}")
     if TRAINERS[setting.trainer].staged != (setting.rounds is not None):
-        raise FrontierError(f"{what} gives rounds to a trainer that takes none, or none to one that does")
+        raise FrontierError(f"{what} gives rounds to a trainer without rounds, or none to one with rounds")
     clocks = {name: chip.clock_hz for name, chip in (*expanders().items(), (CONVERTER, CHIPS[CONVERTER]))}
     clocks |= {name: chip.clock_hz for name, chip in SPI_CHIPS.items()}
     if setting.wiring not in ("", AS_WIRED, BOARD, *clocks):
-        raise FrontierError(f"{what} takes a wiring that is not there: {shortened(repr(setting.wiring))}")
+        raise FrontierError(f"{what} has an unknown wiring: {shortened(repr(setting.wiring))}")
     if setting.wiring in clocks and not SLOWEST_HZ <= setting.clock_hz <= clocks[setting.wiring]:
         raise FrontierError(f"{what} runs its {setting.wiring} at {setting.clock_hz} Hz, which it cannot")
     if setting.wiring not in ("", AS_WIRED) and not Wiring(setting.wiring, setting.clock_hz).fits(point.switches):

@@ -143,7 +143,7 @@ def summary(frontier: Frontier) -> str:
 
 
 LUCK = (
-    "A point is the best of many, so its rate is corrected for luck by a bootstrap over what was tried; the rates of "
+    "A point is the best of many, so its rate is corrected for luck by a bootstrap over everything tried; the rates of "
     "marks, of placements as they were screened and of the curves are not."
 )
 

@@ -19,7 +19,7 @@ _KEY_LINES = 2
 _LETTER_INCHES = 0.062  # of _FONT_SIZE
 _FONT_SIZE = 7
 
-BETTERED: dict[Aim, str] = {
+REFINED: dict[Aim, str] = {
     "plain": "as chosen",
     "mean": "refined for the mean",
     "worst tenth": "refined for the worst tenth",
@@ -100,7 +100,7 @@ def draw_study(study: Standard, path: Path) -> None:
 
 def _draw_study(axes: "Axes", study: Standard) -> None:
     """Draw two lines for every aim: the mean and the worst tenth."""
-    for (aim, words), colour in zip(BETTERED.items(), map(on_paper, ("soft", "switches", "both")), strict=True):
+    for (aim, words), colour in zip(REFINED.items(), map(on_paper, ("soft", "switches", "both")), strict=True):
         points = [point for point in study.curve if point.aim == aim]
         sizes = [point.subjects for point in points]
         for what, style in (("mean", "-"), ("worst_tenth", "--")):

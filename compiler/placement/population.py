@@ -38,11 +38,11 @@ REACH, EXCHANGES = 4, 2
 # With fewer subjects nothing is exchanged: the worst tenth is then a handful, and with 10 to 40 of the 200 subjects,
 # gains of exchanges within them were more often than not losses on others.
 ENOUGH_SUBJECTS = 80
-_ASKED_OF_EACH = 50
+_TEST_ROWS = 50
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class StudyOptions:
     """Parameters of a study of a population.
 
     keep     switches to keep; method: one of `METHODS` whose parameter is a number of switches
@@ -92,17 +92,17 @@ class Population:
         return replace(self, samples=self.samples.rows(rows), subjects=self.subjects[rows])
 
 
-def rates(learnt: Population, asked: Population, elements: Elements, rounds: int) -> NDArray[np.float64]:
-    """Return the accuracy, by trials, of every subject of `asked`, in the order of their numbers.
+def rates(train: Population, test: Population, elements: Elements, rounds: int) -> NDArray[np.float64]:
+    """Return the accuracy, by trials, of every subject of `test`, in the order of their numbers.
 
-    LogitBoost of `rounds` rounds is trained on the elements, and any joints, of `learnt`.
+    LogitBoost of `rounds` rounds is trained on the elements, and any joints, of `train`.
     """
-    samples, others = (bits_of(population.samples, elements) for population in (learnt, asked))
+    samples, others = (bits_of(population.samples, elements) for population in (train, test))
     stumps, _ = boost(samples.inputs, samples.labels, samples.n_classes, rounds=rounds)
-    _, first, trial = np.unique(asked.samples.trials, return_index=True, return_inverse=True)
+    _, first, trial = np.unique(test.samples.trials, return_index=True, return_inverse=True)
     found = decided(winners(stumps.scores(others.inputs))[np.newaxis], trial)[0]
-    numbers = np.unique(asked.subjects[first], return_inverse=True)[1]
-    right = found == asked.samples.labels[first]
+    numbers = np.unique(test.subjects[first], return_inverse=True)[1]
+    right = found == test.samples.labels[first]
     return np.asarray(np.bincount(numbers, right) / np.bincount(numbers), dtype=np.float64)
 
 
@@ -132,9 +132,9 @@ class Refining:
     def __post_init__(self) -> None:
         people = np.random.default_rng([self.seed, 2]).permutation(np.unique(self.population.subjects))
         one, other = self.population.of(people[::2]), self.population.of(people[1::2])
-        learnt = [half.drawn(self.rows // 2, self.seed) for half in (one, other)]
-        asked = [half.drawn(_ASKED_OF_EACH * len(np.unique(half.subjects)), self.seed) for half in (other, one)]
-        self._halves = tuple(zip(learnt, asked, strict=True))
+        train = [half.drawn(self.rows // 2, self.seed) for half in (one, other)]
+        test = [half.drawn(_TEST_ROWS * len(np.unique(half.subjects)), self.seed) for half in (other, one)]
+        self._halves = tuple(zip(train, test, strict=True))
 
     def best(self, aim: Aim) -> Elements:
         """Return the method's placement ("plain"), or the placement after the exchanges that improve `aim` most.
@@ -165,7 +165,7 @@ class Refining:
         key = frozenset(elements)
         if key not in self._known:
             order = tuple(sorted(elements))
-            parts = [rates(learnt, asked, order, self.rounds) for learnt, asked in self._halves]
+            parts = [rates(train, test, order, self.rounds) for train, test in self._halves]
             self._known[key] = np.concatenate(parts)
         found = served(self._known[key])
         return found.worst_tenth if aim == "worst tenth" else found.mean
@@ -176,9 +176,9 @@ class _Task:
     """Train on some subjects of a population, test on others."""
 
     population: Population
-    learnt: Numbers
-    asked: Numbers
-    take: Asked
+    train: Numbers
+    test: Numbers
+    options: StudyOptions
     seed: int
     place: int
 
@@ -199,7 +199,7 @@ def place_for_population(
     fingerprint, grasp_set = grasp_set.fingerprint(), grasp_set.without_none()
     samples = samples_of(grasp_set, joints=joints)
     population = Population(samples, np.unique(grasp_set.subjects, return_inverse=True)[1])
-    study = standard_placement(population, Asked(keep, method), jobs, on_done)
+    study = standard_placement(population, StudyOptions(keep, method), jobs, on_done)
     return Placement(
         method=method,
         parameter=float(keep),
@@ -214,22 +214,24 @@ def place_for_population(
     )
 
 
-def standard_placement(population: Population, take: Asked, jobs: int = 1, on_done: Progress | None = None) -> Standard:
+def standard_placement(
+    population: Population, options: StudyOptions, jobs: int = 1, on_done: Progress | None = None
+) -> Standard:
     """Return one placement for all subjects of `population`, and the accuracy against the number of training subjects.
 
     `on_done(done, all)` is called after every task. The same arguments give the same result, whatever `jobs`.
     Raises PlacementError for fewer than eight subjects, and for a method that takes no number of switches.
     """
-    if not METHODS.named(take.method).by_number:
-        raise PlacementError(f"{take.method} takes S: a standard placement takes a method of a number of switches")
+    if not METHODS.named(options.method).by_number:
+        raise PlacementError(f"{options.method} takes S: a standard placement takes a method of a number of switches")
     people = np.unique(population.subjects)
     if len(people) < LEAST_SUBJECTS:
         raise PlacementError(
             f"the set has {len(people)} subject(s): a standard placement needs at least {LEAST_SUBJECTS}"
         )
-    people = np.random.default_rng(take.seed).permutation(people)
-    asked, learnt = _apart(people)
-    tasks = [_trial(population, learnt, take), *_curve(population, learnt, asked, take)]
+    people = np.random.default_rng(options.seed).permutation(people)
+    test, train = _apart(people)
+    tasks = [_trial(population, train, options), *_curve(population, train, test, options)]
     found: dict[int, tuple[Served, ...]] = {}
     for done, (place, result) in enumerate(in_workers(_work, tasks, jobs), 1):
         found[place] = result
@@ -238,11 +240,11 @@ def standard_placement(population: Population, take: Asked, jobs: int = 1, on_do
     points = _points(tasks, found)
     tried, curve = points[: len(AIMS)], points[len(AIMS) :]
     aim = max(tried, key=lambda point: point.served.worth).aim
-    elements = _refining(population, take, take.seed).best(aim)
+    elements = _refining(population, options, options.seed).best(aim)
     if on_done is not None:
         on_done(len(tasks) + 1, len(tasks) + 1)
-    rows = len(population.drawn(take.rows, take.seed).subjects)
-    return Standard(elements, take.method, aim, len(people), len(asked), rows, tried, curve)
+    rows = len(population.drawn(options.rows, options.seed).subjects)
+    return Standard(elements, options.method, aim, len(people), len(test), rows, tried, curve)
 
 
 def _apart(people: Numbers) -> tuple[Numbers, Numbers]:
@@ -251,48 +253,48 @@ def _apart(people: Numbers) -> tuple[Numbers, Numbers]:
     return people[:held_out], people[held_out:]
 
 
-def _trial(population: Population, learnt: Numbers, take: Asked) -> _Task:
+def _trial(population: Population, train: Numbers, options: StudyOptions) -> _Task:
     """Return the task that compares the aims, within the training subjects."""
-    asked, rest = _apart(learnt)
-    return _Task(population.of(learnt), rest, asked, take, take.seed, 0)
+    test, rest = _apart(train)
+    return _Task(population.of(train), rest, test, options, options.seed, 0)
 
 
-def _curve(population: Population, learnt: Numbers, asked: Numbers, take: Asked) -> list[_Task]:
+def _curve(population: Population, train: Numbers, test: Numbers, options: StudyOptions) -> list[_Task]:
     """Return the tasks of the learning curve: numbers of subjects, draws of them."""
-    sizes = [*(size for size in _SIZES if size < len(learnt)), len(learnt)]
+    sizes = [*(size for size in _SIZES if size < len(train)), len(train)]
     tasks: list[_Task] = []
     for size in sizes:
-        draws = take.repeats if size < len(learnt) else 1
-        for seed in range(take.seed, take.seed + draws):
-            some = np.random.default_rng([seed, size]).permutation(learnt)[:size]
-            tasks.append(_Task(population.of(np.append(some, asked)), some, asked, take, seed, len(tasks) + 1))
+        draws = options.repeats if size < len(train) else 1
+        for seed in range(options.seed, options.seed + draws):
+            some = np.random.default_rng([seed, size]).permutation(train)[:size]
+            tasks.append(_Task(population.of(np.append(some, test)), some, test, options, seed, len(tasks) + 1))
     return tasks
 
 
 def _work(task: _Task) -> tuple[int, tuple[Served, ...]]:
     """Return the task's number, and the accuracies of the test subjects for each aim."""
-    learnt, asked = task.population.of(task.learnt), task.population.of(task.asked)
-    refining = _refining(learnt, task.take, task.seed)
+    train, test = task.population.of(task.train), task.population.of(task.test)
+    refining = _refining(train, task.options, task.seed)
     placements = [refining.best(aim) for aim in AIMS]
-    found = {elements: served(rates(learnt, asked, elements, task.take.rounds)) for elements in placements}
+    found = {elements: served(rates(train, test, elements, task.options.rounds)) for elements in placements}
     return task.place, tuple(found[elements] for elements in placements)
 
 
-def _refining(population: Population, take: Asked, seed: int) -> Refining:
+def _refining(population: Population, options: StudyOptions, seed: int) -> Refining:
     """Return the method's placement, from rows drawn evenly over the subjects, ready for refinement."""
-    samples = population.drawn(take.rows, seed).samples
+    samples = population.drawn(options.rows, seed).samples
     elements = elements_of(samples)
-    choose = METHODS.named(take.method).chooser(bits_of(samples, elements))
-    kept, more = (tuple(elements[column] for column in choose(size)) for size in (take.keep, take.keep + REACH))
+    choose = METHODS.named(options.method).chooser(bits_of(samples, elements))
+    kept, more = (tuple(elements[column] for column in choose(size)) for size in (options.keep, options.keep + REACH))
     spare = tuple(element for element in more if element not in kept)
-    return Refining(population, kept, spare, take.rows, take.rounds, seed)
+    return Refining(population, kept, spare, options.rows, options.rounds, seed)
 
 
 def _points(tasks: list[_Task], found: dict[int, tuple[Served, ...]]) -> tuple[CurvePoint, ...]:
     """Return the means over the draws for every aim, those of the trial first."""
     draws: dict[tuple[bool, int], list[tuple[Served, ...]]] = {}
     for task in tasks:
-        draws.setdefault((task.place == 0, len(task.learnt)), []).append(found[task.place])
+        draws.setdefault((task.place == 0, len(task.train)), []).append(found[task.place])
     return tuple(
         CurvePoint(size, aim, _mean([one[number] for one in several]))
         for (_, size), several in draws.items()

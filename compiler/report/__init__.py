@@ -1,1 +1,1 @@
-"""`report.html`: all that a build knows of itself, in one file that works offline."""
+"""`report.html`: everything known about a build, in one file that works offline."""

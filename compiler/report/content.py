@@ -1,4 +1,4 @@
-"""What a report is made of, and the table that its sections share."""
+"""The content of a report, and the table type that its sections share."""
 
 from dataclasses import dataclass
 
@@ -21,30 +21,31 @@ from ..tables.faults import FaultCounts
 
 
 class ReportError(ThenarError, ValueError):
-    """The parts of a report do not belong together."""
+    """The parts of a report are inconsistent."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReportContent:
-    """A build and what is known of it; None where a thing was not asked for or has no meaning.
+    """A build and everything known about it; None where something was not requested or does not apply.
 
-    tables        the build's integer tables, tables_bytes their size in `tables.bin`
-    rounds        rounds of boosting that the ensemble holds
-    firmware      a sentence: what the firmware in the build is laid out for, or why there is none
-    only_answer   the one grasp type that every row gets, where there is but one
+    tables        the build's integer tables; tables_bytes is their size in `tables.bin`
+    rounds        the number of boosting rounds in the ensemble
+    firmware      a sentence: the part that the firmware in the build is laid out for, or why there is none
+    only_answer   the grasp type predicted for every row, if there is only one
     tree          the tree that chose the switches, over the recordings' switches; classes index manifest.grasps
-    confusion     (K, K) counts of frames in the headline's folds, row: true, column: recognised, as in manifest.answers
-    study         the paper's tables for these recordings; no_study: a sentence, why there are none
-    frontier      of which the report tells; point: the number of the one that the build is, None if it is none of them
-    hand          where the recordings' switches lie
+    confusion     (K, K) counts of frames in the headline's folds, row: true, column: predicted; K types, with "none" if
+                  the build can predict it
+    study         the paper's tables for these recordings; no_study: a sentence on why there are none
+    frontier      the frontier to report; point: the number of the build's point, None if it is not on the frontier
+    hand          the positions of the recordings' switches
     scan, harness the scan map and the harness that it was made for
-    comparison    the rows trained on, through the model, its tables and the integers
-    faults        what each fault of an input leaves of the rows trained on
-    transitions   which type follows which, where the recordings are whole movements
-    worst         the worst that integers can do, over every frame there is
-    has_page      whether try.html lies beside the report
+    comparison    the training rows, through the model, its tables and the integers
+    faults        the effect of each input fault on the training rows
+    transitions   how often each type follows each, where the recordings are whole movements
+    worst         the worst case of the integers over all possible frames
+    has_page      whether try.html is in the same folder
 
-    Raises ReportError where parts do not belong together.
+    Raises ReportError where parts are inconsistent.
     """
 
     manifest: Manifest
@@ -56,7 +57,7 @@ class ReportContent:
     tree: Tree | None = None
     confusion: NDArray[np.intp] | None = None
     study: Study | None = None
-    no_study: str = "They were not asked for."
+    no_study: str = "They were not requested."
     frontier: Frontier | None = None
     point: int | None = None
     hand: HandShape | None = None
@@ -69,17 +70,17 @@ class ReportContent:
     has_page: bool = False
 
     def __post_init__(self) -> None:
-        grasps, answers = len(self.manifest.grasps), len(self.manifest.answers)
+        grasps, classes = len(self.manifest.grasps), len(self.manifest.answers)
         if self.tables.n_classes != grasps or self.tables.n_switches != len(self.manifest.switches):
-            raise ReportError("the tables are of another build than build.json: compile the build again")
-        if self.confusion is not None and self.confusion.shape not in ((grasps, grasps), (answers, answers)):
-            raise ReportError(f"a confusion matrix of {grasps} grasp types is not {self.confusion.shape}")
+            raise ReportError("the tables do not match build.json: compile the build again")
+        if self.confusion is not None and self.confusion.shape not in ((grasps, grasps), (classes, classes)):
+            raise ReportError(f"the confusion matrix of {grasps} grasp types has the shape {self.confusion.shape}")
         if self.tree is not None and len(self.tree.classes) > grasps:
-            raise ReportError("the tree knows more grasp types than the build: it is of other recordings")
+            raise ReportError("the tree has more grasp types than the build: it belongs to other recordings")
         if self.hand is not None and not self.hand.knows(self.sources):
-            raise ReportError("the hand lacks a kept switch: it is of another glove")
+            raise ReportError("the hand lacks a kept switch: it belongs to another glove")
         if self.scan is not None and (self.harness is None or self.scan.harness != self.harness.fingerprint):
-            raise ReportError("the scan map is not of this harness: compile with --glove and the glove.toml in use")
+            raise ReportError("the scan map does not match the harness: compile with --glove and the glove.toml in use")
 
     @property
     def switch_names(self) -> tuple[str, ...]:
@@ -88,7 +89,7 @@ class ReportContent:
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """Names of the kept switches, and of the taxels that levels are kept of, in the order of the first of each."""
+        """Names of the kept switches, and of the taxels with kept levels, by first occurrence."""
         return tuple(dict.fromkeys(switch.source for switch in self.manifest.switches))
 
 
@@ -96,8 +97,8 @@ class ReportContent:
 class PlainTable:
     """A table of texts: every row is as long as `columns`.
 
-    words  columns of words; the others hold numbers, to the right
-    head   the column that heads the rows
+    words  columns of words; the others hold numbers, right-aligned
+    head   the column with the row headings
     note   a sentence below the table
     """
 

@@ -1,4 +1,4 @@
-"""The section on a frontier: its pictures, its points, what is shown of the picked one, and tables."""
+"""The section on the Pareto front: its charts, its points, the details of the picked one, and tables."""
 
 import re
 import shlex
@@ -30,29 +30,29 @@ from ..text import DASH, NBSP, counted, interval, microseconds, percent, sentenc
 from .content import PlainTable
 from .hand import HandPicture, hand_picture
 
-_FOREIGN = "This frontier is of other recordings than the build."
+_FOREIGN = "This frontier belongs to other recordings than the build."
 _CAPTIONS = {
     "frontier": (
-        "Recognition rate against the time of a frame, both in the table below. Points that differ in the decision "
-        "alone are not on it."
+        "Accuracy against frame time, both in the table below. Points that differ only in their decision rule are not "
+        "shown."
     ),
     "switches": (
-        "Recognition rate against the number of switches. Curves are of switches alone: ours are blue, baselines' are "
-        "thin. Points without switches are not on it."
+        "Accuracy against the number of switches. Curves use switches only: ours are blue, the baselines' are thin. "
+        "Points without switches are not shown."
     ),
     "latency": (
-        "Recognition rate against decision latency, from the hand's arrival in a grasp until it is decided on. Grasps "
-        "that were missed are not in it; only the best for their kind of decision are on it."
+        "Accuracy against decision latency, from the hand's arrival in a grasp until the decision. Missed grasps are "
+        "not included; only the best points of each kind of decision are shown."
     ),
 }
-# Of two names for a colour, the first.
+# If a colour has two names, the first.
 _COLOURS = {colour: f"var(--{name})" for name, (colour, _) in reversed(list(PALETTE.items()))}
-_TARGET = "9"  # radius of what can be clicked, in units of the pictures
+_TARGET = "9"  # radius of the clickable area, in units of the charts
 
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """A picture as a part of the page: the id of its place, what it shows, and its SVG."""
+    """A chart as a part of the page: the id of its element, its caption, and its SVG."""
 
     ident: str
     caption: str
@@ -60,8 +60,8 @@ class Chart:
 
 
 class Detail(Struct, frozen=True):
-    """What is shown of a picked point: a sentence, names and values, its switches, their numbers on the hand that is
-    drawn, and the command that builds it.
+    """The details of a picked point: a sentence, names and values, its switches, their numbers on the drawn hand, and
+    the command that builds it.
     """
 
     number: int
@@ -74,7 +74,7 @@ class Detail(Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class FrontierView:
-    """What the section holds; hand is None where nobody knows where the switches lie."""
+    """The content of the section; hand is None where the switches' positions are unknown."""
 
     charts: tuple[Chart, ...]
     points: PlainTable
@@ -89,7 +89,7 @@ class FrontierView:
 def frontier_view(
     frontier: Frontier, fingerprint: str, hand: HandShape | None, built: int | None = None
 ) -> FrontierView:
-    """Return the section of `frontier` in a build from the recordings of that fingerprint, which is point `built`.
+    """Return the section on `frontier` for a build from the recordings with that fingerprint, which is point `built`.
 
     Raises PictureError without matplotlib.
     """
@@ -123,9 +123,9 @@ def _charts(frontier: Frontier, details: Mapping[int, Detail], picked: Detail) -
 
 
 def _embedded(svg: bytes, ident: str, details: Mapping[int, Detail], picked: int) -> Markup:
-    """Return an SVG file as a part of a page, in the page's colours; its points can be clicked and say what they are.
+    """Return an SVG file as a part of a page, in the page's colours; its points are clickable and have titles.
 
-    Only ids that are referred to stay, and begin with `ident`.
+    Only ids that are referenced are kept, prefixed with `ident`.
     """
     root = ElementTree.fromstring(svg)
     referred = set(re.findall(r'(?:href="|url\()#([^")]+)', svg.decode()))
@@ -142,7 +142,7 @@ def _embedded(svg: bytes, ident: str, details: Mapping[int, Detail], picked: int
 
 
 def _translate(part: ElementTree.Element, ident: str, referred: set[str]) -> None:
-    """Rewrite an element of an SVG file for a page: no namespaces, ids of its own, colours by name."""
+    """Rewrite an element of an SVG file for a page: no namespaces, prefixed ids, named colours."""
     part.tag = part.tag.rpartition("}")[2]
     given, part.attrib = part.attrib, {}
     for name, value in given.items():
@@ -189,7 +189,7 @@ def _facts(point: Point, frontier: Frontier) -> Iterable[tuple[str, str]]:
     setting = point.setting
     for what, rate in rates_of(frontier).items():
         yield f"Accuracy in %, {what}", interval(rate(point))
-    yield "Subtracted for luck", f"{100 * point.luck:.1f} points"
+    yield "Subtracted for selection", f"{100 * point.luck:.1f} points"
     yield "Placement", _placement(point)
     yield "Inputs", f"{setting.inputs}, {counted(len(point.switches), 'switch', 'switches')}"
     yield "Wiring", f"{_wiring(point)}; {counted(point.ports, 'port')}, {counted(point.chips, 'chip')}"
@@ -218,13 +218,13 @@ def _wiring(point: Point) -> str:
 
 
 def _latency(point: Point) -> tuple[str, str]:
-    """Return mean and 99th percentile of the latency, µs; dashes where no grasp was decided on rightly."""
+    """Return mean and 99th percentile of the latency, µs; dashes where no grasp was decided on correctly."""
     latency = point.latency
     return (DASH, DASH) if latency.missed >= 1 else (microseconds(latency.mean_us), microseconds(latency.p99_us))
 
 
 def _time(time: Time) -> str:
-    return "unknown, left out" if time.how == "unknown" else f"{microseconds(time.us)} µs ({time.how})"
+    return "unknown, not included" if time.how == "unknown" else f"{microseconds(time.us)} µs ({time.how})"
 
 
 def _points(frontier: Frontier) -> PlainTable:
@@ -257,14 +257,14 @@ def _points(frontier: Frontier) -> PlainTable:
 
 
 def _tables(frontier: Frontier) -> Iterator[PlainTable]:
-    """Yield what to compare with, the baselines, what was screened and how far models are off, where there are any."""
+    """Yield tables of reference points, baselines, screened placements and model errors, where there are any."""
     kept = elements_of(frontier).capitalize()
     if frontier.marks:
         marks = tuple(
             (mark.name, str(mark.n_switches), interval(mark.rate), microseconds(mark.frame_us))
             for mark in frontier.marks
         )
-        yield PlainTable("To compare with", ("What", kept, f"{frontier.by}, %", "Frame, µs"), marks)
+        yield PlainTable("Reference points", ("What", kept, f"{frontier.by}, %", "Frame, µs"), marks)
     if frontier.curves:
         sizes = sorted({size for curve in frontier.curves for size in curve.sizes})
         rows = []
@@ -272,8 +272,8 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
             rates = dict(zip(curve.sizes, curve.rates, strict=True))
             cells = (f"{100 * rates[size].mean:.1f}" if size in rates else "" for size in sizes)
             rows.append((f"{curve.method}{' (ours)' if curve.ours else ''}", curve.what, *cells))
-        columns = ("Method", "What it is", *(f"{size:g}" for size in sizes))
-        caption = f"Accuracy in % ({frontier.by}, trials), switches alone, against the number of switches"
+        columns = ("Method", "Description", *(f"{size:g}" for size in sizes))
+        caption = f"Accuracy in % ({frontier.by}, trials), switches only, against the number of switches"
         yield PlainTable(caption, columns, tuple(rows), words=(0, 1))
     if frontier.tried:
         tried = tuple(
@@ -288,14 +288,14 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
             for each in frontier.tried
         )
         columns = ("Placement", "Inputs", kept, "Rounds", f"{frontier.by}, %", "Frame, µs")
-        yield PlainTable("Placements that were screened", columns, tried)
+        yield PlainTable("Screened placements", columns, tried)
     if frontier.checks:
         checks = tuple(
             (check.what, check.how, str(check.n), f"{100 * check.mean_error:.1f}", f"{100 * check.worst_error:.1f}")
             for check in frontier.checks
         )
-        columns = ("Model of", "Held against", "Points", "Mean error, %", "Worst error, %")
-        yield PlainTable("How far the models of times are off", columns, checks)
+        columns = ("Model of", "Validated by", "Points", "Mean error, %", "Worst error, %")
+        yield PlainTable("Errors of the timing models", columns, checks)
 
 
 def _taxels(frontier: Frontier) -> str:

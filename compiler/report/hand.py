@@ -8,18 +8,18 @@ import numpy as np
 from ..hand import Floats, HandShape
 
 _MARGIN_MM = 4.0
-_NEAREST_MM = 0.5  # points of an outline nearer to the last one drawn are left out
+_NEAREST_MM = 0.5  # outline points closer than this to the last drawn one are skipped
 _LABELS_MM = 7.0
-_LEAST_LETTER = 8.4 / 370  # of a drawing so wide, in pixels: smaller letters cannot be read
+_LEAST_LETTER = 8.4 / 370  # as a fraction of a drawing of this width in pixels: smaller letters are illegible
 
 
 @dataclass(frozen=True, slots=True)
 class HandPicture:
-    """A hand to draw; `ident` begins the ids of its elements, title and summary are what a screen reader says.
+    """A hand to draw; `ident` prefixes the ids of its elements, title and summary are for screen readers.
 
     view_box is SVG's; radius is of a dot, letter the least size of its number on a narrow screen; outline, strips and
-    creases are values of `d`. Of a digit, labels hold the name and its place; of
-    a switch, dots hold the name, its place, and which of the kept ones it is, from 1; "" if none.
+    creases are values of `d`. labels hold the name and place of each digit; dots hold the name and place of each
+    switch, and its number among the kept ones, from 1; "" if it is not kept.
     """
 
     ident: str
@@ -36,7 +36,7 @@ class HandPicture:
 
 
 def hand_picture(hand: HandShape, kept: Sequence[str], ident: str, title: str, summary: str) -> HandPicture:
-    """Return the picture of `hand` with the switches called `kept`, all of which it knows, numbered in their order."""
+    """Return the picture of `hand` with the switches called `kept`, all of which it has, numbered in their order."""
     order, box = {name: str(place) for place, name in enumerate(kept, 1)}, _view_box(hand)
     return HandPicture(
         ident=ident,
@@ -61,7 +61,7 @@ def hand_picture(hand: HandShape, kept: Sequence[str], ident: str, title: str, s
 def _view_box(hand: HandShape) -> tuple[float, float, float, float]:
     points = np.concatenate([hand.outline, *hand.strips, hand.places, hand.labels])
     (left, bottom), (right, top) = points.min(axis=0) - _MARGIN_MM, points.max(axis=0) + _MARGIN_MM
-    # The names of the digits reach out beyond their places.
+    # The names of the digits extend beyond their places.
     return left - _LABELS_MM, -top, right - left + 2 * _LABELS_MM, top - bottom
 
 

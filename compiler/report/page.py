@@ -1,4 +1,4 @@
-"""`report_html`: one HTML file that needs no other, no network and no date."""
+"""`report_html`: one HTML file that needs no other file, no network and no date."""
 
 import base64
 import hashlib
@@ -22,7 +22,7 @@ from .tree import LINE, STEP, WORDS, TreeView, tree_view
 def report_html(content: ReportContent) -> bytes:
     """Return the report in UTF-8; the same content gives the same bytes.
 
-    The page's policy allows its one script by SHA-256, and no request at all: whatever a name holds stays text.
+    The page's policy allows only its script, by SHA-256, and no requests: any name stays text.
     Raises PictureError where a frontier's charts cannot be drawn without matplotlib.
     """
     environment, manifest, frontier = _environment(), content.manifest, None
@@ -63,7 +63,7 @@ def _environment() -> Environment:
 
 
 def _file(environment: Environment, name: str) -> Markup:
-    """Return a file of the templates' folder, as it is."""
+    """Return a file of the templates' folder verbatim."""
     assert environment.loader is not None
     return Markup(environment.loader.get_source(environment, name)[0])
 
@@ -77,7 +77,7 @@ def _colours() -> Markup:
 def _json(details: Iterable[Detail]) -> Markup:
     """Return number -> detail for the script, between tags."""
     text = msgspec.json.encode({str(detail.number): detail for detail in details}).decode()
-    # Whatever a name holds: no tag begins or ends here, and no entity is one.
+    # Whatever a name contains, it must not begin or end a tag or be an entity.
     for letter in "<>&":
         text = text.replace(letter, f"\\u{ord(letter):04x}")
     return Markup(text)
@@ -87,7 +87,7 @@ def _tree(content: ReportContent) -> TreeView | None:
     tree = content.tree
     if tree is None or not tree.inputs:
         return None
-    # The kept elements are those that the tree asks for, in the order of its nodes.
+    # The kept elements are the inputs of the tree, in the order of its nodes.
     kept = dict(zip(tree.inputs, content.switch_names, strict=True))
     names = [kept.get(number, f"switch {number}") for number in range(tree.n_inputs)]
     return tree_view(tree, names, content.manifest.grasps)
@@ -99,6 +99,6 @@ def _hand(content: ReportContent) -> HandPicture | None:
     kept, most = len(content.sources), len(content.hand.names)
     summary = (
         f"{content.hand.view}; {kept} of {most} switches are kept and numbered in the order in which they were chosen. "
-        "The table beside it says which they are."
+        "The table lists them."
     )
     return hand_picture(content.hand, content.sources, "kept-hand", "Kept switches on the hand", sentence(summary))

@@ -1,4 +1,4 @@
-"""The sections on what is recognised: the paper's tables, and what is mistaken for what."""
+"""The sections on accuracy: the paper's tables, and the confusion matrices."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from ..segmenting.transitions import Transitions
 from ..text import NBSP, counted, percent, sentence
 from .content import PlainTable, ReportContent
 
-# Wider tables cannot be read; the list of what is mistaken most often can.
+# Wider tables are illegible; the list of the most frequent mistakes is not.
 WIDEST = 40
 _MOST = 5
 _SHADES = 9
@@ -30,7 +30,7 @@ def study_tables(study: Study) -> tuple[PlainTable, ...]:
 
 
 def study_notes(study: Study) -> Iterator[str]:
-    """Yield how the rows were cut, what to beware of, and which tables are missing, and why."""
+    """Yield how the rows were split, the caveats, and the missing tables with the reasons."""
     yield sentence(str(study))
     yield from map(sentence, study.warnings)
     for left in study.left_out:
@@ -59,10 +59,10 @@ def transition_table(found: Transitions) -> PlainTable:
 
 @dataclass(frozen=True, slots=True)
 class ConfusionView:
-    """Counts as a table: where they are from, the grasp types, a row for each of these, and what is mistaken most.
+    """Counts as a table: their source, the grasp types, a row for each of these, and the most frequent mistakes.
 
-    rows  grasp type; its counts, each with the class that shades it ("hit1" to "miss9", "" for none); how many rows it
-          has; the share of them that was recognised. There are none where the table would be too wide.
+    rows  grasp type; its counts, each with its shading class ("hit1" to "miss9", "" for none); its number of rows; the
+          share of them predicted correctly. Empty where the table would be too wide.
     """
 
     title: str
@@ -72,7 +72,7 @@ class ConfusionView:
 
 
 def confusion_view(title: str, grasps: Sequence[str], counts: NDArray[np.intp]) -> ConfusionView:
-    """Return the table of `counts` (K, K), row: true, column: recognised; a shade is a share of its row."""
+    """Return the table of `counts` (K, K), row: true, column: predicted; a shade is a share of its row."""
     rows = []
     for number, (grasp, line) in enumerate(zip(grasps, counts.tolist(), strict=True)):
         total = sum(line)
@@ -88,7 +88,7 @@ def confusions(content: ReportContent) -> Iterator[ConfusionView]:
         rate = content.manifest.headline
         folds = "" if rate is None else f", {rate.title}, {counted(rate.folds, 'nested fold')}"
         yield confusion_view(
-            f"This build's own recipe{folds}", content.manifest.answers[: len(content.confusion)], content.confusion
+            f"This build's recipe{folds}", content.manifest.answers[: len(content.confusion)], content.confusion
         )
     if content.study is None:
         return
@@ -110,11 +110,11 @@ def _shaded(count: int, total: int, hit: bool) -> tuple[str, str]:
 
 
 def _mistaken(grasps: Sequence[str], counts: NDArray[np.intp]) -> Iterator[str]:
-    """Yield sentences on the commonest mistakes; of equally common ones the first in the table."""
+    """Yield sentences on the most frequent mistakes; ties are in the order of the table."""
     wrong = counts.copy()
     np.fill_diagonal(wrong, 0)
     for place in np.argsort(-wrong, axis=None, kind="stable")[:_MOST].tolist():
         true, found = divmod(place, len(grasps))
         if wrong[true, found]:
             total = int(counts[true].sum())
-            yield f"{grasps[true]} taken for {grasps[found]}: {wrong[true, found]:,} of {total:,} rows"
+            yield f"{grasps[true]} mistaken for {grasps[found]}: {wrong[true, found]:,} of {total:,} rows"

@@ -32,12 +32,12 @@ def headline(manifest: Manifest) -> str:
     said = f"This build recognises {types} grasp types from {' and '.join(inputs)}"
     rate = manifest.headline
     if rate is None:
-        return f"{said}; what to expect of new grasps was not measured."
+        return f"{said}; the accuracy on new grasps was not measured."
     return f"{said}; {rate.title}: {percent(rate.rate, NBSP)} of {rate.unit}."
 
 
 def facts(content: ReportContent) -> Iterator[tuple[str, str, str]]:
-    """Yield the numbers that one asks for first: what each is, itself in large, and what it is out of."""
+    """Yield the key numbers: the name of each, the large number, and what it is a part of."""
     manifest = content.manifest
     for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
         yield f"Recognised, {rate.title}", percent(rate.rate, NBSP), rate.basis
@@ -45,45 +45,45 @@ def facts(content: ReportContent) -> Iterator[tuple[str, str, str]]:
         yield (
             f"Held, {found.held.title}",
             percent(found.held.rate, NBSP),
-            f"of grasps said to be held, {found.held.basis}",
+            f"of grasps recognised as held, {found.held.basis}",
         )
         if found.none is not None:
             yield (
                 f"Nothing held, {found.none.title}",
                 percent(found.none.rate, NBSP),
-                f"said to be none, {found.none.basis}",
+                f"recognised as none, {found.none.basis}",
             )
     yield "Switches kept", f"{len(manifest.switches)}", f"of {manifest.source.switches}"
-    whose = "of a source of your own" if _unread(content) else "of the CyberGlove"
+    whose = "from a custom source" if _unread(content) else "of the CyberGlove"
     yield "Joints", f"{len(manifest.joints)}", whose if manifest.joints else "none are used"
     fit = manifest.fit
-    yield "Trainer", fit.trainer, f"chosen of {counted(fit.tried, 'fit')}" if fit.compared else "given"
+    yield "Trainer", fit.trainer, f"chosen among {counted(fit.tried, 'fit')}" if fit.compared else "given"
     if content.rounds:
-        ended = f"of {fit.number('rounds'):g}: the tolerance ended the training"
+        ended = f"of {fit.number('rounds'):g}: training stopped at the tolerance"
         yield "Rounds", f"{content.rounds}", ended if manifest.stopped_after else "of boosting"
     yield "Tables", f"{content.tables_bytes:,}", "bytes of tables.bin"
     yield "Changed by rounding", f"{manifest.proof.changed}", f"of {counted(manifest.source.rows, 'row')}"
 
 
 def _unread(content: ReportContent) -> str:
-    """Return a sentence on joints that no CyberGlove measures; "" without any, or where one is wired."""
+    """Return a sentence on joints that no CyberGlove measures; "" without joints, or where a glove is wired."""
     wired = content.harness is not None and content.harness.cyberglove is not None
     return "" if wired else own_joints([joint.name for joint in content.manifest.joints])
 
 
 def warnings(content: ReportContent) -> Iterator[str]:
-    """Yield what to beware of."""
+    """Yield warnings."""
     manifest = content.manifest
     if unread := _unread(content):
         yield sentence(unread)
     if content.only_answer is not None:
         yield (
-            f"Every row is recognised as {content.only_answer}: no input tells grasp types apart by itself, and the "
-            "model looks at one at a time."
+            f"Every row is predicted as {content.only_answer}: no single input distinguishes grasp types, and the "
+            "model uses one at a time."
         )
     if manifest.zero_gain_nodes:
         nodes = counted(manifest.zero_gain_nodes, "decision")
-        yield f"At {nodes} of the placement no switch gains anything alone: the lowest-numbered was taken."
+        yield f"At {nodes} of the placement no switch gains anything alone: the one with the lowest number was chosen."
     if manifest.source.independent:
         yield sentence(INDEPENDENT)
     if manifest.source.simulated:
@@ -91,9 +91,9 @@ def warnings(content: ReportContent) -> Iterator[str]:
 
 
 def kept_table(content: ReportContent) -> PlainTable:
-    """Return the kept switches in their order, and what each brought.
+    """Return the kept switches in order, with the information that each contributed.
 
-    The share of the grasp types' entropy that it and those before it brought is known where a tree chose them.
+    Where a tree chose them, also the share of the grasp types' entropy explained by each and those before it.
     """
     switches, tree, hand = content.manifest.switches, content.tree, content.hand
     entropy = 0.0 if tree is None else entropy_bits(list(tree.nodes[0].counts))
@@ -112,13 +112,13 @@ def kept_table(content: ReportContent) -> PlainTable:
 
 
 def placement_sentences(content: ReportContent) -> tuple[str, str]:
-    """Return by which method the switches were chosen, and how to read their table."""
+    """Return the placement method, and how to read the switches' table."""
     method = content.manifest.options.placement
     how = METHODS[method].help if method in METHODS else "Chosen by another version of thenar"
     if content.tree is not None:
-        bits = "brought the tree; together is what it and those before it brought, as a share of all there is to know"
+        bits = "contributed to the tree; together is the share of their entropy explained by it and those before it"
     else:
-        bits = "holds alone, without the others"
+        bits = "provides alone, without the others"
     return (
         f"{how} (--method {method}).",
         f"Columns count from 0 in the recordings. Bits are the information on the grasp type that a switch {bits}.",
@@ -126,15 +126,15 @@ def placement_sentences(content: ReportContent) -> tuple[str, str]:
 
 
 def fit_sentences(manifest: Manifest) -> Iterator[str]:
-    """Yield what trained the model, and how it was chosen."""
+    """Yield which trainer made the model, and how it was chosen."""
     fit = manifest.fit
     if not fit.compared:
-        yield f"The model was trained by {fit}, as the options say: nothing was chosen."
+        yield f"The model was trained by {fit}, as given by the options; nothing was chosen."
         return
     yield f"The model was trained by {fit}, because {fit.why}."
     yield (
         f"{counted(fit.tried, 'fit')} were compared in {counted(fit.folds, 'fold')} of the training rows ({fit.of}). "
-        "Each fold of the rates above chose anew, from its own training rows alone."
+        "Each fold of the accuracies above repeated the choice on its training rows only."
     )
 
 
@@ -164,44 +164,43 @@ def no_tree(manifest: Manifest) -> str:
 
 
 def guarantee_sentences(content: ReportContent) -> Iterator[str]:
-    """Yield what build.json proves of the integers, and what the worst case adds to it."""
+    """Yield the guarantees for the integers in build.json, and those of the worst-case analysis."""
     proof, rows, worst = content.manifest.proof, content.manifest.source.rows, content.worst
     yield (
-        f"Scores are sums of integers, {proof.scale:.1f} steps to a unit of score. No sum of them, in any order and "
-        f"with any inputs missing, goes beyond {proof.bound:,} steps, and so none leaves {proof.width} bits."
+        f"Scores are sums of integers, {proof.scale:.1f} steps per unit of score. No sum of them, in any order and "
+        f"with any inputs missing, exceeds {proof.bound:,} steps, so all fit in {proof.width} bits."
     )
     yield (
-        f"Rounding moves no score by more than {proof.error:g} steps, so that a lead of more than "
-        f"{proof.safe_margin:g} steps keeps its grasp type: {_share(proof.covered, rows)} rows trained on have it. "
+        f"Rounding changes no score by more than {proof.error:g} steps, so a lead of more than "
+        f"{proof.safe_margin:g} steps keeps its grasp type: {_share(proof.covered, rows)} training rows have it. "
         f"{counted(proof.changed, 'row')} changed grasp type."
     )
     if worst is not None:
         yield (
-            f"At worst, over every frame there is and not only those recorded, {worst.leader} loses "
-            f"{worst.loss:.3f} steps of its lead over {worst.competitor}. Worked out exactly, ties in whole steps "
-            f"included, a lead of more than {worst.safe_margin:.3f} steps is safe: "
-            f"{_share(worst.covered, rows)} rows trained on have it."
+            f"In the worst case over all possible frames, recorded or not, {worst.leader} loses {worst.loss:.3f} steps "
+            f"of its lead over {worst.competitor}. By this exact analysis, ties included, a lead of more "
+            f"than {worst.safe_margin:.3f} steps is safe: {_share(worst.covered, rows)} training rows have it."
         )
 
 
 def guarantee_table(content: ReportContent) -> PlainTable | None:
-    """Return the differences and their bounds, where the worst case was worked out."""
+    """Return the differences and their bounds; None without a worst-case analysis."""
     found, worst = content.comparison, content.worst
     if found is None or worst is None:
         return None
     most, integer_bound = 2 ** (content.manifest.proof.width - 1) - 1, found.integer_bound + found.slack
     float_difference, float_bound = f"{found.collapse_difference:.3g}", f"{found.collapse_bound:.3g}"
     rows = (
-        ("Ensemble against float tables, units of score", float_difference, float_bound),
-        ("Float tables against integers, steps", f"{found.integer_difference:.3f}", f"{integer_bound:.3f}"),
-        ("Most that a lead can lose, steps, all frames", f"{worst.loss:.3f}", f"{worst.bound:.3f}"),
-        ("Furthest that a sum can get from zero, steps", f"{abs(worst.reach):,}", f"{most:,}"),
+        ("Ensemble vs. float tables, units of score", float_difference, float_bound),
+        ("Float tables vs. integers, steps", f"{found.integer_difference:.3f}", f"{integer_bound:.3f}"),
+        ("Largest loss of a lead, steps, all frames", f"{worst.loss:.3f}", f"{worst.bound:.3f}"),
+        ("Largest magnitude of a sum, steps", f"{abs(worst.reach):,}", f"{most:,}"),
     )
-    return PlainTable("Differences beside their bounds", ("What", "Found", "Bound"), rows)
+    return PlainTable("Differences and their bounds", ("What", "Found", "Bound"), rows)
 
 
 def fault_table(content: ReportContent) -> PlainTable | None:
-    """Return what is left where each input is lost or stuck at its worst value, the worst first."""
+    """Return the accuracy with each input lost or stuck at its worst value, the worst first."""
     found = content.faults
     if found is None:
         return None
@@ -213,7 +212,7 @@ def fault_table(content: ReportContent) -> PlainTable | None:
         less = f"{100 * (found.correct - found.lost[one]) / found.total:.1f}"
         lost, stuck = rates
         rows.append((names[one], lost, less, stuck, value))
-    caption = f"Recognised with one input lost or stuck, % of {counted(found.total, 'trial')} trained on"
+    caption = f"Accuracy with one input lost or stuck, % of {counted(found.total, 'trial')} trained on"
     return PlainTable(caption, ("Input", "Lost", "Points less", "Stuck", "At"), tuple(rows), words=(0, 4))
 
 
@@ -222,7 +221,7 @@ def _worst_first(found: FaultCounts) -> list[int]:
 
 
 def fault_bars(content: ReportContent) -> tuple[tuple[str, float, float], ...]:
-    """Return for each input, the worst first: its name, the share of trials recognised without it, and with it."""
+    """Return for each input, the worst first: its name, the accuracy without it, and with it."""
     found = content.faults
     if found is None:
         return ()
@@ -237,7 +236,7 @@ def _share(count: int, total: int) -> str:
 
 
 def scan_table(content: ReportContent) -> PlainTable | None:
-    """Return the transactions that read the kept switches, in their order; None without a scan map or without any."""
+    """Return the transactions that read the kept switches, in order; None without a scan map or transactions."""
     scan, harness, names = content.scan, content.harness, content.switch_names
     if scan is None or harness is None or not scan.ports:
         return None
@@ -254,7 +253,7 @@ def scan_table(content: ReportContent) -> PlainTable | None:
 
 
 def scan_sentences(content: ReportContent) -> Iterator[str]:
-    """Yield what the wire is bound to take; nothing without a scan map."""
+    """Yield sentences on the time on the wires; nothing without a scan map."""
     scan, harness, joints = content.scan, content.harness, len(content.manifest.joints)
     if scan is None or harness is None:
         return
@@ -280,20 +279,20 @@ def scan_sentences(content: ReportContent) -> Iterator[str]:
         )
     if harness.cyberglove is not None and joints:
         us, glove = microseconds(glove_us(harness.cyberglove, joints)), harness.cyberglove
-        how = "by the vendor's formula" if glove.record_us is None else "as it was measured"
+        how = "by the vendor's formula" if glove.record_us is None else "as measured"
         record = f"A record of {counted(joints, 'sensor')} of the CyberGlove"
-        yield f"{record} takes {us} µs on its own line, {how}, beside the scan."
+        yield f"{record} takes {us} µs on its own line, {how}, in addition to the scan."
 
 
 def provenance(manifest: Manifest) -> Pairs:
-    """Return what build.json says of its origin. No date, no host."""
+    """Return the origin of the build from build.json, without date or host."""
     source = manifest.source
     pairs = (
         ("Made by", f"thenar {manifest.thenar}"),
         ("Recordings, SHA-256", source.fingerprint),
         ("Rows and taxonomy", f"{counted(source.rows, 'row')}, {source.taxonomy}"),
         ("Simulated by", source.simulated),
-        ("build.json, its checksum", manifest.checksum),
+        ("Checksum of build.json", manifest.checksum),
         ("tables.bin, SHA-256", manifest.tables_sha256),
         ("ensemble.bin, SHA-256", manifest.ensemble_sha256),
         ("scan.json, SHA-256", manifest.scan_sha256 or ""),
@@ -303,7 +302,7 @@ def provenance(manifest: Manifest) -> Pairs:
 
 
 def options_set(manifest: Manifest) -> Pairs:
-    """Return every option that is set, by the name that `thenar compile` gives it: of trainers, only of its own."""
+    """Return every option that is set, by its name for `thenar compile`, with options of the chosen trainer only."""
     options = manifest.options
     names = {trainer.name: {setting.name for setting in trainer.settings} for trainer in TRAINERS.values()}
     every = set().union(*names.values())
@@ -320,7 +319,7 @@ def options_set(manifest: Manifest) -> Pairs:
 
 
 def commands(content: ReportContent) -> tuple[str, str]:
-    """Return the commands that make the build again, and verify it."""
+    """Return the commands that reproduce the build and verify it."""
     pairs = options_set(content.manifest)
     words = (value if name == "--at-most" else value and shlex.quote(value) for name, value in pairs)
     flags = "".join(f" {name} {value}".rstrip() for (name, _), value in zip(pairs, words, strict=True))

@@ -1,1 +1,1 @@
-"""`try.html`: a build to be tried in a browser, in one file, without a server or a network."""
+"""`try.html`: a build to try out in a browser, in one file, without a server or a network."""

@@ -1,4 +1,4 @@
-"""`try_html`: the page of a build, its tables, its hand and some of its rows in one file."""
+"""`try_html`: the page of a build, with its tables, its hand and some of its rows in one file."""
 
 import base64
 import hashlib
@@ -25,9 +25,9 @@ from ..text import counted, listed
 
 MOST_BYTES = 500_000
 _MOST_ROWS = 400
-# For the page itself to remain small beside the rows.
+# To keep the page small with its rows.
 _ROWS_BYTES = 200_000
-# In this order: what one takes from another stands before it.
+# In dependency order: a module comes after those that it imports.
 _MODULES = ("tables.js", "lines.js", "scanner.js", "cyberglove.js", "serial.js", "try.js")
 _EXPORT = re.compile(r"^export (?:async )?(?:function|class|const) (\w+)", re.MULTILINE)
 
@@ -46,15 +46,15 @@ def try_html(
     Parameters
     ----------
     manifest, tables, hand : Manifest, bytes, HandDrawing
-        What `build.json`, `tables.bin` and `hand.json` hold.
+        The contents of `build.json`, `tables.bin` and `hand.json`.
     harness : Harness or None
         The wiring that the build was compiled for.
     rows : bits (n, s), codes (n, j), labels (n,)
-        The rows trained on, as the build reads them; some of each grasp type go into the page.
+        The training rows, as the build reads them; a sample of each grasp type goes into the page.
     """
     bits, codes, labels = rows
     data = {
-        "answers": manifest.answers,
+        "classes": manifest.answers,
         "tables": base64.b64encode(tables).decode(),
         "refusal": _refusal(manifest),
         "switches": [_switch(switch.name, switch.threshold) for switch in manifest.switches],
@@ -77,13 +77,13 @@ def try_html(
 
 
 def sample(labels: NDArray[np.intp], classes: int) -> list[int]:
-    """Return numbers of rows: of each grasp type as many, evenly spaced among its own, one type after the other."""
+    """Return row numbers: equally many of each grasp type, evenly spaced in its rows, one type after the other."""
     each = max(1, _MOST_ROWS // classes)
     found = []
     for label in range(classes):
         mine = np.flatnonzero(labels == label)
         found.append(mine[np.unique(np.linspace(0, len(mine) - 1, each).astype(int))].tolist() if len(mine) else [])
-    # Should there be room for a few alone, they are of all types.
+    # If there is room for only a few, they cover all types.
     turns = max(map(len, found), default=0)
     return [mine[turn] for turn in range(turns) for mine in found if turn < len(mine)]
 
@@ -124,7 +124,7 @@ def _joint(joint: Calibration, codes: NDArray[np.uint16]) -> Json:
 
 
 def _wiring(manifest: Manifest, harness: Harness | None) -> Json:
-    """Return which input of the build is what of the first board, the CyberGlove and the first stream of a wiring."""
+    """Return the build's inputs on the first board, the CyberGlove and the first stream of a wiring."""
     found: dict[str, object] = {"scanner": None, "cyberglove": None, "stream": None}
     if harness is None:
         return found
@@ -144,7 +144,7 @@ def _wiring(manifest: Manifest, harness: Harness | None) -> Json:
 
 
 def _levels(manifest: Manifest, taxels: Sequence[str], settings: TaxelSettings) -> list[tuple[int, int, int]]:
-    """Return (channel, limit of its counts, switch) of levels; none where counts mean nothing without a calibration."""
+    """Return (channel, limit of its counts, switch) of levels; empty where counts need a calibration."""
     try:
         calibration = calibration_of(settings)
         return [
@@ -184,7 +184,7 @@ def _rendered(manifest: Manifest, data: Json) -> bytes:
             style_sha256=_sha256(style),
             script=Markup(script),
             script_sha256=_sha256(script),
-            sentence=f"It distinguishes {len(manifest.answers)} answers by {listed(read)}.",
+            sentence=f"It distinguishes {len(manifest.answers)} classes by {listed(read)}.",
             levels=levels,
             checksum=manifest.checksum[:16],
             version=manifest.thenar,
@@ -195,7 +195,7 @@ def _rendered(manifest: Manifest, data: Json) -> bytes:
 
 
 def embedded(data: object) -> Markup:
-    """Return JSON between tags: whatever a name holds, no tag begins or ends in it, and no entity is one."""
+    """Return JSON for a script element: whatever a name contains, it begins or ends no tag and is no entity."""
     text = msgspec.json.encode(data).decode()
     for letter in "<>&":
         text = text.replace(letter, f"\\u{ord(letter):04x}")
@@ -233,12 +233,12 @@ def _style() -> str:
 
 @lru_cache(maxsize=1)
 def _script() -> str:
-    """Return all modules as one, each in a scope of its own from which its exports are taken."""
+    """Return all modules as one script, each in a separate scope from which its exports are taken."""
     return "".join(map(scoped, (_shared("hand.js"), *map(_own, _MODULES))))
 
 
 def scoped(module: str) -> str:
-    """Return a module's text as a statement that declares what it exports."""
+    """Return a module's text as a statement that declares its exports."""
     names, body = _EXPORT.findall(module), _EXPORT.sub(lambda found: found[0].removeprefix("export "), module)
     taken = f"const {{ {', '.join(names)} }} = " if names else ""
     given = f"return {{ {', '.join(names)} }};\n" if names else ""

@@ -1,1 +1,1 @@
-"""The harness: which switch hangs on which pin of which chip, as `glove.toml` says."""
+"""The harness: the chip and pin of every switch, read from `glove.toml`."""

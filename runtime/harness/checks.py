@@ -1,4 +1,4 @@
-"""What a harness must satisfy beyond the types of its fields. Faults come in an order in which the first one counts."""
+"""The rules that a harness must satisfy beyond the types of its fields. The first fault in order counts."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -18,9 +18,9 @@ _SENSORS = (18, 22)
 
 
 def faults(harness: Harness) -> Iterator[Fault]:
-    """Yield what is wrong with `harness` and where; what comes after a fault may be wrong because of it."""
+    """Yield the faults of `harness` and their places; later faults may be consequences of earlier ones."""
     if reason := fault(harness.name):
-        yield ("name",), f"{shortened(repr(harness.name))} is no name of a glove: it {reason}"
+        yield ("name",), f"{shortened(repr(harness.name))} is not a valid glove name: it {reason}"
     if harness.cyberglove is not None:
         yield from _of_glove(harness.cyberglove)
     yield from _of_devices(harness)
@@ -28,7 +28,7 @@ def faults(harness: Harness) -> Iterator[Fault]:
         if not (scanner.switches or scanner.taxels):
             yield ("scanner", number), "the key switches is missing: a board has switches, taxels or both"
         if scanner.mux and not scanner.taxels:
-            yield ("scanner", number, "mux"), "a multiplexer without taxels: name them, or leave it out"
+            yield ("scanner", number, "mux"), "is a multiplexer without taxels: name them, or leave it out"
     for number, bus in enumerate(harness.buses):
         yield from _of_bus(("bus", number), bus)
     for number, chip in enumerate(harness.spi):
@@ -37,7 +37,7 @@ def faults(harness: Harness) -> Iterator[Fault]:
         yield from _of_stream(("stream", number), stream)
     joints = [("stream", number, "joints") for number, stream in enumerate(harness.streams) if stream.joints]
     for place in joints if harness.cyberglove is not None else joints[1:]:
-        yield place, "another device measures joints already: they come from one"
+        yield place, "joints must come from one device, and another one measures them already"
     yield from _of_elements(harness)
 
 
@@ -63,11 +63,11 @@ def _of_devices(harness: Harness) -> Iterator[Fault]:
     seen: dict[str, Place] = {}
     for place, device in places:
         fault_of = device_fault if place[-1] == "device" else _FAULT_OF.get(str(place[0]), port_fault)
-        # The source that opens a stream says what is wrong with its port.
+        # The source that opens a stream reports faults of its port.
         if place[0] != "stream" and (reason := fault_of(device)):
             yield place, f"{shortened(repr(device))} {reason}"
         if device in seen:
-            yield place, f"{device} is {spelled(seen[device])} already: one device, one entry"
+            yield place, f"{device} is already {spelled(seen[device])}: name each device in one entry only"
         seen[device] = place
 
 
@@ -94,8 +94,8 @@ def _of_chip(place: Place, chip: ChipWiring, bus: BusWiring) -> Iterator[Fault]:
             (*place, "closed"),
             f"a {kind.name} measures taxels: leave it out",
         )
-    if chip.closed == "high" and not kind.registers:  # what is not pulled down reads as high, whatever the switch does
-        yield (*place, "closed"), f"a {kind.name} pulls its inputs up by itself: let switches pull them down"
+    if chip.closed == "high" and not kind.registers:  # an input that nothing pulls down reads high, open or closed
+        yield (*place, "closed"), f"a {kind.name} pulls its inputs up: let switches pull them down"
     slowest = min(kind.clock_hz, tca9548a.CLOCK_HZ if chip.mux else kind.clock_hz)
     if bus.clock_hz > slowest:
         which = kind.name if slowest == kind.clock_hz else "TCA9548A"
@@ -112,7 +112,7 @@ def _of_spi(place: Place, chip: SpiWiring) -> Iterator[Fault]:
 
 def _of_stream(place: Place, stream: StreamWiring) -> Iterator[Fault]:
     if not stream.used:
-        yield place, "the keys switches, joints and taxels are missing: it has one of them; doctor --line proposes them"
+        yield place, "must have one of the keys switches, joints and taxels; doctor --line proposes them"
     known = tuple(filter(None, stream.columns)) or (*stream.used, *([] if stream.time is None else [stream.time]))
     named: list[tuple[Place, str]] = [(("time",), stream.time)] if stream.time is not None else []
     named += [(("switches", number), name) for number, name in enumerate(stream.switches)]
@@ -134,9 +134,9 @@ def _of_values(place: Place, stream: StreamWiring) -> Iterator[Fault]:
     for kind, ranges in (("joints", stream.joints), ("taxels", stream.taxels)):
         for name, (low, high) in ranges.items():
             if low == high:
-                yield (*place, kind, name), f"a range from {low} to {high} is none: write the least and the greatest"
+                yield (*place, kind, name), f"a range from {low} to {high} is empty: write the least, then the greatest"
     if stream.calibration is not None and not stream.joints:
-        yield (*place, "calibration"), "it is of joints, and there are none: taxels' are named under [taxels]"
+        yield (*place, "calibration"), "is for joints, and there are none: name that of taxels under [taxels]"
 
 
 def _of_pins(place: Place, chip: ChipWiring | SpiWiring, usable: Sequence[str]) -> Iterator[Fault]:
@@ -146,23 +146,23 @@ def _of_pins(place: Place, chip: ChipWiring | SpiWiring, usable: Sequence[str]) 
 
 
 def _of_addresses(place: Place, bus: BusWiring) -> Iterator[Fault]:
-    """A chip that is always connected, or a mux, must have its address to itself; others, on their channel."""
+    """Yield address clashes: a chip that is always connected, or a mux, needs a unique address; others, per channel."""
     muxes = {chip.mux.address for chip in bus.chips if chip.mux}
     seen: dict[tuple[int, int] | None, dict[int, int]] = {None: {}}
     for number, chip in enumerate(bus.chips):
         channel = (chip.mux.address, chip.mux.channel) if chip.mux else None
-        # Upstream chips answer on every channel: they clash with what is behind any of them.
+        # Upstream chips respond on every channel: they clash with chips behind any of them.
         rooms = seen.values() if channel is None else (seen[None], seen.setdefault(channel, {}))
         here = (*place, "chip", number, "address")
         for other in (room[chip.address] for room in rooms if chip.address in room):
-            yield here, f"0x{chip.address:02X} is the address of {spelled((*place, 'chip', other))} too: both answer"
+            yield here, f"0x{chip.address:02X} is the address of {spelled((*place, 'chip', other))} too: change one"
         if chip.address in muxes:
-            yield here, f"0x{chip.address:02X} is the address of a mux on this bus too: both answer"
+            yield here, f"0x{chip.address:02X} is also the address of a mux on this bus: change one"
         seen[channel][chip.address] = number
 
 
 def _of_elements(harness: Harness) -> Iterator[Fault]:
-    """A taxel and a switch may not share a name either: levels are named after their taxel."""
+    """Yield names used twice; a taxel and a switch may not share a name either, since levels are named by taxel."""
 
     def wired() -> Iterator[tuple[Place, str]]:
         for number, scanner in enumerate(harness.scanners):
@@ -183,11 +183,11 @@ def _of_elements(harness: Harness) -> Iterator[Fault]:
 
 
 def _of_names(named: Iterable[tuple[Place, str]], what: str) -> Iterator[Fault]:
-    """Every name must be good and stand once."""
+    """Yield names that are invalid or used twice."""
     seen: dict[str, Place] = {}
     for place, name in named:
         if reason := fault(name):
-            yield place, f"{shortened(repr(name))} is no name of a {what}: it {reason}"
+            yield place, f"{shortened(repr(name))} is not a valid name of a {what}: it {reason}"
         if name in seen:
-            yield place, f"{what} {name!r} is {spelled(seen[name])} already: a {what} has one place"
+            yield place, f"{what} {name!r} is already {spelled(seen[name])}: wire it in one place"
         seen[name] = place

@@ -1,4 +1,4 @@
-"""From `glove.toml` to a Harness; what is wrong in it is told with file, line, key, and what to do."""
+"""From `glove.toml` to a Harness; errors name file, line and key, and say what to do."""
 
 from pathlib import Path
 
@@ -13,16 +13,16 @@ from .wiring import Harness
 
 
 def load_harness(path: str | Path) -> Harness:
-    """Return the harness in a TOML file; its name, where it has none, is the file's, or "glove" where that is no name.
+    """Return the harness in a TOML file; a missing name is the file's, or "glove" if that is not a valid name.
 
-    The paths of calibrations come back absolute. Raises HarnessError with file, line and key.
+    The paths of calibrations are returned as absolute. Raises HarnessError with file, line and key.
     """
     file = Path(path)
     return _calibrated(_harness_of(read_source(file, HarnessError), file.stem), file.parent)
 
 
 def parse_harness(text: str, name: str) -> Harness:
-    """Return the harness that `text`, which messages call `name`, is; its calibrations' paths as they stand there.
+    """Return the harness described by `text`, whose name in messages is `name`; calibration paths stay as written.
 
     Raises HarnessError as `load_harness` does.
     """
@@ -39,7 +39,7 @@ def _harness_of(source: TomlText, name: str) -> Harness:
 
 
 def _calibrated(harness: Harness, folder: Path) -> Harness:
-    """Return the harness with the paths of its calibrations counted from `folder`."""
+    """Return the harness with the paths of its calibrations resolved from `folder`."""
     glove, taxels = harness.cyberglove, harness.taxel_settings
     streams = tuple(
         replace(stream, calibration=str(folder.resolve() / stream.calibration)) if stream.calibration else stream

@@ -1,6 +1,6 @@
-"""What a glove is wired to: serial lines and buses, and which switch hangs on which pin or key.
+"""The wiring of a glove: serial lines and buses, and the pin or key of each switch.
 
-The structs are the tables of `glove.toml`, field by field; a harness that was loaded has been found sound.
+The structs are the tables of `glove.toml`, field by field; a loaded harness is known to be valid.
 """
 
 import hashlib
@@ -19,9 +19,9 @@ from ..taxels import TaxelSettings
 
 # A board's bitmap has no room for more.
 MOST_KEYS = 2000
-# An ANALOG of a board has no room for more.
+# An ANALOG reply of a board has no room for more.
 MOST_CHANNELS = MOST_ASKED
-# Of the clock of a bus.
+# Clock rates of a bus.
 SLOWEST_HZ = 1000
 Text = Annotated[str, Meta(min_length=1)]
 Baud = Annotated[int, Meta(ge=1, le=12_000_000)]
@@ -29,22 +29,22 @@ Milliseconds = Annotated[float, Meta(ge=0.0, le=1000.0)]
 
 
 class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
-    """A table of `glove.toml`: what has its default is left out when it is written."""
+    """A table of `glove.toml`; fields with their default are omitted when it is written."""
 
 
 class GloveWiring(_Table, frozen=True):
-    """The CyberGlove: its port (a device, socket:// or rfc2217://), and how it is asked.
+    """The CyberGlove: its port (a device, socket:// or rfc2217://), and how it is read.
 
     baud         "auto" tries the usual ones
-    mode         "stream": it sends by its own clock; "poll": it is asked for every record; "demand": a run asks for one
-                 where the switches cannot decide without
+    mode         "stream": it sends by its own clock; "poll": every record is requested; "demand": a run requests one
+                 only when the switches cannot decide alone
     rate_hz      None: as fast as it can
-    filter       whether the box's digital filter is on; None: as the box has it
-    record_us    what one record of all sensors takes, as measured (`thenar doctor --write`); None: by the formula
-    mask         whether sensors that no joint of a build is are left out of the records of a run
-    sensors      None: the glove is asked
+    filter       whether the box's digital filter is on; None: as set on the box
+    record_us    measured time of a record of all sensors (`thenar doctor --write`); None: by the formula
+    mask         whether a run omits sensors from the records that no joint of the build uses
+    sensors      None: as the glove reports
     calibration  path of its calibration; relative paths in a file count from that file's folder
-    joints       our names of the wire's sensors, in wire order, where a build calls them otherwise than the driver
+    joints       names of the wire's sensors, in wire order, if a build names them differently from the driver
     """
 
     port: Text
@@ -60,7 +60,7 @@ class GloveWiring(_Table, frozen=True):
 
     @property
     def all_sensors(self) -> int:
-        """How many sensors the glove must have: 18 where nothing says so."""
+        """The number of sensors that the glove must have: 18 by default."""
         return len(self.joints) or self.sensors or SENSORS
 
     @property
@@ -70,8 +70,8 @@ class GloveWiring(_Table, frozen=True):
 
 
 class ScannerWiring(_Table, frozen=True):
-    """A switch-scanner board: key k of the board is switches[k], "" where there is none; and channel c of its converter
-    taxels[c], 16 channels on each multiplexer `mux`, where it has any.
+    """A switch-scanner board: key k of the board is switches[k], "" for none; channel c of its converter, if any, is
+    taxels[c], with 16 channels on each multiplexer `mux`.
     """
 
     port: Text
@@ -85,15 +85,15 @@ Range = tuple[float, float]
 
 
 class StreamWiring(_Table, frozen=True):
-    """Rows of numbers that a board or another program sends: lines (`thenar.drivers.line_reader`), LSL, a ROS topic.
+    """Rows of numbers sent by a board or a program: lines (`thenar.drivers.line_reader`), LSL, a ROS topic.
 
-    columns      the columns in their order, "" for one that nobody uses; (): the sender names them
+    columns      the columns in order, "" for unused ones; (): the sender names them
     time         the column with the sender's clock, in `time_unit`
-    rate_hz      how many rows come a second
-    switches     the columns that are switches: closed where the number is above the threshold, or, where `closed` is
-                 "low", where it is not; `thresholds` are those of single switches
+    rate_hz      rows per second
+    switches     the columns that are switches: closed if the number is above the threshold, or, if `closed` is "low",
+                 if it is not; `thresholds` are those of single switches
     joints       the columns that are joints, and the range of their numbers, which become the codes 1 to 255
-    taxels       the columns that are taxels, and the range of their numbers: of whole numbers, as many codes
+    taxels       the columns that are taxels, and the range of their numbers: each whole number is one code
     calibration  path of a calibration of the joints
     """
 
@@ -113,7 +113,7 @@ class StreamWiring(_Table, frozen=True):
 
     @property
     def used(self) -> tuple[str, ...]:
-        """The columns that are used, the sender's clock aside."""
+        """The columns that are used, without the sender's clock."""
         return (*self.switches, *self.joints, *self.taxels)
 
     @property
@@ -123,7 +123,7 @@ class StreamWiring(_Table, frozen=True):
 
     @property
     def period_us(self) -> int:
-        """From one row to the next."""
+        """The time from one row to the next."""
         return round(1e6 / self.rate_hz)
 
 
@@ -135,9 +135,9 @@ class MuxChannel(_Table, frozen=True):
 
 
 class ChipWiring(_Table, frozen=True):
-    """A port expander or a converter: its kind (a key of CHIPS), where it is, and the switch or taxel on each pin.
+    """A port expander or a converter: its kind (a key of CHIPS), its place, and the switch or taxel on each pin.
 
-    closed says at what level of its pin a switch is closed: "low" where it pulls its pin down.
+    closed is the level of its pin at which a switch is closed: "low" if it pulls its pin down.
     """
 
     kind: str
@@ -148,7 +148,7 @@ class ChipWiring(_Table, frozen=True):
 
     @property
     def chip(self) -> Chip:
-        """What the driver knows of such a chip."""
+        """The driver's description of the chip."""
         return CHIPS[self.kind]
 
     @property
@@ -158,12 +158,12 @@ class ChipWiring(_Table, frozen=True):
 
     @property
     def measures(self) -> bool:
-        """Whether taxels hang on it, not switches."""
+        """Whether it reads taxels, not switches."""
         return isinstance(self.chip, Converter)
 
     @property
     def place(self) -> str:
-        """How messages call it: "mcp23017 at 0x20" or "mcp23017 at 0x20 behind channel 2 of 0x70"."""
+        """Its name in messages: "mcp23017 at 0x20" or "mcp23017 at 0x20 behind channel 2 of 0x70"."""
         behind = f" behind channel {self.mux.channel} of 0x{self.mux.address:02X}" if self.mux else ""
         return f"{self.kind} at 0x{self.address:02X}{behind}"
 
@@ -177,7 +177,7 @@ class BusWiring(_Table, frozen=True):
 
 
 class SpiWiring(_Table, frozen=True):
-    """A converter on SPI: its device, its kind (a key of SPI_CHIPS), its clock, None: its fastest at 3.3 V; and the
+    """A converter on SPI: its device, its kind (a key of SPI_CHIPS), its clock (None: its fastest at 3.3 V), and the
     taxel on each of its channels.
     """
 
@@ -188,7 +188,7 @@ class SpiWiring(_Table, frozen=True):
 
     @property
     def chip(self) -> SpiChip:
-        """What the driver knows of such a chip."""
+        """The driver's description of the chip."""
         return SPI_CHIPS[self.kind]
 
     @property
@@ -203,7 +203,7 @@ class SpiWiring(_Table, frozen=True):
 
     @property
     def place(self) -> str:
-        """How messages call it."""
+        """Its name in messages."""
         return f"{self.kind} at {self.device}"
 
 
@@ -233,7 +233,7 @@ class Harness(_Table, frozen=True):
 
     @property
     def switches(self) -> tuple[str, ...]:
-        """The names of all switches that are wired: the boards', then the chips', pin by pin, then the streams'."""
+        """The names of all wired switches: the boards', then the chips', pin by pin, then the streams'."""
         keys = (name for scanner in self.scanners for name in scanner.switches if name)
         chips = (chip for bus in self.buses for chip in bus.chips if not chip.measures)
         streams = (name for stream in self.streams for name in stream.switches)
@@ -241,9 +241,7 @@ class Harness(_Table, frozen=True):
 
     @property
     def taxel_names(self) -> tuple[str, ...]:
-        """The names of all taxels that are wired: the boards', then the converters', channel by channel, then the
-        streams'.
-        """
+        """The names of all wired taxels: the boards', then the converters', channel by channel, then the streams'."""
         boards = (name for scanner in self.scanners for name in scanner.taxels if name)
         chips: list[ChipWiring | SpiWiring] = [chip for bus in self.buses for chip in bus.chips if chip.measures]
         streams = (name for stream in self.streams for name in stream.taxels)
@@ -251,7 +249,7 @@ class Harness(_Table, frozen=True):
 
     @property
     def joint_device(self) -> GloveWiring | StreamWiring | None:
-        """What measures the joints: the CyberGlove, or a stream that has some."""
+        """The device that measures the joints: the CyberGlove, or a stream with joints."""
         return self.cyberglove or next((stream for stream in self.streams if stream.joints), None)
 
     @property
@@ -267,26 +265,26 @@ class Harness(_Table, frozen=True):
 
     @property
     def on_chips(self) -> int:
-        """How many switches and taxels are wired to chips."""
+        """The number of switches and taxels that are wired to chips."""
         chips: list[ChipWiring | SpiWiring] = [*(chip for bus in self.buses for chip in bus.chips), *self.spi]
         return sum(len(chip.pins) for chip in chips)
 
     def chip_of(self, bus: int, number: int) -> ChipWiring | SpiWiring:
-        """Return a chip as scan maps count: bus after bus, then every SPI device as a bus of one chip.
+        """Return a chip by the numbering of scan maps: bus after bus, then every SPI device as a bus of one chip.
 
         Raises IndexError if there is none.
         """
         return self.buses[bus].chips[number] if bus < len(self.buses) else (self.spi[bus - len(self.buses)],)[number]
 
     def line_of(self, bus: int) -> BusWiring | SpiWiring:
-        """Return a bus, or an SPI device, as scan maps count them."""
+        """Return a bus, or an SPI device, by the numbering of scan maps."""
         return self.buses[bus] if bus < len(self.buses) else self.spi[bus - len(self.buses)]
 
     @property
     def fingerprint(self) -> str:
-        """SHA-256, in hex, of which switch is where: of chips, pins and keys in their order.
+        """SHA-256, in hex, of the place of each switch: of chips, pins and keys in order.
 
-        Ports, device files and clocks may change without it: a map of the switches stays right then.
+        It does not cover ports, device files and clocks: a map of the switches stays valid when they change.
         """
         return hashlib.sha256(msgspec.json.encode(list(self._where()))).hexdigest()
 

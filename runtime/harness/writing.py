@@ -1,4 +1,4 @@
-"""A Harness as the text of a `glove.toml`, and a file that says what was measured."""
+"""Write a Harness as the text of a `glove.toml`, or a measured record time into an existing file."""
 
 import re
 from pathlib import Path
@@ -21,15 +21,15 @@ _ADDRESS = re.compile(r"^address = (\d+)$", re.MULTILINE)
 
 def harness_to_toml(harness: Harness) -> str:
     """Return the text of a file that `load_harness` reads as `harness`; addresses are written in hex."""
-    # tomli_w knows no hex; it writes every key on a line of its own and no line break inside a text.
+    # tomli_w has no hex; it writes every key on a separate line and no line break inside a text.
     text = _ADDRESS.sub(lambda found: f"address = 0x{int(found[1]):02X}", tomli_w.dumps(msgspec.to_builtins(harness)))
     return _RANGE.sub(lambda found: f"[{float(found[1]):.12g}, {float(found[2]):.12g}]", text)
 
 
 def write_record_us(path: Path, us: int) -> None:
-    """Write into a `glove.toml` what a record of its CyberGlove takes; all else in the file stays as it is.
+    """Write the record time of a CyberGlove into its `glove.toml`; the rest of the file stays as it is.
 
-    Raises HarnessError where the table of the CyberGlove is not spelled so that a line of it can be changed.
+    Raises HarnessError if the table of the CyberGlove is not spelled so that one of its lines can be changed.
     """
     text = read_source(path, HarnessError).text
 
@@ -43,5 +43,5 @@ def write_record_us(path: Path, us: int) -> None:
         wanted = msgspec.structs.replace(harness.cyberglove, record_us=us, calibration=None)
     found = parse_harness(changed, path.name).cyberglove
     if found is None or msgspec.structs.replace(found, calibration=None) != wanted:
-        raise HarnessError(f"{path} has no table [cyberglove] on lines of its own: write `record_us = {us}` there")
+        raise HarnessError(f"{path} has no table [cyberglove] on separate lines: write `record_us = {us}` there")
     write_atomically(path, changed.encode())

@@ -1,1 +1,1 @@
-"""Live recognition: devices that come and go, their newest frames joined, scored and decided upon."""
+"""Live recognition: devices that come and go, with their newest frames joined, scored and decided on."""

@@ -1,4 +1,4 @@
-"""A look at every device of a harness, one after the other: is it there, and is it as fast as its wire allows?"""
+"""A check of every device of a harness, one after the other: is it there, and is it as fast as its wire allows?"""
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
@@ -25,22 +25,22 @@ from ..sources.spi import SpiConverter
 from ..taxels import Taxels, calibration_of
 from .quarantine import Chattering, numbers
 
-# So much slower than its wire a device may be: computers have other things to do, too.
+# How much slower than its wire a device may be: computers have other things to do, too.
 SLOW = 1.5
 _SCANS = 101
 _LISTEN_S = 1.0
-# A board that its port's opening resets needs so long to begin.
+# Start-up time of a board that is reset when its port opens.
 _STARTS_S = 3.0
-# The part that a finding on the record time of all sensors is of.
+# The part of a finding on the record time of all sensors.
 RECORD = "a record"
 
 
 class Finding(msgspec.Struct, frozen=True):
-    """What was found of a device; of a bus, chip by chip and as a whole.
+    """The finding on a device; for a bus, chip by chip and as a whole.
 
-    predicted_us  from one record or full bitmap to the next, or what the readings take, by the arithmetic of the wire,
-                  of a CyberGlove by its vendor's formula
-    measured_us   the same as it was, the median; None where nothing came
+    predicted_us  from one record or full bitmap to the next, or the time of the readings, by the arithmetic of the
+                  wire, for a CyberGlove by its vendor's formula
+    measured_us   the same as measured, the median; None if nothing came
     remarks       what is missing, slow or odd, in sentences
     slow          whether it takes much longer than its wire does
     """
@@ -57,10 +57,10 @@ class Finding(msgspec.Struct, frozen=True):
 def check_up(
     harness: Harness, scan: ScanMap, sensors: Sequence[str] = ()
 ) -> Iterator[Callable[[], tuple[Finding, ...]]]:
-    """Yield a look at each device of `harness`, of its chips at those that `scan` reads, of a CyberGlove at records of
-    these sensors alone, too: call it, it takes a second or a few.
+    """Yield a finding on each device of `harness`, of its chips only those that `scan` reads, of a CyberGlove also on
+    records of these sensors only; a finding takes a second or a few.
 
-    None raises because a device is not there: that is a finding.
+    It does not raise for a device that is not there: that is a finding.
     """
     if (glove := harness.cyberglove) is not None:
         yield lambda: _glove(glove, sensors)
@@ -74,8 +74,8 @@ def check_up(
 
 
 def _glove(wiring: GloveWiring, read: Sequence[str]) -> tuple[Finding, ...]:
-    """Return what the glove is and how fast as it is wired, and what a record takes at best: of all its sensors, and of
-    those that are `read`, or half of them.
+    """Return the kind and the speed of the glove as wired, and its best record times: of all its sensors, and of those
+    that are `read`, or half of them.
     """
     device, predicted = GloveDevice(wiring), glove_us(wiring, wiring.all_sensors)
     try:
@@ -86,14 +86,14 @@ def _glove(wiring: GloveWiring, read: Sequence[str]) -> tuple[Finding, ...]:
         return (Finding(device.name, "", False, predicted, None, (str(wrong),)),)
     finally:
         device.close()
-    found = _told(Finding(device.name, "" if info is None else info.text, True, predicted, measured, remarks))
+    found = _remarked(Finding(device.name, "" if info is None else info.text, True, predicted, measured, remarks))
     some = read if 0 < len(read) < device.sensors else wiring.sensor_names[: device.sensors // 2]
     fastest = msgspec.structs.replace(wiring, rate_hz=None, mode="stream", record_us=None)
     return (found, _record(fastest, wiring.sensor_names), _record(fastest, some))
 
 
 def _record(wiring: GloveWiring, read: Sequence[str]) -> Finding:
-    """Return what a record of these sensors takes by the vendor's formula, and as it is."""
+    """Return the record time of these sensors by the vendor's formula, and as measured."""
     device = GloveDevice(wiring)
     device.read_only(read)
     predicted = glove_us(wiring, len(read))
@@ -136,7 +136,7 @@ def _scanner(harness: Harness, number: int) -> tuple[Finding, ...]:
     found = Finding(device.name, board, True, float(device.period_us), measured, remarks)
     highest = None if analog is None else (1 << analog.bits) - 1
     wired = [name for name in harness.scanners[number].taxels if name]
-    return (_told(found), *taxel_findings(device.name, wired, harness, frames, highest))
+    return (_remarked(found), *taxel_findings(device.name, wired, harness, frames, highest))
 
 
 def _stream(harness: Harness, number: int) -> tuple[Finding, ...]:
@@ -176,7 +176,7 @@ def _wrong(switches: Sequence[str], frames: Sequence[SwitchFrame]) -> Iterator[s
         seen, closed = seen | read, closed & (frame.closed | ~read)
     shaking = chattering.switches
     if never := [switches[number] for number in numbers(seen & closed & ~shaking)] if frames else []:
-        yield f"closed all the time: {list_names(never)}; if nothing was touched, stuck"
+        yield f"closed all the time: {list_names(never)}; if nothing was touched, they are stuck"
     if shaking:
         yield f"faster than a hand: {list_names([switches[number] for number in numbers(shaking)])}; a loose contact?"
 
@@ -184,9 +184,9 @@ def _wrong(switches: Sequence[str], frames: Sequence[SwitchFrame]) -> Iterator[s
 def taxel_findings(
     device: str, names: Sequence[str], harness: Harness, frames: Sequence[SwitchFrame], highest: int | None
 ) -> Iterator[Finding]:
-    """Yield what was seen of each taxel of these names: its counts, their noise, and what is wrong with it.
+    """Yield a finding on each taxel of these names: its counts, their noise, and its faults.
 
-    Without a calibration the ends of the converter are pointed out, but are no faults.
+    Without a calibration, counts at the ends of the converter are remarked, but are not faults.
     """
     places = harness.taxel_names
     calibration = calibration_of(harness.taxel_settings)
@@ -210,14 +210,14 @@ def taxel_findings(
 
 
 def _recognising(board: Scanner) -> tuple[str, ...]:
-    """Return a remark if the board recognises by itself."""
+    """Return a remark if the board recognises grasps by itself."""
     grasp, segment = board.grasp, board.segment
     if grasp is None:
         return ()
     number = f"grasp type {grasp.number} of the build that it carries, counted from 0"
     what = "no grasp type" if grasp.number is None else number
     follows = "" if segment is None else f"; it follows segments, {segment.number} so far, the newest {segment.state}"
-    return (f"it recognises by itself, at last {what}{follows}",)
+    return (f"it recognises grasps by itself, last {what}{follows}",)
 
 
 def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[Finding, ...]:
@@ -235,7 +235,7 @@ def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[Finding, ...]:
     finally:
         device.close()
     there = all(finding.present for finding in found)
-    scanned = _told(Finding(device.name, "a whole scan", there, times.us, whole if there else None, way))
+    scanned = _remarked(Finding(device.name, "a whole scan", there, times.us, whole if there else None, way))
     return (*found, scanned, *_taxels(device.name, device.taxels, harness, frames))
 
 
@@ -255,7 +255,7 @@ def _spi(harness: Harness, bus: int, scan: ScanMap) -> tuple[Finding, ...]:
     there = not device.silent
     remarks = (wrong,) if wrong and not there else ()
     found = Finding(device.name, device.device.chip.name, there, predicted.us, measured if there else None, remarks)
-    return (_told(found), *_taxels(device.name, device.taxels, harness, frames))
+    return (_remarked(found), *_taxels(device.name, device.taxels, harness, frames))
 
 
 def _taxels(
@@ -272,13 +272,13 @@ def _chip(device: I2cDevice, place: int, time: ChipTime) -> Finding:
     if not state.present:
         return Finding(device.name, time.place, False, time.us, None, (state.last_error,))
     remarks = (f"{state.errors} failures, the last: {state.last_error}",) if state.errors else ()
-    return _told(Finding(device.name, time.place, True, time.us, taken, remarks))
+    return _remarked(Finding(device.name, time.place, True, time.us, taken, remarks))
 
 
-def _told(finding: Finding) -> Finding:
+def _remarked(finding: Finding) -> Finding:
     """Return the finding with a remark if it is slow, or silent."""
     if finding.measured_us is None and finding.present:
-        remark = "it answers, and then nothing comes: is it busy, or set to another rate?"
+        remark = "it responds, and then nothing comes: is it busy, or set to another rate?"
         return msgspec.structs.replace(finding, remarks=(*finding.remarks, remark))
     times = (finding.measured_us or 0.0) / finding.predicted_us
     if times <= SLOW:
@@ -287,12 +287,12 @@ def _told(finding: Finding) -> Finding:
     return msgspec.structs.replace(finding, remarks=(*finding.remarks, remark), slow=True)
 
 
-_ADVICE = "does its clock run as fast as glove.toml says, and is the computer busy?"
+_ADVICE = "does its clock run at the speed in glove.toml, and is the computer busy?"
 
 
 def _gap(read: Callable[[], object], middle: Callable[[list[float]], float] = median) -> float | None:
-    """Return the median time between two frames that come within a second, in microseconds; or their mean, which frames
-    that come in bunches do not change.
+    """Return the median time between two frames within a second, in microseconds; or their mean, which does not change
+    for frames that come in bunches.
     """
     end, came = monotonic() + _LISTEN_S, list[float]()
     while monotonic() < end:
@@ -313,7 +313,7 @@ def _duration(read: Callable[[], object]) -> float:
 
 
 def _counted(device: GloveDevice | ScannerDevice) -> tuple[str, ...]:
-    """Return a remark on what a line lost or damaged, if it did."""
+    """Return a remark on bytes lost or damaged on a line, if there were any."""
     wrong = [f"{count.name} {count.value}" for count in device.counts() if count.value and count.name in _WRONG]
     return (f"on its line: {', '.join(wrong)}",) if wrong else ()
 

@@ -1,6 +1,6 @@
-"""What is decided, frame after frame: who leads in one frame, hysteresis and dwell, and a sequential test.
+"""The decision, frame after frame: the leader of one frame, hysteresis and dwell, and a sequential test.
 
-The sequential test takes as many frames as a stated error rate takes, no more.
+The sequential test takes as many frames as the given error rate requires, no more.
 
 The scores of a frame are log-likelihoods of the grasp types, up to a constant: their softmax is the probability of each
 type given the frame, and Bayes' rule divides that by the types' shares in training. The test adds the scores of frames
@@ -11,16 +11,16 @@ later, with a probability of at most 1 / a; so, summed over the K - 1 wrong type
 ends wrong with a probability of at most error_rate. Thresholds and sums are integers: scores in steps, ln(a) rounded
 up.
 
-That holds under assumptions, and no longer than they do:
-  - one type during a test: evidence older than the longest test is dropped, undecided, and the test begins anew;
+That holds only under these assumptions:
+  - one type during a test: evidence older than the longest test is dropped, undecided, and the test starts afresh;
   - scores are log-likelihood ratios: the ensemble's probabilities are calibrated, types were recorded equally often;
-  - frames are independent, given the type. Successive frames are not: a hand that rests sends nearly the same frame
-    again, which is no new evidence. `spacing_us` leaves out frames nearer than that to the last one that counted; take
+  - frames are independent, given the type. Successive frames are not: a resting hand sends nearly the same frame
+    again, which is no new evidence. `spacing_us` leaves out frames nearer than that to the last one that counted; use
     the time after which two frames of one grasp are no more alike than frames of two grasps of that type.
 
-Whole frames and frames with lost inputs are never evidence in one test. While an answer or a test that rests on whole
-frames is no older than the longest test, frames with lost inputs are left aside; after that they have tests of their
-own, whose answers and evidence are dropped at the next whole frame.
+Whole frames and frames with lost inputs are never evidence in the same test. While a result or a test based on whole
+frames is no older than the longest test, frames with lost inputs are ignored; after that they have separate tests,
+whose results and evidence are dropped at the next whole frame.
 """
 
 import math
@@ -32,22 +32,22 @@ from ..scores import Scorer, odds, softmax
 
 
 class Standing:
-    """The K scores of a frame (2^15 too high, unread switches left out), and what unread switches could do to them.
+    """The K scores of a frame (2^15 too high, unread switches left out), and the possible effect of unread switches.
 
     Without unread switches every number here is that of the frame. With some, `margin`, `lead` and `probability` are
-    the least that any state of the unread switches, closed, open or lost, would have given: the true ones are no less.
+    the minimum over all states of the unread switches, closed, open or lost: the true ones are no less. The bit
     `Scorer.joints_bit` among them says that the joints are unread, too.
 
-    Of a build that refuses frames there are K + 1 of them (`or_none`), and none is the last class.
+    For a build that refuses frames there are K + 1 of them (`or_none`), and none is the last class.
     """
 
-    __slots__ = ("_odds", "_rivals", "_scorer", "_unread", "candidate", "lanes")
+    __slots__ = ("_odds", "_others", "_scorer", "_unread", "candidate", "lanes")
 
     def __init__(self, lanes: tuple[int, ...], scorer: Scorer, unread: Mask = 0) -> None:
         self.lanes = lanes
         self.candidate = lanes.index(max(lanes))
         self._scorer, self._unread = scorer, unread
-        self._rivals = self._nearest(self.candidate) if unread else lanes
+        self._others = self._nearest(self.candidate) if unread else lanes
         self._odds = 0.0, 0.0
 
     @property
@@ -58,27 +58,27 @@ class Standing:
     @property
     def certain(self) -> bool:
         """Whether the candidate wins whatever the unread switches are; of equal scores the lowest number wins."""
-        return self._rivals.index(max(self._rivals)) == self.candidate
+        return self._others.index(max(self._others)) == self.candidate
 
     def leads(self, lead: int) -> bool:
         """Return whether the candidate wins, by `lead` steps at least, whatever the unread inputs are."""
         best = self.lanes[self.candidate]
-        rivals = ((number, rival) for number, rival in enumerate(self._rivals) if number != self.candidate)
-        return all(rival + max(lead, number < self.candidate) <= best for number, rival in rivals)
+        others = ((number, score) for number, score in enumerate(self._others) if number != self.candidate)
+        return all(score + max(lead, number < self.candidate) <= best for number, score in others)
 
     @property
     def margin(self) -> int:
-        """How many steps the candidate leads the second best by."""
-        second, best = sorted(self._rivals)[-2:]
+        """The candidate's lead over the second best, in steps."""
+        second, best = sorted(self._others)[-2:]
         return best - second
 
     def lead(self, held: int) -> int:
-        """Return how many steps the candidate leads class `held` by."""
-        return self.lanes[self.candidate] - self._rivals[held]
+        """Return the candidate's lead over class `held`, in steps."""
+        return self.lanes[self.candidate] - self._others[held]
 
     def contradicts(self, held: int, lead: int) -> bool:
-        """Return whether the candidate is not `held` and leads it by `lead` steps, as far as may be: with unread
-        switches, whether any state of them gives that lead.
+        """Return whether the candidate is not `held` and may lead it by `lead` steps: with unread switches, whether any
+        state of them gives that lead.
         """
         if self.candidate == held:
             return False
@@ -91,45 +91,45 @@ class Standing:
             return softmax(self._nearest(number), number, scale)
         of, total = self._odds
         if of != scale:
-            self._odds = scale, (total := odds(self._rivals, scale))
-        return softmax(self._rivals, number, scale, total)
+            self._odds = scale, (total := odds(self._others, scale))
+        return softmax(self._others, number, scale, total)
 
     def or_none(self, lead: int) -> "Standing":
-        """Return the same with none, the last class, `lead` steps above the best: below it, where that is negative."""
+        """Return the same with none, the last class, `lead` steps above the best, or below it if that is negative."""
         return Standing((*self.lanes, max(self.lanes) + lead), self._scorer, self._unread)
 
     def _reach(self, number: int) -> tuple[int, ...]:
-        """Return how much closer to class `number` the unread switches can bring each: none is left where it is."""
+        """Return how much closer to class `number` the unread switches can bring each class; none is left as it is."""
         classes = self._scorer.tables.n_classes
         if number == classes:
             return (0,) * (classes + 1)
         return (*self._scorer.reach(number, self._unread), *(0,) * (len(self.lanes) - classes))
 
     def _nearest(self, number: int) -> tuple[int, ...]:
-        """Return the scores with every rival of class `number` as near to it, or as far above it, as it can come."""
+        """Return the scores with every other class as near to class `number`, or as far above it, as it can come."""
         return tuple(map(add, self.lanes, self._reach(number)))
 
 
 @dataclass(slots=True)
 class Decision:
-    """The class decided on, out of candidates frame by frame. A frame is whole if none of its inputs is lost.
+    """The decided class, from candidates frame by frame. A frame is whole if none of its inputs is lost.
 
-    - The first candidate after nothing is decided on at once.
-    - Another candidate takes over when it has been the candidate, with a lead of at least `lead_steps` over the class
-      decided on, in every frame for `dwell_us`.
-    - Where for `hold_us` no frame spoke for the class decided on, yet no other could take over, the candidate does.
+    - The first candidate, with no class decided, is decided on at once.
+    - Another candidate takes over when it has been the candidate, with a lead of at least `lead_steps` over the decided
+      class, in every frame for `dwell_us`.
+    - If for `hold_us` no frame favoured the decided class, yet no other could take over, the candidate does.
 
-    That holds among frames of one kind. A decision rests either on whole frames or on frames with lost inputs:
+    This applies to frames of one kind. A decision is based either on whole frames or on frames with lost inputs:
 
-    - One that rests on whole frames is displaced by no frame with lost inputs. Such a frame only ends the dwell of a
-      rival, so that a dwell is made of whole frames in a row.
+    - One based on whole frames is displaced by no frame with lost inputs. Such a frame only ends the dwell of another
+      candidate, so that a dwell consists of consecutive whole frames.
     - After `hold_us` without a whole frame its evidence is too old, and it counts as none: the candidate of the frame
       with lost inputs is decided on at once.
-    - One that rests on frames with lost inputs counts as none once a whole frame comes: its candidate is decided on at
-      once. So after a whole frame, every decision rests on whole frames.
+    - One based on frames with lost inputs counts as none once a whole frame comes: its candidate is decided on at once.
+      So after a whole frame, every decision is based on whole frames.
 
-    So two changes are at least the dwell apart, unless the decision counted as none in between. Times are those of the
-    frames (microseconds, never falling): a frame that is seen twice counts once.
+    So two changes are at least the dwell time apart, unless the decision counted as none in between. Times are those
+    of the frames (microseconds, never falling): a frame that is seen twice counts once.
     """
 
     lead_steps: int
@@ -143,7 +143,7 @@ class Decision:
     _supported_us: int = 0
 
     def update(self, time_us: int, standing: Standing, *, whole: bool = True) -> int:
-        """Return the class decided on, after the frame of `time_us`; `whole`: no input of it is lost."""
+        """Return the decided class after the frame of `time_us`; `whole`: no input of it is lost."""
         if whole:
             self._whole_us = time_us
         elif self.held is not None and self._whole and time_us - self._whole_us < self.hold_us:
@@ -162,7 +162,7 @@ class Decision:
         return self.held
 
     def forget(self) -> None:
-        """Decide on nothing: too little can be read."""
+        """Drop the decision: too little can be read."""
         self.held = self._rival = None
 
     def _take(self, candidate: int, time_us: int, whole: bool) -> int:
@@ -172,11 +172,11 @@ class Decision:
 
 @dataclass(slots=True)
 class SequentialTest:
-    """Decides test after test; an answer holds until the next test has one, or `longest_us` have gone.
+    """Decides test after test; a result holds until the next test has one, or `longest_us` have passed.
 
-    After a whole frame, one with no input lost, both the answer and the evidence rest on whole frames.
+    After a whole frame, one with no input lost, both the result and the evidence are based on whole frames.
 
-    error_rate lies between 0 and 1, scale is in steps per unit of score, times are in microseconds.
+    error_rate is between 0 and 1, scale is in steps per unit of score, times are in microseconds.
     """
 
     classes: int
@@ -213,7 +213,7 @@ class SequentialTest:
         return self.held
 
     def forget(self) -> None:
-        """Drop evidence and answer: too little can be read."""
+        """Drop evidence and result: too little can be read."""
         self.held, self._sums, self._counted_us = None, (), None
 
     def _add(self, time_us: int, lanes: tuple[int, ...]) -> None:

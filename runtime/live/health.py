@@ -1,15 +1,14 @@
-"""How the glove fares: what `thenar run --status` shows and what is published beside the grasps.
+"""The glove's health: shown by `thenar run --status` and published with the grasps.
 
-Switches that are never, or always, on are held against how often they were in the recordings that the build was
-trained on.
+Switches that are never, or always, closed are compared with how often they were closed in the training recordings.
 
-The build remembers that share; in builds of older versions a switch's mean row is its row times the share. A grasp that
-is held is one observation, however many frames it lasts. If a switch is on in a share p of grasps, it stays
-off throughout n of them with a probability of at most (1 - p)^n, and on with at most p^n, given that grasps come as
-they did in the recordings. Because people also repeat one grasp for long, a switch is only suspected once half of the
-grasp types were seen since it was last found otherwise.
+The build holds that share; in builds of older versions a switch's mean row is its row times the share. A held grasp is
+one observation, however many frames it lasts. If a switch is closed in a share p of grasps, it stays open throughout n
+of them with a probability of at most (1 - p)^n, and closed with at most p^n, given that grasps are distributed as in
+the recordings. Because people also repeat one grasp for long, a switch is only suspected once half of the grasp types
+were seen since its other state was last seen.
 
-What is found against all other inputs, and left out of the answer, is the quarantine's matter (quarantine.py).
+The quarantine (quarantine.py) finds faults from all other inputs and leaves those inputs out of the prediction.
 """
 
 import math
@@ -24,13 +23,13 @@ from ..published import UNKNOWN, DeviceHealth, Drift, HealthReport, LiveGrasp, Q
 from .quarantine import Chattering, JointDrift, numbers
 
 RATE_US = 1_000_000
-# How improbable what was seen must be of a switch that works.
+# How improbable the observation must be for a working switch.
 ALARM = 1e-4
 _SURE = 1 - 1e-12
 
 
 class Health:
-    """Watches frames and grasps go by; nothing that it finds changes an answer."""
+    """Observes frames and grasps; its findings change no prediction."""
 
     def __init__(self, build: Build) -> None:
         self._switch_names = tuple(switch.name for switch in build.manifest.switches)
@@ -51,7 +50,7 @@ class Health:
         glove_us: int | None = None,
         codes: Sequence[int] | None = None,
     ) -> None:
-        """Take what was published, and the frames that it came of; a frame that was seen before counts once.
+        """Take a published grasp, and the frames behind it; a frame that was seen before counts once.
 
         glove_us is the time of the glove's frame, codes are its joints' (`Moment.codes`), None while lost.
         """
@@ -78,7 +77,7 @@ class Health:
         overflowed: int = 0,
         quarantined: tuple[Quarantined, ...] = (),
     ) -> HealthReport:
-        """Return how things stand."""
+        """Return the current health."""
         drifts = zip(self._joint_names, self._drift.codes, strict=False)
         return HealthReport(
             time_us=now_us,
@@ -120,7 +119,7 @@ class FrameRate:
             self._began_us, self._frames = time_us, 0
 
     def hz(self, now_us: int) -> float:
-        """Return the rate of the last whole second; of the time since the last frames, when they do not come."""
+        """Return the rate of the last whole second, or of the time since the last frames, if none come."""
         if self._began_us is not None and now_us - self._began_us > 2 * RATE_US:
             return self._over(now_us)
         return self._hz
@@ -130,12 +129,12 @@ class FrameRate:
 
 
 def on_shares(build: Build) -> list[float]:
-    """Return, for every switch, the share of the recordings in which it was on; nan where nobody knows: in builds of
-    older versions, where its row is all zeros.
+    """Return, for every switch, the share of the recordings in which it was closed; nan if unknown: in builds of older
+    versions, if its row is all zeros.
     """
-    told = [switch.closed_share for switch in build.manifest.switches]
-    known = [share for share in told if share is not None]
-    if len(known) == len(told):
+    stored = [switch.closed_share for switch in build.manifest.switches]
+    known = [share for share in stored if share is not None]
+    if len(known) == len(stored):
         return known
     tables = build.tables
     rows, means = tables.switch_rows.astype(np.float64), tables.switch_means.astype(np.float64)
@@ -146,14 +145,14 @@ def on_shares(build: Build) -> list[float]:
 
 
 def patience(share: float) -> float:
-    """Return after how many grasps in which it does not happen, what happens in `share` of them is missed."""
+    """Return the number of grasps without an event after which an event of this `share` is suspiciously missing."""
     if math.isnan(share) or share <= 0:
         return math.inf
     return math.ceil(math.log(ALARM) / math.log1p(-min(share, _SURE)))
 
 
 class Missed:
-    """Counts, for every switch, the grasps since something was last seen of it: that it was on, or that it was off."""
+    """Counts, for every switch, the grasps since an event of it: that it was closed, or that it was open."""
 
     def __init__(self, shares: Sequence[float], classes: int) -> None:
         self._patience = [patience(share) for share in shares]
@@ -173,7 +172,7 @@ class Missed:
         self.seen = 0
 
     def suspects(self) -> list[int]:
-        """Return the switches of which it should have been seen by now."""
+        """Return the switches whose event should have been seen by now."""
         return [
             switch
             for switch, (grasps, types) in enumerate(zip(self._grasps, self._types, strict=True))
@@ -182,7 +181,7 @@ class Missed:
 
 
 class StuckSwitches:
-    """Both kinds of being stuck."""
+    """Both kinds of stuck switches."""
 
     def __init__(self, build: Build) -> None:
         shares, classes = on_shares(build), build.tables.n_classes
@@ -197,7 +196,7 @@ class StuckSwitches:
         self._off.seen |= ~closed & read
 
     def end_grasp(self, number: int | None) -> None:
-        """End a grasp of type `number`; None: it was none, and what was seen meanwhile counts for the next."""
+        """End a grasp of type `number`; None: it was none, and its observations count for the next."""
         if number is not None:
             self._on.end_grasp(number, self._read)
             self._off.end_grasp(number, self._read)

@@ -1,4 +1,4 @@
-"""What an unknown sender of rows sends, and a proposal of the `[[stream]]` that reads it."""
+"""The rows of an unknown sender, and a proposal of the `[[stream]]` that reads them."""
 
 import re
 from collections import Counter
@@ -19,7 +19,7 @@ from ..names import fault, nearest, shortened
 from ..sources.base import SOURCES
 from ..sources.rows import RowKind
 
-# Boards that are reset by the opening of their port start their program within it.
+# Boards that are reset when their port opens start their program within this time.
 _PATIENCE_US = 6_000_000
 _MOST_ROWS = 100_000
 _WAIT_S = 0.1
@@ -29,15 +29,15 @@ _TIME = re.compile(r"^(t|ts|ms|us|s)$|time|milli|micro|stamp|clock|sec", re.IGNO
 _UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 _HIGHEST = (255, 1023, 4095, 16_383, 32_767, 65_534)
 _PARTS = (1.0, 3.3, 5.0, 10.0, 100.0, 180.0, 360.0)
-# A joint that moved over such a share of its converter's range was moved on purpose.
+# A joint that moved over this share of its converter's range was moved on purpose.
 _MOVED = 0.1
-# In less time rows come at no rate: they were waiting somewhere.
+# In less time no rate can be measured: the rows had been waiting somewhere.
 _LEAST_S = 0.3
-_NO_RATE = "the rows came all at once: write into rate_hz how many come a second"
+_NO_RATE = "the rows came all at once: set rate_hz to the number of rows a second"
 
 
 class Heard(msgspec.Struct, frozen=True):
-    """A column as it was heard: its least and greatest number, and what it is taken for."""
+    """A received column: its least and greatest number, and its proposed use."""
 
     column: str
     least: float | None
@@ -46,7 +46,7 @@ class Heard(msgspec.Struct, frozen=True):
 
 
 class Proposal(msgspec.Struct, frozen=True):
-    """The stream that fits a sender, its columns, and remarks on what was odd, in sentences."""
+    """The stream that fits a sender, its columns, and remarks on oddities, in sentences."""
 
     stream: StreamWiring
     columns: tuple[Heard, ...]
@@ -55,30 +55,30 @@ class Proposal(msgspec.Struct, frozen=True):
 
 
 def reader_of(port: str, baud: int) -> RowReader:
-    """Return what reads rows from `port`. Raises SettingError if nothing does."""
+    """Return a reader of rows from `port`. Raises SettingError if there is none."""
     wiring = StreamWiring(port=port, baud=baud)
     for kind in SOURCES.values():
         if isinstance(kind, RowKind) and kind.reader is not None and kind.takes(port):
             return kind.reader(wiring)
-    raise SettingError(f"{shortened(repr(port))} is no port that rows come from{nearest(port, ['lsl:', 'ros:'])}")
+    raise SettingError(f"{shortened(repr(port))} is not a port for rows{nearest(port, ['lsl:', 'ros:'])}")
 
 
 def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str] = ()) -> Proposal:
-    """Return the stream that fits what comes from `port` within so many seconds after the first row; `columns` name
-    those that the sender does not.
+    """Return the stream that fits the rows from `port` within `listen_s` seconds after the first; `columns` name those
+    that the sender does not.
 
-    Raises SettingError about a port that cannot be, DeviceError where no rows come.
+    Raises SettingError for an invalid port, DeviceError if no rows come.
     """
     with reader_of(port, baud) as reader:
         reader.open()
         came = list(_listened(reader, listen_s))
         counts, odd = reader.counts(), reader.odd
     if not came:
-        what = f"what comes holds no rows: {odd}; is {baud} its baud rate?" if odd else "nothing comes"
+        what = f"the data holds no rows: {odd}; is {baud} its baud rate?" if odd else "nothing comes"
         raise DeviceError(f"{port}: {what}")
     remarks = []
     if wrong := counts.misfits + counts.overlong:
-        remarks.append(f"{wrong} lines were no rows" + (f", such as {odd}" if odd else ""))
+        remarks.append(f"{wrong} lines were not rows" + (f", such as {odd}" if odd else ""))
     return _proposed(StreamWiring(port=port, baud=baud, columns=tuple(columns)), came, remarks)
 
 
@@ -105,7 +105,7 @@ def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], remarks: list
     alike = [(time_us, row) for time_us, row in came if (row.names, len(row.values)) == (names, width)]
     given = bare.columns or (("",) * width if names is None else names)
     if len(given) != width:
-        raise SettingError(f"{len(given)} columns are named, and rows have {width}: name every one, in their order")
+        raise SettingError(f"{len(given)} columns are named, but rows have {width}: name every one, in order")
     columns = tuple(_sound(name, place) for place, name in enumerate(names or given, start=1))
     values = {name: [row.values[place] for _, row in alike] for place, name in enumerate(columns)}
     span_s = (alike[-1][0] - alike[0][0]) / 1e6
@@ -122,12 +122,12 @@ def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], remarks: list
         kinds.get(kind, []).append(name)
         heard.append(Heard(name, min(numbers, default=None), max(numbers, default=None), kind))
         if len(numbers) < len(found):
-            remarks.append(f"{name}: {len(found) - len(numbers)} of {len(found)} values were no numbers")
+            remarks.append(f"{name}: {len(found) - len(numbers)} of {len(found)} values were not numbers")
     gaps = [later - earlier for (earlier, _), (later, _) in pairwise(alike)]
     if gaps and max(gaps) > max(4 * median(gaps), 100_000):
         remarks.append(f"the longest break between two rows was {max(gaps) / 1000:.0f} ms")
     if time is None and not stamped:
-        remarks.append("no column is a clock: rows are timed when they arrive; a column of millis() is better")
+        remarks.append("no column is a clock, so rows are timed when they arrive: add a column of millis() if possible")
     stream = msgspec.structs.replace(
         bare,
         columns=tuple(
@@ -148,13 +148,13 @@ def _sound(name: str, place: int) -> str:
 
 
 def _rounded(rate_hz: float) -> float:
-    """Return a rate of two digits."""
+    """Return a rate rounded to two digits."""
     step: float = 10.0 ** (floor(log10(rate_hz)) - 1)
     return float(f"{round(rate_hz / step) * step:.6g}")
 
 
 def _clock(values: dict[str, list[float | None]], span_s: float) -> tuple[str | None, str, float]:
-    """Return the column that is a clock, one so named before another, its unit, and how far it went, in seconds."""
+    """Return the column that is a clock, preferably one named so, its unit, and its span in seconds."""
     for named in (True, False):
         for name, found in values.items():
             numbers = [value for value in found if value is not None]
@@ -173,7 +173,7 @@ def _clock(values: dict[str, list[float | None]], span_s: float) -> tuple[str | 
 
 
 def _rises(numbers: Sequence[float]) -> bool:
-    """Return whether numbers rise, from nearly every row to the next: no finger does."""
+    """Return whether numbers rise from nearly every row to the next, as no finger does."""
     steps = [later - earlier for earlier, later in pairwise(numbers)]
     return len(steps) > 3 and sum(step < 0 for step in steps) < 2 and sum(step > 0 for step in steps) > 0.9 * len(steps)
 
@@ -191,7 +191,7 @@ def _kind(name: str, numbers: Sequence[float]) -> str:
 
 
 def _range(numbers: Sequence[float]) -> Range:
-    """Return the range of the converter, or the scale, that such numbers are usually of."""
+    """Return the range of the converter, or the scale, that such numbers usually have."""
     least, greatest = min(numbers), max(numbers)
     whole = all(number.is_integer() for number in numbers)
     top = max(abs(least), abs(greatest))
@@ -202,7 +202,7 @@ def _range(numbers: Sequence[float]) -> Range:
 
 
 def _joint_range(numbers: Sequence[float]) -> Range:
-    """Return what a joint moved over, widened, or the whole range where it was not moved: its codes are 255."""
+    """Return the range that a joint moved over, widened, or the whole range if it was not moved: it has 255 codes."""
     low, high = _range(numbers)
     least, greatest = min(numbers), max(numbers)
     if greatest - least < _MOVED * (high - low):

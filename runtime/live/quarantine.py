@@ -1,37 +1,38 @@
-"""Inputs that are read and yet wrong: found live, treated as lost while they are, and used again when they behave.
+"""Inputs that are read but wrong: found live, treated as lost while they are, and used again when they recover.
 
 **Stuck switches.** Each switch has two cumulative sums (E. S. Page, Biometrika 41, 1954), one for "stuck closed", one
 for "stuck open". A grasp adds to each the logarithm of
 
     P(what the switch shows | stuck) / P(what the switch shows | it works, and what all other inputs show)
 
-and no sum falls below 0. The scores without the switch, whose mean row stands in, give the probabilities of the grasp
-types; the build says in what share of a subject's trials of each type the switch was closed. Of the subjects trained on
-the one that explains best what is seen counts (P. J. Huber, Ann. Math. Stat. 36, 1965, tests the least favourable pair
-in the same way), and nothing is taken to be less probable than 1/20: people do what no recording holds. The share of a
-switch that is stuck and nevertheless moves in a grasp is taken to be 1/32.
+and no sum falls below 0. The scores without the switch, replaced by its mean row, give the probabilities of the grasp
+types; the build holds the share of a subject's trials of each type in which the switch was closed. Of the training
+subjects the one that best explains the observation counts (P. J. Huber, Ann. Math. Stat. 36, 1965, tests the least
+favourable pair in the same way), and nothing is assumed less probable than 1/20: people do what no recording holds. A
+stuck switch is assumed to move all the same in 1/32 of the grasps.
 
-If the model holds, the mean of the ratio is at most 1 while the switch works. Then a sum needs, in the mean, at least
-e^h observations to reach h (G. Lorden, Ann. Math. Stat. 42, 1971). All sums together shall do so once in GRASPS grasps,
-of two observations each; so h is ln(2 * switches * 2 * GRASPS).
+If the model holds, the mean of the ratio is at most 1 while the switch works. Then a sum needs on average at least e^h
+observations to reach h (G. Lorden, Ann. Math. Stat. 42, 1971). All sums together may do so once in GRASPS grasps, of
+two observations each; so h is ln(2 * switches * 2 * GRASPS).
 
 A hand that never closes a switch looks like a switch that never closes. So a switch is called stuck open only after it
-was seen to close: the share of grasps in which it did when it should have, in this run, multiplies the build's share.
+was seen to close: the share of grasps of this run in which it closed when expected multiplies the build's share.
 
 A fault makes other inputs look wrong. So of several sums that reach h together only the largest counts; then the last
-grasps are weighed again without the switch that it is of.
+grasps are weighed again without its switch.
 
 **A grasp** is one observation, however many frames it lasts: contacts that have not changed by half for SETTLED_US. A
-switch that cannot be read for a while counts as it last was: an outage begins no grasp. The frame with the fewest
-contacts between two grasps, however short, is one, too, if it differs by half from both. There a switch counts as
-closed that was never seen open in between: a hand that opens opens all of its switches. So next to no other contact a
-switch that works is taken to stay closed in no less than 1/100 of the cases.
+switch that cannot be read for a while keeps its last state: an outage begins no grasp. The frame with the fewest
+contacts between two grasps, however short, is also one, if it differs by half from both. There a switch counts as
+closed if it was never seen open in between: an opening hand opens all of its switches. So next to no other contact a
+working switch is assumed to stay closed in no less than 1/100 of the cases.
 
-**Chatter.** A change of a switch costs 1/20 s. A switch that is a second in debt changes faster than a hand, which is
-what a loose contact does; it behaves again once the debt is paid, at the latest 2 s after the last change.
+**Chatter.** A change of a switch costs 1/20 s, paid off as time passes. A switch that is a second in debt changes
+faster than a hand, which is typical of a loose contact; it recovers once the debt is paid, at the latest 2 s after the
+last change.
 
-**Drift.** A joint's codes wander off when a glove slips or a sensor ages. The hand opens and closes again and again, so
-a joint's lowest and highest code come back. When both have moved the same way since the first minute, the sensor's zero
+**Drift.** A joint's codes drift when a glove slips or a sensor ages. The hand opens and closes again and again, so a
+joint's lowest and highest code come back. When both have moved the same way since the first minute, the sensor's zero
 has moved by at least the smaller of both; grasps that merely use less of the range move them towards each other.
 """
 
@@ -49,21 +50,21 @@ from ..frames import Mask, SwitchFrame
 from ..published import Quarantined
 from ..tables import HIGHEST_CODE, IntegerTables
 
-# How long contacts have to stay for a grasp to be looked at.
+# Time for which contacts must stay the same before a grasp is evaluated.
 SETTLED_US = 100_000
-# So often all switches must be read, where scans may end early.
+# Interval at which all switches must be read, if scans may end early.
 WHOLE_US = 50_000
-# Grasps from one false alarm to the next, in the mean.
+# Average number of grasps between two false alarms.
 GRASPS = 1_000
 # Evidence is counted in sixteenths of a nat.
 _NAT = 16
 _SLIPS, _LEAST, _LEAST_ALONE = 1 / 32, 1 / 20, 1 / 100
-# Observations that are weighed again without a switch once it is found to be stuck.
+# Observations that are weighed again without a switch that was found to be stuck.
 _KEPT = 64
-# A switch begins with one grasp in which it closed as it should and one in which it did not (Laplace's rule).
+# A switch begins with one grasp in which it closed as expected and one in which it did not (Laplace's rule).
 _DOUBT = 255
 
-# Nobody presses and releases a switch ten times a second; a contact that is loose does.
+# Nobody presses and releases a switch ten times a second; a loose contact does.
 MOST_CHANGES = 20
 DRIFT_US = 60_000_000
 # Share of a joint's range in the first window by which both ends must have moved.
@@ -75,8 +76,8 @@ Ints = NDArray[np.int64]
 
 # exp(-i / 16), in 65535ths; the last is 0.
 _WEIGHTS = np.array([round(65535 * math.exp(-i / _NAT)) for i in range(200)])
-# Evidence of being stuck where a switch shows what a stuck one does, and where it does not, by the share of grasps, in
-# 255ths, in which one that works would show the former.
+# Evidence of being stuck if a switch shows the state of a stuck one, and if it does not, by the share of grasps, in
+# 255ths, in which a working one would show the former.
 _SHOWN, _ALONE = (
     np.array([max(round(_NAT * math.log((1 - _SLIPS) / max(q / 255, least))), 0) for q in range(256)])
     for least in (_LEAST, _LEAST_ALONE)
@@ -85,15 +86,15 @@ _MOVED = np.array([min(round(_NAT * math.log(_SLIPS / max(1 - q / 255, _SLIPS)))
 
 
 class StuckTest:
-    """The sums of all switches, and what is found by them.
+    """The sums of all switches, and the faults found by them.
 
-    stuck  the switches that are, and the row of `sums` that says so, in the order in which they were found
+    stuck  the stuck switches, each with the row of `sums` that found it, in the order of detection
     sums   evidence (2, s) of being stuck closed and open, in sixteenths of a nat
-    limit  the h that it takes
+    limit  the required h
     """
 
     def __init__(self, build: Build) -> None:
-        """Find nothing in a build of an older version, which does not say how often its switches are closed."""
+        """Find nothing in a build of an older version, which does not hold how often its switches are closed."""
         tables, switches = build.tables, build.manifest.switches
         least, most = (
             np.array([list(bytes.fromhex(text)) for text in texts], np.int64)
@@ -111,7 +112,7 @@ class StuckTest:
         self._last: deque[_Grasp] = deque(maxlen=_KEPT)
 
     def weigh(self, lanes: Sequence[int], closed: Mask, read: Mask, lost: Mask) -> None:
-        """Take a grasp: the scores of a frame, which switches are closed and read, and which are scored as lost."""
+        """Take a grasp: the scores of a frame, the switches closed and read, and those scored as lost."""
         flags = (_flags(mask, len(self._rows)) for mask in (closed, read, lost))
         grasp = _Grasp(np.array(lanes, np.int64), *flags)
         shares, held = self._shares_of(grasp), self._held(grasp)
@@ -133,7 +134,7 @@ class StuckTest:
             self._weigh_again(switch)
 
     def _weigh_again(self, switch: int) -> None:
-        """Work out the sums of switches that are not found to be stuck, from the last grasps without this one."""
+        """Recalculate the sums of switches that are not stuck, from the last grasps, without this one."""
         sums = np.zeros_like(self.sums)
         for number, grasp in enumerate(self._last):
             grasp = self._last[number] = grasp.without(switch, self._rows, self._means)
@@ -147,8 +148,8 @@ class StuckTest:
         return known
 
     def _shares_of(self, grasp: "_Grasp") -> Ints:
-        """Return by what share of grasps, in 255ths (2, s), training explains that a switch is closed, and open, as far
-        as all other inputs tell the type.
+        """Return the share of grasps, in 255ths (2, s), in which by training a switch is closed, and open, given the
+        type as far as all other inputs determine it.
         """
         own = np.where(grasp.lost[:, np.newaxis], 0, self._means - self._rows * grasp.closed[:, np.newaxis])
         scores = grasp.lanes + own
@@ -158,14 +159,14 @@ class StuckTest:
         return found
 
     def _held(self, grasp: "_Grasp") -> bool:
-        """Whether at least half of the contacts are there that the likeliest type has: less says nothing of a switch
-        that is open.
+        """Return whether at least half of the likeliest type's contacts are there: with fewer, an open switch means
+        nothing.
         """
         contacts = int(self._contacts[int(grasp.lanes.argmax())])
         return 4 * 255 * int(np.count_nonzero(grasp.closed & ~grasp.lost)) >= contacts
 
     def _evidence(self, grasp: "_Grasp", shares: Ints, held: bool) -> Ints:
-        # Doubts whether this hand closes a switch at all go with it as it is seen to do so.
+        # Doubt whether this hand closes a switch at all decreases as it is seen to do so.
         closes = (255 - shares[1]) * (self._seen + _DOUBT) // (self._due + 2 * _DOUBT)
         shares = np.stack([shares[0], 255 - closes])
         shown = np.stack([grasp.closed, ~grasp.closed])
@@ -178,7 +179,7 @@ class StuckTest:
 
 @dataclass(frozen=True, slots=True)
 class _Grasp:
-    """What was seen of a grasp: scores (K,), and which switches were closed, read, and scored as lost (s,)."""
+    """An observed grasp: scores (K,), and which switches were closed, read, and scored as lost (s,)."""
 
     lanes: Ints
     closed: Flags
@@ -186,7 +187,7 @@ class _Grasp:
     lost: Flags
 
     def without(self, switch: int, rows: Ints, means: Ints) -> "_Grasp":
-        """Return the same with a switch scored as lost."""
+        """Return the same grasp with a switch scored as lost."""
         if self.lost[switch]:
             return self
         lost = self.lost.copy()
@@ -221,7 +222,7 @@ class Chattering:
 
 class JointDrift:
     """Compares the lowest and highest code of every joint in the last whole window with those of the first window in
-    which it moved over a third of the codes that the tables tell apart.
+    which it moved over a third of the codes that the tables distinguish.
     """
 
     def __init__(self, tables: IntegerTables) -> None:
@@ -233,13 +234,13 @@ class JointDrift:
         self.codes: tuple[int, ...] = ()
 
     def frame(self, time_us: int, codes: Sequence[int]) -> None:
-        """Take the codes of all joints; `codes` is then by how much each has drifted, 0 where it is within bounds."""
+        """Take the codes of all joints; `codes` then holds the drift of each, 0 if it is within bounds."""
         if self._began_us is not None and time_us - self._began_us >= DRIFT_US:
             self._end()
             self._began_us = None
         if self._began_us is None:
             self._began_us, self._low, self._high = time_us, list(codes), list(codes)
-        # Seldom so: after a few grasps a joint has been where it goes.
+        # This seldom happens: after a few grasps a joint has covered its range.
         if any(map(lt, codes, self._low)):
             self._low = list(map(min, self._low, codes))
         if any(map(gt, codes, self._high)):
@@ -269,18 +270,18 @@ def _span(tables: IntegerTables, joint: int) -> int:
 
 
 class Quarantine:
-    """What is left out of the scores, though it is read.
+    """The inputs that are left out of the scores, though they are read.
 
-    found  every input that is wrong, and whether it is used all the same
+    found  every wrong input, and whether it is still used
     out    the switches and joints that are left out now
     """
 
     def __init__(self, build: Build, fits: Callable[[Mask, Mask], bool], *, active: bool = True) -> None:
-        """Take what says whether these switches and joints may be lost together; not `active`: leave nothing out."""
+        """Take the test whether these switches and joints may be lost together; not `active`: leave nothing out."""
         switches, joints = build.manifest.switches, build.manifest.joints
         self._names = {False: [switch.name for switch in switches], True: [joint.name for joint in joints]}
         self._fits, self._active, self._all = fits, active, (1 << len(switches)) - 1
-        # No field of a build of an older version says how often its switches are closed.
+        # A build of an older version has no field for how often its switches are closed.
         self._stuck = StuckTest(build) if switches and switches[0].closed_least else None
         self._chattering, self._drift = Chattering(len(switches)), JointDrift(build.tables)
         self._wrong: dict[tuple[bool, int], str] = {}
@@ -288,20 +289,20 @@ class Quarantine:
         self.out: tuple[Mask, Mask] = 0, 0
         self.found: tuple[Quarantined, ...] = ()
         self._seen_us = self._joints_us = self._since_us = -1
-        # What switches showed when they were last read, the contacts of the grasp, and what was read as it began.
+        # The last known state of the switches, the contacts of the grasp, and the switches read as it began.
         self._shown: Mask = 0
         self._contacts: Mask = 0
         self._read: Mask = 0
         self._weighed = True
         self._state: tuple[Mask, Mask, Mask] = 0, 0, 0
-        # Since the last grasp: what stayed closed, and the frame with the fewest contacts, its scores and what is lost.
+        # Since the last grasp: the switches that stayed closed, and the frame with the fewest contacts.
         self._before: Mask = 0
         self._stayed: Mask = self._all
         self._fewest: tuple[Mask, Mask, Mask, Sequence[int], Mask] | None = None
 
     def left_out(self, lost: Mask, joints_lost: Mask) -> tuple[Mask, Mask]:
-        """Return the switches and joints to leave out, when these are lost as well: the first that were found come
-        first, as long as the answer does not become unknown by that.
+        """Return the switches and joints to leave out, when these are lost as well: in the order of detection, as long
+        as the result does not become unknown because of them.
         """
         if (chosen := self._chosen.get((lost, joints_lost))) is None:
             chosen = self._chosen[lost, joints_lost] = self._choose(lost, joints_lost)
@@ -312,7 +313,7 @@ class Quarantine:
         if len(self._chosen) >= _KEPT:
             self._chosen.clear()
         out, found = [0, 0], list[Quarantined]()
-        # Where too much is lost anyway, nothing that is used would help.
+        # If too much is lost anyway, using any of them would not help.
         unknown = not self._fits(lost, joints_lost)
         for (is_joint, number), reason in self._wrong.items():
             more = list(out)
@@ -333,7 +334,7 @@ class Quarantine:
         stuck = self._stuck
         if chattering != self._chattering.switches:
             self._sort()
-        # A scan that ended early leaves open what the others say.
+        # In a scan that ended early, the other switches are unknown.
         if stuck is None or frame.unread:
             return
         if (state := (frame.closed, read, lost)) == self._state and self._weighed:
@@ -365,7 +366,7 @@ class Quarantine:
                 self._sort()
 
     def _sort(self) -> None:
-        """Bring what is wrong up to date, in the order in which it was found."""
+        """Update the list of wrong inputs, in the order of detection."""
         stuck = {} if self._stuck is None else self._stuck.stuck
         now = {(False, number): (STUCK_CLOSED, STUCK_OPEN)[kind] for number, kind in stuck.items()}
         now |= {(False, number): CHATTERING for number in numbers(self._chattering.switches)}

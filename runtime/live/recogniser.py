@@ -1,4 +1,4 @@
-"""The live recogniser: the newest frame of each device, joined, scored, decided upon."""
+"""The live recogniser: joins the newest frame of each device, scores it and decides."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,16 +20,16 @@ from .quarantine import Quarantine
 
 
 class Moment(msgspec.Struct):
-    """One grasp that is published, and what it came of.
+    """A published grasp, and the data behind it.
 
-    grasp     the grasp type and how far to trust it
+    grasp     the grasp type and its confidence
     switches  the newest frame of the switches; None before the first
     glove     the newest record of the CyberGlove; None before the first
     codes     the joints' codes that were scored; None while the joints are lost
-    preshape  what the robot's hand shall have now; None where it shall be told nothing, as before the first grasp has
+    preshape  the preshape that the robot's hand should have now; None to send it nothing, as before the first grasp has
               settled (`PreshapeSelector`: 0.1 s)
     angles    the glove's joints; None without a calibration, and while the glove says nothing
-    scores    those of all classes that segments are made of; None while too little can be read
+    scores    those of all classes of segments; None while too little can be read
     refused   whether the build refuses their frame
     """
 
@@ -44,14 +44,14 @@ class Moment(msgspec.Struct):
 
 
 class LiveRecognizer:
-    """Joins switches and CyberGlove and says what they show, whatever of them is there.
+    """Joins switches and CyberGlove and recognises grasps, with whichever of them are available.
 
-    A frame counts for two of its periods. A record of the glove that is older serves until `policy.grace_us`, and the
-    answer is degraded. What is older still, or lost, or of a glove that is not plugged into its box, is
-    replaced by its mean contribution, and the answer is degraded; it is unknown when the share of the tables' weight
-    that is lost exceeds `policy.max_lost`, and when nothing is left that the build uses. An input that is read and yet
-    wrong is treated as lost (`quarantine`). A device whose kind the build does not use is left aside. The answer
-    depends on nothing but the frames handed over and their times, so a replay of the same calls gives the same answers.
+    A frame is current for two of its periods. An older record of the glove is used until `policy.grace_us`, with health
+    "degraded". Inputs that are older still, or lost, or of a glove that is not plugged into its box, are replaced by
+    their mean contribution, with health "degraded"; health is "unknown" when the lost share of the tables' weight
+    exceeds `policy.max_lost`, and when no input of the build is left. An input that is read but wrong is treated as
+    lost (`quarantine`). A device whose kind the build does not use is ignored. The result depends only on the given
+    frames and their times, so a replay of the same calls gives the same results.
     """
 
     def __init__(
@@ -67,8 +67,8 @@ class LiveRecognizer:
     ) -> None:
         """Take the names of the CyberGlove's sensors in wire order, and periods; None: there is no such device.
 
-        on_demand: records come only where they are asked for (`wants_record`). Joints that nobody read are not lost
-        where the switches decide without them.
+        on_demand: records come only on request (`wants_record`). Joints that nobody read are not lost if the switches
+        decide without them.
 
         Raises SettingError if the CyberGlove cannot serve the build.
         """
@@ -95,15 +95,15 @@ class LiveRecognizer:
         self._alone = LiveScores(build.scorer) if on_demand else None
 
     def wants_record(self, now_us: int, switches: SwitchFrame | None, glove: GloveFrame | None) -> bool:
-        """Return whether a record is to be asked for: one newer than this frame, which cannot decide without, or one
-        newer than the last tick of the segments.
+        """Return whether to request a record: one newer than this frame, which cannot decide without, or one newer
+        than the last tick of the segments.
         """
         if self._alone is None:
             return False
         segments = self._segments
         if segments and segments.due(now_us) and (glove is None or glove.time_us <= now_us - segments.tick_us):
             return True
-        # Where no switch is read any more, records come as often as switches would.
+        # If no switch is read any more, records come as often as switches would.
         silent = switches is None or not self._all_switches & ~switches.lost
         since_us = now_us - self._longest_us if silent or switches is None else min(switches.time_us, now_us)
         if glove is not None and glove.time_us >= since_us:
@@ -111,12 +111,12 @@ class LiveRecognizer:
         return self._without_joints(self._trusted(switches, 0)) is None
 
     def _trusted(self, frame: SwitchFrame | None, joints_lost: Mask) -> SwitchFrame | None:
-        """Return the frame with the switches lost that are in quarantine."""
+        """Return the frame with the quarantined switches marked as lost."""
         out = self.quarantine.left_out(self._all_switches if frame is None else frame.lost, joints_lost)[0]
         return replace(frame, lost=frame.lost | out) if out and frame is not None else frame
 
     def _without_joints(self, frame: SwitchFrame | None) -> Standing | None:
-        """Return who leads in a frame whatever the joints are, None where they matter, or may not be left unread."""
+        """Return the leader of a frame whatever the joints are; None if they matter, or may not be left unread."""
         if self._alone is None or frame is None:
             return None
         lost, unread = frame.lost, frame.unread & ~frame.lost
@@ -125,16 +125,16 @@ class LiveRecognizer:
         return standing if standing.leads(self._lead) else None
 
     def step(self, now_us: int, unix_us: int, switches: SwitchFrame | None, glove: GloveFrame | None) -> Moment:
-        """Return what is recognised at `now_us`, given what came in since the last step (None: nothing).
+        """Return the prediction at `now_us`, given the frames since the last step (None: none).
 
-        The same frame may be handed over again: it grows no younger. Raises FrameError for a frame of another glove.
+        The same frame may be passed again: it keeps its age. Raises FrameError for a frame of another glove.
         """
         newest = self._switches
         if switches is not None and switches is not newest.frame and self._reads_switches:
             newest.take(switches, now_us, self._longest_us)
         frame = newest.frame if now_us <= newest.expires_us else None
-        # Ports that were left unread are certain only with the joints by which their scan ended; and a frame that was
-        # handed over once stays the newest, so every scan that can end early brings the joints' frame along.
+        # Unread ports are certain only with the joints by which their scan ended; and a frame that was passed once
+        # stays the newest, so every scan that can end early includes the joints' frame.
         codes = self._joints.codes(now_us, glove if frame is None or frame.glove is None else frame.glove)
         late = codes is not None and self._joints.late(now_us)
         if codes:
@@ -170,9 +170,9 @@ class LiveRecognizer:
         return Moment(grasp, switches, glove, codes, scores=scores, refused=refused)
 
     def _standing(self, frame: SwitchFrame | None) -> tuple[Standing, Mask]:
-        """Return who leads, and what is lost: unread switches are, unless the candidate is certain without them.
+        """Return the leader, and the lost inputs: unread switches are lost, unless the candidate is certain without.
 
-        They always are certain where the scan was ended by an `EarlyExit` with the codes of this step; with others, the
+        They always are certain if the scan was ended by an `EarlyExit` with the codes of this step; with others, the
         frame may have been left unread too early.
         """
         if frame is None:
@@ -188,8 +188,8 @@ class LiveRecognizer:
     def _whole_scores(
         self, now_us: int, frame: SwitchFrame | None, standing: Standing, codes: Sequence[int] | None, dull: Mask
     ) -> tuple[tuple[int, ...], bool]:
-        """Return the scores of the newest frame of which nothing was left unread, and whether the build refuses it; if
-        that is more than two ticks old, those of this one, in which what is unread counts as lost.
+        """Return the scores of the newest frame without unread inputs, and whether the build refuses it; if that is
+        more than two ticks old, those of this one, in which unread inputs count as lost.
         """
         if standing.whole or now_us > self._whole_until_us:
             closed, lost, lanes = 0, self._all_switches, standing.lanes
@@ -228,7 +228,7 @@ class LiveRecognizer:
         label, of_segment = segment.label, 0.0
         if label is not None and not unknown:
             of_segment = probability if label == decided else standing.probability(label, self._scale)
-        # By name, seventeen fields take as long as a third of the rest.
+        # Keyword arguments would take a third of the time of everything else for seventeen fields.
         return LiveGrasp(
             now_us,
             unix_us,
@@ -267,11 +267,11 @@ class Missing:
 
 
 class MissingInputs:
-    """Says what is missing, and keeps the last answer: what is lost seldom changes.
+    """Determines the missing inputs, and keeps the last result: losses seldom change.
 
-    The weight of an input is how far its rows (of a switch: closed and open) lie apart, summed over the grasp types, in
-    steps: an input that never moves a score weighs nothing. Too much is lost when the lost inputs' share of the weight
-    of all exceeds `max_lost`, and when nothing that the build uses can be read.
+    The weight of an input is the distance between its rows (for a switch: closed and open), summed over the grasp
+    types, in steps: an input that never moves a score has no weight. Too much is lost when the lost inputs' share of
+    the total weight exceeds `max_lost`, and when no input of the build can be read.
     """
 
     def __init__(self, build: Build, max_lost: float) -> None:
@@ -284,14 +284,14 @@ class MissingInputs:
         self._last = Missing()
 
     def of(self, switches: Mask, joints: Mask) -> Missing:
-        """Return what is missing when these switches and joints are lost."""
+        """Return the missing inputs when these switches and joints are lost."""
         lost = switches | joints << self._n_switches
         if lost != self._state:
             self._state, self._last = lost, self._work_out(lost)
         return self._last
 
     def may_be_lost(self, switches: Mask, joints: Mask) -> bool:
-        """Return whether an answer can do without these."""
+        """Return whether a grasp can be recognised without these."""
         return not self._work_out(switches | joints << self._n_switches).too_much
 
     def _work_out(self, lost: Mask) -> Missing:

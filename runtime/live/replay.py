@@ -1,4 +1,4 @@
-"""A recording run through once more: by its own build, or by another that reads the same inputs."""
+"""Replay a recording: by its own build, or by another that reads the same inputs."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -19,19 +19,20 @@ from ..taxels import Taxels, count_limit
 from .recogniser import LiveRecognizer, Moment
 from .system import System
 
-# A device counts as delivering as often as nineteen of twenty of its frames came.
+# The period of a device is the one that nineteen of twenty of its frames kept.
 _USUALLY = 0.95
 
 
 def replayed(
     build: Build, recording: Path, policy: Policy | None = None, warn: Callable[[str], None] = lambda _: None
 ) -> Iterator[tuple[LiveGrasp, LiveGrasp]]:
-    """Yield what was recognised and what is now, moment by moment, decided as it was then or by another `policy`.
+    """Yield the recorded and the new prediction, moment by moment, decided as before or by another `policy`.
 
-    The newest frames at each moment are those that stand before it in the recording, as the live loop wrote them. At
+    The newest frames at each moment are those that precede it in the recording, as the live loop wrote them. At the end
+    `warn` takes a sentence on each fault of the file.
     the end `warn` takes a sentence on each fault of the file.
 
-    Raises McapError if it is no recording, SettingError if it is of another build.
+    Raises McapError if it is not a recording, SettingError if it is from another build.
     """
     for entry, moment in moments(build, recording, policy, warn):
         yield entry, moment.grasp
@@ -40,7 +41,7 @@ def replayed(
 def moments(
     build: Build, recording: Path, policy: Policy | None = None, warn: Callable[[str], None] = lambda _: None
 ) -> Iterator[tuple[LiveGrasp, Moment]]:
-    """Yield what was recognised and all that is known now; see `replayed`."""
+    """Yield the recorded prediction and the complete new moment; see `replayed`."""
     reader = Reader(recording)
     recognizer = _system(build, reader.session, reader.path.name, policy).recognizer()
     switches: SwitchFrame | None = None
@@ -57,12 +58,13 @@ def moments(
 
 
 def recognised(build: Build, recording: Path, warn: Callable[[str], None] = lambda _: None) -> Iterator[Moment]:
-    """Yield all that a build makes of a recording of whatever build, or of none, decided as by default.
+    """Yield a build's moments for a recording of any build, or of none, decided by the default policy.
 
-    Moments are those of the recorded run; of a recording without one, those at which a frame came. Of another build's,
-    switches and joints are taken by their names, levels of taxels from the recorded counts. `warn` as for `replayed`.
+    Moments are those of the recorded run; without a run, those at which a frame came. For another build's recording,
+    switches and joints are matched by name, and levels of taxels taken from the recorded counts. `warn` as for
+    `replayed`.
 
-    Raises McapError if it is no recording, SettingError if it lacks an input of the build.
+    Raises McapError if it is not a recording, SettingError if it lacks an input of the build.
     """
     reader = Reader(recording)
     if reader.session.build == build.manifest.checksum:
@@ -77,10 +79,10 @@ def recognised(build: Build, recording: Path, warn: Callable[[str], None] = lamb
 
 
 class Stepper:
-    """Takes the entries of a recording one by one, a session first, from wherever in the file; `session` is theirs.
+    """Takes the entries of a recording one by one, a session first, from anywhere in the file; `session` is theirs.
 
-    What is recognised in its own build's recordings is decided as it was then. Raises SettingError if the recording
-    lacks an input of the build.
+    Recordings of the same build are decided as before. Raises SettingError if the recording lacks an input of the
+    build.
     """
 
     def __init__(self, build: Build, name: str, periods: tuple[int | None, int | None]) -> None:
@@ -91,7 +93,7 @@ class Stepper:
         self.glove: GloveFrame | None = None
 
     def take(self, entry: Entry) -> Moment | None:
-        """Return the moment that an entry makes: of a run each grasp, of other recordings each frame."""
+        """Return the moment of an entry: for a run at each grasp, for other recordings at each frame."""
         if isinstance(entry, Session):
             self._begin(entry)
         elif isinstance(entry, SwitchFrame):
@@ -109,7 +111,7 @@ class Stepper:
         return None
 
     def _begin(self, session: Session) -> None:
-        """Begin with a session, which has another clock: what came before it is of another time."""
+        """Begin with a session, which has another clock: earlier entries are from another time."""
         self.session, self.switches, self.glove = session, None, None
         if session.build == self._build.manifest.checksum:
             self._inputs: _Inputs | None = None
@@ -120,7 +122,7 @@ class Stepper:
 
 
 def periods_us(entries: Iterable[Entry]) -> tuple[int | None, int | None]:
-    """Return how often switches and records of the glove came among these entries; None where none did."""
+    """Return the periods of switches and glove records among these entries; None if there were none."""
     times: dict[type, list[int]] = {SwitchFrame: [], GloveFrame: []}
     for entry in entries:
         if isinstance(entry, SwitchFrame | GloveFrame):
@@ -131,7 +133,7 @@ def periods_us(entries: Iterable[Entry]) -> tuple[int | None, int | None]:
 
 
 class _Inputs:
-    """What a build reads of a recording that is not its own. Raises SettingError if the recording lacks an input."""
+    """The build's inputs in a recording of another build. Raises SettingError if the recording lacks one."""
 
     def __init__(self, build: Build, session: Session, name: str) -> None:
         self._build, self._session = build, session
@@ -150,15 +152,15 @@ class _Inputs:
         lacking += [joint.name for joint in manifest.joints if joint.name not in session.sensors]
         if lacking:
             raise SettingError(
-                f"{name} was recorded without {list_names(lacking)}, which the build reads: take a build "
-                "of what it holds, or record all that the build reads"
+                f"{name} was recorded without {list_names(lacking)}, which the build reads: use a build "
+                "of the recorded inputs, or record all inputs of the build"
             )
         self._turn = Rewired(pairs)
         self._taxels = Taxels(session.taxels, list(levels.values()), session.taxel_calibration, harness.taxel_settings)
         self._levels = 0, self._taxels.owned
 
     def of(self, frame: SwitchFrame) -> SwitchFrame:
-        """Return a recorded frame with the bits of the build's switches; levels are those of the newest counts."""
+        """Return a recorded frame with the bits of the build's switches; levels come from the newest counts."""
         if frame.taxels is not None:
             self._levels = self._taxels.read(frame.time_us, frame.taxels)
         turn, (closed, lost) = self._turn, self._levels
@@ -180,11 +182,11 @@ def _system(build: Build, session: Session, name: str, policy: Policy | None) ->
     if session.build != build.manifest.checksum:
         raise SettingError(
             f"{name} was recorded with another build: replay it with its own, or let "
-            "`thenar segment` find what this one sees"
+            "`thenar segment` classify it with this one"
         )
     harness = parse_harness(session.harness, name)
     scan = System.map_of(build, harness)
     system = System(build, harness, scan, session.sensors, session.calibration, policy or session.policy or Policy())
     if session.switches != system.switch_names:
-        raise SettingError(f"{name} names other switches than its build has: it is damaged")
+        raise SettingError(f"{name} names other switches than its build: it is damaged")
     return system

@@ -1,4 +1,4 @@
-"""Every device of a harness, each kept open in a thread of its own, and the newest that they delivered, joined."""
+"""Every device of a harness, each kept open in a separate thread, and their newest frames, joined."""
 
 import logging
 from collections import deque
@@ -18,20 +18,20 @@ from ..published import Count, DeviceHealth
 from ..scanning.scanmap import ScanMap
 from ..sources.base import SOURCES, ExitOf, Source
 
-# What is said of a device before it was tried for the first time.
+# The state of a device before the first attempt to open it.
 NOT_YET = "not opened yet"
 # Recovery is promised within a second of the cable's return; opening a CyberGlove takes a part of that.
 RETRY_S = 0.2
-# How long a reading may block before its thread looks whether it is to stop.
+# How long a reading may block before its thread checks whether it should stop.
 READ_S = 0.1
-# Frames that came in and were not taken yet; a loop that stalls for longer than they last loses the oldest.
+# Frames that arrived and were not taken yet; a loop that stalls for longer loses the oldest.
 _MOST_WAITING = 4096
-# How long to wait for something new where there is no device whose period would say so.
+# How long to wait for something new if there is no device with a period.
 _PATIENCE_US = 100_000
-# No device's frames count for longer.
+# No device's frames are current for longer.
 _LONGEST_WAIT_US = 60_000_000
 
-# Faults of one device that are logged with their traces; one whose text never repeats must not fill a disk.
+# Faults of one device that are logged with their traces; changing messages must not fill a disk.
 _MOST_FAULTS = 20
 
 _log = logging.getLogger("thenar")
@@ -40,13 +40,13 @@ T = TypeVar("T")
 
 
 class Readable(Protocol[T_co]):
-    """What can be kept: a `Source`, as a rule."""
+    """An object that can be kept open: usually a `Source`."""
 
     def open(self) -> object:
-        """Open it; raises DeviceError when it is not there, SettingError when no try helps."""
+        """Open it; raises DeviceError if it is not there, SettingError if no retry helps."""
 
     def read(self, timeout_s: float) -> T_co | None:
-        """Return the next sample, None if there is none in time; raises as `open` does."""
+        """Return the next sample, or None if none arrives in time; raises as `open` does."""
 
     def close(self) -> None:
         """Close it, in whatever state it is."""
@@ -54,8 +54,8 @@ class Readable(Protocol[T_co]):
 
 @dataclass(frozen=True, slots=True)
 class DeviceState:
-    """How a device fares: `error` says what is or was wrong last, opened how often it was opened, faults how often an
-    exception ended its reading that only a fault of the program explains.
+    """The state of a device: `error` is the current or last error, opened how often it was opened, faults how often an
+    exception ended its reading that only a bug in the program explains.
     """
 
     name: str
@@ -66,9 +66,9 @@ class DeviceState:
 
 
 class Keeper(Generic[T]):
-    """Keeps `device` open and hands every sample to `take`, in a thread of its own, until it is closed.
+    """Keeps `device` open and passes every sample to `take`, in a separate thread, until it is closed.
 
-    A SettingError ends it unless the device was open before: `failure` holds it, for whoever waits on the device.
+    A SettingError ends it unless the device was open before: `failure` then holds it, for callers that wait.
     """
 
     def __init__(
@@ -87,11 +87,11 @@ class Keeper(Generic[T]):
         self._thread.start()
 
     def stop(self) -> None:
-        """Let it end soon."""
+        """Make it end soon."""
         self._stop.set()
 
     def close(self) -> None:
-        """End: returns once the device is closed."""
+        """End it: returns once the device is closed."""
         self.stop()
         if self._thread.is_alive():
             self._thread.join()
@@ -104,13 +104,13 @@ class Keeper(Generic[T]):
                 self._read()
             except SettingError as wrong:
                 self._become(connected=False, error=str(wrong))
-                # What it did before it can do: only a garbled answer can say otherwise.
+                # It worked before, so it can again: only a garbled reply can say otherwise.
                 if not self.state.opened:
                     self.failure = wrong
                     return
             except DeviceError as wrong:
                 self._become(connected=False, error=str(wrong))
-            except Exception as fault:  # a fault of ours must not leave a dead thread that passes for a live device
+            except Exception as fault:  # a bug of ours must not leave a dead thread that looks like a live device
                 self._blame(f"{type(fault).__name__}: {fault}")
             finally:
                 self._let_go()
@@ -134,7 +134,7 @@ class Keeper(Generic[T]):
         """Count an exception, and log it with its trace, once: a device that opens and then fails does so for hours."""
         if fault not in self._logged and len(self._logged) < _MOST_FAULTS:
             self._logged.add(fault)
-            _log.exception("%s: a fault of the program", self.state.name)
+            _log.exception("%s: a bug in the program", self.state.name)
         self.state = replace(self.state, faults=self.state.faults + 1)
         self._become(connected=False, error=fault)
 
@@ -148,7 +148,7 @@ class Keeper(Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """The newest frames at `time_us`; all that arrived since the last time; the glove's record if it still counts."""
+    """The newest frames at `time_us`; all that arrived since the last time; the glove's record if it is current."""
 
     time_us: int
     switches: SwitchFrame | None
@@ -161,8 +161,8 @@ class Arrivals:
     """Frames from the threads of the devices, for the one thread that takes them.
 
     Each part reads some of the switches: `owned` are those of each, which share no switch; switches that no part owns
-    are always lost. What these methods share is only touched under the condition, but for `glove`, of which one
-    attribute at a time may be read without it, and `overflowed`: each is a value that is replaced whole.
+    are always lost. The shared state of these methods is only accessed under the condition, except `glove`, one
+    attribute of which may be read without it, and `overflowed`: each is a value that is replaced whole.
 
     switches    the newest frame of all parts together; None before the first
     glove       the newest record of the CyberGlove
@@ -180,7 +180,7 @@ class Arrivals:
         self._condition = Condition()
 
     def put_switches(self, part: int, frame: SwitchFrame, longest_us: int) -> None:
-        """Take in a frame of part number `part`, which counts for longest_us from the time at which it was read."""
+        """Add a frame of part number `part`, which is current for longest_us from its reading time."""
         with self._condition:
             now = now_us()
             self._parts[part][1].take(frame, now, longest_us)
@@ -190,7 +190,7 @@ class Arrivals:
             self._condition.notify_all()
 
     def put_glove(self, frame: GloveFrame, longest_us: int) -> None:
-        """Take in a record of the glove, which counts for longest_us from the time at which it was read."""
+        """Add a record of the glove, which is current for longest_us from its reading time."""
         with self._condition:
             self.glove.take(frame, now_us(), longest_us)
             self._wait_for_taking(frame)
@@ -199,9 +199,9 @@ class Arrivals:
     def take(self, patience_us: Callable[[], int] | None = None, at_most_us: int = _LONGEST_WAIT_US) -> Taken:
         """Return the newest frames, and all that arrived since the last call.
 
-        If nothing has arrived, wait for it, but no longer than at_most_us: until the first of the fresh frames is too
-        old; where none is fresh, for patience_us(). Without it, do not wait. A part of the switches that fell silent is
-        lost from then on, whether or not another one speaks.
+        If nothing has arrived, wait for it, but no longer than at_most_us: until the first of the current frames
+        expires; if none is current, for patience_us(). Without patience_us, do not wait. A part of the switches that
+        has stopped sending is lost from then on, whether or not another one sends.
         """
         with self._condition:
             now = now_us()
@@ -219,8 +219,8 @@ class Arrivals:
             return Taken(now, self.switches, glove.frame, arrived, glove.frame if now <= glove.expires_us else None)
 
     def fresh_for_us(self, now_us: int) -> int | None:
-        """Return after how many microseconds the first of the fresh frames is too old; None: none is fresh. `take` asks
-        for it under the condition.
+        """Return the microseconds until the first of the current frames expires; None: none is current. `take` calls it
+        under the condition.
         """
         switches_us, glove_us = self._joined_until_us, self.glove.expires_us
         if switches_us < now_us:
@@ -228,10 +228,10 @@ class Arrivals:
         return (switches_us if glove_us < now_us else min(switches_us, glove_us)) + 1 - now_us
 
     def _joined(self, now_us: int) -> SwitchFrame | None:
-        """Return the newest of all parts as one frame, None before the first came.
+        """Return the newest of all parts as one frame, or None before the first.
 
-        What a part owns is lost once its frame has expired, all of it when all have. The time is that of the newest
-        frame, expired or not: it never falls when a part does. It stays so until the first of the fresh frames expires.
+        The switches of a part are lost once its frame has expired, all of them when all have. The time is that of the
+        newest frame, expired or not: it never falls when a part does. It stays so until a current frame expires.
         """
         fresh: list[SwitchFrame] = []
         time_us, silent, until_us = -1, self._nobodys, -1
@@ -258,7 +258,7 @@ class Arrivals:
         return SwitchFrame(time_us, closed, lost | silent, unread, glove, taxels)
 
     def _lose(self, now_us: int) -> None:
-        """Join the parts anew, of which one may have fallen silent: that is news once."""
+        """Join the parts again, if one may have stopped sending: that is reported once."""
         switches = self._joined(now_us)
         if switches is not None and switches != self.switches:
             self.switches = switches
@@ -270,7 +270,7 @@ class Arrivals:
 
 
 def _joined_taxels(parts: Sequence[tuple[int | None, ...]]) -> tuple[int | None, ...] | None:
-    """Return the codes that the devices read, each its own taxels; None where none read any."""
+    """Return the codes of the devices, each with its own taxels; None if no device has any."""
     if len(parts) < 2:
         return parts[0] if parts else None
     return tuple(next((code for code in codes if code is not None), None) for codes in zip(*parts, strict=True))
@@ -279,13 +279,13 @@ def _joined_taxels(parts: Sequence[tuple[int | None, ...]]) -> tuple[int | None,
 class Sources:
     """The devices of `harness`, from entering this context to leaving it.
 
-    switch_names  the switches wanted, in the order of the frames' bits: a build's kept switches
-    scan          which ports of the I2C expanders to read, in which order
-    early         what ends scans early where one device reads all switches, given the joints' codes; None: nothing does
-    sensors       the joints' sensors that somebody has a use for; None: all, and all the time
-    on_demand     whether a record of the joints comes only when asked for (`ask`)
+    switch_names  the wanted switches, in the order of the frames' bits: a build's kept switches
+    scan          the ports of the I2C expanders to read, in order
+    early         ends scans early if one device reads all switches, given the joints' codes; None: nothing does
+    sensors       the joints' sensors in use; None: all, and all the time
+    on_demand     whether a record of the joints comes only on request (`ask`)
 
-    changed       whether a device came, went or failed otherwise since somebody set this to False
+    changed       whether a device came, went or failed differently since this was last set to False
 
     take(at_most_us) returns the newest frames, and all that arrived since the last call. It waits for something as long
     as the newest frames stay fresh, and for a period where none is, but no longer than at_most_us, if that is given.
@@ -320,12 +320,12 @@ class Sources:
         ]
 
     def ask(self) -> None:
-        """Ask for a record of the joints now, where they come on demand."""
+        """Request a record of the joints now, if they come on demand."""
         for glove in self._gloves:
             glove.ask()
 
     def leave_out(self, switches: Mask, joints: Mask) -> None:
-        """Say which switches and joints are scored as lost, though they are read."""
+        """Set the switches and joints that are scored as lost, though they are read."""
         for reader in self._readers:
             reader.leave_out(switches, joints)
 
@@ -337,20 +337,20 @@ class Sources:
 
     @property
     def switch_period_us(self) -> int | None:
-        """How often the switches should come at least; None where nothing reads them."""
+        """The longest expected period of the switches; None if nothing reads them."""
         return max((reader.period_us for reader in self._readers), default=None)
 
     @property
     def glove_period_us(self) -> int | None:
-        """How often the glove should send; None where there is none."""
+        """The longest expected period of the glove; None if there is none."""
         return max((glove.period_us for glove in self._gloves), default=None)
 
     def devices(self) -> tuple[DeviceState, ...]:
-        """Return how every device fares."""
+        """Return the state of every device."""
         return tuple(keeper.state for keeper in self._keepers)
 
     def health(self) -> tuple[DeviceHealth, ...]:
-        """Return how every device fares, with what its driver counts."""
+        """Return the state of every device, with its driver's counters."""
         return tuple(
             DeviceHealth(
                 state.name,
@@ -363,16 +363,16 @@ class Sources:
 
     @property
     def overflowed(self) -> int:
-        """How many frames came in that nobody took in time; a recording lacks them."""
+        """The number of frames that arrived and were not taken in time; a recording lacks them."""
         return self._arrivals.overflowed
 
     @property
     def failure(self) -> SettingError | None:
-        """Why a device can never work as glove.toml says; None: each may."""
+        """Why a device can never work as configured in glove.toml; None: each may."""
         return next((keeper.failure for keeper in self._keepers if keeper.failure is not None), None)
 
     def raise_settings(self) -> None:
-        """Raise the SettingError of a device that can never work as glove.toml says."""
+        """Raise the SettingError of a device that can never work as configured in glove.toml."""
         if self.failure is not None:
             raise self.failure
 
@@ -391,7 +391,7 @@ class Sources:
             keeper.close()
 
     def _taking(self, source: Source) -> Callable[[SwitchFrame | GloveFrame], None]:
-        """Return what takes the frames of a source, of either kind."""
+        """Return a function that takes the frames of a source, of either kind."""
         part = self._readers.index(source) if source in self._readers else None
 
         def take(frame: SwitchFrame | GloveFrame) -> None:

@@ -1,4 +1,4 @@
-"""A build and a harness put together: the devices, and the recogniser of what they deliver."""
+"""A build and a harness combined: the devices, and the recogniser of their frames."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from .sources import Sources
 
 @dataclass(frozen=True, slots=True, eq=False)
 class System:
-    """What runs: `scan` is the build's own map, or one that was planned for the harness now."""
+    """The running system: `scan` is the build's own map, or one that was planned for the harness now."""
 
     build: Build
     harness: Harness
@@ -36,12 +36,12 @@ class System:
 
     @classmethod
     def of(cls, build: Build, harness: Harness, policy: Policy | None = None) -> "System":
-        """Put `build` and `harness` together.
+        """Combine `build` and `harness`.
 
         Raises HarnessError if they do not fit, SettingError if the CyberGlove's calibration does not.
         """
         calibration = None if harness.calibration is None else load_calibration(Path(harness.calibration))
-        # A source of one's own sends the codes of the build's joints, in their order.
+        # A user's own source sends the codes of the build's joints, in order.
         names = harness.sensor_names or tuple(joint.name for joint in build.manifest.joints)
         return cls(build, harness, cls.map_of(build, harness), names, calibration, policy or Policy())
 
@@ -61,7 +61,7 @@ class System:
 
     @property
     def unread(self) -> str:
-        """A sentence on the build's joints where nothing in the harness reads them; "" where all is read."""
+        """A sentence on the build's joints if nothing in the harness reads them; "" if everything is read."""
         joints = [joint.name for joint in self.build.manifest.joints]
         if not joints or slowest_us(self.harness, self.scan, "joints") is not None:
             return ""
@@ -69,7 +69,7 @@ class System:
         return f"nothing in {self.harness.name!r} reads the build's joints, and every grasp is degraded: {how}"
 
     def recognizer(self) -> LiveRecognizer:
-        """Return a recogniser of what the devices deliver.
+        """Return a recogniser for the frames of the devices.
 
         Raises SettingError if the CyberGlove cannot serve the build.
         """
@@ -85,7 +85,7 @@ class System:
 
     @property
     def _meaning(self) -> Meaning:
-        """What the joints' bytes mean: by the calibration, or by the ranges of a stream's numbers."""
+        """The meaning of the joints' bytes: by the calibration, or by the ranges of a stream's numbers."""
         device = self.harness.joint_device
         if self.calibration is not None or not isinstance(device, StreamWiring):
             return self.calibration
@@ -93,14 +93,14 @@ class System:
 
     @property
     def on_demand(self) -> bool:
-        """Whether records are asked for only where the switches cannot decide: a sequential test needs them all."""
+        """Whether records are requested only if the switches cannot decide: a sequential test needs them all."""
         glove, reads = self.harness.cyberglove, self.build.tables.n_switches > 0 < self.build.tables.n_joints
         return reads and glove is not None and glove.mode == "demand" and self.policy.error_rate is None
 
     @property
     def read_sensors(self) -> tuple[str, ...]:
-        """The sensors that a run reads, in wire order: those of the build's joints, or all where it has none, or where
-        the harness sets no mask.
+        """The sensors that a run reads, in wire order: those of the build's joints, or all if it has none, or if the
+        harness sets no mask.
         """
         glove, joints = self.harness.cyberglove, {joint.name for joint in self.build.manifest.joints}
         some = tuple(name for name in self.sensor_names if name in joints)
@@ -108,7 +108,7 @@ class System:
 
     def sources(self, *, full_scan: bool = False, all_sensors: bool = False) -> Sources:
         """Return the devices; with `full_scan`, and for a sequential test, every scan goes to its end; with
-        `all_sensors` the CyberGlove sends those as well that the build has no use for, whether or not they decide.
+        `all_sensors` the CyberGlove also sends the sensors that the build does not use, whether or not they decide.
 
         Raises SettingError if the calibration of the taxels cannot serve the build.
         """
@@ -119,10 +119,10 @@ class System:
         return Sources(self.harness, self.switch_names, scan, early, sensors, on_demand=self.on_demand)
 
     def early_exit(self, ports: Sequence[Mask]) -> EarlyExit:
-        """Return what ends a scan of these ports early without changing any decision. Segments, and builds that refuse
-        frames, need whole ones: every half tick a scan goes to its end.
+        """Return a test that ends a scan of these ports early without changing any decision. Segments, and builds that
+        refuse frames, need whole scans: every half tick a scan goes to its end.
 
-        Hand `start` the codes of the glove's record that the recogniser will be given with the scan.
+        Pass to `start` the codes of the glove record that the recogniser will get with the scan.
         """
         policy = self.policy
         lead = policy.lead_steps(self.build.tables.scale)
@@ -131,7 +131,7 @@ class System:
         return EarlyExit(self.build.scorer, ports, lead=lead, on_demand=self.on_demand, whole_us=whole_us)
 
     def joints(self) -> Joints:
-        """Return what makes the build's joint codes of the CyberGlove's records."""
+        """Return a converter of the CyberGlove's records to the build's joint codes."""
         period_us = slowest_us(self.harness, self.scan, "joints")
         grace_us = self.policy.grace_of(period_us or 0)
         return Joints(self.build.manifest.joints, self.sensor_names, self._meaning, period_us, grace_us)

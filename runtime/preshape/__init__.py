@@ -1,4 +1,4 @@
-"""Grasp types to preshapes of a robot hand, and when to change from one to the next."""
+"""From grasp types to preshapes of a robot hand, and when to change them."""
 
 from .loading import SHIPPED, load_preshapes, preshape_selector
 from .selector import Preshape, PreshapeError, PreshapeSelector, PreshapeTable

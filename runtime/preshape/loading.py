@@ -1,4 +1,4 @@
-"""Tables of preshapes from TOML: those that ship, by name, and the user's own, by path.
+"""Tables of preshapes from TOML: shipped ones by name, and the user's by path.
 
 name = "My gripper"
 time_from_start_s = 1.0
@@ -6,12 +6,12 @@ time_from_start_s = 1.0
 [[joints]]                      # any number, in the order of the positions below
 name = "finger_joint"
 unit = "deg"                    # deg, rad, mm or m
-range = [0, 45]                 # in that unit; positions outside are refused
+range = [0, 45]                 # in that unit; positions outside are rejected
 
 [[preshapes]]
 name = "open"
-positions = [0]                 # one a joint, each in its joint's unit
-grasps = ["PoS", "CMF"]         # the grasp types, as the build spells them; "none": while nothing is held
+positions = [0]                 # one per joint, each in its joint's unit
+grasps = ["PoS", "CMF"]         # the grasp types, spelled as in the build; "none": while nothing is held
 """
 
 import math
@@ -59,7 +59,7 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def load_preshapes(name: str | os.PathLike[str]) -> PreshapeTable:
-    """Return a table that ships with thenar, by its name (one of SHIPPED), or the user's own, by its path.
+    """Return a table shipped with thenar, by its name (one of SHIPPED), or the user's, by its path.
 
     Raises PreshapeError naming the file, its line and the key.
     """
@@ -78,10 +78,10 @@ def load_preshapes(name: str | os.PathLike[str]) -> PreshapeTable:
 def preshape_selector(
     name: str | os.PathLike[str], build: "Build", *, segments: bool = True, change_while_held: bool = False
 ) -> tuple[PreshapeSelector, str]:
-    """Return what selects from a table for a build, and a sentence on grasp types for which it has no preshape, or "".
+    """Return a selector for a build, and a sentence on grasp types that have no preshape, or "".
 
-    It selects by `segments` where the build was trained with rows in which nothing is held, otherwise by the grasp type
-    alone: a build that only refuses frames misses most of the times at which contact is lost.
+    It selects by `segments` if the build was trained with rows in which nothing is held, otherwise by the grasp type
+    alone: a build that only refuses frames misses most losses of contact.
 
     Raises PreshapeError.
     """
@@ -97,7 +97,7 @@ def _find(name: str | os.PathLike[str]) -> Traversable:
     if not path.exists():
         raise PreshapeError(
             f"there is neither a file {path} nor a table of that name{nearest(str(name), SHIPPED)}: "
-            "name a table that ships, or the path of your own"
+            "name a shipped table, or the path of your own"
         )
     return path
 
@@ -110,7 +110,7 @@ def _check_name(source: TomlText, place: Place, name: str) -> None:
 def _check_once(source: TomlText, place: Place, kind: str, name: str, seen: set[str]) -> None:
     _check_name(source, place, name)
     if name in seen:
-        raise source.error(place, f"{kind} {name!r} is there already")
+        raise source.error(place, f"{kind} {name!r} is named twice")
     seen.add(name)
 
 
@@ -121,7 +121,7 @@ def _check_joints(source: TomlText, content: _File) -> None:
     for number, joint in enumerate(content.joints):
         _check_once(source, ("joints", number, "name"), "joint", joint.name, seen)
         if joint.range[0] > joint.range[1]:
-            raise source.error(("joints", number, "range"), "must be the lowest position and then the highest")
+            raise source.error(("joints", number, "range"), "must be the lowest and then the highest position")
 
 
 def _check_preshapes(source: TomlText, content: _File) -> None:
@@ -134,7 +134,7 @@ def _check_preshapes(source: TomlText, content: _File) -> None:
         for index, grasp in enumerate(entry.grasps):
             _check_name(source, (*place, "grasps", index), grasp)
             if grasp in grasps:
-                raise source.error((*place, "grasps", index), f"{grasp!r} takes preshape {grasps[grasp]!r} already")
+                raise source.error((*place, "grasps", index), f"{grasp!r} already has preshape {grasps[grasp]!r}")
             grasps[grasp] = entry.name
     if not grasps:
         raise source.error(("preshapes",), "must name at least one grasp type")
@@ -142,7 +142,7 @@ def _check_preshapes(source: TomlText, content: _File) -> None:
 
 def _check_positions(source: TomlText, place: Place, entry: _Entry, joints: tuple[_Joint, ...]) -> None:
     if len(entry.positions) != len(joints):
-        raise source.error(place, f"must be {len(joints)} positions, one a joint, not {len(entry.positions)}")
+        raise source.error(place, f"must be {len(joints)} positions, one per joint, not {len(entry.positions)}")
     for number, (position, joint) in enumerate(zip(entry.positions, joints, strict=True)):
         low, high = joint.range
         if not low <= position <= high:

@@ -1,5 +1,5 @@
-"""Preshapes of a robot hand, and when it shall change from one to the next: only on a grasp type that is sure, and has
-been for a moment.
+"""Preshapes of a robot hand, and when to change from one to the next: only after a grasp type has been certain for a
+moment.
 """
 
 from collections.abc import Iterable, Mapping
@@ -13,16 +13,16 @@ from ..published import NONE, UNKNOWN, LiveGrasp
 
 
 class PreshapeError(ThenarError, ValueError):
-    """A table of preshapes cannot be used as it stands, or not with this build."""
+    """A table of preshapes cannot be used as it is, or not with this build."""
 
 
 class Preshape(msgspec.Struct, frozen=True):
-    """One point of a trajectory, as trajectory_msgs/JointTrajectory has it.
+    """One point of a trajectory, as in trajectory_msgs/JointTrajectory.
 
-    name               what the table calls it; several grasp types may share a preshape
+    name               its name in the table; several grasp types may share a preshape
     joint_names        the robot's joints, in the table's order
-    positions          one a joint: rad for a joint that turns, m for one that slides, as everywhere in ROS
-    time_from_start_s  when the hand shall be there, counted from the moment it is told
+    positions          one per joint: rad for a joint that turns, m for one that slides, as usual in ROS
+    time_from_start_s  when the hand must arrive, counted from the moment of sending
     """
 
     name: str
@@ -33,18 +33,18 @@ class Preshape(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class PreshapeTable:
-    """The preshapes of one robot hand: `chosen` holds one for every grasp type that the table names.
+    """The preshapes of one robot hand: `chosen` holds one for every grasp type in the table.
 
-    It may name "none" as well: what opens the hand while nothing is held.
+    The table may also name "none": the preshape that opens the hand while nothing is held.
     """
 
     name: str
     chosen: Mapping[str, Preshape]
 
     def check(self, grasps: Iterable[str]) -> str:
-        """Return what is missing for a build that recognises `grasps`, as a sentence for the user, or nothing.
+        """Return a sentence about grasp types of the build (`grasps`) that have no preshape, or "" if all have one.
 
-        Raises PreshapeError if the table names none of them: it is for another taxonomy.
+        Raises PreshapeError if the table names none of them, since it is for another taxonomy.
         """
         wanted = tuple(grasp for grasp in grasps if grasp != NONE)
         missing = tuple(grasp for grasp in wanted if grasp not in self.chosen)
@@ -53,9 +53,9 @@ class PreshapeTable:
         if len(missing) == len(wanted):
             raise PreshapeError(
                 f"preshapes {self.name}: none of the build's grasp types ({list_names(wanted)}) is among the table's "
-                f"({list_names(tuple(self.chosen))}): take a table for the taxonomy of the build"
+                f"({list_names(tuple(self.chosen))}): use a table for the taxonomy of the build"
             )
-        return f"preshapes {self.name}: none for {', '.join(missing)}: nothing is sent to the hand on those"
+        return f"preshapes {self.name}: none for {', '.join(missing)}: nothing is sent to the hand for those"
 
 
 MIN_PROBABILITY = 0.8
@@ -65,14 +65,14 @@ SETTLE_MS = 100
 class PreshapeSelector:
     """Holds the last confident preshape.
 
-    It changes to another only when that one was called for by every frame of the last `settle_ms`, each with at least
-    `min_probability`. In between it answers with the preshape that it holds; on "unknown", and on a grasp type that the
-    table does not name, with none: whoever moves the hand then leaves it where it is. While nothing is held it goes on
-    with what it holds, unless the table names a preshape for "none".
+    It changes to another only if every frame of the last `settle_ms` called for that one, each with at least
+    `min_probability`. Until then it returns the preshape that it holds. On "unknown", and on a grasp type missing from
+    the table, it returns None, and the hand stays where it is. While nothing is held, the last preshape stays, unless
+    the table names one for "none".
 
-    With `segments`, the type of the segment calls, while it forms and while it is held; of a build that knows none.
-    Once the preshape of a held segment is taken, it changes only after nothing was held, unless `change_while_held`.
-    Otherwise `LiveGrasp.grasp` calls.
+    With `segments`, the type of the segment calls for a preshape, while it forms and while it is held, if the build
+    knows "none". Once the preshape of a held segment is taken, it changes only after nothing was held, unless
+    `change_while_held`. Without `segments`, `LiveGrasp.grasp` calls for it.
     """
 
     __slots__ = (
@@ -98,9 +98,9 @@ class PreshapeSelector:
     ) -> None:
         """Raise PreshapeError unless 0 <= min_probability <= 1 and settle_ms >= 0."""
         if not 0 <= min_probability <= 1:
-            raise PreshapeError(f"the least probability of a preshape lies between 0 and 1, not at {min_probability}")
+            raise PreshapeError(f"the minimum probability of a preshape must be between 0 and 1, not {min_probability}")
         if not settle_ms >= 0:
-            raise PreshapeError(f"a preshape settles within 0 ms or more, not {settle_ms}")
+            raise PreshapeError(f"the settle time of a preshape must be 0 ms or more, not {settle_ms}")
         self._table = table
         self._min_probability = min_probability
         self._settle_us = settle_ms * 1000
@@ -111,7 +111,7 @@ class PreshapeSelector:
         self._locked = False
 
     def update(self, grasp: LiveGrasp) -> Preshape | None:
-        """Return the preshape that the hand shall have now, or None where it shall be told nothing."""
+        """Return the preshape that the hand should have now, or None to send it nothing."""
         type_, probability = grasp.grasp, grasp.probability
         if self._segments:
             type_, probability = grasp.segment_type, 1.0 if grasp.state == "none" else grasp.segment_probability

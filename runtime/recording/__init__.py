@@ -1,1 +1,1 @@
-"""Raw frames in MCAP files, which survive whatever ends the process."""
+"""Raw frames in MCAP files that survive however the process ends."""

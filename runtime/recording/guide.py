@@ -1,6 +1,6 @@
-"""Guided collection: which grasp comes next, what the wearer is shown, what a key means, when a grasp is captured.
+"""Guided collection: the next grasp, the display, the meaning of keys, and the time of capture.
 
-No terminal, no device and no clock in here: frames, keys and the time come in, labels go to a Recorder.
+It has no terminal, device or clock: frames, keys and the time come in, labels go to a Recorder.
 """
 
 import random
@@ -22,7 +22,7 @@ from .writer import Recorder
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One grasp to record: its number in the collection, from 1, its type and its object; of none, its movement."""
+    """One grasp to record: its number in the collection, from 1, its type and its object; for none, its movement."""
 
     number: int
     grasp: str
@@ -31,8 +31,8 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class Journal:
-    """A collection that was begun: its first session, the accepted trials in the order in which they were accepted, and
-    where to go on.
+    """A collection that was begun: its first session, the accepted trials in the order of acceptance, and the place to
+    continue.
     """
 
     path: Path
@@ -42,29 +42,29 @@ class Journal:
 
 
 def planned(collection: Collection) -> tuple[Trial, ...]:
-    """Return the trials of a collection: every task so many times, its objects by turns, all in one random order.
+    """Return the trials of a collection: every task repeated, with its objects by turns, all in one random order.
 
-    So the paper collected: each type 100 times with two objects, in random order. Equal collections give equal plans.
-    Raises SettingError if there are more than a million trials.
+    The paper collected in the same way: each type 100 times with two objects, in random order. Equal collections give
+    equal plans. Raises SettingError if there are more than a million trials.
     """
     if len(collection.tasks) * collection.repetitions > MOST_TRIALS:
         raise SettingError(
             f"{len(collection.tasks)} grasp types of {collection.repetitions} repetitions each are more than "
-            f"{MOST_TRIALS} trials: take fewer repetitions"
+            f"{MOST_TRIALS} trials: use fewer repetitions"
         )
     grasps = [
         (task.grasp, task.objects[repetition % len(task.objects)])
         for task in collection.tasks
         for repetition in range(collection.repetitions)
     ]
-    # Of all its methods only random() gives the same numbers in every Python to come.
+    # Of all its methods only random() is guaranteed to give the same numbers in every future Python.
     draw = random.Random(collection.seed).random
     ordered = sorted((draw(), place) for place in range(len(grasps)))
     return tuple(Trial(number, *grasps[place]) for number, (_, place) in enumerate(ordered, start=1))
 
 
 def read_journal(path: Path) -> Journal:
-    """Return the collection that a recording holds. Raises McapError, SettingError where it is none, or OSError."""
+    """Return the collection in a recording. Raises McapError, SettingError if it has none, or OSError."""
     reader = Reader(path)
     first = reader.session
     if first.collection is None:
@@ -82,14 +82,14 @@ def read_journal(path: Path) -> Journal:
     return Journal(path, first, tuple(accepted), reader.tail)
 
 
-# A frame this old was not read while the grasp was held.
+# A frame of this age was not read while the grasp was held.
 FRESH_US = 200_000
-# So long the empty hand moves in a trial of none.
+# Time for which the empty hand moves in a trial of none.
 MOVING_US = 2_000_000
 
 
 class Stage(Enum):
-    """Where a collection stands: before its first countdown, counting, while the empty hand moves, with a captured
+    """The stage of a collection: before its first countdown, counting, while the empty hand moves, with a captured
     trial to judge, paused, with no trial left, or over.
     """
 
@@ -103,7 +103,7 @@ class Stage(Enum):
 
 
 class Key(Enum):
-    """What the keys mean: go on (and accept), do it again, undo the trial before, leave this one out, pause, leave."""
+    """The meanings of keys: continue (and accept), repeat, undo the previous trial, skip this one, pause, leave."""
 
     ACCEPT = "accept"
     REDO = "redo"
@@ -119,34 +119,34 @@ _OFFERED: dict[Stage, dict[Key, str]] = {
     Stage.COUNTDOWN: _UNDER_WAY,
     Stage.MOVING: _UNDER_WAY,
     Stage.REVIEW: {Key.ACCEPT: "keep it, next grasp", Key.REDO: "do it again"},
-    Stage.PAUSED: {Key.ACCEPT: "go on"},
+    Stage.PAUSED: {Key.ACCEPT: "continue"},
     Stage.DONE: {Key.ACCEPT: "finish"},
     Stage.OVER: {},
 }
-# Keys that are not offered and yet mean something.
+# Keys that are not offered but still work.
 _ALSO = {
     (Stage.READY, Key.REDO): Key.ACCEPT,
     (Stage.PAUSED, Key.REDO): Key.ACCEPT,
     (Stage.PAUSED, Key.PAUSE): Key.ACCEPT,
 }
-# Here a trial waits for somebody to start it.
+# In these stages a trial waits for the user to start it.
 _WAITING = (Stage.READY, Stage.PAUSED)
 
 
 class Guide:
-    """Leads through `trials`: countdown, capture, judgement, one key a trial.
+    """Leads through `trials`: countdown, capture, judgement, one key per trial.
 
-    stage, trial  where it stands (trial: None when none is left)
-    done          how many trials are accepted, those of earlier sittings included
-    skipped       how many were left out here; they come again in another sitting
-    problem       why nothing could be captured, as a sentence; "" when all was well
+    stage, trial  the current state (trial: None if none is left)
+    done          number of accepted trials, those of earlier sittings included
+    skipped       number of trials skipped here; they come again in another sitting
+    problem       why nothing could be captured, as a sentence; "" without a problem
     step          counts every change of stage or trial
     """
 
     def __init__(
         self, trials: Sequence[Trial], recorder: Recorder, countdown_us: int, accepted: Sequence[int] = ()
     ) -> None:
-        """Lead through those of `trials` that are not `accepted`, by their numbers in the order in which they were.
+        """Lead through the `trials` whose numbers are not `accepted`; these are in the order of acceptance.
 
         The recorder's session must have a collection.
         """
@@ -168,12 +168,12 @@ class Guide:
 
     @property
     def done(self) -> int:
-        """How many trials are accepted."""
+        """The number of accepted trials."""
         return sum(accepted for _, accepted in self._past)
 
     @property
     def skipped(self) -> int:
-        """How many trials were left out in this sitting."""
+        """The number of trials skipped in this sitting."""
         return len(self._past) - self.done
 
     @property
@@ -187,7 +187,7 @@ class Guide:
         return self._switches, self._glove
 
     def offered(self) -> dict[Key, str]:
-        """Return the keys that do something now, and what they do."""
+        """Return the keys that are active now, and their effects."""
         if self.stage is Stage.OVER:
             return {}
         found = dict(_OFFERED[self.stage])
@@ -196,15 +196,15 @@ class Guide:
         if self._past:
             found[Key.UNDO] = f"undo the last ({self._past[-1][0].grasp})"
         if self._left:
-            found[Key.QUIT] = "leave, and go on another time" if self.stage in _WAITING else "leave"
+            found[Key.QUIT] = "leave, and continue another time" if self.stage in _WAITING else "leave"
         return found
 
     def seconds_left(self, now_us: int) -> float:
-        """Return what is left of the countdown, or of the movement."""
+        """Return the time left of the countdown, or of the movement."""
         return max(0, self._zero_us - now_us) / 1e6
 
     def take(self, now_us: int, arrived: Sequence[SwitchFrame | GloveFrame]) -> None:
-        """Record what came in, but for a pause; where the countdown has ended, capture the grasp, or begin the movement
+        """Record the arrived frames, except in a pause; after the countdown, capture the grasp, or begin the movement
         of the empty hand, which is captured when its time has passed. Raises FrameError.
         """
         for frame in arrived:
@@ -219,7 +219,7 @@ class Guide:
             self._capture(now_us)
 
     def press(self, now_us: int, key: Key) -> None:
-        """Do what `key` asks for, if it means anything now."""
+        """Carry out `key`, if it is active now."""
         key = _ALSO.get((self.stage, key), key)
         if self.stage is Stage.OVER or key not in {*self.offered(), Key.QUIT}:
             return
@@ -239,13 +239,13 @@ class Guide:
             self._begin(now_us)
 
     def _judge(self, now_us: int, event: Event) -> None:
-        """Be done with this trial, and go on to the next."""
+        """Finish this trial, and go on to the next."""
         self._label(now_us, event)
         self._past.append((self._left.pop(), event == "accepted"))
         self._turn(now_us)
 
     def _undo(self, now_us: int) -> None:
-        """Return to the trial before; one that was captured and not judged yet is dropped."""
+        """Return to the previous trial, dropping one that was captured but not judged."""
         if self.stage is Stage.REVIEW:
             self._label(now_us, "redone")
         self._left.append(self._past.pop()[0])
@@ -255,7 +255,7 @@ class Guide:
         self._turn(now_us)
 
     def _turn(self, now_us: int) -> None:
-        """Begin the trial that is next now, or wait for somebody to start it if this one waited, too."""
+        """Begin the next trial, or wait for the user to start it if this one waited, too."""
         if self._left and self.stage in _WAITING:
             self.problem = ""
             self._become(self.stage)

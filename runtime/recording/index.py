@@ -1,8 +1,8 @@
-"""`Index`: where in a recording's file each moment is, so that it can be read from anywhere.
+"""`Index`: the file positions of a recording's moments, so that it can be read from anywhere.
 
-A recording is neither chunked nor indexed, for it must survive the death of its writer. So it is scanned once, most of
-its messages undecoded; what was scanned can be read at once, while the rest still is. Of a file that is cut or damaged
-all that stands before the fault can be read.
+A recording is neither chunked nor indexed, because it must survive the death of its writer. So it is scanned once, most
+of its messages undecoded; the scanned part can be read at once, during the scan. A truncated or damaged file can be
+read up to the fault.
 """
 
 from array import array
@@ -18,7 +18,7 @@ from .reader import Decoder, Entry, Reader
 from .records import End, RawRecord, RecordStream
 from .session import Session
 
-# From one place that is noted to the next.
+# Distance from one recorded position to the next.
 _STEP_NS = 200_000_000
 _LOG_NS = slice(6, 14)
 _TIMED = {Opcode.MESSAGE, Opcode.CHUNK}
@@ -26,16 +26,16 @@ _MANY = {SWITCHES, GLOVE, GRASP, TAXELS, RECOGNITION}
 
 
 class Index:
-    """The places of a recording: 16 bytes for a fifth of a second of it.
+    """The positions of a recording: 16 bytes for a fifth of a second of it.
 
     session   the first one
-    first_us, last_us   the span that was scanned so far, in microseconds since 1970; None before the first message
-    scanned, size       how many bytes of how many were scanned
-    fault     why nothing more can be read; "" while nothing is wrong
+    first_us, last_us   the span scanned so far, in microseconds since 1970; None before the first message
+    scanned, size       number of bytes scanned, and in total
+    fault     why nothing more can be read; "" if there is no fault
     """
 
     def __init__(self, path: Path) -> None:
-        """Raises McapError if `path` is no recording of thenar's, OSError as it comes."""
+        """Raise McapError if `path` is not a recording of thenar, OSError as it comes."""
         self.path, self.session = path, Reader(path).session
         self._head, self._sessions = list[RawRecord](), list[tuple[int, RawRecord]]()
         self._times, self._offsets = array("q"), array("q")
@@ -44,16 +44,16 @@ class Index:
         self.scanned, self.size, self.fault = 0, path.stat().st_size, ""
 
     def scan(self, every_us: int = 0) -> Iterator[tuple[int, Entry]]:
-        """Yield entries with their moments in microseconds since 1970, and note where they are.
+        """Yield entries with their moments in microseconds since 1970, and record their positions.
 
-        Of recognitions one in `every_us` is decoded, and no frame; with 0 all are.
+        One prediction per `every_us` is decoded, and no frame; with 0 all are.
         """
         decoder, due_ns, in_data = Decoder(Tail()), 0, True
         stream = RecordStream(self.path)
         self.size = stream.size
         try:
             for record in stream:
-                # What follows repeats what is known, but says whether the file is whole.
+                # The rest repeats known content, but shows whether the file is whole.
                 in_data = in_data and record.opcode != Opcode.DATA_END
                 if not in_data:
                     continue
@@ -80,8 +80,8 @@ class Index:
         self.scanned = self.size
 
     def since(self, unix_us: int) -> Iterator[tuple[int, Entry]]:
-        """Yield all entries from a fifth of a second or more before a moment on, their session first, with theirs;
-        from the first one on of a moment before all, and to the end of what was scanned when this is called.
+        """Yield all entries from a fifth of a second or more before a moment on, preceded by their session, up to the
+        end of the part scanned when this is called; from the first one on if the moment is before all.
         """
         at = max(bisect_right(self._times, 1000 * unix_us - _STEP_NS) - 1, 0)
         if not len(self._offsets):
@@ -100,7 +100,7 @@ class Index:
                 yield _unix_us(entry, decoder), entry
 
     def _note(self, record: RawRecord) -> int:
-        """Note the place of a message or chunk, if the newest place lies back far enough; return its time."""
+        """Record the position of a message or chunk, if the newest is far enough back; return its time."""
         if record.opcode not in _TIMED or record.content is None or not self._sessions:
             return 0
         content = record.content
@@ -123,7 +123,7 @@ def _entries(decoder: Decoder, record: RawRecord) -> Iterator[Entry]:
 
 
 def _unix_us(entry: Entry, decoder: Decoder) -> int:
-    """Return when an entry was, in microseconds since 1970."""
+    """Return the time of an entry, in microseconds since 1970."""
     clock_us = decoder.session.clock_ns // 1000 if decoder.session is not None else 0
     return clock_us if isinstance(entry, Session) else clock_us + entry.time_us
 

@@ -1,8 +1,8 @@
-"""How a recording is laid out as MCAP: its channels, how it begins, and how it ends.
+"""The layout of a recording as MCAP: its channels, its beginning, and its end.
 
-Neither chunked nor compressed: a record is whole in the file as soon as it is written, so that a process that is killed
+It is neither chunked nor compressed: a record is whole in the file as soon as it is written, so that a killed process
 loses at most the record that it was writing. All messages are standard ROS 2 messages in CDR under the profile `ros2`,
-with their definitions embedded: Foxglove shows them, `ros2 bag` plays them, and neither needs a package of ours.
+with their definitions embedded: Foxglove shows them, `ros2 bag` plays them, and neither needs a package of thenar.
 (MCAP specification, appendix `ros2`; rosbag2_storage_mcap, which reads a file without message indices in its order.)
 """
 
@@ -20,14 +20,14 @@ from .messages import BYTES, DEFINITIONS, STRING
 from .session import METADATA, Session, from_metadata, to_metadata
 
 MAGIC = b"\x89MCAP0\r\n"
-# More than any record of ours holds. Read as JSON a record takes some twenty times its length.
+# Longer than any record of ours. Parsed as JSON a record takes about twenty times its length.
 LARGEST_RECORD = 16 << 20
-# What the name of the program in the file's header begins with.
+# Prefix of the program's name in the file's header.
 WRITER = "thenar "
 
 SWITCHES, GLOVE, GRASP, RECOGNITION, TRIALS, TAXELS, MARKS = range(1, 8)
-# Channel number: (topic, type of its messages). That of taxels is there only where the glove has some, that of marks
-# where somebody can set one.
+# Channel number: (topic, type of its messages). The taxels' channel exists only if the glove has taxels, that of marks
+# only if marks can be set.
 CHANNELS = {
     SWITCHES: ("/thenar/switches", BYTES),
     GLOVE: ("/thenar/glove", BYTES),
@@ -42,8 +42,8 @@ _SCHEMAS = {name: number for number, name in enumerate(DEFINITIONS, start=1)}
 
 @dataclass(slots=True)
 class Tail:
-    """What the end of a recording says of it: length and CRC-32 of the data section so far, messages a channel, times
-    of the first and the last (nanoseconds since 1970), place and length of every session's record.
+    """The content of a recording's end: length and CRC-32 of the data section so far, messages per channel, times of
+    the first and the last (nanoseconds since 1970), place and length of every session's record.
     """
 
     size: int = 0
@@ -70,14 +70,14 @@ class Tail:
 
 
 def beginning(version: str, tail: Tail | None = None) -> bytes:
-    """Return what a recording by this version of thenar, with the channels that `tail` counts, begins with, up to its
+    """Return the first bytes of a recording by this version of thenar, with the channels that `tail` counts, up to its
     first session.
     """
     return MAGIC + _written(Header("ros2", f"{WRITER}{version}"), *_schemas(), *_channels(tail or Tail()))
 
 
 def session_record(session: Session) -> bytes:
-    """Return the record that begins a session. Raises SettingError if no reader would take it."""
+    """Return the record that begins a session. Raises SettingError if no reader would accept it."""
     texts = to_metadata(session)
     try:
         from_metadata(texts)
@@ -86,14 +86,14 @@ def session_record(session: Session) -> bytes:
     record = _written(Metadata(METADATA, texts))
     if len(record) > LARGEST_RECORD:
         raise SettingError(
-            f"the description of this glove takes {len(record)} bytes, {LARGEST_RECORD} at most are recorded: "
+            f"the description of this glove takes {len(record)} bytes, and at most {LARGEST_RECORD} are recorded: "
             "shorten glove.toml, or the names in it"
         )
     return record
 
 
 def ending(tail: Tail) -> bytes:
-    """Return what closes a recording: the end of its data, a summary, the footer."""
+    """Return the bytes that close a recording: the end of its data, a summary, the footer."""
     data_end = _written(DataEnd(tail.crc))
     indices = [MetadataIndex(offset, length, METADATA) for offset, length in tail.sessions]
     summary = _written(*_schemas(), *_channels(tail), _statistics(tail), *indices)
@@ -109,7 +109,7 @@ def _schemas() -> list[McapRecord]:
 
 
 def _channels(tail: Tail) -> list[McapRecord]:
-    # The profile demands the key; empty, a player takes its own settings.
+    # The profile requires the key; if it is empty, a player uses its own settings.
     qos = {"offered_qos_profiles": ""}
     return [
         Channel(number, topic, "cdr", qos, _SCHEMAS[name])

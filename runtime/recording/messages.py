@@ -8,7 +8,7 @@ A switch's byte has bit 0 set when it is closed, bit 1 when it could not be read
 1 closed, 2 or more not known. Where switches were left unread because of a record of the glove, that record follows
 them: its time in microseconds of the host's monotonic clock (8 bytes, little-endian), then its bytes. The bytes of a
 glove are its sensors in wire order, then its status byte if it sends one. The codes of taxels, two bytes each,
-little-endian, FFFF for one that was not read, stand before the switches that were read with them.
+little-endian, FFFF for one that was not read, come before the switches that were read with them.
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ _BYTES = Struct("<4sIII")
 _RULE = "=" * 80
 
 STRING, BYTES = "std_msgs/msg/String", "std_msgs/msg/UInt8MultiArray"
-# As `ros2 bag record` embeds them: the definition, then those that it rests on.
+# As embedded by `ros2 bag record`: the definition, then the definitions that it uses.
 DEFINITIONS = {
     STRING: "string data\n",
     BYTES: (
@@ -80,12 +80,12 @@ _SPREAD = [bytes(byte >> bit & 1 for bit in range(8)) for byte in range(256)]
 
 
 def switch_bytes(frame: SwitchFrame, switches: int, sensors: int) -> bytes:
-    """Return a byte for each of so many switches, and the record of so many sensors that the frame rests on, if any.
+    """Return a byte for each of `switches`, and the record of `sensors` that the frame depends on, if any.
 
-    Raises FrameError if the frame is not of so many.
+    Raises FrameError if the frame has other numbers of them.
     """
     if (frame.closed | frame.lost | frame.unread) >> switches:
-        raise FrameError(f"a frame with bits beyond the {switches} switches that are recorded")
+        raise FrameError(f"a frame has bits beyond the {switches} recorded switches")
     states = _spread(frame.closed, switches)
     if frame.lost or frame.unread:
         lost, unread = _spread(frame.lost, switches), _spread(frame.unread, switches)
@@ -96,10 +96,10 @@ def switch_bytes(frame: SwitchFrame, switches: int, sensors: int) -> bytes:
 
 
 def switch_frame(time_us: int, data: bytes, switches: int, sensors: int) -> SwitchFrame:
-    """Return the frame that `switch_bytes` made. Raises McapError."""
+    """Return the frame written by `switch_bytes`. Raises McapError."""
     states, rest = data[:switches], data[switches:]
     if len(states) < switches or 0 < len(rest) < _TIME_BYTES:
-        raise McapError(f"holds {len(data)} bytes, its session names {switches} switches")
+        raise McapError(f"holds {len(data)} bytes, but its session names {switches} switches")
     array = np.frombuffer(states, np.uint8)
     if switches and int(array.max()) > _CLOSED | _LOST | _UNREAD:
         raise McapError(f"holds a switch in state {int(array.max())}")
@@ -114,17 +114,17 @@ def switch_frame(time_us: int, data: bytes, switches: int, sensors: int) -> Swit
 
 
 def glove_bytes(frame: GloveFrame, sensors: int) -> bytes:
-    """Return the record of so many sensors. Raises FrameError if it has another number."""
+    """Return the record of `sensors` sensors. Raises FrameError if it has another number."""
     if len(frame.sensors) != sensors:
-        found = f"a record of {len(frame.sensors)} sensors, {sensors} are recorded"
-        raise FrameError(f"{found}: say under [cyberglove] of glove.toml how many there are")
+        found = f"a record has {len(frame.sensors)} sensors, but {sensors} are recorded"
+        raise FrameError(f"{found}: set the number under [cyberglove] of glove.toml")
     return frame.sensors if frame.status is None else frame.sensors + bytes((frame.status,))
 
 
 def glove_frame(time_us: int, data: bytes, sensors: int) -> GloveFrame:
-    """Return the frame that `glove_bytes` made. Raises McapError."""
+    """Return the frame written by `glove_bytes`. Raises McapError."""
     if len(data) - sensors not in (0, 1):
-        raise McapError(f"holds {len(data)} bytes, its session names {sensors} sensors")
+        raise McapError(f"holds {len(data)} bytes, but its session names {sensors} sensors")
     return GloveFrame(time_us, data[:sensors], data[sensors] if len(data) > sensors else None)
 
 
@@ -132,18 +132,18 @@ _NOT_READ = 0xFFFF
 
 
 def taxel_bytes(codes: Sequence[int | None], taxels: int) -> bytes:
-    """Return the codes of so many taxels. Raises FrameError if it has another number, or a code does not fit."""
+    """Return the bytes of `taxels` codes. Raises FrameError for another number of codes, or one that does not fit."""
     if len(codes) != taxels:
-        raise FrameError(f"a frame of {len(codes)} taxels, {taxels} are recorded")
+        raise FrameError(f"a frame has {len(codes)} taxels, but {taxels} are recorded")
     if any(code is not None and not 0 <= code < _NOT_READ for code in codes):
-        raise FrameError(f"a taxel's code lies outside 0..{_NOT_READ - 1}")
+        raise FrameError(f"a taxel's code is outside 0..{_NOT_READ - 1}")
     return Struct(f"<{taxels}H").pack(*(_NOT_READ if code is None else code for code in codes))
 
 
 def taxel_codes(data: bytes, taxels: int) -> tuple[int | None, ...]:
-    """Return the codes that `taxel_bytes` wrote. Raises McapError."""
+    """Return the codes written by `taxel_bytes`. Raises McapError."""
     if len(data) != 2 * taxels:
-        raise McapError(f"holds {len(data)} bytes, its session names {taxels} taxels")
+        raise McapError(f"holds {len(data)} bytes, but its session names {taxels} taxels")
     return tuple(None if code == _NOT_READ else code for code in Struct(f"<{taxels}H").unpack(data))
 
 

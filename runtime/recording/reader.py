@@ -1,4 +1,4 @@
-"""A recording read back: sessions, frames, recognitions and labels in the order in which they were written."""
+"""Read a recording back: sessions, frames, predictions and labels in the order in which they were written."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -32,16 +32,16 @@ _DECODERS: dict[int, Callable[[bytes], LiveGrasp | Label | Mark]] = {
     TRIALS: msgspec.json.Decoder(Label).decode,
     MARKS: msgspec.json.Decoder(Mark).decode,
 }
-# What the library's records answer bad bytes with.
+# Errors that the library's records raise on bad bytes.
 _UNREADABLE = (LibraryError, error, UnicodeDecodeError, OverflowError)
-# Beyond them no time and no count of a recording lies.
+# Limits that no valid time or count of a recording exceeds.
 _LEAST, _LARGEST = -(2**63), 2**63 - 1
 _REASON = 200
 
 
 @dataclass(slots=True)
 class Passed:
-    """Records, or parts of them, that were passed over: how many, and the first few with their places."""
+    """Records, or parts of them, that were skipped: how many, and the first few with their places."""
 
     count: int = 0
     first: list[str] = field(default_factory=list)
@@ -54,13 +54,13 @@ class Passed:
 
 
 class Decoder:
-    """Takes the records of a data section one by one.
+    """Decodes the records of a data section one by one.
 
-    session  whose messages come now; None before the first
+    session  the session of the next messages; None before the first
     ours     whether the file says that thenar wrote it
     foreign  whether another program has packed, numbered or added something
-    passed   what was passed over
-    broken   the offset of a chunk that does not match its checksum; None: all do
+    passed   the skipped records
+    broken   the offset of a chunk that does not match its checksum; None: all match
     """
 
     def __init__(self, tail: Tail) -> None:
@@ -76,12 +76,12 @@ class Decoder:
         self._codes: tuple[int | None, tuple[int | None, ...]] = None, ()
 
     def channel(self, content: bytes) -> int | None:
-        """Return which of our channels a message is of; None of a foreign one, and of one that is cut short."""
+        """Return our channel of a message; None for a foreign or truncated one."""
         return self._channels.get(int.from_bytes(content[:2], "little")) if len(content) >= _MESSAGE.size else None
 
     def entries(self, record: RawRecord) -> Iterator[Entry]:
-        """Yield what the record holds. Raises McapError, which goes on from "the record at byte 17 "."""
-        # Indices of its messages follow a chunk. They repeat what it holds.
+        """Yield the record's entries. Raises McapError, whose text continues "the record at byte 17 "."""
+        # Indices of its messages follow a chunk. They repeat its content.
         self._indexed = self._indexed and record.opcode == Opcode.MESSAGE_INDEX
         content = record.content
         if content is None or (record.opcode != Opcode.CHUNK and len(content) > LARGEST_RECORD):
@@ -98,7 +98,7 @@ class Decoder:
             yield from self._described(record, content)
 
     def _described(self, record: RawRecord, content: bytes) -> Iterator[Session]:
-        """Take a record that says what others mean."""
+        """Take a record that describes others."""
         if record.opcode == Opcode.HEADER:
             self.ours = self._parsed(Header, record, content).library.startswith(WRITER)
         elif record.opcode == Opcode.METADATA:
@@ -113,14 +113,14 @@ class Decoder:
         """Return the content of a record as the library's `kind`. Raises McapError."""
         found, rest = parsed(kind, content)
         if rest:
-            # MCAP lets later versions add fields. This version of it has none.
+            # MCAP lets later versions add fields. This version of the record has none.
             self.foreign = True
             self.passed.add(f"{rest} bytes more than a {kind.__name__.lower()} has", record.end - rest)
         return found
 
     def _message(self, content: bytes) -> Entry | None:
         if len(content) < _MESSAGE.size:
-            raise McapError("is a message cut short")
+            raise McapError("is a truncated message")
         number, _, logged_ns, published_ns = _MESSAGE.unpack_from(content)
         if number not in self._channels:
             raise McapError(f"is a message of channel {number}, which the file does not name")
@@ -151,7 +151,7 @@ class Decoder:
         before, session = self.session, from_metadata(metadata.metadata)
         if before is not None and _wired(before) != _wired(session):
             raise McapError(
-                "begins a session of another glove than that before it: its switches, taxels or sensors differ"
+                "begins a session of another glove than the one before: its switches, taxels or sensors differ"
             )
         self.session, self._codes = session, (None, ())
         self._tail.add_session(record.end - record.offset)
@@ -175,7 +175,7 @@ class Decoder:
         if chunk.compression:
             compression = shortened(chunk.compression)
             raise McapError(f"is compressed by {compression}: `mcap decompress` makes a copy that can be read")
-        # 0 where a program worked none out.
+        # 0 if a program calculated none.
         if chunk.uncompressed_crc not in (0, crc32(chunk.data)) or chunk.uncompressed_size != len(chunk.data):
             self.broken = offset
         for record in inside(chunk.data, offset):
@@ -188,7 +188,7 @@ def _wired(session: Session) -> tuple[tuple[str, ...], ...]:
 
 
 class _Whole(ReadDataStream):
-    """Reads as many bytes as are asked for, or none."""
+    """Reads exactly the requested number of bytes, or none."""
 
     def read(self, length: int) -> bytes:
         data = super().read(length)
@@ -198,13 +198,13 @@ class _Whole(ReadDataStream):
 
 
 def parsed(kind: type[Any], content: bytes) -> tuple[Any, int]:
-    """Return the content of a record as the library's `kind`, and how many bytes are left. Raises McapError."""
+    """Return the content of a record as the library's `kind`, and the number of bytes left. Raises McapError."""
     stream = _Whole(BytesIO(content))
     try:
         return kind.read(stream), len(content) - stream.count
     except _UNREADABLE as wrong:
         reason = shortened(str(wrong)) or type(wrong).__name__
-        raise McapError(f"is no {kind.__name__.lower()}: {reason}") from None
+        raise McapError(f"is not a valid {kind.__name__.lower()}: {reason}") from None
 
 
 def _from_json(channel: int, text: bytes) -> LiveGrasp | Label | Mark | None:
@@ -222,15 +222,15 @@ def _from_json(channel: int, text: bytes) -> LiveGrasp | Label | Mark | None:
     return entry
 
 
-# All of a footer but its checksum, which covers the rest.
+# All of a footer except its checksum, which covers the rest.
 _CHECKED_FOOTER = 16
-# The most that is made of a recording beyond its own size, in bytes.
+# Maximum memory for a recording beyond its own size, in bytes.
 _LARGEST_MADE = 20_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A fault of a file that could be read nevertheless: its kind, how often it occurs, a sentence for people."""
+    """A fault of a file that could still be read: its kind, how often it occurs, a sentence for people."""
 
     kind: str
     count: int
@@ -238,17 +238,17 @@ class Fault:
 
 
 class Reader:
-    """Iterates once over the entries of a recording, up to the last whole record of a file that was cut.
+    """Iterates once over the entries of a recording, up to the last whole record of a truncated file.
 
-    session   whose entries come next; the first is known at once
-    tail      what has been read of the data section, behind which a Recorder can go on
-    end       how the file ends; None before that is reached
-    altered   whether some checksum of a file that was closed does not match, or is missing where thenar writes one
-    foreign   whether another program has packed or added something, so that no Recorder may go on
+    session   the session of the next entries; the first is known at once
+    tail      the data section read so far, after which a Recorder can continue
+    end       how the file ends; None before the end is reached
+    altered   whether a checksum of a closed file does not match, or is missing although thenar writes it
+    foreign   whether another program has packed or added something, so that no Recorder may continue
     """
 
     def __init__(self, path: Path) -> None:
-        """Raises McapError if `path` is no recording of thenar's, OSError as it comes."""
+        """Raise McapError if `path` is not a recording of thenar, OSError as it comes."""
         self.path = path
         self.tail = Tail()
         self._wrong: list[str] = []
@@ -258,17 +258,17 @@ class Reader:
         self._entries = self._read()
         first = next(self._entries, None)
         if not isinstance(first, Session):
-            raise McapError(f"{path.name} holds no session of thenar: cut at its beginning, or of another program")
+            raise McapError(f"{path.name} holds no session of thenar: cut at its beginning, or from another program")
         self.session = first
 
     @property
     def end(self) -> End | None:
-        """How the file ends; None before that is reached."""
+        """How the file ends; None before the end is reached."""
         return self._records.end
 
     @property
     def altered(self) -> bool:
-        """Whether some byte is known not to be as it was written."""
+        """Whether some byte is known to have changed since it was written."""
         return bool(self._wrong) or self._decoder.broken is not None
 
     @property
@@ -295,7 +295,7 @@ class Reader:
         if wrong:
             yield Fault("altered recordings", 1, f"{name} is altered: {'; '.join(wrong)}")
         if passed.count:
-            message = f"{name} holds what thenar does not read, passed over: {list_names(passed.first, passed.count)}"
+            message = f"{name} holds records that thenar skips: {list_names(passed.first, passed.count)}"
             yield Fault("records passed over", passed.count, message)
 
     def _read(self) -> Iterator[Entry]:
@@ -306,7 +306,7 @@ class Reader:
                 raise McapError(f"{self.path.name}: the record at byte {record.offset} {wrong}") from None
 
     def _taken(self, record: RawRecord) -> Iterator[Entry]:
-        """Yield what a record of the data section holds; what follows that section repeats what is known."""
+        """Yield the entries of a record of the data section; later sections repeat known content."""
         if record.opcode == Opcode.FOOTER:
             self._end_summary(record)
         elif not self._in_data:
@@ -332,7 +332,7 @@ class Reader:
             self._wrong.append("the end of its data is missing, and their checksum with it")
 
     def _check(self, what: str, said: int, found: int, rest: int) -> None:
-        """Note where the checksum of `what` does not match. Of other programs 0 means that there is none."""
+        """Note a checksum of `what` that does not match. In files of other programs 0 means none."""
         if said != found and (said or self._decoder.ours):
             self._wrong.append(f"the checksum of {what} does not match")
         if rest:
@@ -340,9 +340,9 @@ class Reader:
 
 
 def check_made(what: str, made: int, size: int) -> None:
-    """Raise McapError if something of `made` bytes would be made of recordings of `size` bytes.
+    """Raise McapError if `made` bytes of `what` are to be allocated for recordings of `size` bytes.
 
-    Every row was captured from frames of its length, so a sound recording is at least as long as its rows.
+    Every row was captured from frames of its length, so a valid recording is at least as long as its rows.
     """
     if made > size + _LARGEST_MADE:
-        raise McapError(f"{what} would fill {made >> 20} MiB, more than {size} bytes can have recorded: it is damaged")
+        raise McapError(f"{what} would take {made >> 20} MiB, more than {size} bytes can have recorded: it is damaged")

@@ -1,6 +1,6 @@
-"""The records of an MCAP file, one after the other, up to the last whole one. No length in the file is believed.
+"""The records of an MCAP file, one after the other, up to the last whole one. No length in the file is trusted.
 
-Every byte counts in the checksums, also those of records that nobody here knows or that are too long to be kept.
+Every byte counts in the checksums, including those of unknown records and of those too long to be kept.
 """
 
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ from ..files import open_file
 from .layout import LARGEST_RECORD, MAGIC
 
 _OPENING = Struct("<BQ")
-# Other programs' chunks are usually of 1 to 4 MB. Longer ones are passed over.
+# Other programs' chunks are usually 1 to 4 MB. Longer ones are skipped.
 LARGEST_CHUNK = 64 << 20
 _PIECE = 1 << 20
 _READ = frozenset(
@@ -37,9 +37,9 @@ _READ = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class RawRecord:
-    """A whole record: where it begins and what it is.
+    """A whole record: its place and its content.
 
-    content        None where it is of no use here, or longer than any that is
+    content        None if it is of no use here, or too long
     before, after  CRC-32 of all bytes from the beginning of its section to its own beginning, and to its end
     """
 
@@ -53,7 +53,7 @@ class RawRecord:
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """How a file ends: closed properly or not; the last whole record ends at byte `whole` of `size`; and why there."""
+    """How a file ends: closed properly or not; the last whole record ends at byte `whole` of `size`; and the reason."""
 
     closed: bool
     whole: int
@@ -62,7 +62,7 @@ class End:
 
 
 class RecordStream:
-    """Iterates over the whole records of `path`; `end` is known afterwards. No file makes it take much memory.
+    """Iterates over the whole records of `path`; `end` is known afterwards. Memory use is bounded for any file.
 
     A section begins with the file; another one wherever `begin_section` is called.
     """
@@ -76,15 +76,13 @@ class RecordStream:
             self.size = file.seek(0, SEEK_END)
             file.seek(0)
             if file.read(len(MAGIC)) != MAGIC:
-                raise McapError(
-                    f"{path.name} does not begin as an MCAP file does: it is another kind of file, or empty"
-                )
+                raise McapError(f"{path.name} does not begin like an MCAP file: it is another kind of file, or empty")
 
     def __iter__(self) -> Iterator[RawRecord]:
         return self.since(len(MAGIC))
 
     def since(self, offset: int) -> Iterator[RawRecord]:
-        """Iterate from the record at `offset` on, where a record is known to begin."""
+        """Iterate from `offset` on, where a record is known to begin."""
         with open_file(self._path, McapError) as file:
             file.seek(offset)
             while (record := self._next(file)) is not None:
@@ -94,7 +92,7 @@ class RecordStream:
                     return
 
     def begin_section(self) -> None:
-        """Count the checksum from the end of the newest record on."""
+        """Start the checksum after the newest record."""
         self._crc = 0
 
     def _next(self, file: BinaryIO) -> RawRecord | None:
@@ -114,7 +112,7 @@ class RecordStream:
         return RawRecord(offset, opcode, content, end, before, self._crc)
 
     def _content(self, file: BinaryIO, opcode: int, length: int) -> bytes | None:
-        """Return the next `length` bytes, or nothing of a record that is passed over. Its bytes count all the same."""
+        """Return the next `length` bytes, or nothing for a record that is skipped. Its bytes count all the same."""
         if opcode in _READ and length <= (LARGEST_CHUNK if opcode == Opcode.CHUNK else LARGEST_RECORD):
             content = file.read(length)
             self._crc = crc32(content, self._crc)
@@ -150,7 +148,7 @@ def kind_of(opcode: int) -> str:
 
 
 def inside(chunk: bytes, offset: int) -> Iterator[RawRecord]:
-    """Return the records inside a chunk's data, all of them said to be at the chunk's `offset`. Raises McapError."""
+    """Return the records inside a chunk's data, all placed at the chunk's `offset`. Raises McapError."""
     file = BytesIO(chunk)
     while opening := file.read(_OPENING.size):
         opcode, length = _OPENING.unpack(opening) if len(opening) == _OPENING.size else (0, len(chunk))

@@ -1,7 +1,7 @@
-"""What a recording says of itself: which glove, read how, for whom. Stands in the file as text for every MCAP tool.
+"""A recording's description of itself: the glove, how it was read, for whom. Stored as text for every MCAP tool.
 
-MCAP holds it as one Metadata record called `thenar`: a key a field, text as it is, all else as JSON. A recording that
-was resumed holds one for every time that it was begun, each with its own clock.
+MCAP holds it as one Metadata record called `thenar`: one key per field, text as it is, all else as JSON. A recording
+that was resumed holds one for every time that it was begun, each with its own clock.
 """
 
 import re
@@ -22,7 +22,7 @@ METADATA = "thenar"
 # Collections are of version 3: since 2 a trial says when it began, since 3 one may be undone or skipped. All else is
 # written as version 1.
 VERSION = 3
-# No glove, no taxonomy and no patience goes beyond them. A file that does is damaged, or made to fill the memory.
+# Limits of any glove, taxonomy and patience. A file that exceeds them is damaged, or made to fill the memory.
 _MOST_SWITCHES, _MOST_SENSORS, _MOST_TYPES, _MOST_OBJECTS = 65_536, 255, 10_000, 1000
 MOST_TRIALS = 1_000_000
 
@@ -30,14 +30,14 @@ Number = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
 
 
 class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A grasp type to collect, and the objects to grasp so, by turns; of "none", the movements of the empty hand."""
+    """A grasp type to collect, and its objects, by turns; for "none", the movements of the empty hand."""
 
     grasp: str
     objects: Annotated[tuple[str, ...], msgspec.Meta(min_length=1, max_length=_MOST_OBJECTS)]
 
 
 class Collection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What is collected, and of whom: `repetitions` of every task in an order that `seed` draws.
+    """The plan of a collection: `repetitions` of every task in an order drawn from `seed`.
 
     `types` are those of the taxonomy, all of them and in its order; `tasks` may be fewer.
     """
@@ -54,12 +54,12 @@ Event = Literal["begun", "captured", "accepted", "redone", "skipped", "undone"]
 
 
 class Label(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What happened to a trial, numbered from 1 in the order of the collection.
+    """An event of a trial, numbered from 1 in the order of the collection.
 
-    "begun": the hand moves from now on, to the grasp, or, of none, without one until "captured"; "captured": the frames
-    before this one are the grasp; "accepted": those captured last are kept; "redone": they are not; "skipped": neither
-    are they, and the trial is left for another session; "undone": what was kept or skipped of this trial is not, also
-    if that was in an earlier session. time_us is the host's monotonic clock.
+    "begun": the hand moves from now on, to the grasp, or for none until "captured"; "captured": the frames before this
+    one are the grasp; "accepted": those captured last are kept; "redone": they are not; "skipped": neither are they,
+    and the trial is left for another session; "undone": the kept or skipped result of this trial is revoked, also if it
+    is from an earlier session. time_us is the host's monotonic clock.
     """
 
     time_us: Number
@@ -71,7 +71,7 @@ class Label(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Mark(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A moment that somebody marked while it was recorded, on the host's monotonic clock, and what they wrote to it."""
+    """A moment that a user marked during the recording, on the host's monotonic clock, and the user's text."""
 
     time_us: Number
     text: Annotated[str, msgspec.Meta(max_length=200)] = ""
@@ -81,12 +81,12 @@ class Session(msgspec.Struct, frozen=True, kw_only=True):
     """One stretch of recording.
 
     thenar       the version that recorded
-    build        checksum of the build.json in use; empty: none was, and no recognitions follow
+    build        checksum of the build.json in use; empty: none was, and no predictions follow
     harness      text of the glove.toml
     switches     names of the switches, in the order of the frames' bits
     sensors      names of the CyberGlove's sensors, in wire order
     calibration  of the CyberGlove, if one was given
-    policy       how grasps were decided on; None: by none, or by an early version that did not say
+    policy       the rules of decisions; None: there were none, or an early version did not record them
     collection   what was collected; None: an unlabelled run
     taxels       names of the taxels, in the order of the frames' codes
     taxel_calibration  of the taxels, if one was given
@@ -107,7 +107,7 @@ class Session(msgspec.Struct, frozen=True, kw_only=True):
 
 
 _FIELDS = fields(Session)
-# Written only where there are any: a glove without taxels is recorded as it ever was.
+# Written only if there are any: a glove without taxels is recorded as before.
 _OF_TAXELS = ("taxels", "taxel_calibration")
 
 
@@ -121,7 +121,7 @@ def to_metadata(session: Session) -> dict[str, str]:
 def from_metadata(texts: dict[str, str]) -> Session:
     """Return the session that a Metadata record holds. Raises McapError saying which key is wrong."""
     version = texts.get("version", "")
-    # No more digits than any version will have, and than int() takes.
+    # No more digits than any version will have, and than int() accepts.
     if not re.fullmatch("[0-9]{1,9}", version):
         raise McapError(f"its version is {shortened(repr(version), 20)}, not a number: it was not recorded by thenar")
     if int(version) > VERSION:
@@ -131,7 +131,7 @@ def from_metadata(texts: dict[str, str]) -> Session:
             raise McapError(f"its metadata lack {field.name!r}: damaged, or not recorded by thenar")
     session = Session(**{field.name: _value(field, texts) for field in _FIELDS if field.name in texts})
     if session.policy is not None and "lag_us" not in texts["policy"]:
-        # By an early version, which sought no segments.
+        # From an early version, which had no segments.
         session = msgspec.structs.replace(session, policy=replace(session.policy, lag_us=None))
     _check_names(session)
     return session

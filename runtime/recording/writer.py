@@ -1,4 +1,4 @@
-"""`Recorder`: frames, recognitions and labels into an MCAP file, as they come."""
+"""`Recorder`: writes frames, predictions and labels into an MCAP file as they come."""
 
 import os
 import time
@@ -27,13 +27,13 @@ SYNC_S = 1.0
 class AppendedFile:
     """Appends to `path`.
 
-    What is appended has reached the operating system when `append` returns: no kill can take it. A loss of power can
-    take about the last second, for a thread of its own calls fdatasync that often; nobody waits for it. The first
-    error, such as a full disk, ends it all: `failure` says so, and the file keeps its whole records.
+    Data has reached the operating system when `append` returns: no kill can take it. A power failure can take about the
+    last second, because a separate thread calls fdatasync that often; nobody waits for it. The first error, such as a
+    full disk, ends the recording: `failure` says so, and the file keeps its whole records.
     """
 
     def __init__(self, path: Path, size: int, sync_s: float = SYNC_S) -> None:
-        """Go on behind the first `size` bytes of the file; what follows them is cut off. Raises OSError."""
+        """Continue after the first `size` bytes of the file; the rest is cut off. Raises OSError."""
         self.failure: str | None = None
         self.size = size
         self._path = path
@@ -49,7 +49,7 @@ class AppendedFile:
         self._thread.start()
 
     def append(self, data: bytes) -> bool:
-        """Append `data` whole and return True; return False if that fails, and ever after; and when closed."""
+        """Append `data` whole and return True; return False if that fails, ever after, and when closed."""
         if self.failure is not None or self._closing.is_set():
             return False
         try:
@@ -58,7 +58,7 @@ class AppendedFile:
                 written += os.write(self._file, data[written:])
         except OSError as reason:
             self._fail(reason)
-            # Takes back the part of the record that fitted.
+            # Remove the part of the record that fitted.
             with suppress(OSError):
                 os.ftruncate(self._file, self.size)
             return False
@@ -66,7 +66,7 @@ class AppendedFile:
         return True
 
     def close(self) -> None:
-        """Bring everything to the disk and close. May wait for the disk; may be called again."""
+        """Write everything to the disk and close. May wait for the disk; may be called again."""
         if self._closing.is_set():
             return
         self._closing.set()
@@ -97,21 +97,21 @@ class AppendedFile:
 # Opcode, length of the rest, channel, sequence, log time, publish time (MCAP specification, Message).
 _MESSAGE = Struct("<BQHIQQ")
 _MESSAGE_OPCODE, _OPENING = 5, 9
-# A recording tells how somebody's hand moves.
+# A recording shows how a person's hand moves.
 _PRIVATE = 0o600
 _json = msgspec.json.Encoder().encode
 
 
 class _Recognition(LiveGrasp, frozen=True, omit_defaults=True):
-    """A recognition as it is recorded: without fields that say nothing, as those of a segment while there is none."""
+    """A prediction as recorded: without empty fields, such as those of a segment while there is none."""
 
 
 class Recorder:
     """Writes a recording; every message has left the process when its method returns.
 
-    A message is published at the time of its frame and logged then too, but never before the message written last:
-    the file is in the order of its log times. Both are the monotonic clock, set by the date once when the session
-    begins, so that a date that is changed meanwhile moves nothing.
+    A message is published at the time of its frame and logged then too, but never before the message written last: the
+    file is in the order of its log times. Both use the monotonic clock, set to the date once when the session begins,
+    so that a later change of the date moves nothing.
 
     A full disk ends the recording and nothing else: no method raises, and `failure` holds the sentence for the user.
     """
@@ -119,9 +119,9 @@ class Recorder:
     def __init__(
         self, path: Path, session: Session, *, tail: Tail | None = None, marks: bool = False, sync_s: float = SYNC_S
     ) -> None:
-        """Begin a file that must not exist, which takes `marks` or not, or go on behind the `tail` of one that does.
+        """Begin a file that must not exist, with or without `marks`, or continue after the `tail` of an existing one.
 
-        Raises SettingError where the file exists, OSError as the operating system gives it.
+        Raises SettingError if the file exists, OSError as the operating system gives it.
         """
         after_ns = 0 if tail is None else tail.last_ns
         self.session = replace(session, clock_ns=max(time.time_ns(), after_ns) - time.monotonic_ns())
@@ -137,35 +137,35 @@ class Recorder:
 
     @property
     def failure(self) -> str | None:
-        """Why nothing is recorded any more; None while all is well."""
+        """Why recording stopped; None while there is no error."""
         return self._file.failure
 
     @property
     def messages(self) -> int:
-        """How many messages the file holds."""
+        """The number of messages in the file."""
         return sum(self._tail.counts.values())
 
     def switches(self, frame: SwitchFrame) -> None:
-        """Record a reading of the switches, and the taxels' codes before it. Raises FrameError if it is of others than
-        this session's.
+        """Record a reading of the switches, and the taxels' codes before it. Raises FrameError if it does not have the
+        switches of this session.
         """
         if frame.taxels is not None:
             self._message(TAXELS, frame.time_us, encode_bytes(taxel_bytes(frame.taxels, self._taxels)))
         self._message(SWITCHES, frame.time_us, encode_bytes(switch_bytes(frame, self._switches, self._sensors)))
 
     def glove(self, frame: GloveFrame) -> None:
-        """Record a record of the CyberGlove. Raises FrameError if it has not this session's sensors."""
+        """Record a record of the CyberGlove. Raises FrameError if it does not have the sensors of this session."""
         self._message(GLOVE, frame.time_us, encode_bytes(glove_bytes(frame, self._sensors)))
 
     def grasp(self, grasp: LiveGrasp) -> None:
-        """Record a recognition; the grasp type also by itself whenever it changes."""
+        """Record a prediction; the grasp type also separately whenever it changes."""
         self._message(RECOGNITION, grasp.time_us, encode_text(_json(_Recognition(*astuple(grasp)))))
         if grasp.grasp != self._grasp:
             self._grasp = grasp.grasp
             self._message(GRASP, grasp.time_us, encode_text(grasp.grasp.encode()))
 
     def moment(self, arrived: Iterable[SwitchFrame | GloveFrame], grasp: LiveGrasp) -> None:
-        """Record the frames that came in since the last moment, and then what was recognised in the newest of them."""
+        """Record the frames that arrived since the last moment, then the prediction for the newest of them."""
         for frame in arrived:
             if isinstance(frame, SwitchFrame):
                 self.switches(frame)
@@ -174,7 +174,7 @@ class Recorder:
         self.grasp(grasp)
 
     def label(self, label: Label) -> None:
-        """Record what became of a trial."""
+        """Record the outcome of a trial."""
         self._message(TRIALS, label.time_us, encode_text(_json(label)))
 
     def mark(self, mark: Mark) -> None:
@@ -213,14 +213,14 @@ class Recorder:
 def _begun(path: Path, session: Session, marks: bool) -> Tail:
     """Make the file, its first session in it, and return its tail."""
     if path.exists():
-        raise SettingError(f"{path} exists, and a recording is never written over: name another file")
+        raise SettingError(f"{path} exists, and a recording is never overwritten: name another file")
     tail = Tail()
     if session.taxels:
         tail.counts[TAXELS] = 0
     if marks:
         tail.counts[MARKS] = 0
     first, record = beginning(session.thenar, tail), session_record(session)
-    # Whole or not at all, so that there is no file without a session.
+    # Written whole or not at all, so that no file lacks a session.
     write_atomically(path, first + record, mode=_PRIVATE)
     tail.add_bytes(first + record)
     tail.add_session(len(record))

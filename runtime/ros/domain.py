@@ -1,4 +1,4 @@
-"""Names as ROS 2 has them, and a participant in its nodes' domain: on this machine, unless others are let in."""
+"""ROS 2 names, and a participant in the domain of its nodes: on this machine only, unless it is public."""
 
 import os
 import re
@@ -20,16 +20,16 @@ from thenar.drivers.errors import SettingError
 from .messages import TYPE_HASHES
 
 _DEPTH = 10
-# Of a fast topic, for the time that a thread may be late.
+# History of a fast topic, for the time that a thread may be late.
 _READ_DEPTH = 256
 _UNLIMITED = -1
 _MAX_DOMAIN = 232  # above it the ports of DDS would pass 65535
 _MAX_LENGTH = 200
 
 _FORM = "<CycloneDDS><Domain>{}</Domain></CycloneDDS>"
-# Behind all others. A reader that hangs would otherwise hold up every writer's end for a second.
+# Added after all others. A hanging reader would otherwise delay every writer's end by a second.
 _SETTINGS = _FORM.format("<Internal><WriterLingerDuration>100 ms</WriterLingerDuration></Internal>")
-# Loopback has no multicast: participants look for each other at the ports of localhost.
+# Loopback has no multicast: participants find each other at the ports of localhost.
 _LOOPBACK = _FORM.format(
     """
     <General>
@@ -44,10 +44,10 @@ _DESCRIPTORS = Path("/proc/self/fd")
 
 
 def join(number: int, *, public: bool) -> tuple[Domain | None, DomainParticipant]:
-    """Return the domain, where it is ours to end, and a participant in it.
+    """Return the domain, if it is ours to end, and a participant in it.
 
-    CYCLONEDDS_URI says which network is used, where it is set. Otherwise it is loopback alone unless `public`. Raises
-    DDSException, and OSError where the system does not keep a socket to loopback.
+    CYCLONEDDS_URI selects the network if it is set. Otherwise it is loopback only, unless `public`. Raises
+    DDSException, and OSError if the system does not limit a socket to loopback.
     """
     users = os.environ.get("CYCLONEDDS_URI", "")
     if users or public:
@@ -62,15 +62,15 @@ def _join(number: int, settings: str) -> tuple[Domain | None, DomainParticipant]
     except DDSException as reason:
         if reason.code != DDSException.DDS_RETCODE_PRECONDITION_NOT_MET:
             raise
-        ours = None  # somebody in this process is in it already, with settings of their own
+        ours = None  # this process has joined it already, with other settings
     return ours, DomainParticipant(number)
 
 
 @contextmanager
 def _kept_to_loopback() -> Iterator[None]:
-    """Let the datagram sockets that are opened meanwhile receive from this machine alone.
+    """Make the datagram sockets that are opened in this context receive only from this machine.
 
-    Cyclone DDS binds those that it receives with to all addresses, whatever interface it is given.
+    Cyclone DDS binds its receiving sockets to all addresses, whatever interface it is given.
     """
     before = _sockets()
     yield
@@ -81,7 +81,7 @@ def _kept_to_loopback() -> Iterator[None]:
 
 
 def _sockets() -> dict[int, str]:
-    """Return the sockets of this process: which descriptor is which socket."""
+    """Return the sockets of this process: the socket of each descriptor."""
     found = {}
     for link in _DESCRIPTORS.iterdir():
         with suppress(OSError):  # closed meanwhile
@@ -92,15 +92,15 @@ def _sockets() -> dict[int, str]:
 
 
 def namespace(name: str) -> str:
-    """Return `name` if topics can stand under it, as "/thenar" or "/lab/left_hand". Raises SettingError."""
+    """Return `name` if it is a valid namespace for topics, as "/thenar" or "/lab/left_hand". Raises SettingError."""
     fits = re.fullmatch(r"(?:/[A-Za-z][A-Za-z0-9_]*)+", name) and "__" not in name and len(name) <= _MAX_LENGTH
     if not fits:
-        raise SettingError(f"ros:{name} is no name of ROS: write it as ros:/thenar, with letters, digits and single _")
+        raise SettingError(f"ros:{name} is not a ROS name: write it as ros:/thenar, with letters, digits and single _")
     return name
 
 
 def dds_topic(name: str) -> str:
-    """Return what DDS calls the ROS topic `name`: "/thenar/grasp" is "rt/thenar/grasp"."""
+    """Return the DDS name of the ROS topic `name`: "/thenar/grasp" is "rt/thenar/grasp"."""
     return f"rt{name}"
 
 
@@ -108,16 +108,16 @@ def domain() -> int:
     """Return the domain that the environment variable ROS_DOMAIN_ID names, or 0. Raises SettingError."""
     text = os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
     if not text.isdecimal() or int(text) > _MAX_DOMAIN:
-        raise SettingError(f"ROS_DOMAIN_ID is {text!r}: it is a whole number from 0 to {_MAX_DOMAIN}, or not set")
+        raise SettingError(f"ROS_DOMAIN_ID is {text!r}: set it to a whole number from 0 to {_MAX_DOMAIN}, or unset it")
     return int(text)
 
 
 def writer(participant: DomainParticipant, name: str, kind: Any, *, kept: bool = False) -> Any:
-    """Return what writes messages of a kind to the ROS topic `name`: reliable, the last 10 kept, and volatile unless
-    the newest is `kept` for readers that come later (transient local).
+    """Return a writer for messages of a kind on the ROS topic `name`: reliable, the last 10 kept, and volatile unless
+    the newest is `kept` for late readers (transient local).
     """
     policies = [
-        # Nobody may hold the writer up: what does not fit is refused at once.
+        # Nobody may delay the writer: a message that does not fit is rejected at once.
         Policy.Reliability.Reliable(max_blocking_time=0),
         Policy.Durability.TransientLocal if kept else Policy.Durability.Volatile,
         Policy.DurabilityService(0, Policy.History.KeepLast(1), _UNLIMITED, _UNLIMITED, _UNLIMITED),
@@ -130,7 +130,7 @@ def writer(participant: DomainParticipant, name: str, kind: Any, *, kept: bool =
 
 
 def reader(participant: DomainParticipant, name: str, kind: Any) -> Any:
-    """Return what reads messages of a kind from the ROS topic `name`, of reliable and best-effort writers alike."""
+    """Return a reader for messages of a kind on the ROS topic `name`, from reliable and best-effort writers."""
     policies = [
         Policy.Reliability.BestEffort,
         Policy.Durability.Volatile,
@@ -142,7 +142,7 @@ def reader(participant: DomainParticipant, name: str, kind: Any) -> Any:
 
 
 def volatile_readers(of: Any) -> frozenset[int]:
-    """Return the readers that a writer has found and that ask for nothing of what was written before they came."""
+    """Return a writer's known readers that do not request messages written before they joined."""
     readers = {handle: of.get_matched_subscription_data(handle) for handle in of.get_matched_subscriptions()}
     wanted = {handle: data.qos[Policy.Durability] for handle, data in readers.items() if data is not None}
     return frozenset(handle for handle, durability in wanted.items() if durability == Policy.Durability.Volatile)

@@ -1,8 +1,8 @@
-"""The ROS 2 messages that are published, as DDS types, under the names and with the layout that ROS 2 gives them.
+"""The published ROS 2 messages as DDS types, with the names and the layout that ROS 2 uses.
 
 std_msgs/String, sensor_msgs/JointState, trajectory_msgs/JointTrajectory and diagnostic_msgs/DiagnosticArray, field by
-field as their .msg files have them; a type pkg/msg/Name is pkg::msg::dds_::Name_ in DDS. They are final and keyless,
-and go out as plain CDR (XCDR1), as rmw_cyclonedds and rmw_fastrtps write theirs. Needs the extra `ros`.
+field as in their .msg files; a type pkg/msg/Name is pkg::msg::dds_::Name_ in DDS. They are final and keyless, and are
+sent as plain CDR (XCDR1), as rmw_cyclonedds and rmw_fastrtps send theirs. Needs the extra `ros`.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from ..preshape.selector import Preshape
 from ..published import Health, JointAngles, LiveGrasp
 from ..task import Progress
 
-# REP-2011: ROS 2 from Iron on looks for it in the endpoint's user data, and warns where it is missing.
+# REP-2011: ROS 2 from Iron on expects it in the endpoint's user data, and warns if it is missing.
 TYPE_HASHES = {
     "std_msgs::msg::dds_::String_": "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
     "sensor_msgs::msg::dds_::JointState_": "RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e",
@@ -127,7 +127,7 @@ class Float32MultiArray(IdlStruct, typename="std_msgs::msg::dds_::Float32MultiAr
 @dataclass
 @final
 class JointTrajectoryPoint(IdlStruct, typename="trajectory_msgs::msg::dds_::JointTrajectoryPoint_"):
-    """Where joints shall stand, and when."""
+    """Joint positions, and the time to reach them."""
 
     positions: sequence[float64]
     velocities: sequence[float64]
@@ -139,7 +139,7 @@ class JointTrajectoryPoint(IdlStruct, typename="trajectory_msgs::msg::dds_::Join
 @dataclass
 @final
 class JointTrajectory(IdlStruct, typename="trajectory_msgs::msg::dds_::JointTrajectory_"):
-    """Points to pass; a header's stamp of zero means: start now."""
+    """Points to pass; a stamp of zero in the header means: start now."""
 
     header: Header
     joint_names: sequence[str]
@@ -149,7 +149,7 @@ class JointTrajectory(IdlStruct, typename="trajectory_msgs::msg::dds_::JointTraj
 @dataclass
 @final
 class KeyValue(IdlStruct, typename="diagnostic_msgs::msg::dds_::KeyValue_"):
-    """A value, and what it is of."""
+    """A value and its key."""
 
     key: str
     value: str
@@ -158,7 +158,7 @@ class KeyValue(IdlStruct, typename="diagnostic_msgs::msg::dds_::KeyValue_"):
 @dataclass
 @final
 class DiagnosticStatus(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticStatus_"):
-    """How a component is doing: level 0 is fine, 1 a warning, 2 an error."""
+    """The state of a component: level 0 is fine, 1 a warning, 2 an error."""
 
     level: byte
     name: str
@@ -170,7 +170,7 @@ class DiagnosticStatus(IdlStruct, typename="diagnostic_msgs::msg::dds_::Diagnost
 @dataclass
 @final
 class DiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticArray_"):
-    """How components are doing."""
+    """The states of components."""
 
     header: Header
     status: sequence[DiagnosticStatus]
@@ -180,7 +180,7 @@ LEVELS: dict[Health, int] = {"ok": 0, "changing": 0, "degraded": 1, "unknown": 2
 
 
 def segment(name: str, grasp: LiveGrasp) -> DiagnosticArray:
-    """Return what is recognised as the status of component `name`, stamped with its moment."""
+    """Return the prediction as the status of component `name`, stamped with its moment."""
     began_us = None if grasp.segment_us is None else grasp.unix_us - grasp.time_us + grasp.segment_us
     values = {
         "grasp": grasp.grasp,
@@ -199,7 +199,7 @@ def segment(name: str, grasp: LiveGrasp) -> DiagnosticArray:
 
 
 def task(name: str, unix_us: int, progress: Progress) -> DiagnosticArray:
-    """Return how far a hand has come in a task as the status of component `name`, at a moment."""
+    """Return a hand's progress in a task as the status of component `name`, at a moment."""
     values = {
         "step": str(progress.step),
         "steps": str(progress.steps),

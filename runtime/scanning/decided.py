@@ -1,9 +1,9 @@
-"""When a scan may stop: as soon as no state of the unread switches could change who wins. Integer tables, exact.
+"""When a scan may stop: as soon as no state of the unread switches could change the winner. Integer tables, exact.
 
-Among sums that leave the unread switches out, let l be the leader. Class r can still overtake l if its score and the
-most that the unread switches can bring it closer (`Scorer.reach`) exceed l's; or equal it, where r has the lower number
-and would win the tie. `EarlyExit` stops when no r can. It stops no later than that either: while it goes on, there is a
-state of the unread switches in which somebody else wins. `Decided` counts the same over recorded frames.
+Among sums that leave the unread switches out, let l be the leader. Class r can still overtake l if its score plus the
+most that the unread switches can bring it closer (`Scorer.reach`) exceeds l's; or equals it, if r has the lower number
+and would win the tie. `EarlyExit` stops when no r can, and no later: while it goes on, some state of the unread
+switches makes another class win. `Decided` counts the same over recorded frames.
 """
 
 from collections.abc import Sequence
@@ -26,11 +26,11 @@ _KEPT = 1 << 16
 class EarlyExit:
     """Watches a scan port by port.
 
-    groups are the switches of each port, in the order in which ports are read; no switch may be in two of them. With a
-    `lead` in steps, the scan goes on until the leader is sure to lead everybody by so much: a decision that asks for
-    such a lead (`Policy.lead`) is then the same as after the whole scan. `on_demand`: the joints are read after the
-    switches, and only where these do not decide; until then nothing is known of them. `whole_us`: after so long without
-    one, a scan is to go to its end whatever is decided, for those who need all scores; None: nobody does.
+    groups are the switches of each port, in reading order; no switch may be in two of them. With a `lead` in steps, the
+    scan goes on until the leader is certain to lead all others by that much: a decision that requires such a lead
+    (`Policy.lead`) is then the same as after the whole scan. `on_demand`: the joints are read after the switches, and
+    only if these do not decide; until then nothing is known of them. `whole_us`: after this time without one, a scan
+    goes to its end even if it is decided, for readers that need all scores; None: there are none.
 
     left_out  switches and joints that are scored as lost, though they are read
     """
@@ -44,7 +44,7 @@ class EarlyExit:
         on_demand: bool = False,
         whole_us: int | None = None,
     ) -> None:
-        """Raise SettingError if a switch is in two groups or is none of the build's."""
+        """Raise SettingError if a switch is in two groups, or not in the build."""
         tables = scorer.tables
         self._groups = tuple(groups)
         self._later = _later(self._groups, tables.n_switches)
@@ -61,7 +61,7 @@ class EarlyExit:
         self._lost: Mask = 0
 
     def start(self, codes: Sequence[int] | None, closed: Mask = 0, lost: Mask | None = None) -> None:
-        """Begin a scan: the joints' codes (None: lost; on demand: whatever), and what is known of switches of no port.
+        """Begin a scan: the joints' codes (None: lost; on demand: ignored), and the known switches that are on no port.
 
         With lost=None all of those are lost. Raises FrameError.
         """
@@ -71,9 +71,9 @@ class EarlyExit:
         self._scores.joints(None if self.on_demand else codes, joints)
 
     def after(self, port: int, closed: Mask, lost: Mask = 0) -> bool:
-        """Take what port number `port` read, of its own switches; return whether the ports after it can be left out.
+        """Take the reading of port number `port`, its switches only; return whether later ports can be left out.
 
-        Ports come in order. After the last, with no `lead`, the answer is always yes, if the joints are known.
+        Ports come in order. After the last, with no `lead`, the result is always True, if the joints are known.
         """
         group = self._groups[port]
         self._closed |= closed & group
@@ -88,10 +88,10 @@ class EarlyExit:
         return self._later[port] & self._all
 
     def _hurdles_of(self, port: int, leader: int) -> tuple[int, ...]:
-        """Return what, added to a class's score, must not exceed the leader's: (K,), 0 for the leader itself."""
+        """Return the amounts which, added to a class's score, must not exceed the leader's: (K,), 0 for the leader."""
         found = [
-            reach + max(self._lead, rival < leader)
-            for rival, reach in enumerate(self._reach(leader, self._later[port]))
+            reach + max(self._lead, other < leader)
+            for other, reach in enumerate(self._reach(leader, self._later[port]))
         ]
         found[leader] = 0
         return tuple(found)
@@ -103,7 +103,7 @@ def _later(groups: Sequence[Mask], n_switches: int) -> list[Mask]:
     for group in reversed(groups):
         later.append(seen)
         if group & seen or group >> n_switches:
-            raise SettingError("a switch of the scan is read by two ports, or is none of the build's: compile it again")
+            raise SettingError("a switch of the scan is read by two ports, or is not in the build: compile it again")
         seen |= group
     return later[::-1]
 
@@ -112,9 +112,9 @@ Ints = NDArray[np.int32]
 
 
 class Decided:
-    """Recorded frames under a set of ports. A set of ports is an integer: bit p is port p.
+    """Recorded frames under a set of ports, which is an integer: bit p is port p.
 
-    on_demand: the joints are not known from the start. They are one more port, behind the last.
+    on_demand: the joints are not known from the start. They are one more port, after the last.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ class Decided:
     ) -> None:
         """Take the build's switches on each port, and the frames: bits (n, s) and codes (n, j).
 
-        Switches of no port are known from the start. Raises FrameError if a shape does not fit the tables.
+        Switches on no port are known from the start. Raises FrameError if a shape does not fit the tables.
         """
         if bits.shape != (len(bits), tables.n_switches) or codes.shape != (len(bits), tables.n_joints):
             raise FrameError(
@@ -144,7 +144,7 @@ class Decided:
         self._shares = [bits[:, list(port)].astype(np.int32) @ rows[list(port)] for port in ports]
         self._reaches = [_reaches(tables, port) for port in ports]
         if on_demand:
-            # As if they were lost; reading them adds the rest.
+            # As if the joints were lost; reading them adds the rest.
             share = joints - tables.jointless.astype(np.int32)
             self._base -= share
             self._shares.append(share)
@@ -156,15 +156,15 @@ class Decided:
         return self._frames
 
     def undecided(self, read: int) -> int:
-        """Return how many frames are undecided when these ports were read."""
+        """Return the number of frames that are undecided after reading these ports."""
         if read not in self._counts:
             self._counts[read] = self._frames - int(np.count_nonzero(self.after(read)[1]))
         return self._counts[read]
 
     def after(self, read: int) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-        """Return each frame's leader when these ports were read (n,), and whether it is decided (n,)."""
+        """Return each frame's leader after reading these ports (n,), and whether it is decided (n,)."""
         sums, classes = self._base.copy(), np.arange(self._base.shape[1])
-        # hurdles[l, c]: what c can come closer to leader l, and one step where it would win a tie.
+        # hurdles[l, c]: how much closer c can come to leader l, plus one step if it would win a tie.
         hurdles = (classes < classes[:, np.newaxis]).astype(np.int32)
         for port, (share, reach) in enumerate(zip(self._shares, self._reaches, strict=True)):
             if read >> port & 1:

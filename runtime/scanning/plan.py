@@ -1,8 +1,8 @@
 """From a harness and a build's tables to its scan map: the fewest transactions, in the order that decides earliest.
 
-What belongs together stays together, such as the ports behind one channel of a mux; the rest is ordered for the least
-expected cost. A unit is a port, or units in a row that nothing else may come between. Costs are wire times in integer
-nanoseconds, so that sums have no order; the cost of an order is the sum over its ports.
+Units stay together, such as the ports behind one channel of a mux; the rest is ordered for the least expected cost. A
+unit is a port, or a row of units without anything in between. Costs are wire times in integer nanoseconds, so that sums
+do not depend on order; the cost of an order is the sum over its ports.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -22,7 +22,7 @@ from .ports import whole_scan
 from .scanmap import Port, ScanMap
 from .timing import mux_of, port_us, reading_of, select_us, selections, waiting_us
 
-# Up to so many ports every order counts (2^n sets of ports); above, a good one is looked for.
+# Up to this many ports every order is evaluated (2^n sets of ports); above, a heuristic searches for a good one.
 EXACT = 10
 
 Order = tuple[int, ...]
@@ -34,7 +34,7 @@ _Step = Callable[[int, int], tuple[int, Order]]
 
 
 def arranged(units: Sequence[Unit], cost: Cost) -> Order:
-    """Return all ports of all `units` in an order of low cost; of the lowest cost there is up to EXACT ports."""
+    """Return all ports of all `units` in an order of low cost; the lowest up to EXACT ports."""
     best = _exact if len(ports_in(units)) <= EXACT else _searched
 
     def through(read: int, unit: Unit) -> tuple[int, Order]:
@@ -47,7 +47,7 @@ def arranged(units: Sequence[Unit], cost: Cost) -> Order:
 
 
 def ports_in(unit: Unit) -> Order:
-    """Return the ports of a unit, in the order in which they stand there."""
+    """Return the ports of a unit, in order."""
     return (unit,) if isinstance(unit, int) else tuple(port for each in unit for port in ports_in(each))
 
 
@@ -68,7 +68,8 @@ def _exact(read: int, items: Sequence[int], step: _Step) -> tuple[int, Order]:
 def _searched(read: int, items: Sequence[int], step: _Step) -> tuple[int, Order]:
     """Return a low cost of walking through all `items` after `read`, and how.
 
-    From the back: last comes what is cheapest then against being first. Then neighbours change places while it helps.
+    It builds the order from the back: last comes the item that saves most by not being first. Then neighbours are
+    exchanged while that helps.
     """
     left, order = list(range(len(items))), list[int]()
     while left:
@@ -104,9 +105,9 @@ _Room = tuple[int, ...]
 class Costs:
     """The costs of `ports`, by their numbers.
 
-    units are all of them as nested tuples: what is behind one channel stays together, and where a bus has more muxes
-    than one, what is behind one mux. A bus with conversions that need time takes as long as its wire, or as the chip
-    whose conversions together take longest: they go on while the bus reads other ports.
+    units holds all of them as nested tuples: the ports behind one channel stay together, and if a bus has several
+    muxes, those behind one mux. A bus with slow conversions takes as long as its wire, or as the chip whose conversions
+    together take longest: they go on while the bus reads other ports.
     """
 
     def __init__(self, ports: Sequence[Port], harness: Harness) -> None:
@@ -129,35 +130,35 @@ class Costs:
             chips[port.bus, port.chip] = chips.get((port.bus, port.chip), 0) | 1 << number
         self._rooms = tuple(opened.values())
         self.units: tuple[Unit, ...] = tuple(tuple(map(tuple, inside.values())) for inside in nested.values())
-        self._slow: list[tuple[int, tuple[int, ...]]] = []  # of each bus where something waits: its ports, chip by chip
+        self._slow: list[tuple[int, tuple[int, ...]]] = []  # of each bus with waiting times: its ports, chip by chip
         for bus in dict.fromkeys(bus for bus, _ in chips):
             mine = tuple(mask for (on, _), mask in chips.items() if on == bus)
             if any(self._waits[port] for port in range(len(ports)) if sum(mine) >> port & 1):
                 self._slow.append((sum(mine), mine))
 
     def after(self, read: int, port: int) -> int:
-        """Return what reading `port` takes after the ports `read`: the first behind a channel needs it selected."""
+        """Return the time to read `port` after the ports `read`: the first behind a channel must select it."""
         for every, chips in self._slow:
             if every >> port & 1:
                 return self._elapsed((read | 1 << port) & every, chips) - self._elapsed(read & every, chips)
         return self._ns[port] + sum(ns for room, ns in self._rooms if room >> port & 1 and not read & room)
 
     def _elapsed(self, read: int, chips: Sequence[int]) -> int:
-        """Return what a bus with these chips takes for the ports `read`, all of them its own."""
+        """Return the time of a bus with these chips for the ports `read`, all of them its own."""
         wire = sum(self._ns[port] for port in _numbers(read)) + sum(ns for room, ns in self._rooms if room & read)
         slowest = max(sum(self._ns[port] + self._waits[port] for port in _numbers(read & chip)) for chip in chips)
         return max(wire, slowest)
 
     def of(self, unit: Unit) -> int:
-        """Return what reading a unit takes, with the selections that it alone needs."""
+        """Return the time to read a unit, with the selections that it alone needs."""
         ports = ports_in(unit)
         inside = sum(1 << port for port in ports)
-        # Conversions count as if nothing were read meanwhile.
+        # Conversions count as if nothing were read in parallel.
         own = sum(self._ns[port] + self._waits[port] for port in ports)
         return own + sum(ns for room, ns in self._rooms if not room & ~inside)
 
     def expected(self, frames: Decided) -> Cost:
-        """Return the time that reading a port takes over all `frames` that are not decided before.
+        """Return the time to read a port, summed over all `frames` that are not decided before.
 
         The first counts in every frame, because nothing stops a scan before it.
         """
@@ -172,7 +173,7 @@ def _numbers(ports: int) -> Iterator[int]:
     return (port for port in range(ports.bit_length()) if ports >> port & 1)
 
 
-# Of more recorded frames than this, evenly spaced ones decide on the order.
+# With more recorded frames than this, evenly spaced ones decide the order.
 FRAMES = 5000
 
 
@@ -185,10 +186,10 @@ def plan_scan(
 ) -> ScanMap:
     """Return the scan map that reads a build's switches, named in the build's order, in `harness`.
 
-    Of every chip it takes the fewest transactions, and as few selections as channels; what is behind one channel stays
-    together. bits (n, s) and codes (n, j), where given, are recorded frames: the order is then the one that takes the
-    least wire time until a scan may stop, on average over them (exactly up to order.EXACT ports). Without frames, what
-    can change scores most per microsecond comes first. Raises HarnessError if a switch is wired to nothing.
+    For every chip it takes the fewest transactions, and no more selections than channels; ports behind one channel stay
+    together. bits (n, s) and codes (n, j), if given, are recorded frames: the order is then the one with the least
+    average wire time until a scan may stop (exact up to EXACT ports). Without frames, the ports that can change scores
+    most per microsecond come first. Raises HarnessError if a switch is wired to nothing.
     """
     if lacking := unwired(harness, switch_names):
         raise HarnessError(
@@ -210,14 +211,14 @@ def plan_scan(
 def check_harness(scan: ScanMap, harness: Harness, switch_names: Sequence[str]) -> None:
     """Raise HarnessError unless `scan` was made for `harness`; ports, devices and clocks may have changed since.
 
-    Every port is then a reading of a chip that there is, and every bit and key the switch of the build, by its name.
+    Every port is then a reading of an existing chip, and every bit and key is the switch of the build, by its name.
     """
     if scan.harness != harness.fingerprint:
         raise HarnessError(
-            f"the build's scan map was made for another wiring than that of harness {harness.name!r}: "
+            f"the build's scan map was made for another wiring than harness {harness.name!r}: "
             "compile again with --glove"
         )
-    # Whoever sealed the map may have written into it what he wanted.
+    # A sealed map may still hold anything its author wanted.
     wired = whole_scan(harness, switch_names)
     where = {
         (port.bus, port.chip, pin): (switch, port.closed_high)
@@ -241,7 +242,7 @@ def check_harness(scan: ScanMap, harness: Harness, switch_names: Sequence[str]) 
 
 
 def unwired(harness: Harness, switch_names: Sequence[str]) -> list[str]:
-    """Return which of these names hang on nothing: neither switches nor levels of taxels of the harness."""
+    """Return the names that are wired to nothing: neither switches nor levels of taxels of the harness."""
     read = set(whole_scan(harness, switch_names).switches)
     return [name for number, name in enumerate(switch_names) if number not in read]
 
@@ -256,7 +257,7 @@ def _pins(port: Port, harness: Harness) -> list[tuple[int, int]]:
 
 
 def _by_reach(unit: Unit, reaches: Sequence[int], costs: Costs) -> Order:
-    """Return the ports of a unit by how far they carry scores per time, the furthest first, its own units likewise."""
+    """Return the ports of a unit by their reach per time, the furthest first, its inner units likewise."""
     if isinstance(unit, int):
         return (unit,)
 

@@ -1,4 +1,4 @@
-"""Which transactions read a set of switches: of each chip the fewest, and of as few the shortest on the wire."""
+"""The transactions that read a set of switches: the fewest per chip, and the shortest on the wire among those."""
 
 from collections.abc import Collection, Mapping, Sequence
 from itertools import combinations
@@ -10,13 +10,13 @@ from ..manifest import Switch
 from ..names import level_name, taxel_and_code
 from .scanmap import SCHEMA, BoardLevel, Pair, Port, ScanMap, StreamRead
 
-# Of each taxel its levels: (code, number of the switch) pairs, ascending.
+# The levels of each taxel: (code, number of the switch) pairs, ascending.
 Levels = Mapping[str, tuple[Pair, ...]]
 
 
 def wired_names(harness: Harness, switches: Sequence[Switch]) -> list[str]:
-    """Return the names under which a harness has a build's switches: of a level "pad3>57", whatever an older build
-    calls it, unless a comparator's pin has its name.
+    """Return the names of a build's switches in a harness: for a level "pad3>57", whatever an older build calls it,
+    unless a comparator's pin has its name.
     """
     pins = set(harness.switches)
     return [
@@ -28,9 +28,9 @@ def wired_names(harness: Harness, switches: Sequence[Switch]) -> list[str]:
 
 
 def levels_of(harness: Harness, switch_names: Sequence[str]) -> Levels:
-    """Return which of these names are levels of taxels of the harness; a taxel's own name is its level above 0.
+    """Return the names that are levels of the harness's taxels; a taxel's own name is its level above 0.
 
-    A name of a switch is none, whatever it looks like.
+    The name of a switch is never a level, whatever it looks like.
     """
     taxels, pins = set(harness.taxel_names), set(harness.switches)
     found: dict[str, list[Pair]] = {}
@@ -42,9 +42,9 @@ def levels_of(harness: Harness, switch_names: Sequence[str]) -> Levels:
 
 
 def cover(chip: Chip, pins: Collection[int]) -> tuple[Reading, ...]:
-    """Return the readings of `chip` that show all `pins`: the fewest, then those of the fewest SCL periods.
+    """Return the readings of `chip` that show all `pins`: the fewest, then those with the fewest SCL periods.
 
-    Each shows a pin that no other of them shows. A reading of three ports may pass over an unused one in the middle
+    Each shows a pin that none of the others shows. A reading of three ports may include an unused one in the middle
     (TCA6424A): one transaction of 57 SCL periods instead of two of 39.
     """
     wanted = set(pins)
@@ -56,8 +56,8 @@ def cover(chip: Chip, pins: Collection[int]) -> tuple[Reading, ...]:
 
 
 def ports_of(harness: Harness, numbers: Mapping[str, int], levels: Levels | None = None) -> tuple[Port, ...]:
-    """Return the fewest ports whose answers hold all switches of `numbers` that hang on chips, chip by chip, and the
-    conversions of all taxels of `levels`.
+    """Return the fewest ports whose replies hold all switches of `numbers` that are wired to chips, chip by chip, and
+    the conversions of all taxels of `levels`.
     """
     found = levels or {}
     expanders = (
@@ -84,7 +84,7 @@ def _ports(bus: int, number: int, wired: ChipWiring, numbers: Mapping[str, int])
 
 
 def _conversions(bus: int, number: int, wired: ChipWiring | SpiWiring, levels: Levels) -> list[Port]:
-    """Return a port for each taxel that has levels, of which there may be none: all levels of it are one conversion."""
+    """Return a port for each taxel with levels, if any: one conversion gives all its levels."""
     readings = wired.chip.readings
     return [
         Port(bus, number, readings[channel].name, (), True, levels[taxel])
@@ -100,8 +100,8 @@ def _shown(readings: Collection[Reading]) -> set[int]:
 def whole_scan(harness: Harness, switch_names: Sequence[str], *, every_taxel: bool = False) -> ScanMap:
     """Return the map that reads the switches and levels of these names, chip by chip with the fewest transactions.
 
-    Names that are wired to nothing are read by nobody. With `every_taxel`, taxels without levels are converted too: to
-    record their codes, not for a build.
+    Names that are wired to nothing are not read. With `every_taxel`, taxels without levels are converted too, to record
+    their codes, not for a build.
     """
     levels = levels_of(harness, switch_names)
     on_taxels = {number for pairs in levels.values() for _, number in pairs}

@@ -1,4 +1,4 @@
-"""A harness for a new reduced glove: the kept switches on the fewest ports, and the fewest bytes on the bus."""
+"""Propose a harness for a new reduced glove: the kept switches on the fewest ports, and the fewest bytes on the bus."""
 
 from collections.abc import Iterator, Sequence
 from itertools import islice
@@ -23,11 +23,11 @@ from ..harness.wiring import (
 )
 from ..names import list_names, nearest, taxel_and_code
 
-# What every board's I2C does, and most chips; slower where the chip is.
+# Supported by every board's I2C, and most chips; a slower chip slows it down.
 CLOCK_HZ = 400_000
-# What reads taxels: the most channels on a bus, converted within the transfer that reads them.
+# The converter for taxels: the most channels on a bus, converted within the transfer that reads them.
 CONVERTER = "ads7828"
-# A board's converter has no more channels by itself; CD74HC4067 multiply them.
+# A board's converter alone has no more channels; CD74HC4067 multiply them.
 _BOARD_CHANNELS = 8
 
 
@@ -40,13 +40,13 @@ def propose_harness(
     device: str = "/dev/i2c-1",
     cyberglove: GloveWiring | None = None,
 ) -> Harness:
-    """Return a harness with all the switches on chips of one kind on one bus, the first names on the first chips; and
+    """Return a harness with all switches on chips of one kind on one bus, the first names on the first chips, and
     `taxels`, and those whose levels are among the names, on converters.
 
-    kind may be a converter's, on I2C or SPI: switches are then on the usual expander. Each chip is read in one
-    transaction, as few as the kind allows, and of as few the shortest on the wire. Chips beyond the kind's addresses go
-    behind a TCA9548A, those that come first stay before it. Raises HarnessError if there is no such kind, or no room
-    for so many switches.
+    kind may be a converter, on I2C or SPI: switches are then on the usual expander. Each chip is read in as few
+    transactions as the kind allows, and the shortest on the wire among those. Chips beyond the kind's addresses go
+    behind a TCA9548A; the first ones stay in front of it. Raises HarnessError if there is no such kind, or no room
+    for all switches.
     """
     if kind not in CHIPS and kind not in SPI_CHIPS:
         raise HarnessError(f"there is no chip {kind!r}{nearest(kind, [*CHIPS, *SPI_CHIPS])}")
@@ -76,14 +76,14 @@ def _on_spi(kind: str, names: Sequence[str]) -> tuple[SpiWiring, ...]:
 
 
 def _parted(names: Sequence[str], taxels: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the switches, and the taxels, levels of which may be among the names."""
+    """Return the switches, and the taxels whose levels may be among the names."""
     levels = {name: level[0] for name in names if (level := taxel_and_code(name))}
     return [name for name in names if name not in levels], list(dict.fromkeys((*levels.values(), *taxels)))
 
 
 def _hung(kind: str, names: Sequence[str]) -> tuple[ChipWiring, ...]:
-    """Return the chips of a kind with all the names; pins are taken in their order, so that the last chip's are on as
-    few ports as will do.
+    """Return the chips of a kind with all the names; pins are taken in order, so that the last chip uses as few ports
+    as possible.
     """
     chip = CHIPS[kind]
     inputs, left = _inputs(chip), iter(names)
@@ -100,23 +100,23 @@ def propose_board(
     port: str = "/dev/ttyACM0",
     cyberglove: GloveWiring | None = None,
 ) -> Harness:
-    """Return a harness with all the switches on one scanner board, a key each, in their order, and the taxels whose
-    levels are among the names on its converter.
+    """Return a harness with all switches on one scanner board, one key each, in order, and the taxels whose levels are
+    among the names on its converter.
 
-    Raises HarnessError if no board has so many keys or channels.
+    Raises HarnessError if no board has enough keys or channels.
     """
     switches, taxels = _parted(switch_names, ())
     kinds = (("switches", switches, MOST_KEYS, "keys"), ("taxels", taxels, MOST_CHANNELS, "channels"))
     for what, names, most, places in kinds:
         if len(names) > most:
-            raise HarnessError(f"{len(names)} {what}, one board has {most} {places}: share them between boards by hand")
+            raise HarnessError(f"{len(names)} {what}, but one board has {most} {places}: use several boards, by hand")
     mux: Literal["cd74hc4067"] | None = "cd74hc4067" if len(taxels) > _BOARD_CHANNELS else None
     board = ScannerWiring(port=port, switches=tuple(switches), taxels=tuple(taxels), mux=mux)
     return Harness(name=name, cyberglove=cyberglove, scanners=(board,) if switch_names else ())
 
 
 def propose_cyberglove(joints: Sequence[str]) -> GloveWiring | None:
-    """Return a CyberGlove that measures joints of these names; None where they are a glove of one's own."""
+    """Return a CyberGlove that measures joints of these names, or None for joints of another glove."""
     sensors = sensors_with(joints)
     if sensors is None:
         return None
@@ -124,12 +124,12 @@ def propose_cyberglove(joints: Sequence[str]) -> GloveWiring | None:
 
 
 def own_joints(joints: Sequence[str]) -> str:
-    """Return a sentence on what has to read joints that no CyberGlove measures; "" for others, and without joints."""
+    """Return a sentence on how to read joints that no CyberGlove measures; "" for others, and without joints."""
     if not joints or sensors_with(joints) is not None:
         return ""
     return (
-        f"joints {list_names(joints)} have to be read by a source of your own: a board that prints them ([[stream]] of "
-        "glove.toml), the converter of a board ([analog] of board.toml), or a source of yours (docs/how-to/extend.md)"
+        f"joints {list_names(joints)} need a source of your own: a board that prints them ([[stream]] of glove.toml), "
+        "the converter of a board ([analog] of board.toml), or a source that you add (docs/how-to/extend.md)"
     )
 
 
@@ -142,8 +142,8 @@ def _inputs(chip: Chip) -> list[str]:
 
 
 def _places(chip: Chip, count: int) -> list[tuple[int, MuxChannel | None]]:
-    """Return an address for each of `count` chips, and a channel for those behind the mux: few channels, and of the
-    addresses as many before the mux as these channels allow.
+    """Return an address for each of `count` chips, and a channel for those behind the mux: with the fewest channels,
+    and then as many chips in front of the mux as these channels allow.
     """
     addresses = len(chip.addresses)
     if count <= addresses:
@@ -151,8 +151,8 @@ def _places(chip: Chip, count: int) -> list[tuple[int, MuxChannel | None]]:
     channels = -(-count // addresses)
     if channels > len(tca9548a.CHANNELS):
         raise HarnessError(
-            f"{count} {chip.name} for so many switches, one bus has room for {len(tca9548a.CHANNELS) * addresses}: "
-            "choose a chip with more pins, or share the switches between buses by hand"
+            f"{count} {chip.name} are needed, and one bus has room for {len(tca9548a.CHANNELS) * addresses}: "
+            "choose a chip with more pins, or split the switches between buses by hand"
         )
     before = (channels * addresses - count) // (channels - 1)
     return list(islice(_behind(chip, before, channels), count))

@@ -1,7 +1,8 @@
-"""The scan map: which transactions read the kept switches, in which order; `scan.json` of a build.
+"""The scan map: the transactions that read the kept switches, in order; `scan.json` of a build.
 
-It names chips by their place in the harness that it was made for, whose fingerprint it holds. Its bytes are canonical:
-fields in the order of the structs below, indented by two, one newline at the end. `build.json` holds their SHA-256.
+It refers to chips by their place in the harness that it was made for, whose fingerprint it holds. Its bytes are
+canonical: fields in the order of the structs below, indented by two, one newline at the end. `build.json` holds their
+SHA-256.
 """
 
 from typing import Annotated
@@ -16,17 +17,17 @@ SCHEMA = 1
 MAX_BYTES = 4 << 20
 
 Number = Annotated[int, Meta(ge=0, le=65535)]
-# A bit of an answer, or a key of a board, and the number of the build's switch that it shows.
+# A bit of a reply, or a key of a board, and the number of its switch in the build.
 Pair = tuple[Number, Number]
-# A channel of a board's converter, the code above which a level is closed, and the number of the build's switch.
+# A channel of a board's converter, the code above which a level is closed, and the number of its switch in the build.
 BoardLevel = tuple[Number, Number, Number]
 
 
 class Port(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """One transaction: the reading of this name of chip `chip` of bus `bus`, the I2C buses first, then SPI devices.
 
-    switches holds (bit of the answer, number of the build's switch) pairs; closed_high says that a bit of 1 is a closed
-    switch, as against one of 0. A conversion, which reads one taxel, has `levels` in their place: (code, number of the
+    switches holds (bit of the reply, number of the build's switch) pairs; with closed_high a bit of 1 is a closed
+    switch, otherwise a bit of 0. A conversion, which reads one taxel, has `levels` instead: (code, number of the
     build's switch) pairs, closed above the code, codes ascending.
     """
 
@@ -39,12 +40,12 @@ class Port(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
 
     @property
     def elements(self) -> tuple[int, ...]:
-        """The numbers of the build's switches that it shows, levels included."""
+        """The numbers of the build's switches that it reads, levels included."""
         return tuple(number for _, number in (*self.switches, *self.levels))
 
 
 class StreamRead(Struct, frozen=True, forbid_unknown_fields=True):
-    """What is read of a stream: (place among its switches, number of the build's switch) pairs, and levels of its
+    """The used part of a stream: (place among its switches, number of the build's switch) pairs, and levels of its
     taxels by their places.
     """
 
@@ -53,10 +54,10 @@ class StreamRead(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ScanMap(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """What to read of a glove, ports in the order in which to read them.
+    """The reading plan of a glove, with its ports in reading order.
 
-    scanners holds, for every board of the harness, (key, number of the build's switch) pairs; taxels, where a board
-    measures levels, for every board its levels; streams, what is read of every stream.
+    scanners holds (key, number of the build's switch) pairs for every board of the harness; taxels holds every board's
+    levels, if any board measures levels; streams holds the used part of every stream.
     """
 
     schema: int
@@ -68,7 +69,7 @@ class ScanMap(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
 
     @property
     def switches(self) -> tuple[int, ...]:
-        """The numbers of the build's switches that are read: of the boards, of the ports, of the streams."""
+        """The numbers of the build's switches that are read: from the boards, the ports, the streams."""
         keys = (switch for pairs in self.scanners for _, switch in pairs)
         levels = (switch for board in self.taxels for *_, switch in board)
         streams = (pair[-1] for stream in self.streams for pair in (*stream.switches, *stream.levels))
@@ -76,7 +77,7 @@ class ScanMap(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
 
     @property
     def board_channels(self) -> tuple[int, ...]:
-        """Of how many channels each board is asked for the codes."""
+        """The number of channels whose codes each board is asked for."""
         levels = self.taxels or ((),) * len(self.scanners)
         return tuple(len({channel for channel, *_ in board}) for board in levels)
 
@@ -87,9 +88,9 @@ def scanmap_to_bytes(scan: ScanMap) -> bytes:
 
 
 def scanmap_from_bytes(data: bytes, what: str = "scan.json") -> ScanMap:
-    """Return the scan map of a `scan.json`, which messages call `what`.
+    """Return the scan map of a `scan.json`, whose name in messages is `what`.
 
-    Raises BuildError if it is oversized, no such document, of a newer schema, not canonical, or reads a thing twice.
+    Raises BuildError if it is oversized, no such document, of a newer schema, not canonical, or reads an input twice.
     """
     scan = decode_document(data, ScanMap, what, "a scan map", MAX_BYTES, SCHEMA)
     if data != scanmap_to_bytes(scan):
@@ -99,7 +100,7 @@ def scanmap_from_bytes(data: bytes, what: str = "scan.json") -> ScanMap:
 
 
 def check_switches(scan: ScanMap, switches: int, what: str = "scan.json") -> None:
-    """Raise BuildError unless `scan` reads each of a build's so many switches once, and nothing else."""
+    """Raise BuildError unless `scan` reads each of a build's `switches` once, and nothing else."""
     if sorted(scan.switches) != list(range(switches)):
         raise BuildError(f"{what} does not read each of the {switches} kept switches once: compile the build again")
 

@@ -1,11 +1,11 @@
-"""How long reading takes on the wire, predicted from clocks and baud rates.
+"""Reading times on the wire, predicted from clocks and baud rates.
 
-A transaction takes its SCL periods and the time for which the bus must be free before the next START, which the
+A transaction takes its SCL periods plus the time for which the bus must be free before the next START, which the
 standard gives by speed: 4.7, 1.3 and 0.5 us up to 100 kHz, 400 kHz and above. Each transaction and each selection of a
-mux's channel is one system call, whose cost is the machine's own and is given by the caller.
+mux's channel is one system call, whose cost depends on the machine and is given by the caller.
 
-A converter that needs time begins its next conversion as soon as its last was read, and the bus reads other ports
-meanwhile: the first in the order of the scan that can be read. It waits where none can.
+A slow converter begins its next conversion as soon as its last was read, and the bus reads other ports in the
+meantime: the first in scan order that can be read. It waits if none can.
 """
 
 from collections import Counter
@@ -31,8 +31,8 @@ _BAUD = 115_200
 
 
 class ChipTime(Struct, frozen=True):
-    """What one chip of a scan takes alone: harness.chip_of(bus, chip), by name; its readings; how many kept switches,
-    levels included, they show; microseconds, system calls and conversions included, selections of its channel not.
+    """The time of one chip of a scan alone: harness.chip_of(bus, chip), by name; its readings; the number of kept
+    switches, levels included, that they show; microseconds with system calls and conversions, without selections.
     """
 
     bus: int
@@ -45,10 +45,10 @@ class ChipTime(Struct, frozen=True):
 
 
 class ScanTime(Struct, frozen=True):
-    """What a whole scan takes: chip by chip in the order in which they are first read, selections, and all together.
+    """The time of a whole scan: chip by chip in the order of their first reading, selections, and in total.
 
-    full_us is a scan of all the switches and taxels that are wired to chips, kept or not, for comparison. Where
-    conversions are overlapped, `us` is less than the sum of the chips.
+    full_us is a scan of all switches and taxels that are wired to chips, kept or not, for comparison. With overlapped
+    conversions, `us` is less than the sum of the chips.
     """
 
     chips: tuple[ChipTime, ...]
@@ -59,35 +59,35 @@ class ScanTime(Struct, frozen=True):
 
     @property
     def share(self) -> float:
-        """The scan's time as a share of the full one's."""
+        """The scan's time as a share of the full scan's."""
         return self.us / self.full_us if self.full_us else 0.0
 
 
 def free_us(clock_hz: int) -> float:
-    """Return for how long a bus of this clock must be free between a STOP and the next START."""
+    """Return the time for which a bus of this clock must be free between a STOP and the next START."""
     return next((us for clock, us in _FREE_US if clock_hz <= clock), _FREE_FASTEST_US)
 
 
 def port_us(reading: Reading, clock_hz: int) -> float:
-    """Return what one reading takes on the wire, in microseconds: of a conversion also the transfer that begins it."""
+    """Return the wire time of one reading, in microseconds; a conversion includes the transfer that begins it."""
     if isinstance(reading, Transfer):
         return reading.scl_periods * 1e6 / clock_hz + SELECT_US
     return reading.scl_periods * 1e6 / clock_hz + free_us(clock_hz) + start_us(reading, clock_hz)
 
 
 def start_us(reading: Reading, clock_hz: int) -> float:
-    """Return what the transfer that begins a conversion takes on the wire; 0 where there is none."""
+    """Return the wire time of the transfer that begins a conversion; 0 if there is none."""
     periods = reading.start_periods if isinstance(reading, Conversion) else 0
     return periods * 1e6 / clock_hz + free_us(clock_hz) if periods else 0.0
 
 
 def waiting_us(reading: Reading) -> float:
-    """Return how long a conversion takes from its beginning until it can be read; 0 where nothing has to wait."""
+    """Return the time from the beginning of a conversion until it can be read; 0 if nothing has to wait."""
     return reading.us if isinstance(reading, Conversion) else 0.0
 
 
 def select_us(clock_hz: int) -> float:
-    """Return what selecting a channel of a mux takes on the wire, in microseconds."""
+    """Return the wire time of selecting a channel of a mux, in microseconds."""
     return tca9548a.SCL_PERIODS * 1e6 / clock_hz + free_us(clock_hz)
 
 
@@ -103,7 +103,7 @@ def reading_of(port: Port, harness: Harness) -> Reading:
 
 
 def scan_us(scan: ScanMap, harness: Harness, ioctl_us: float = 0.0) -> ScanTime:
-    """Return what a scan of the map takes, no port left out, with system calls of `ioctl_us` microseconds each."""
+    """Return the time of a scan of the map with all ports, with system calls of `ioctl_us` microseconds each."""
     chips = tuple(_chip_times(scan.ports, harness, ioctl_us))
     chosen = _selected_us(scan.ports, harness, ioctl_us)
     everything = whole_scan(harness, harness.switches, every_taxel=True).ports
@@ -112,7 +112,7 @@ def scan_us(scan: ScanMap, harness: Harness, ioctl_us: float = 0.0) -> ScanTime:
 
 
 def _whole_us(ports: Sequence[Port], harness: Harness, ioctl_us: float) -> float:
-    """Return what reading these ports takes. fsum: in another order, the same to the last bit where nothing waits."""
+    """Return the time to read these ports. fsum: in another order, the same to the last bit if nothing waits."""
     slow = {port.bus for port in ports if waiting_us(reading_of(port, harness))}
     fast = [port for port in ports if port.bus not in slow]
     times = (*_selected_us(fast, harness, ioctl_us), *(t.us for t in _chip_times(fast, harness, ioctl_us)))
@@ -121,11 +121,11 @@ def _whole_us(ports: Sequence[Port], harness: Harness, ioctl_us: float) -> float
 
 
 def overlapped_us(ports: Sequence[Port], harness: Harness, ioctl_us: float = 0.0) -> float:
-    """Return what reading these ports of one bus takes, conversions overlapped with what the bus does meanwhile."""
+    """Return the time to read these ports of one bus, with conversions overlapped with other readings."""
     clock_hz = harness.line_of(ports[0].bus).clock_hz
     route: MuxChannel | None = None
     us = 0.0
-    for _ in range(2):  # the first scan leaves the mux as every further one finds it
+    for _ in range(2):  # the first scan leaves the mux in the state that every further one finds
         us, route = _one_round(ports, harness, clock_hz, ioctl_us, route)
     return us
 
@@ -133,7 +133,7 @@ def overlapped_us(ports: Sequence[Port], harness: Harness, ioctl_us: float = 0.0
 def _one_round(
     ports: Sequence[Port], harness: Harness, clock_hz: int, ioctl_us: float, route: MuxChannel | None
 ) -> tuple[float, MuxChannel | None]:
-    """Return how long one scan takes, and which channel is connected after it."""
+    """Return the time of one scan, and the channel that is connected after it."""
     now, ready = 0.0, dict[int, float]()
     left = list(ports)
 
@@ -169,8 +169,8 @@ def _one_round(
 
 
 def selections(ports: Iterable[Port], harness: Harness) -> tuple[tuple[int, ...], ...]:
-    """Return what has to be written to muxes in a scan: (bus, mux, channel) to select a channel, (bus, mux) to leave
-    another mux for this one.
+    """Return the writes to muxes in a scan: (bus, mux, channel) to select a channel, (bus, mux) to leave another mux
+    for this one.
 
     A bus on which only one channel is read stays on it.
     """
@@ -182,11 +182,11 @@ def selections(ports: Iterable[Port], harness: Harness) -> tuple[tuple[int, ...]
 
 
 def glove_us(glove: GloveWiring, sensors: int, *, wire_only: bool = False) -> float:
-    """Return the shortest period of a CyberGlove's records of so many sensors, in microseconds.
+    """Return the shortest period of a CyberGlove's records of `sensors` sensors, in microseconds.
 
-    It is the vendor's formula (`shortest_us`), in the proportion in which `record_us` was measured to it for all
-    sensors; and no less than the period at which records are asked for. `wire_only` leaves out what the box takes to
-    digitise. The rate is 115200 baud where it is to be found. A record that is asked for takes the byte that asks, too.
+    It is the vendor's formula (`shortest_us`), scaled by the ratio of the measured `record_us` for all sensors to it;
+    and no less than the period of requests. `wire_only` leaves out the time that the box takes to digitise. An unknown
+    rate counts as 115200 baud. A requested record also includes the byte of the request.
     """
     baud = _BAUD if glove.baud == "auto" else glove.baud
     asking_us = 0.0 if glove.mode == "stream" else sending_us(len(glove_protocol.POLL), baud)
@@ -200,13 +200,13 @@ def glove_us(glove: GloveWiring, sensors: int, *, wire_only: bool = False) -> fl
     return max(us, 1e6 / glove.rate_hz if glove.rate_hz else 0.0)
 
 
-# From ANALOG to ANALOG, at least; and what thenar's boards take to convert a channel: 14 cycles of 125 kHz.
+# Minimum time from ANALOG to ANALOG; and the time of thenar's boards to convert a channel: 14 cycles of 125 kHz.
 _ANALOG_US, _CONVERSION_US = 2000.0, 112.0
 
 
 def analog_us(channels: int, baud: int) -> float:
-    """Return how often a board sends the codes of so many channels, in microseconds: the line is free for half of the
-    time at least.
+    """Return the period at which a board sends the codes of `channels` channels, in microseconds: the line is free for
+    at least half of the time.
     """
     return max(_ANALOG_US, 2 * _codes_us(channels, baud))
 
@@ -216,17 +216,17 @@ def _codes_us(channels: int, baud: int) -> float:
 
 
 def conversions_us(scanner: ScannerWiring, channels: int) -> float:
-    """Return how long a board converts so many channels. Behind a multiplexer each first conversion is thrown away."""
+    """Return the time in which a board converts `channels`. Behind a multiplexer each first conversion is discarded."""
     return channels * _CONVERSION_US * (1 if scanner.mux is None else 2)
 
 
 def taxels_us(scanner: ScannerWiring, channels: int) -> float:
-    """Return how long a board takes to convert so many channels, and then to send their codes, in microseconds."""
+    """Return the time in which a board converts `channels` channels and sends their codes, in microseconds."""
     return conversions_us(scanner, channels) + _codes_us(channels, scanner.baud) if channels else 0.0
 
 
 def scanner_us(scanner: ScannerWiring) -> float:
-    """Return how long a board's full bitmap takes on its line, in microseconds."""
+    """Return the time of a board's full bitmap on its line, in microseconds."""
     return sending_us(-(-len(scanner.switches) // 8) + OVERHEAD, scanner.baud)
 
 
@@ -252,6 +252,6 @@ def _chip_times(ports: Iterable[Port], harness: Harness, ioctl_us: float) -> Ite
 
 
 def _alone_us(reading: Reading, clock_hz: int, ioctl_us: float) -> float:
-    """Return what a reading takes where nothing else is read meanwhile."""
+    """Return the time of a reading if nothing else is read in parallel."""
     calls = 2 if start_us(reading, clock_hz) else 1
     return port_us(reading, clock_hz) + waiting_us(reading) + calls * ioctl_us

@@ -1,1 +1,1 @@
-"""From frames to segments: nothing held, a grasp from its beginning to its end, nothing held again."""
+"""From frames to segments: nothing held, a grasp from beginning to end, nothing held again."""

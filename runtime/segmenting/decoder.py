@@ -1,13 +1,13 @@
 """The cheapest segmentation of a stream, tick by tick: exact Viterbi with explicit shortest durations, O(K) a tick.
 
-Let F_k(t) be what ticks 0 to t cost state k, emissions and `stay`. A segment of k that begins at s, before which the
-cheapest path costs enter_k(s), costs enter_k(s) - F_k(s - 1) + F_k(t) by tick t. So the best beginning does not depend
-on t: b_k(t), the least enter_k(s) - F_k(s - 1) of all s <= t, is one comparison a tick. A segment may end once it has
-lasted least_k ticks: a path that may leave k at t costs b_k(t - least_k + 1) + F_k(t), for which the last least_k
-values of b_k are kept. The state with the least b_k(t) + F_k(t) is the one in which the cheapest path ends now.
+Let F_k(t) be the cost of ticks 0 to t in state k, emissions and `stay`. A segment of k that begins at s, entered at
+cost enter_k(s) on the cheapest path, costs enter_k(s) - F_k(s - 1) + F_k(t) by tick t. So the best beginning does not
+depend on t: b_k(t), the least enter_k(s) - F_k(s - 1) of all s <= t, is one comparison a tick. A segment may end once
+it has lasted least_k ticks: a path that may leave k at t costs b_k(t - least_k + 1) + F_k(t), for which the last
+least_k values of b_k are kept. The state with the least b_k(t) + F_k(t) is the one in which the cheapest path ends now.
 
-The first segment may be of any length, as the stream may begin within it, and so may the last. Of paths that cost the
-same, the one wins whose last segment has the lower state, then the one in which it begins earlier, then the segment
+The first segment may be of any length, as the stream may begin within it, and so may the last. Of paths with equal
+costs the one wins whose last segment has the lower state, then the one in which it begins earlier, then the segment
 before it decides, and so on.
 """
 
@@ -28,11 +28,11 @@ _NEVER = 1 << 60
 
 
 class Decoded(msgspec.Struct, frozen=True):
-    """What is known at a tick.
+    """The known states at a tick.
 
-    state    the state of tick `tick`, which the lag allows to be known now; none before the first, where `tick` < 0
-    segment  the number of the grasp segment that this state is in, or that was the last: it counts changes of `state`
-             to a type, from 1; 0 before the first
+    state    the state of tick `tick`, which the lag allows to be known now; none before the first, if `tick` < 0
+    segment  the number of the grasp segment of this state, or of the last one: it counts changes of `state` to a type,
+             from 1; 0 before the first
     start    the tick at which the segment of `state` began, as it is known now
     newest   the state in which the cheapest path ends now
     newest_start  the tick at which its segment began
@@ -47,10 +47,10 @@ class Decoded(msgspec.Struct, frozen=True):
 
 
 class _Sources(msgspec.Struct):
-    """What a segment that begins at a tick could come from, each a state and the tick at which its segment began.
+    """The possible origins of a segment that begins at a tick, each a state and the tick at which its segment began.
 
-    The cheapest type, from which a type begins (itself never does: to go on costs no more); none, from which those
-    types begin whose bit is set in `from_none`; the type from which none begins.
+    They are the cheapest type, from which a type begins (never the same type: to go on costs no more); none, from which
+    those types begin whose bit is set in `from_none`; and the type from which none begins.
     """
 
     first: tuple[int, int]
@@ -65,22 +65,22 @@ class _Sources(msgspec.Struct):
 
 
 class _Paths:
-    """The cheapest paths to the newest tick, and where those of the last `depth` ticks came from; None: of all."""
+    """The cheapest paths to the newest tick, and the origins of the last `depth` ticks; None: of all."""
 
     def __init__(self, model: SegmentModel, depth: int | None) -> None:
         K = model.n_types
         self._none, self.tick = K, -1
         self._enter, self._direct, self._leave = model.enter, model.direct, model.leave
         self._least_leave = min(model.leave)
-        # By how much none is dearer than the cheapest type where a type begins after the latter.
+        # The extra cost of none over the cheapest type if a type begins after the latter.
         self._gaps = [direct - enter for enter, direct in zip(model.enter, model.direct, strict=True)]
         self._least_gap, self._largest_gap = min(self._gaps), max(self._gaps)
-        # What every state pays at every tick changes no comparison.
+        # A cost that every state pays at every tick changes no comparison.
         usual = max(model.stay, key=model.stay.count)
         self._stay = [cost - usual for cost in model.stay]
         self._stays = any(self._stay[:K])
         self._sums, self._best, self._starts = [0] * (K + 1), [0] * (K + 1), [0] * (K + 1)
-        # Of each of the last ticks, b of all states and the beginnings that it is of.
+        # For each of the last ticks, b of all states and the beginnings that belong to it.
         self._past = deque([(self._best, self._starts)] * max(model.least), max(model.least))
         self._least, self._alike = model.least, len({*model.least[:K]}) == 1
         self._costs = (_NEVER, _NEVER, _NEVER)
@@ -101,7 +101,7 @@ class _Paths:
         base, changes, self._next.from_none = self._changes()
         first = ending = within = least = _NEVER
         first_in = ending_in = least_in = 0
-        # Types alone: numbers and changes are of no more.
+        # Types only: the next lines add none.
         for k, change, total, cost, own, row in zip(range(none), changes, sums, types_costs, best, rows, strict=False):
             begun = base + change - total
             total += cost
@@ -113,7 +113,7 @@ class _Paths:
             if own < least:
                 least, least_in = own, k
             mature = row[k] + total
-            # Most types are too dear for either.
+            # Most types are too expensive for either.
             if mature < within:
                 if mature < first:
                     first, first_in = mature, k
@@ -136,8 +136,8 @@ class _Paths:
         self._next = _Sources(first_of, (none, none_ends[none]), ending_of, 0)
 
     def _changes(self) -> tuple[int, Sequence[int], int]:
-        """Return what types cost that begin now, each beyond the first number, and the bits of those that do so after
-        none.
+        """Return the costs of types that begin now, relative to the first number, and the bits of those that do so
+        after none.
         """
         first, none, _ = self._costs
         gap = none - first
@@ -169,8 +169,8 @@ class _Paths:
 class Decoder:
     """Decodes a live stream, with a fixed lag: integers only.
 
-    After each tick it says what state held `lag_ticks` ticks ago, on the cheapest path to the newest tick. A later tick
-    may favour another path: what was said is not taken back.
+    After each tick it returns the state of `lag_ticks` ticks ago, on the cheapest path to the newest tick. A later tick
+    may favour another path: a state once returned is not revised.
     """
 
     __slots__ = ("_lag", "_model", "_paths", "_segment", "_state")
@@ -178,12 +178,12 @@ class Decoder:
     def __init__(self, model: SegmentModel, lag_ticks: int) -> None:
         """Take a lag, in ticks of the model. Raises SettingError if it is negative."""
         if lag_ticks < 0:
-            raise SettingError(f"a lag of {lag_ticks} ticks: it is 0 or more")
+            raise SettingError(f"a lag of {lag_ticks} ticks is not possible: use 0 or more")
         self._model, self._lag, self._paths = model, lag_ticks, _Paths(model, lag_ticks)
         self._state, self._segment = model.n_types, 0
 
     def push(self, lanes: Sequence[int], refused: bool = False) -> Decoded:
-        """Take the scores of the next tick, and whether its frame is refused (of models with a refusal)."""
+        """Take the scores of the next tick, and whether its frame is refused (for models with a refusal)."""
         paths = self._paths
         paths.step(self._model.costs(lanes, refused))
         tick, newest, begun = paths.tick - self._lag, *paths.newest
@@ -202,7 +202,7 @@ class Decoder:
 
 
 def emissions(scores: ArrayLike, model: SegmentModel, refused: ArrayLike | None = None) -> NDArray[np.int64]:
-    """Return what frames cost the states, (T, K + 1), as `SegmentModel.costs` does frame by frame.
+    """Return the costs of frames for the states, (T, K + 1), as `SegmentModel.costs` does frame by frame.
 
     Parameters
     ----------
@@ -211,16 +211,16 @@ def emissions(scores: ArrayLike, model: SegmentModel, refused: ArrayLike | None 
     model : SegmentModel
         Its `shift`, `gain`, `most` and `refusal` are used.
     refused : array of bool, shape (T,), optional
-        Frames that the build's rejection refuses; of a model with a refusal.
+        Frames that the build's rejection refuses; for a model with a refusal.
 
     Raises
     ------
     BuildError
-        If the scores are of another number of classes.
+        If the scores have another number of classes.
     """
     lanes = np.asarray(scores, np.int64)
     if lanes.ndim != 2 or lanes.shape[1] != model.n_lanes:
-        raise BuildError(f"scores of shape {lanes.shape}, the segment model takes {model.n_lanes} a frame")
+        raise BuildError(f"scores have shape {lanes.shape}, but the segment model takes {model.n_lanes} a frame")
     behind = lanes.max(axis=1, initial=np.iinfo(np.int64).min, keepdims=True) - lanes
     found: NDArray[np.int64] = np.minimum((behind >> model.shift) * model.gain >> 8, model.most)
     if model.refusal is None:

@@ -1,4 +1,4 @@
-"""Segments of a live stream: the decoder fed at the ticks of its model, and its answers in the host's time."""
+"""Segments of a live stream: the decoder fed at the ticks of its model, with results in the host's time."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ _MOST_SET = 16
 
 
 class Segment(msgspec.Struct, frozen=True):
-    """The segment of a moment, as `LiveGrasp` publishes it: its state, number, grasp type (that of class `label`, None
+    """The segment of a moment, as published in `LiveGrasp`: its state, number, grasp type (that of class `label`, None
     between segments) and beginning.
     """
 
@@ -25,11 +25,11 @@ class Segment(msgspec.Struct, frozen=True):
 
 
 class LiveSegments:
-    """Feeds a decoder with the newest scores at every tick, integers and times alone: a replay gives the same answers.
+    """Feeds a decoder with the newest scores at every tick; uses only integers and times, so a replay gives the same.
 
-    A tick is taken at the first update at or after it. Where an update comes late, the ticks before the last one that
-    is due take the scores of the update before: they were the newest then. While too little can be read, no tick is
-    taken; after `GRACE_US` of that, or without an update, the segment is over, and paths begin afresh.
+    A tick is taken at the first update at or after it. If an update comes late, the ticks before the last due one take
+    the scores of the previous update: they were the newest then. While too little can be read, no tick is taken; after
+    `GRACE_US` of that, or without an update, the segment is over, and paths start afresh.
     """
 
     def __init__(self, model: SegmentModel, grasps: Sequence[str], lag_us: int) -> None:

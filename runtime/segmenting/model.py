@@ -1,4 +1,4 @@
-"""The explicit-duration hidden Markov model of a build: small integer costs, and what a frame costs each state.
+"""The explicit-duration hidden Markov model of a build: small integer costs of frames, durations and transitions.
 
 States are the grasp types, 0 to K - 1, and "none", the last, K. Costs are steps of negative logarithms, usually
 `STEPS` to a nat, and the best segmentation of a stream is the cheapest one:
@@ -8,7 +8,7 @@ States are the grasp types, 0 to K - 1, and "none", the last, K. Costs are steps
     a type k begins         enter[k] after none, direct[k] after another type
     none begins             leave[k] after type k
 
-The first segment begins for nothing.
+The first segment begins at no cost.
 """
 
 from collections.abc import Sequence
@@ -34,16 +34,16 @@ class SegmentModel(Struct, frozen=True, forbid_unknown_fields=True, omit_default
     Parameters
     ----------
     shift, gain, most : int
-        What a frame costs a state (see the module); `gain_of` makes the first two.
+        The cost of a frame for a state (see the module); `gain_of` makes the first two.
     least : tuple of int, length K + 1
         The shortest duration of each state, in ticks.
     stay : tuple of int, length K + 1
-        The cost of each tick of a segment, so that durations beyond the shortest fall off geometrically.
+        The cost of each tick of a segment, so that durations beyond the shortest decay geometrically.
     enter, leave, direct : tuple of int, length K
         The cost of a type after none, of none after a type, of a type after another type.
     refusal : int or None
         None: the tables have a class "none". Otherwise none costs nothing in a refused frame, in which every type costs
-        so much more; in all other frames none costs so much.
+        this amount more; in all other frames none costs this amount.
     tick_us : int
         The time of a tick.
     """
@@ -71,7 +71,9 @@ class SegmentModel(Struct, frozen=True, forbid_unknown_fields=True, omit_default
         if min(costs) < 0 or not 1 <= min(self.least) <= max(self.least) <= 255:
             raise BuildError("a segment model has a cost below 0, or a shortest duration that is not 1 to 255 ticks")
         if not (0 <= self.shift <= 8 and 1 <= self.gain <= 65535 and 1 <= self.most <= _MOST):
-            raise BuildError(f"a frame's cost of (difference >> {self.shift}) * {self.gain} >> 8, at most {self.most}")
+            raise BuildError(
+                f"a frame cannot cost (difference >> {self.shift}) * {self.gain} >> 8, at most {self.most}"
+            )
         if self.shift < 8 and 255 * self.gain >> 8 < self.most:
             raise BuildError(
                 f"a gain of {self.gain} takes a byte to {255 * self.gain >> 8}, below {self.most}, "
@@ -80,14 +82,14 @@ class SegmentModel(Struct, frozen=True, forbid_unknown_fields=True, omit_default
         if self.spread > LARGEST:
             raise BuildError(
                 f"paths through this segment model may differ by {self.spread} steps, at most {LARGEST} fit: "
-                f"take shorter durations than {max(self.least)} ticks, or longer ticks"
+                f"use shorter durations than {max(self.least)} ticks, or longer ticks"
             )
 
     @classmethod
     def usual(cls, n_types: int, has_none: bool, scale: float) -> Self:
-        """Return a model for tables of `scale` steps per unit whose streams nobody has learnt from.
+        """Return a default model for tables of `scale` steps per unit, for builds not trained on streams.
 
-        Holds of at least 100 ms, none of at least 50 ms; three frames that are certain begin a grasp.
+        Grasps last at least 100 ms, none at least 50 ms; three frames that are certain begin a grasp.
         """
         shift, gain = gain_of(scale, 0.25)
         return cls(
@@ -104,23 +106,23 @@ class SegmentModel(Struct, frozen=True, forbid_unknown_fields=True, omit_default
 
     @property
     def n_types(self) -> int:
-        """K, and the number of the state none."""
+        """K, which is also the number of the state none."""
         return len(self.enter)
 
     @property
     def n_lanes(self) -> int:
-        """How many scores a frame has: K, and one more where the tables have a class "none"."""
+        """The number of scores per frame: K, plus one if the tables have a class "none"."""
         return self.n_types + (self.refusal is None)
 
     @property
     def spread(self) -> int:
         """The largest difference that the decoder compares.
 
-        Let P be the most that a tick costs, L the longest of the shortest durations, X the dearest change, V(t) the
-        cheapest path to tick t: a path's beginning is a path, so V never falls. Where the cheapest path is in a segment
-        that is not whole yet, the state before it could have gone on, for (L - 1) P at most: so a state that may be
-        left at t costs V(t) + (L - 1) P at most, the cheapest of them. From there any state can be had whole L ticks
-        later, for X + L P. So all states lie within X + (2 L - 1) P of each other, and what enters is X away from
+        Let P be the most that a tick costs, L the longest of the shortest durations, X the most expensive transition,
+        V(t) the cheapest path to tick t: a path's beginning is a path, so V never falls. If the cheapest path is in a
+        segment that is not complete, the state before it could have gone on, for (L - 1) P at most: so the cheapest of
+        the states that may be left at t costs at most V(t) + (L - 1) P. From there any state can be complete L ticks
+        later, for X + L P. So all states lie within X + (2 L - 1) P of each other, and entering states are X away from
         them.
         """
         tick = self.most + max(self.stay) + (self.refusal or 0)
@@ -128,7 +130,7 @@ class SegmentModel(Struct, frozen=True, forbid_unknown_fields=True, omit_default
         return 2 * change + (2 * max(self.least) - 1) * tick
 
     def costs(self, lanes: Sequence[int], refused: bool = False) -> list[int]:
-        """Return what a frame costs each of the K + 1 states; `lanes` are its `n_lanes` scores, from any zero."""
+        """Return the costs of a frame for each of the K + 1 states; `lanes` are its `n_lanes` scores, from any zero."""
         best, shift, extra = max(lanes), self.shift, self.refusal
         table = _costs(shift, self.gain, self.most)
         found = [table[best - lane >> shift] for lane in lanes]
@@ -139,7 +141,7 @@ class SegmentModel(Struct, frozen=True, forbid_unknown_fields=True, omit_default
 
 @lru_cache
 def _costs(shift: int, gain: int, most: int) -> bytes:
-    """Return what a frame costs a state for each difference of scores, which are of 16 bits, after the shift."""
+    """Return the cost of a frame for a state, for each difference of 16-bit scores, after the shift."""
     return bytes(min(behind * gain >> 8, most) for behind in range(1 << 16 - shift))
 
 

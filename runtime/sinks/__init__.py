@@ -1,4 +1,4 @@
-"""Where recognised grasps go: one file for each kind of sink, found by the registry `SINKS`."""
+"""The sinks for recognised grasps: one file per kind, found by the registry `SINKS`."""
 
 from ..published import JointAngles
 from ..task import ProgressLine

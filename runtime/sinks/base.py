@@ -1,4 +1,4 @@
-"""What every sink is, which kinds there are, and several sinks as one."""
+"""The interface of all sinks, their kinds, and several sinks as one."""
 
 import logging
 from abc import ABC, abstractmethod
@@ -24,19 +24,19 @@ _log = logging.getLogger("thenar")
 
 
 class SinkError(ThenarError, OSError):
-    """A sink cannot be opened: the name is taken, no such folder, a package is missing. The message says which."""
+    """A sink cannot be opened: the name is taken, the folder or a package is missing. The message says which."""
 
 
 class SinkReport(msgspec.Struct, frozen=True):
-    """How a sink is doing, since it was opened.
+    """The state of a sink since it was opened.
 
-    where     as `open_sink` has it
-    readers   how many read now; None where that cannot be known
-    sent      what went out, counted once a reader
-    lost      what did not: a reader was slow, was gone, or the system refused
-    error     what went wrong last, or nothing
-    over      whether nothing will go out any more: its only reader is gone, the disk is full, it broke
-    dropped   how many readers were dropped, for they took nothing, or were the slowest when all places were taken
+    where     as given to `open_sink`
+    readers   number of current readers; None if unknown
+    sent      lines sent, counted once per reader
+    lost      lines not sent: a reader was slow or gone, or the system refused
+    error     the last error, or nothing
+    over      whether nothing more will be sent: its only reader is gone, the disk is full, it broke
+    dropped   number of readers dropped because they took nothing, or were the slowest when all places were taken
     """
 
     where: str
@@ -49,7 +49,7 @@ class SinkReport(msgspec.Struct, frozen=True):
 
 
 class Sink(ABC):
-    """An open sink: it takes every frame's result. A sink of your own derives from this, and needs `publish` alone.
+    """An open sink: it takes every frame's result. To write your own, derive from this; only `publish` is required.
 
     No method blocks and none but the constructor raises: what cannot be sent is lost, and counted.
     """
@@ -57,40 +57,40 @@ class Sink(ABC):
     __slots__ = ()
 
     def begin(self, build: "Build") -> None:  # noqa: B027
-        """Learn what recognises, before the first frame."""
+        """Take the build that recognises, before the first frame."""
 
     @abstractmethod
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Send on what was recognised.
+        """Send a prediction.
 
-        preshape is what the hand shall have now, None where it shall be told nothing; angles are the glove's.
+        preshape is the one that the hand should have now, or None to send it nothing; angles are the glove's.
         """
 
     def moment(self, moment: "Moment") -> None:  # noqa: B027
-        """Send on what the grasp that was published last came of: frames, codes, scores."""
+        """Send the frames, codes and scores behind the grasp that was published last."""
 
     def health(self, report: HealthReport) -> None:  # noqa: B027
-        """Send on how the glove fares, once a second or so."""
+        """Send the glove's health, about once a second."""
 
     def task(self, progress: Progress) -> None:  # noqa: B027
-        """Send on how far the hand has come in a task, at the first frame and whenever that changes."""
+        """Send the hand's progress in a task, at the first frame and whenever it changes."""
 
     def report(self) -> SinkReport:
-        """Return how the sink itself is doing."""
+        """Return the state of the sink itself."""
         return SinkReport(type(self).__name__, None, 0, 0)
 
     def close(self) -> None:  # noqa: B027
-        """Let go of everything; may be called twice."""
+        """Release everything; may be called twice."""
 
 
 @dataclass(frozen=True, slots=True)
 class SinkPlace:
-    """Where a sink is to be opened.
+    """The place where a sink is to be opened.
 
     text     as the user wrote it: "ros:/thenar?public&rate=50"
     place    what follows the name: "/thenar"
     options  the options that are given, and their values: {"public": "", "rate": "50"}
-    wait     whether it had better wait for a slow reader than lose lines: right for a replay, wrong for a live glove
+    wait     whether to wait for a slow reader rather than lose lines: right for a replay, wrong for a live glove
     """
 
     text: str
@@ -101,24 +101,24 @@ class SinkPlace:
 
 @dataclass(frozen=True, slots=True)
 class SinkKind:
-    """A kind of sink, as `--sink NAME:PLACE` chooses it.
+    """A kind of sink, as chosen by `--sink NAME:PLACE`.
 
-    A module of `thenar.runtime.sinks` defines one as `MEMBER`, or a tuple of several; another package names one under
-    the entry point `thenar.sinks`.
+    A module of `thenar.runtime.sinks` defines one as `MEMBER`, or a tuple of several; another package registers one
+    under the entry point `thenar.sinks`.
 
     Attributes
     ----------
     name : str
         The name before the colon: "tcp".
     place : str
-        What follows it, as help spells it: "127.0.0.1:PORT".
+        The part after it, as spelled in help: "127.0.0.1:PORT".
     help : str
-        What it does, in a few words: "JSON lines to whoever connects".
+        Its function, in a few words: "JSON lines to whoever connects".
     open : callable
-        `open(where)` returns an open `Sink` at a `SinkPlace`. It raises SettingError about a place that means nothing,
-        SinkError about one that cannot be opened. A package that only this sink needs is imported in here.
+        `open(where)` returns an open `Sink` at a `SinkPlace`. It raises SettingError for an invalid place, SinkError
+        for one that cannot be opened. A package that only this sink needs is imported in it.
     options : tuple of str
-        Words that may follow the place behind a question mark, parted by &: "public"; "rate=HZ" takes a value.
+        Words that may follow the place after a question mark, separated by &: "public"; "rate=HZ" takes a value.
     rank : int
         Orders the kinds.
     """
@@ -132,7 +132,7 @@ class SinkKind:
 
     @property
     def spelling(self) -> str:
-        """How `--sink` has it: "ros:/NAMESPACE[?public][?rate=HZ]"."""
+        """Its form in `--sink`: "ros:/NAMESPACE[?public][?rate=HZ]"."""
         return f"{self.name}:{self.place}" + "".join(f"[?{option}]" for option in self.options)
 
 
@@ -140,16 +140,16 @@ SINKS = Members("sink", SinkKind, "thenar.runtime.sinks", "thenar.sinks")
 
 
 def open_sink(where: str, *, wait: bool = False) -> Sink:
-    """Return the sink that `where` names: NAME:PLACE, as the kinds in `SINKS` spell it.
+    """Return the sink that `where` names: NAME:PLACE, spelled as in the kinds of `SINKS`.
 
-    With `wait`, it rather waits for a slow reader than loses lines. Raises SettingError about a name that means
-    nothing, SinkError about one that cannot be opened.
+    With `wait`, it waits for a slow reader rather than lose lines. Raises SettingError for an invalid name, SinkError
+    for one that cannot be opened.
     """
     name, _, place = where.partition(":")
     if not place or name not in SINKS:
         kinds = ", ".join(kind.spelling for kind in SINKS.values())
         wrong = f"there is no kind of sink called {shortened(name)!r}" if place else "names no sink"
-        raise SettingError(f"{shortened(repr(where))}: {wrong}: take one of {kinds}")
+        raise SettingError(f"{shortened(repr(where))}: {wrong}: use one of {kinds}")
     kind, options = SINKS[name], dict[str, str]()
     if kind.options:
         place, mark, given = place.partition("?")
@@ -157,13 +157,13 @@ def open_sink(where: str, *, wait: bool = False) -> Sink:
         known = {option.partition("=")[:2] for option in kind.options}
         if not {part[:2] for part in parts} <= known:
             spelled = " or ".join(f"`{option}`" for option in kind.options)
-            raise SettingError(f"{shortened(repr(where))}: behind the question mark can only be {spelled}")
+            raise SettingError(f"{shortened(repr(where))}: after the question mark only {spelled} can follow")
         options = {option: value for option, _, value in parts}
     return kind.open(SinkPlace(where, place, options, wait))
 
 
 class Fanout:
-    """Publishes to every one of `sinks`. One that raises, against its promise, is left out from then on: its report
+    """Publishes to every one of `sinks`. One that raises, against its contract, is left out from then on: its report
     says why, and the log has the trace.
     """
 
@@ -174,7 +174,7 @@ class Fanout:
         self._errors, self._lost = [""] * len(self._sinks), [0] * len(self._sinks)
 
     def begin(self, build: "Build") -> None:
-        """Tell all sinks what recognises."""
+        """Pass the build to all sinks."""
         self._all(lambda sink: sink.begin(build))
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
@@ -182,19 +182,19 @@ class Fanout:
         self._all(lambda sink: sink.publish(grasp, preshape, angles))
 
     def moment(self, moment: "Moment") -> None:
-        """Send on to all sinks that work what the newest grasp came of."""
+        """Send the moment behind the newest grasp to all sinks that work."""
         self._all(lambda sink: sink.moment(moment))
 
     def health(self, report: HealthReport) -> None:
-        """Send on to all sinks that work how the glove fares."""
+        """Send the glove's health to all sinks that work."""
         self._all(lambda sink: sink.health(report))
 
     def task(self, progress: Progress) -> None:
-        """Send on to all sinks that work how far the hand has come."""
+        """Send the hand's progress to all sinks that work."""
         self._all(lambda sink: sink.task(progress))
 
     def reports(self) -> tuple[SinkReport, ...]:
-        """Return how every sink is doing, in their order."""
+        """Return the states of all sinks, in order."""
         return tuple(self._report(number, sink) for number, sink in enumerate(self._sinks))
 
     def close(self) -> None:
@@ -229,4 +229,4 @@ class Fanout:
 
     def _blame(self, number: int, reason: Exception) -> None:
         self._errors[number] = f"{type(reason).__name__}: {reason}"
-        _log.error("sink %s: a fault of the program", type(self._sinks[number]).__name__, exc_info=reason)
+        _log.error("sink %s: a bug in the program", type(self._sinks[number]).__name__, exc_info=reason)

@@ -1,18 +1,18 @@
-"""Live topics for Foxglove, over its own WebSocket protocol (extra `foxglove`); messages are JSON, with their schemas.
+"""Live topics for Foxglove, over Foxglove's WebSocket protocol (extra `foxglove`); messages are JSON, with schemas.
 
     /thenar/grasp     the grasp type, probability, state, segment and health, on change and `rate` times a second
     /thenar/scores    score and probability of every grasp type, with `grasp`
-    /thenar/switches  names of the switches that are closed, lost or left unread, with `grasp`
-    /thenar/joints    angles in rad where they are calibrated, and the codes that are scored, with `grasp`
+    /thenar/switches  names of the switches that are closed, lost or unread, with `grasp`
+    /thenar/joints    angles of calibrated joints in rad, and the codes that are scored, with `grasp`
     /thenar/preshape  the preshape, on change and once a second
     /thenar/task      if a task is followed: its step, on change and once a second
-    /thenar/health    once a second, if asked for: how the glove fares
+    /thenar/health    once a second, if requested: the glove's health
 
-A message's time is that of its frame. A topic that nobody has subscribed to costs nothing. What waits for a reader is
-bounded, the oldest goes first: one that stops reading holds nobody up. The server is the SDK's, on threads of its own;
-readers can ask for nothing but topics. A web page that is open in a browser of this machine may read as Foxglove does.
+A message has the time of its frame. A topic without subscribers costs nothing. A reader's queue is bounded and drops
+the oldest first: a reader that stops delays nobody. The SDK's server runs on separate threads; readers can only request
+topics. A web page open in a browser of this machine may read as Foxglove does.
 
-Foxglove knows no null, no alternatives and no references in a schema: what is None is left out of its message.
+Foxglove's schemas have no null, no alternatives and no references: None is left out of its message.
 """
 
 import ipaddress
@@ -39,12 +39,12 @@ if TYPE_CHECKING:
 RATE_HZ = 50
 _FASTEST_HZ = 1000
 _REPEAT_US = 1_000_000
-# Messages that wait for one reader, of all topics: some two seconds.
+# Messages queued for one reader, over all topics: about two seconds.
 BACKLOG = 512
 
 
 class Score(msgspec.Struct, frozen=True):
-    """How a frame scores a grasp type, in integer steps, and its softmax among all."""
+    """The score of a frame for a grasp type, in integer steps, and its softmax among all."""
 
     grasp: str
     score: int
@@ -52,8 +52,8 @@ class Score(msgspec.Struct, frozen=True):
 
 
 class Scores(msgspec.Struct, frozen=True):
-    """Those of every grasp type, in the build's order, and whether the build refuses the frame; none while too little
-    can be read.
+    """The scores of every grasp type, in the build's order, and whether the build refuses the frame; none while too
+    little can be read.
     """
 
     types: tuple[Score, ...]
@@ -61,7 +61,7 @@ class Scores(msgspec.Struct, frozen=True):
 
 
 class Switches(msgspec.Struct, frozen=True):
-    """Names of the build's switches. Of those that are in none of the lists it is known that they are open."""
+    """Names of the build's switches. A switch that is in none of the lists is known to be open."""
 
     closed: tuple[str, ...]
     lost: tuple[str, ...]
@@ -69,21 +69,21 @@ class Switches(msgspec.Struct, frozen=True):
 
 
 class Angle(msgspec.Struct, frozen=True):
-    """Where a joint of the glove is."""
+    """The angle of a joint of the glove."""
 
     name: str
     position_rad: float
 
 
 class Code(msgspec.Struct, frozen=True):
-    """What is scored of a joint of the build."""
+    """The scored code of a joint of the build."""
 
     name: str
     code: int
 
 
 class JointValues(msgspec.Struct, frozen=True):
-    """All joints; lists are empty where there is no calibration, or the joints are lost."""
+    """All joints; lists are empty without a calibration, or while the joints are lost."""
 
     angles: tuple[Angle, ...]
     codes: tuple[Code, ...]
@@ -101,7 +101,7 @@ TOPICS: dict[str, type[msgspec.Struct]] = {
 
 
 def schema(kind: type[msgspec.Struct]) -> dict[str, Any]:
-    """Return the JSON schema of a struct in the part of the language that Foxglove knows."""
+    """Return the JSON schema of a struct, in the subset that Foxglove supports."""
     (found,), shared = msgspec.json.schema_components((kind,), ref_template="{name}")
     return {"title": f"thenar.{kind.__name__}", **_plain(found, shared)}
 
@@ -128,9 +128,9 @@ def encode(content: msgspec.Struct) -> bytes:
 
 
 class FoxgloveServer(Sink):
-    """Serves Foxglove at an address. Raises SettingError about one that cannot be, SinkError where it cannot be served.
+    """Serves Foxglove at an address. Raises SettingError for an invalid one, SinkError if it cannot be served.
 
-    `host` is an address, `port` 0 any free one: the attribute `port` says which.
+    `host` is an address, `port` 0 any free one: the attribute `port` is the one in use.
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int = 8765, *, rate: int = RATE_HZ, where: str = "") -> None:
@@ -140,8 +140,8 @@ class FoxgloveServer(Sink):
 
         self._where = where or f"foxglove:{host}:{port}"
         if not 1 <= rate <= _FASTEST_HZ:
-            raise SettingError(f"{self._where}: a rate of {rate}: it is 1 to {_FASTEST_HZ} a second")
-        # Channels are gone with it.
+            raise SettingError(f"{self._where}: a rate of {rate} is not possible: use 1 to {_FASTEST_HZ} a second")
+        # Channels end when it is garbage-collected.
         self._context = context = foxglove.Context()
         self._channels = {
             topic: foxglove.Channel(topic, schema=schema(kind), message_encoding="json", context=context)
@@ -159,13 +159,13 @@ class FoxgloveServer(Sink):
             )
         except (RuntimeError, OSError) as reason:
             said = re.sub(r" \(os error [0-9]+\)", "", str(reason).removeprefix("FoxgloveError: "))
-            hint = ": another process serves that port; take another" if "in use" in said else ""
+            hint = ": another process serves that port; use another" if "in use" in said else ""
             raise SinkError(f"{self._where} cannot be opened: {said}{hint}") from None
         self.port: int = self._server.port
         self._period_us, self._due, self._closed = 1_000_000 // rate, False, False
         self._written_us = self._repeated_us = self._unix_us = self._time_us = 0
         self._shown: tuple[object, ...] = ()
-        # Preshape and task, by their topics: whoever comes later has them within a second.
+        # Preshape and task, by topic: late readers get them within a second.
         self._kept: dict[str, msgspec.Struct] = {}
         self._build: Build | None = None
         self._sent = self._lost = 0
@@ -176,7 +176,7 @@ class FoxgloveServer(Sink):
         self._build = build
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Publish the grasp if that is news, or due, and what is kept."""
+        """Publish the grasp if it changed or is due, and the kept messages."""
         self._time_us, self._unix_us = grasp.time_us, grasp.unix_us
         shown = (grasp.grasp, grasp.health, grasp.state, grasp.segment, grasp.segment_type)
         # The recording of several sessions may go back in time.
@@ -194,7 +194,7 @@ class FoxgloveServer(Sink):
                 self._log(topic, content)
 
     def moment(self, moment: "Moment") -> None:
-        """Publish with the grasp what it came of."""
+        """Publish the details with the grasp."""
         if self._due and self._build is not None and self._subscribed:
             self._log("/thenar/scores", _scores(moment, self._build))
             if moment.switches is not None:
@@ -202,11 +202,11 @@ class FoxgloveServer(Sink):
             self._log("/thenar/joints", _joints(moment, self._build))
 
     def health(self, report: HealthReport) -> None:
-        """Publish how the glove fares."""
+        """Publish the glove's health."""
         self._log("/thenar/health", report, report.time_us - self._time_us)
 
     def task(self, progress: Progress) -> None:
-        """Publish how far the hand has come."""
+        """Publish the hand's progress."""
         self._keep("/thenar/task", progress)
 
     def _keep(self, topic: str, content: msgspec.Struct) -> None:
@@ -214,7 +214,7 @@ class FoxgloveServer(Sink):
         self._log(topic, content)
 
     def _log(self, topic: str, content: msgspec.Struct, later_us: int = 0) -> None:
-        """Hand a message to the server if somebody reads its topic, stamped so much later than the newest frame."""
+        """Pass a message to the server if its topic has readers, stamped `later_us` after the newest frame."""
         channel = self._channels[topic]
         if self._closed or not channel.has_sinks():
             return
@@ -226,12 +226,12 @@ class FoxgloveServer(Sink):
             self._error = str(reason)
 
     def report(self) -> SinkReport:
-        """Return how this sink is doing; what the server drops of a reader that is slow, it tells nobody."""
+        """Return the state of this sink; the server does not report the messages that it drops for slow readers."""
         readers = 0 if self._closed else len(self._subscribed)
         return SinkReport(self._where, readers, self._sent, self._lost, self._error)
 
     def close(self) -> None:
-        """End the server and its connections."""
+        """Stop the server and its connections."""
         if not self._closed:
             self._closed = True
             self._server.stop()
@@ -240,7 +240,7 @@ class FoxgloveServer(Sink):
 
 
 def _listener(base: type[Any], subscribed: Counter[int]) -> Any:
-    """Return what counts the topics of each reader."""
+    """Return a listener that counts each reader's topics."""
 
     class Listener(base):  # type: ignore[misc]
         def on_subscribe(self, client: Any, channel: Any) -> None:
@@ -289,11 +289,13 @@ def _joints(moment: "Moment", build: "Build") -> JointValues:
 def _open(where: SinkPlace) -> Sink:
     rate = where.options.get("rate", str(RATE_HZ))
     if not re.fullmatch("[0-9]{1,9}", rate):
-        raise SettingError(f"{where.text}: a rate of {shortened(repr(rate))}: it is 1 to {_FASTEST_HZ} a second")
+        raise SettingError(
+            f"{where.text}: a rate of {shortened(repr(rate))} is not possible: use 1 to {_FASTEST_HZ} a second"
+        )
     _, address = resolve(where.place, where.text, "foxglove:127.0.0.1:8765")
     if "public" not in where.options and not ipaddress.ip_address(address[0].partition("%")[0]).is_loopback:
         raise SettingError(
-            f"{where.text}: other machines could read along there: take 127.0.0.1, or write "
+            f"{where.text}: other machines could read it there: use 127.0.0.1, or write "
             f"foxglove:{where.place}?public to let them"
         )
     try:
@@ -305,7 +307,7 @@ def _open(where: SinkPlace) -> Sink:
 MEMBER = SinkKind(
     "foxglove",
     "127.0.0.1:PORT",
-    f"live topics for Foxglove, {RATE_HZ} or HZ times a second and on change; with public others may read",
+    f"live topics for Foxglove, {RATE_HZ} or HZ times a second and on change; with public also for other machines",
     _open,
     ("public", "rate=HZ"),
     rank=6,

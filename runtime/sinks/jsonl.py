@@ -1,9 +1,9 @@
-"""JSON lines into a file: stdout, a pipe, a file on disk, anything that takes bytes.
+"""JSON lines to a file: stdout, a pipe, a file on disk, or anything else that takes bytes.
 
-Lines are of grasps, and now and then of how the glove fares, and of how far the hand has come in a task. A reader tells
-them apart by `kind`; msgspec does so by itself: `msgspec.json.decode(line, type=Line | HealthLine | ProgressLine)`.
+Lines describe grasps, and now and then the glove's health and the hand's progress in a task. Readers distinguish them
+by `kind`; msgspec does so automatically: `msgspec.json.decode(line, type=Line | HealthLine | ProgressLine)`.
 
-A line goes out entirely or not at all, and nobody waits for a descriptor that is slow.
+A line is sent whole or not at all, and a slow descriptor delays nobody.
 """
 
 import os
@@ -26,14 +26,14 @@ from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
 
 class Line(LiveGrasp, frozen=True, tag_field="kind", tag="grasp"):
-    """The fields of `LiveGrasp`, and behind them the preshape and the angles, null where there are none."""
+    """The fields of `LiveGrasp`, followed by the preshape and the angles, null if there are none."""
 
     preshape: Preshape | None = None
     angles: JointAngles | None = None
 
 
 class DetailLine(Detail, frozen=True, tag_field="kind", tag="detail"):
-    """The fields of `Detail`, the `number` of the line of a grasp that it belongs to, and the build's checksum."""
+    """The fields of `Detail`, the `number` of the grasp line that it belongs to, and the build's checksum."""
 
     number: int = 0
     build: str = ""
@@ -48,32 +48,32 @@ _GRASP, _PRESHAPE, _ANGLES = b'{"kind":"grasp",', b',"preshape":', b',"angles":'
 
 
 def encode(grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> bytes:
-    """Return a frame's line, its newline included. UTF-8, no newline inside.
+    """Return a frame's line, including its newline. UTF-8, no newline inside.
 
-    The bytes of a `Line`, without making one.
+    The bytes equal those of a `Line`, without making one.
     """
     parts = (_GRASP, _encode(grasp)[1:-1], _PRESHAPE, _encode(preshape), _ANGLES, _encode(angles), b"}\n")
     return b"".join(parts)
 
 
 def encode_detail(detail: Detail, number: int, build: str) -> bytes:
-    """Return a detail's line, its newline included."""
+    """Return a detail's line, including its newline."""
     return _encode(DetailLine(**structs.asdict(detail), number=number, build=build)) + b"\n"
 
 
 def encode_health(report: HealthReport) -> bytes:
-    """Return a report's line, its newline included."""
+    """Return a report's line, including its newline."""
     return _encode(HealthLine(**{name: getattr(report, name) for name in report.__struct_fields__})) + b"\n"
 
 
 def encode_task(progress: Progress) -> bytes:
-    """Return the line of a task's progress, its newline included."""
+    """Return the line of a task's progress, including its newline."""
     return _encode(ProgressLine(**structs.asdict(progress))) + b"\n"
 
 
-# What a descriptor that is writable takes at once without blocking, even where it is set to block (POSIX: PIPE_BUF).
+# Bytes that a writable descriptor takes at once without blocking, even if it is set to block (POSIX: PIPE_BUF).
 _PIECE = select.PIPE_BUF
-# Where an error waits or the reader is gone, writing says so.
+# If an error is pending or the reader is gone, writing reports it.
 _WRITABLE = select.POLLOUT | select.POLLERR | select.POLLHUP
 
 
@@ -82,9 +82,9 @@ Writer = Callable[[bytes], int]
 
 
 class Outlet:
-    """One reader's end: at most the rest of one line waits here, what else waits stands in the system's own buffer.
+    """One reader's end: at most the rest of one line waits here; the rest waits in the system's buffer.
 
-    written   how many bytes it has taken
+    written   number of bytes that it has taken
     """
 
     __slots__ = ("_rest", "_write", "written")
@@ -96,11 +96,11 @@ class Outlet:
 
     @property
     def waiting(self) -> int:
-        """How many bytes of the newest line are still to be written."""
+        """The number of bytes of the newest line that are not written yet."""
         return len(self._rest)
 
     def send(self, line: bytes) -> bool:
-        """Send `line` if the reader keeps up; return whether it went out or began to. Raises OSError if it is gone."""
+        """Send `line` if the reader keeps up; return whether it was at least begun. Raises OSError if it is gone."""
         for data in (self._rest, line):
             self._rest = data
             try:
@@ -111,7 +111,7 @@ class Outlet:
             except BlockingIOError:
                 if data is not line:
                     return False
-        # Nothing of this line went out: it is lost, and the next one starts afresh.
+        # Nothing of this line was sent: it is lost, and the next one starts afresh.
         if line and len(self._rest) == len(line):
             self._rest = b""
             return False
@@ -119,7 +119,7 @@ class Outlet:
 
 
 def patient_writer(descriptor: int) -> Writer:
-    """Return a writer for a descriptor that is shared with others, and so must not be set to non-blocking."""
+    """Return a writer for a shared descriptor, which must not be set to non-blocking."""
     poll = select.poll()
     poll.register(descriptor, select.POLLOUT)
 
@@ -133,10 +133,10 @@ def patient_writer(descriptor: int) -> Writer:
 
 
 class JsonLines(Sink):
-    """One line a frame into `file`.
+    """Writes one line per frame to `file`.
 
-    A pipe whose reader is slow loses whole lines and holds nobody up; with `wait` it is the other way round, which is
-    right for a replay and wrong for a live glove. A reader that is gone (`head`) is noted in the report.
+    A pipe with a slow reader loses whole lines and delays nobody; with `wait` it waits instead, which is right for a
+    replay and wrong for a live glove. A reader that is gone (`head`) is noted in the report.
     """
 
     __slots__ = ("_error", "_file", "_lost", "_outlet", "_owned", "_sent", "_where")
@@ -175,7 +175,7 @@ class JsonLines(Sink):
             self._lost += not sent
 
     def _take_back(self, torn: int) -> None:
-        """Cut off the part of a line that a full disk had room for, unless somebody else has written behind it."""
+        """Cut off the part of a line that still fitted on a full disk, unless another process has written after it."""
         if not (torn > 0 and self._owned):
             return
         with suppress(OSError, ValueError):
@@ -189,7 +189,7 @@ class JsonLines(Sink):
         return SinkReport(self._where, None, self._sent, self._lost, self._error, over=bool(self._error))
 
     def close(self) -> None:
-        """Finish the line that was begun, if the reader lets us, and close what was opened here."""
+        """Finish the line that was begun, if the reader allows, and close the file if it was opened here."""
         self._send(b"")
         if self._owned:
             self._file.close()
@@ -217,7 +217,7 @@ def _open(place: SinkPlace) -> JsonLines:
     if path == "-":
         return JsonLines(sys.stdout.buffer, wait=wait, where=where)
     try:
-        # A named pipe that nobody reads would hold up a blocking open for ever.
+        # A named pipe without a reader would block the open forever.
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK, 0o666)
     except OSError as reason:
         hint = ": is its reader running?" if Path(path).is_fifo() else ""
@@ -233,7 +233,7 @@ def _open(place: SinkPlace) -> JsonLines:
 
 
 def _finish_line(descriptor: int, path: str) -> None:
-    """End the line that whoever wrote the file last was killed in, so that the next one begins a line."""
+    """End a line that its writer left incomplete when it was killed, so that the next one begins on a new line."""
     found = os.fstat(descriptor)
     if not (stat.S_ISREG(found.st_mode) and found.st_size):
         return

@@ -1,11 +1,11 @@
 """Streams of the Lab Streaming Layer (extra `lsl`), for recorders and stimulus programs.
 
     NAME         a text, "Markers": the grasp type, when it changes, "unknown" and "none" included
-    NAME-angles  numbers, "MoCap": the glove's joints in rad, where they are calibrated, whenever they are measured
+    NAME-angles  numbers, "MoCap": the glove's calibrated joints in rad, whenever they are measured
 
-A stamp is the time of the moment on the clock of LSL, which is this computer's monotonic clock; of a replay, the time
-at which it is sent. The streams are announced on this machine, unless LSL's own configuration (LSLAPICFG) says
-otherwise; LSL asks nobody who connects for anything.
+A stamp is the time of the moment on the clock of LSL, which is this computer's monotonic clock; for a replay, the time
+of sending. The streams are announced on this machine, unless LSL's configuration (LSLAPICFG) says otherwise; LSL
+authenticates nobody.
 """
 
 from typing import Any
@@ -20,12 +20,12 @@ from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
 
 class LslStreams(Sink):
-    """Publishes streams under a name. Raises SettingError about a name that cannot be, SinkError if LSL refuses."""
+    """Publishes streams under a name. Raises SettingError for an invalid name, SinkError if LSL refuses."""
 
     def __init__(self, name: str, *, stamped: bool = True) -> None:
         self._lsl, self._name, self._stamped = load_pylsl(f"lsl:{name}"), name, stamped
         if reason := fault(name):
-            raise SettingError(f"lsl:{name!r} is no name of a stream: it {reason}")
+            raise SettingError(f"lsl:{name!r} is not a valid stream name: it {reason}")
         self._grasps = self._outlet(name, "Markers", ("grasp",), "string", 0.0)
         self._angles: Any = None
         self._joints: tuple[str, ...] = ()
@@ -42,7 +42,7 @@ class LslStreams(Sink):
             raise SinkError(f"lsl:{name} cannot be opened: {reason}") from None
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Send what is news."""
+        """Send the changes."""
         if self._closed:
             return
         stamp = grasp.time_us / 1e6 if self._stamped else 0.0
@@ -59,7 +59,7 @@ class LslStreams(Sink):
                 self._angles.push_sample(list(angles.positions_rad), stamp)
 
     def report(self) -> SinkReport:
-        """Return how this sink is doing."""
+        """Return the state of this sink."""
         return SinkReport(f"lsl:{self._name}", None, self._sent, 0)
 
     def close(self) -> None:

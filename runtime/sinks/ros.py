@@ -3,14 +3,14 @@
     NAMESPACE/grasp     std_msgs/String                  the grasp type, "unknown" and "none" included
     NAMESPACE/segment   diagnostic_msgs/DiagnosticArray  the same with its stamp, probability, state, segment and health
     NAMESPACE/preshape  trajectory_msgs/JointTrajectory  when it changes
-    NAMESPACE/angles    sensor_msgs/JointState           the glove's joints, in rad, where they are calibrated
-    NAMESPACE/task      diagnostic_msgs/DiagnosticArray  if a task is followed: its step, when that changes
-    NAMESPACE/health    std_msgs/String                  once a second, if asked for: how the glove fares, as JSON
+    NAMESPACE/angles    sensor_msgs/JointState           the glove's calibrated joints, in rad
+    NAMESPACE/task      diagnostic_msgs/DiagnosticArray  if a task is followed: its step, on change
+    NAMESPACE/health    std_msgs/String                  once a second, if requested: the glove's health, as JSON
 
-Grasp and segment are published when they change, and they and the angles `rate` times a second. Reliable, the last 10
-kept: that serves reliable and best-effort readers alike. Grasp, segment, preshape and task are transient local: whoever
-comes later has the newest at once. Nodes of this machine can read, others where CYCLONEDDS_URI or `?public` lets them;
-ROS_DOMAIN_ID says which domain, as for a ROS 2 node.
+Grasp and segment are published when they change, and they and the angles `rate` times a second. Reliable, with the
+last 10 kept, which serves reliable and best-effort readers alike. Grasp, segment, preshape and task are transient
+local: late readers get the newest at once. Nodes of this machine can read, others if CYCLONEDDS_URI or `?public` allows
+them; ROS_DOMAIN_ID sets the domain, as for a ROS 2 node.
 """
 
 import re
@@ -31,13 +31,13 @@ _FASTEST_HZ = 1000
 
 
 class RosTopics(Sink):
-    """Publishes under a namespace of ROS. What DDS refuses is counted as lost and told in the report."""
+    """Publishes under a namespace of ROS. Messages that DDS refuses are counted as lost in the report."""
 
     def __init__(self, name: str = "/thenar", *, public: bool = False, rate: int = RATE_HZ) -> None:
-        """Publish under `name` to this machine, or to all networks that Cyclone DDS finds if `public`; what does not
-        change, `rate` times a second.
+        """Publish under `name` to this machine, or to all networks that Cyclone DDS finds if `public`; repeat unchanged
+        values `rate` times a second.
 
-        Raise SettingError about a name, a domain or a rate that cannot be, SinkError if DDS does not start.
+        Raise SettingError for an invalid name, domain or rate, SinkError if DDS does not start.
         """
         # Cyclone DDS, which these import, is an extra.
         from cyclonedds.core import DDSException
@@ -45,7 +45,7 @@ class RosTopics(Sink):
         from ..ros import domain, messages
 
         if not 1 <= rate <= _FASTEST_HZ:
-            raise SettingError(f"ros:{name}: a rate of {rate}: it is 1 to {_FASTEST_HZ} a second")
+            raise SettingError(f"ros:{name}: a rate of {rate} is not possible: use 1 to {_FASTEST_HZ} a second")
         self._where = f"ros:{domain.namespace(name)}" + "?public" * public
         self._name, self._messages, self._volatile_readers = name, messages, domain.volatile_readers
         number = domain.domain()
@@ -60,11 +60,11 @@ class RosTopics(Sink):
         except DDSException as reason:
             raise SinkError(
                 f"{self._where} cannot be opened in domain {number}: {reason} "
-                "Look at CYCLONEDDS_URI, and at the network interfaces that it names."
+                "Check CYCLONEDDS_URI, and the network interfaces that it names."
             ) from None
         except OSError as reason:
             raise SinkError(
-                f"{self._where} cannot be kept to this machine: {reason.strerror}. That takes Linux 5.7 or newer; "
+                f"{self._where} cannot be limited to this machine: {reason.strerror}. That takes Linux 5.7 or newer; "
                 f"ros:{name}?public lets other machines read"
             ) from None
         self._closed = False
@@ -76,16 +76,16 @@ class RosTopics(Sink):
         self._error = ""
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Publish what is news to somebody, and once a period everything."""
+        """Publish the changes, and once a period everything."""
         self._unix_us = grasp.unix_us
         self._try(lambda: self._write(grasp, preshape, angles))
 
     def health(self, report: HealthReport) -> None:
-        """Publish how the glove fares."""
+        """Publish the glove's health."""
         self._try(lambda: self._health.write(self._messages.String(json.encode(report).decode())) is None)
 
     def task(self, progress: Progress) -> None:
-        """Publish how far the hand has come, with the stamp of the newest frame."""
+        """Publish the hand's progress, with the stamp of the newest frame."""
         self._try(lambda: self._task.write(self._messages.task(self._name, self._unix_us, progress)) is None)
 
     def _try(self, write: Callable[[], bool]) -> None:
@@ -94,7 +94,7 @@ class RosTopics(Sink):
             return
         try:
             self._sent += write()
-        except Exception as reason:  # Cyclone's Python side raises all kinds about what it cannot serialise
+        except Exception as reason:  # Cyclone's Python side raises many kinds for what it cannot serialise
             self._lost += 1
             self._error = str(reason)
 
@@ -119,8 +119,8 @@ class RosTopics(Sink):
         return news
 
     def _somebody_new(self) -> bool:
-        """Return whether a reader came to whom DDS does not tell the last preshape: a volatile one, as ros2_control's
-        trajectory controllers are.
+        """Return whether a reader joined that DDS does not send the last preshape to: a volatile one, as in
+        ros2_control's trajectory controllers.
         """
         found = self._preshape.get_publication_matched_status().total_count
         if found == self._found:
@@ -130,7 +130,7 @@ class RosTopics(Sink):
         return not self._volatile <= before
 
     def report(self) -> SinkReport:
-        """Return how this sink is doing; its readers are those of the grasp type."""
+        """Return the state of this sink; its readers are those of the grasp type."""
         readers = 0 if self._closed else self._grasp.get_publication_matched_status().current_count
         return SinkReport(self._where, readers, self._sent, self._lost, self._error)
 
@@ -138,7 +138,7 @@ class RosTopics(Sink):
         """Leave the domain."""
         if not self._closed:
             self._closed = True
-            # Each goes with its last name; the domain, which ends what is left in it, goes last.
+            # Each entity ends with its last name; the domain, which ends all that is left in it, goes last.
             del self._grasp, self._segment, self._preshape, self._task, self._angles, self._health
             del self._domain
 
@@ -146,7 +146,9 @@ class RosTopics(Sink):
 def _open(where: SinkPlace) -> Sink:
     rate = where.options.get("rate", str(RATE_HZ))
     if not re.fullmatch("[0-9]{1,9}", rate):
-        raise SettingError(f"ros:{where.place}: a rate of {shortened(repr(rate))}: it is 1 to {_FASTEST_HZ} a second")
+        raise SettingError(
+            f"ros:{where.place}: a rate of {shortened(repr(rate))} is not possible: use 1 to {_FASTEST_HZ} a second"
+        )
     try:
         return RosTopics(where.place, public="public" in where.options, rate=int(rate))
     except ImportError as reason:
@@ -156,7 +158,7 @@ def _open(where: SinkPlace) -> Sink:
 MEMBER = SinkKind(
     "ros",
     "/NAMESPACE",
-    f"topics of ROS 2, {RATE_HZ} or HZ times a second and on change, on this machine; with public others may read",
+    f"topics of ROS 2, {RATE_HZ} or HZ times a second and on change, on this machine; with public also for others",
     _open,
     ("public", "rate=HZ"),
     rank=4,

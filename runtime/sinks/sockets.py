@@ -1,11 +1,10 @@
-"""JSON lines to whoever connects to a socket, a path in the file system or a port of this machine; many at a time.
+"""JSON lines to all readers of a socket, which is a path in the file system or a port of this machine.
 
-Everything happens inside `publish`, without threads and without waiting: new readers are let in, each gets the line if
-it keeps up. A slow reader loses whole lines, sees it by the gaps in `number`, and holds nobody up. What waits for it is
-the rest of one line and what the system buffers, which is kept small so that it does not read the past.
+Everything happens inside `publish`, without threads and without waiting: new readers are accepted, and each gets the
+line if it keeps up. A slow reader loses whole lines, which shows as gaps in `number`, and delays nobody. Only the rest
+of one line waits for it, and the system's buffer, which is kept small so that it does not read the past.
 
-Places are few, and a reader that only holds one is no reader: it is dropped when it takes nothing for five seconds, and
-earlier when somebody new finds no place.
+Places are limited. A reader that takes nothing for five seconds is dropped, and earlier if a new reader finds no place.
 """
 
 import errno
@@ -36,17 +35,17 @@ if TYPE_CHECKING:
 
 _BACKLOG = 16
 MAX_READERS = 32
-# Of one other machine, so that it cannot take every place.
+# Per remote machine, so that none can take every place.
 MAX_OF_ONE = 8
-# A reader that takes not one byte for so long hangs.
+# A reader that takes no byte for this long hangs.
 HANGING_S = 5.0
-# Some fifty lines; the kernel doubles it for its own bookkeeping.
+# About fifty lines; the kernel doubles it for its own bookkeeping.
 SEND_BUFFER = 16384
-# A reader that has lost a line is slow until it has lost none for so long.
+# A reader that lost a line counts as slow until it has lost none for this long.
 _LEVEL_S = 1.0
-# Let in at one frame, so that a crowd at the door does not hold it up.
+# Readers accepted per frame, so that many at once do not delay it.
 _KNOCKS = 16
-# What people look at changes no faster.
+# People cannot follow faster changes.
 _DETAIL_US = 10_000
 _HERE = frozenset({"127.0.0.1", "::1"})
 
@@ -78,7 +77,7 @@ class SocketLines(Sink):
         clock: Callable[[], float] = monotonic,
         detail: bool = False,
     ) -> None:
-        """Serve `listener`; `clock` gives seconds. With `detail`, readers also get what grasps came of."""
+        """Serve `listener`; `clock` gives seconds. With `detail`, readers also get the details of grasps."""
         listener.setblocking(False)
         self._listener = listener
         self._knocks = select.poll()
@@ -93,36 +92,36 @@ class SocketLines(Sink):
         self._build, self._detail_us = "" if detail else None, 0
 
     def begin(self, build: "Build") -> None:
-        """Learn which build recognises."""
+        """Take the build that recognises."""
         if self._build is not None:
             self._build, self._details = build.manifest.checksum, Details(build)
 
     @property
     def address(self) -> tuple[str, int] | str:
-        """Where it listens: host and port, or the path."""
+        """The address of the socket: host and port, or the path."""
         name: tuple[str, int] | str = self._listener.getsockname()
         return name if isinstance(name, str) else name[:2]
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Let in who knocks, and give every reader the line."""
+        """Accept new readers, and send every reader the line."""
         self._let_in()
         if self._readers:
             self._send_all(encode(grasp, preshape, angles))
 
     def moment(self, moment: "Moment") -> None:
-        """Give every reader the line of what the grasp came of, at most a hundred times a second."""
+        """Send every reader the line of the grasp's details, at most a hundred times a second."""
         details, grasp = self._details, moment.grasp
         if details is not None and self._readers and not 0 <= grasp.time_us - self._detail_us < _DETAIL_US:
             self._detail_us = grasp.time_us
             self._send_all(encode_detail(details(moment), grasp.number, self._build or ""))
 
     def health(self, report: HealthReport) -> None:
-        """Give every reader the report's line."""
+        """Send every reader the report's line."""
         if self._readers:
             self._send_all(encode_health(report))
 
     def task(self, progress: Progress) -> None:
-        """Give every reader the progress's line."""
+        """Send every reader the progress's line."""
         if self._readers:
             self._send_all(encode_task(progress))
 
@@ -133,7 +132,7 @@ class SocketLines(Sink):
             with suppress(BlockingIOError):
                 for _ in range(_KNOCKS):
                     self._seat(*self._listener.accept())
-        except OSError as reason:  # gone between knocking and entering, or no descriptors left
+        except OSError as reason:  # gone before it was accepted, or no descriptors left
             self._error = reason.strerror or str(reason)
 
     def _seat(self, reader: socket.socket, peer: Any) -> None:
@@ -144,7 +143,7 @@ class SocketLines(Sink):
             reader.close()
 
     def _has_room(self, host: str) -> bool:
-        """Return whether one more reader of `host` has a place; the slowest reader is dropped if that makes one."""
+        """Return whether one more reader of `host` has a place, after dropping the slowest reader if that makes one."""
         alike = [reader for reader in self._readers if host and reader.host == host]
         if len(alike) >= MAX_OF_ONE:
             crowd, full = alike, f"more than {MAX_OF_ONE} readers on {host}"
@@ -154,7 +153,7 @@ class SocketLines(Sink):
             return True
         slow = [(reader.slow_since_s, place) for place, reader in enumerate(crowd) if reader.slow_since_s is not None]
         if not slow:
-            self._error = f"{full}: the newest were turned away"
+            self._error = f"{full}: the newest were rejected"
             return False
         self._drop(crowd[min(slow)[1]], f"{full}: the slowest was dropped for a new one")
         return True
@@ -184,7 +183,7 @@ class SocketLines(Sink):
         return sent
 
     def report(self) -> SinkReport:
-        """Return how this sink is doing."""
+        """Return the state of this sink."""
         return SinkReport(self._where, len(self._readers), self._sent, self._lost, self._error, dropped=self._dropped)
 
     def close(self) -> None:
@@ -199,7 +198,7 @@ class SocketLines(Sink):
 
 
 class _Reader:
-    """Somebody who reads.
+    """A reader of the lines.
 
     host          the machine it is on; "" for this one
     slow_since_s  when it began to lose lines; None while it keeps up
@@ -220,7 +219,7 @@ class _Reader:
         self._missed_s = 0.0
 
     def send(self, line: bytes, now_s: float) -> bool:
-        """Send `line` if there is room for it; return whether it went out. Raises OSError if the reader is gone."""
+        """Send `line` if there is room for it; return whether it was sent. Raises OSError if the reader is gone."""
         before = self._outlet.written
         sent = self._outlet.send(line)
         if self._outlet.written > before:
@@ -235,7 +234,7 @@ class _Reader:
         return sent
 
     def hangs(self, now_s: float) -> bool:
-        """Return whether lines were offered to it for so long, and it took not a byte."""
+        """Return whether lines were offered for the whole limit without a byte taken."""
         return self._stalled_s is not None and now_s - self._stalled_s >= HANGING_S
 
     def close(self) -> None:
@@ -244,7 +243,7 @@ class _Reader:
 
 
 def _host(reader: socket.socket, peer: Any) -> str:
-    """Return the key of a reader's machine: its address, in IPv6 its network of 64 bits; "" for this machine."""
+    """Return the key of a reader's machine: its address, for IPv6 its 64-bit network; "" for this machine."""
     if reader.family == socket.AF_UNIX:
         return ""
     address = ipaddress.ip_address(peer[0].partition("%")[0])
@@ -256,10 +255,10 @@ def _host(reader: socket.socket, peer: Any) -> str:
 
 
 def open_unix(path: str, clock: Callable[[], float] = monotonic, *, detail: bool = False) -> SocketLines:
-    """Return lines on a Unix socket at `path`.
+    """Return a sink on a Unix socket at `path`.
 
-    The socket that a process left behind when it was killed is replaced; anything else that is there stays. Raises
-    SinkError, or SettingError where no such path can be a socket's.
+    A socket left behind by a killed process is replaced; anything else at that path stays. Raises SinkError, or
+    SettingError if the path is not valid for a socket.
     """
     where = f"unix:{path}"
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -283,15 +282,15 @@ def open_unix(path: str, clock: Callable[[], float] = monotonic, *, detail: bool
 
 
 def _make_way(path: str, where: str) -> None:
-    """Remove a dead socket from `path`. Raises SinkError about anything else that is there."""
+    """Remove a dead socket from `path`. Raises SinkError if anything else is there."""
     try:
         found = Path(path).lstat()
     except FileNotFoundError:
         return
     if not stat.S_ISSOCK(found.st_mode):
-        raise SinkError(f"{where}: there is something else of that name, which stays: take another name")
+        raise SinkError(f"{where}: another file has that name, and it is kept: use another name")
     if not _refuses(path):
-        raise SinkError(f"{where} is in use: another process serves it; stop that one or take another name")
+        raise SinkError(f"{where} is in use: another process serves it; stop that one or use another name")
     if _same(path, found):
         Path(path).unlink()
 
@@ -315,31 +314,31 @@ def _unix_error(where: str, reason: OSError) -> Exception:
         return reason
     if reason.errno is None:  # "AF_UNIX path too long" carries no number
         return SettingError(f"{where}: {reason}: a socket's path has at most 107 bytes")
-    hint = ": make its folder first" if reason.errno == errno.ENOENT else ""
+    hint = ": create its folder first" if reason.errno == errno.ENOENT else ""
     return SinkError(f"{where} cannot be opened: {reason.strerror}{hint}")
 
 
 def open_tcp(
     place: str, *, public: bool = False, clock: Callable[[], float] = monotonic, detail: bool = False
 ) -> SocketLines:
-    """Return lines on a TCP port: "127.0.0.1:7777", "localhost:7777", "[::1]:7777" or, on 127.0.0.1, "7777".
+    """Return a sink on a TCP port: "127.0.0.1:7777", "localhost:7777", "[::1]:7777" or, on 127.0.0.1, "7777".
 
-    Whoever can connect reads along; so only addresses of this machine itself are taken unless `public`. Port 0 is any
-    free one. Raises SinkError, or SettingError where `place` is not such an address.
+    Anyone who can connect can read, so only addresses of this machine are accepted unless `public`. Port 0 means any
+    free one. Raises SinkError, or SettingError if `place` is not such an address.
     """
     where = f"tcp-public:{place}" if public else f"tcp:{place}"
     family, address = resolve(place, where, "tcp:127.0.0.1:7777")
     if not public and not ipaddress.ip_address(address[0].partition("%")[0]).is_loopback:
         raise SettingError(
-            f"{where}: other machines could read along there: take 127.0.0.1, or write tcp-public:{place} to let them"
+            f"{where}: other machines could read it there: use 127.0.0.1, or write tcp-public:{place} to let them"
         )
     return SocketLines(_listener(family, address, where), where, clock=clock, detail=detail)
 
 
 def listen(place: str, where: str, example: str) -> socket.socket:
-    """Return a socket that listens at `place`, as `open_tcp` has it; `where` and `example` are how the user writes it.
+    """Return a socket that listens at `place`, in the syntax of `open_tcp`; messages use `where` and `example`.
 
-    Raises SinkError, or SettingError where `place` is no address.
+    Raises SinkError, or SettingError if `place` is not an address.
     """
     return _listener(*resolve(place, where, example), where)
 
@@ -353,7 +352,7 @@ def _listener(family: socket.AddressFamily, address: tuple[str, int], where: str
         listener.listen(_BACKLOG)
     except OSError as reason:
         listener.close()
-        hint = ": another process serves that port; take another" if reason.errno == errno.EADDRINUSE else ""
+        hint = ": another process serves that port; use another" if reason.errno == errno.EADDRINUSE else ""
         raise SinkError(f"{where} cannot be opened: {reason.strerror}{hint}") from None
     return listener
 
@@ -365,12 +364,12 @@ def resolve(place: str, where: str, example: str) -> tuple[socket.AddressFamily,
     """
     found = re.fullmatch(r"(?:(?:\[([^][]+)\]|([^][:]+)):)?([0-9]{1,5})", place)
     if not found or int(found[3]) > 65535:
-        raise SettingError(f"{where} is no address: write it as {example}, with a port from 0 to 65535")
+        raise SettingError(f"{where} is not an address: write it as {example}, with a port from 0 to 65535")
     host = found[1] or found[2] or "127.0.0.1"
     try:
         family, _, _, _, address = socket.getaddrinfo(host, int(found[3]), type=socket.SOCK_STREAM)[0]
     except (OSError, UnicodeError):
-        raise SettingError(f"{where}: there is no host {host}: take 127.0.0.1") from None
+        raise SettingError(f"{where}: there is no host {host}: use 127.0.0.1") from None
     return family, address  # type: ignore[return-value]
 
 
@@ -379,7 +378,7 @@ MEMBER = (
     SinkKind(
         "unix",
         "PATH",
-        "JSON lines to whoever connects to a socket",
+        "JSON lines to all who connect to a socket",
         lambda where: open_unix(where.place, detail="detail" in where.options),
         _DETAIL,
         rank=1,
@@ -395,7 +394,7 @@ MEMBER = (
     SinkKind(
         "tcp-public",
         "ADDRESS:PORT",
-        "the same, which other machines may read",
+        "the same, readable by other machines",
         lambda where: open_tcp(where.place, public=True, detail="detail" in where.options),
         _DETAIL,
         rank=3,

@@ -1,4 +1,4 @@
-"""Where frames come from: one file for each kind of source, found by the registry `SOURCES`."""
+"""The sources of frames: one file per kind, found by the registry `SOURCES`."""
 
 from .base import SOURCES, Source, SourceKind
 

@@ -16,9 +16,9 @@ _SLOWEST_BAUD = 9_600
 
 
 class GloveDevice(Source):
-    """A CyberGlove. A record that says the glove is unplugged is no frame: it holds no measurement.
+    """A CyberGlove. A record of an unplugged glove is not a frame: it holds no measurement.
 
-    info  what was found at the end of the line when it was opened last
+    info  the glove's description at the last opening
     """
 
     def __init__(self, wiring: GloveWiring) -> None:
@@ -44,7 +44,7 @@ class GloveDevice(Source):
         )
 
     def read_only(self, sensors: Sequence[str], *, on_demand: bool = False) -> None:
-        """Ask the box for these sensors alone: the others are 0 in the frames, which no sensor ever is."""
+        """Request only these sensors from the box: the others are 0 in the frames, which no sensor value is."""
         self._asked = Event() if on_demand else None
         self.driver = self._driver(
             tuple(place for place, name in enumerate(self._wiring.sensor_names) if name in sensors)
@@ -55,7 +55,7 @@ class GloveDevice(Source):
         self.info = self.driver.open()
 
     def read(self, timeout_s: float) -> GloveFrame | None:
-        """Return the next record that holds a measurement; on demand, the one that is asked for."""
+        """Return the next record that holds a measurement; on demand, the requested one."""
         if self._asked is not None and not self._asked.wait(timeout_s):
             return None
         timed = self.driver.read(timeout_s)
@@ -68,7 +68,7 @@ class GloveDevice(Source):
         return None if self._unplugged else GloveFrame(time_us, self._whole(record.sensors), record.status)
 
     def _whole(self, sensors: bytes) -> bytes:
-        """Return a byte for every sensor of the glove, 0 for those that the record leaves out."""
+        """Return a byte for every sensor of the glove, 0 for those that the record omits."""
         if self.info is None or len(sensors) == self.sensors:
             return sensors
         whole = bytearray(self.sensors)
@@ -77,16 +77,16 @@ class GloveDevice(Source):
         return bytes(whole)
 
     def ask(self) -> None:
-        """Be asked for a record now, which is what it waits for on demand."""
+        """Request a record now; on demand, the glove waits for this."""
         if self._asked is not None:
             self._asked.set()
 
     def counts(self) -> tuple[Count, ...]:
-        """Return what the driver counts."""
+        """Return the driver's counters."""
         return counted(self.driver.counts)
 
     def trouble(self) -> str:
-        """Return what is wrong though the line is open; "" if nothing is."""
+        """Return the fault of an open line; "" if there is none."""
         if self._unplugged or self.info is None:
             return "the glove is not plugged into its box" if self._unplugged else ""
         return self.info.unmasked
@@ -97,9 +97,9 @@ class GloveDevice(Source):
 
 
 def glove_period_us(wiring: GloveWiring) -> int:
-    """Return how often a CyberGlove so wired should send at least; the slowest that it can be where that is open.
+    """Return the longest expected period of a CyberGlove with this wiring; the slowest possible one if it is open.
 
-    One that is asked for more than box and line can do sends as fast as they can.
+    A glove that cannot reach the requested rate sends as fast as box and line allow.
     """
     baud = _SLOWEST_BAUD if wiring.baud == "auto" else wiring.baud
     shortest = round(shortest_us(wiring.all_sensors, baud, status=True, filtered=True))

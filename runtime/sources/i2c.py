@@ -22,12 +22,12 @@ from .base import SHORTEST_US, ExitOf, Source, SourceKind, debouncer_of, pause_u
 if TYPE_CHECKING:
     from ..scanning.decided import EarlyExit
 
-# A bus whose chips are all gone is not asked in a busy loop.
+# Delay between attempts on a bus without any chip, to avoid a busy loop.
 _NOBODY_THERE_S = 0.01
 
 
 class _Port(ABC):
-    """What the answers of a port say, debounced. targets are the switches that they show."""
+    """The replies of a port, debounced. targets are the switches that they show."""
 
     targets: Mask
 
@@ -36,11 +36,11 @@ class _Port(ABC):
         self._pause_us = pause_us(debounce)
         self._read_us = 0
 
-    def states(self, answer: int | None) -> tuple[Mask, Mask]:
-        """Return which switches are closed, and which are lost, by an answer that came now; None: none came."""
+    def states(self, reply: int | None) -> tuple[Mask, Mask]:
+        """Return the closed and the lost switches from a reply that came now; None: none came."""
         time_us = now_us()
-        closed, lost = self._states(answer, time_us)
-        if self._debouncer is None or answer is None:
+        closed, lost = self._states(reply, time_us)
+        if self._debouncer is None or reply is None:
             return closed, lost
         if time_us - self._read_us > self._pause_us:
             self._debouncer = debouncer_of(self._debounce)
@@ -49,11 +49,11 @@ class _Port(ABC):
         return self._debouncer.update(time_us, closed, self.targets & ~lost) & ~lost, lost
 
     @abstractmethod
-    def _states(self, answer: int | None, time_us: int) -> tuple[Mask, Mask]: ...
+    def _states(self, reply: int | None, time_us: int) -> tuple[Mask, Mask]: ...
 
 
 class _PortSwitches(_Port):
-    """Bits of an answer, some of them inverted."""
+    """Bits of a reply, some of them inverted."""
 
     def __init__(self, port: Port, debounce: Debounce) -> None:
         super().__init__(debounce)
@@ -61,13 +61,13 @@ class _PortSwitches(_Port):
         self._switches = Rewired(port.switches)
         self.targets = self._switches.targets
 
-    def _states(self, answer: int | None, time_us: int) -> tuple[Mask, Mask]:
-        return (0, self.targets) if answer is None else (self._switches(answer ^ self._inverted), 0)
+    def _states(self, reply: int | None, time_us: int) -> tuple[Mask, Mask]:
+        return (0, self.targets) if reply is None else (self._switches(reply ^ self._inverted), 0)
 
 
 class PortLevels(_Port):
-    """Levels of the taxel whose counts a conversion gives: its name, its place among the harness's taxels, and what
-    compares its counts.
+    """Levels of the taxel that a conversion measures: its name, its place among the harness's taxels, and the
+    comparison of its counts.
     """
 
     def __init__(self, port: Port, harness: Harness, calibration: TaxelCalibration | None) -> None:
@@ -80,13 +80,13 @@ class PortLevels(_Port):
         self.taxels = Taxels([self.name], [port.levels], calibration, harness.taxel_settings, self.highest)
         self.targets = self.taxels.owned
 
-    def _states(self, answer: int | None, time_us: int) -> tuple[Mask, Mask]:
-        return self.taxels.read(time_us, (answer,))
+    def _states(self, reply: int | None, time_us: int) -> tuple[Mask, Mask]:
+        return self.taxels.read(time_us, (reply,))
 
 
 class I2cDevice(Source):
-    """Bus number `number` of a harness, scanned as `scan` has it, whose levels are limits in counts; only the chips in
-    it are touched.
+    """Bus number `number` of a harness, scanned as in `scan`, whose levels are limits in counts; only its chips are
+    accessed.
     """
 
     def __init__(self, harness: Harness, number: int, scan: ScanMap) -> None:
@@ -117,11 +117,11 @@ class I2cDevice(Source):
         return tuple(port for port in self._ports if isinstance(port, PortLevels))
 
     def end_early(self, exit_of: ExitOf, joints: Joints, glove: Newest[GloveFrame]) -> None:
-        """Scan no further than until the ports not yet read cannot change the answer any more."""
+        """End scans as soon as the unread ports cannot change the result."""
         self._early = exit_of([port.targets for port in self._ports]), joints, glove
 
     def leave_out(self, switches: Mask, joints: Mask) -> None:
-        """Score these as lost where scans end early."""
+        """Score these as lost in scans that end early."""
         if self._early is not None:
             self._early[0].left_out = switches, joints
 
@@ -132,12 +132,12 @@ class I2cDevice(Source):
         self._scan = self.bus.interleaved([[self._reads[port] for port in group] for group in self._groups])
 
     def scan(self, chip: int | None = None) -> Interleaved:
-        """Return what reads all ports, or those of the bus's chip of this number, once more."""
+        """Return a reader of all ports, or of those of the bus's chip of this number."""
         ports = [port for port, read in enumerate(self._reads) if chip is None or read.chip == chip]
         return self.bus.interleaved([[self._reads[port] for port in group] for group in self._grouped(ports)])
 
     def _grouped(self, ports: Sequence[int], *, alone: bool = False) -> list[list[int]]:
-        """Return which ports are read together: all but conversions that take time, where a scan goes to its end."""
+        """Return the ports that are read together: all but slow conversions, if a scan goes to its end."""
         slow = [port for port in ports if alone or _takes_time(self._reads[port])]
         together = [port for port in ports if port not in slow]
         return [*([together] if together else []), *([port] for port in slow)]
@@ -147,7 +147,7 @@ class I2cDevice(Source):
         began_us = now_us()
         frame = self._scanned()
         if frame.time_us - began_us > self.longest_us:
-            # A chip held the bus up: what was read before it is no news any more.
+            # A chip held the bus: the readings before that are out of date.
             frame = SwitchFrame(frame.time_us, 0, self.owned)
             self._held_up += 1
         elif not self.owned & ~(frame.lost | frame.unread):
@@ -163,16 +163,16 @@ class I2cDevice(Source):
         if self._early is not None:
             early, joints, newest = self._early
             ends = early.whole_us is None or now_us() - self._whole_us < early.whole_us
-            # On demand, no scan ends by a record: what it leaves unread matters for none.
+            # On demand, no scan ends because of a record: the switches that it leaves unread matter for none.
             glove = None if early.on_demand else newest.frame
             early.start(joints.codes(now_us(), glove))
-        for group, answers in zip(self._groups, self._scan, strict=False):
-            for number, answer in zip(group, answers, strict=True):
+        for group, replies in zip(self._groups, self._scan, strict=False):
+            for number, reply in zip(group, replies, strict=True):
                 port = self._ports[number]
-                shut, silent = port.states(answer)
+                shut, silent = port.states(reply)
                 closed, lost = closed | shut, lost | silent
                 if isinstance(port, PortLevels):
-                    codes[port.place] = answer
+                    codes[port.place] = reply
             if ends and early.after(group[0], shut, silent):
                 unread = early.unread(group[0])
                 break
@@ -182,14 +182,14 @@ class I2cDevice(Source):
         return SwitchFrame(now_us(), closed, lost, unread, glove, taxels)
 
     def counts(self) -> tuple[Count, ...]:
-        """Return how many transfers there were, how many scans were too slow to count, and each chip's failures."""
+        """Return the numbers of transfers, of scans too slow to count, and of each chip's failures."""
         failures = (
             Count(f"failures of {chip.chip.name} at 0x{chip.address:02X}", chip.errors) for chip in self.bus.chips
         )
         return (Count("transfers", self.bus.transfers), Count("held up", self._held_up), *failures)
 
     def trouble(self) -> str:
-        """Return what is wrong with the bus, or with the chips that are absent; "" if nothing is."""
+        """Return the fault of the bus, or the absent chips; "" if there is none."""
         absent = (chip.last_error for chip in self.bus.chips if not chip.present)
         return self.bus.trouble or "; ".join((*absent, *taxel_faults(self.taxels)))
 
@@ -199,7 +199,7 @@ class I2cDevice(Source):
 
 
 def taxel_faults(taxels: Sequence[PortLevels]) -> list[str]:
-    """Return a sentence on the taxels that have faults, if any has: a lost one's chip is told of elsewhere."""
+    """Return a sentence on the taxels with faults, if any; lost ones are reported with their chip."""
     faulty = [f"{each.name}: {fault}" for each in taxels if (fault := each.taxels.faults[0]) not in ("", "silent")]
     return [f"taxels with faults: {list_names(faulty)}"] if faulty else []
 
@@ -217,7 +217,7 @@ def _chip_at(harness: Harness, bus: int, number: int, ports: list[Port]) -> Chip
 
 
 def _bus_period_us(scan: ScanMap, harness: Harness) -> int:
-    """Return how often the switches on I2C buses should be read at least."""
+    """Return the longest period at which the switches on I2C buses should be read."""
     return max(SHORTEST_US, round(scan_us(scan, harness).us))
 
 

@@ -1,7 +1,7 @@
 """Streams of the Lab Streaming Layer as rows (extra `lsl`): `port = "lsl:NAME"` of a [[stream]].
 
-Channels are columns, by the labels that the stream gives them, or in their order; its time stamps are the sender's
-clock. Streams are looked for on this machine, unless LSL's own configuration (LSLAPICFG) says otherwise.
+Channels are columns, by the stream's labels, or in order; its time stamps are the sender's clock. Streams are searched
+for on this machine, unless LSL's configuration (LSLAPICFG) says otherwise.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ _MOST = 256
 
 
 class LslReader(RowReader):
-    """Rows of the LSL stream of a name. Its constructor opens nothing."""
+    """Rows of the LSL stream with a given name. Its constructor opens nothing."""
 
     def __init__(self, port: str) -> None:
         self._port, self._name = port, port.removeprefix("lsl:")
@@ -29,20 +29,20 @@ class LslReader(RowReader):
         self._labels: tuple[str, ...] | None = None
 
     def open(self) -> None:
-        """Look for the stream and subscribe to it."""
+        """Find the stream and subscribe to it."""
         lsl = load_pylsl(self._port)
         if not self._name or not self._name.isprintable():
             raise SettingError(f"{self._port!r} names no stream: write lsl:NAME")
         found = lsl.resolve_byprop("name", self._name, 1, _RESOLVE_S)
         if not found:
-            raise DeviceError(f"{self._port}: there is no LSL stream of this name: does its program run?")
+            raise DeviceError(f"{self._port}: there is no LSL stream of this name: is its program running?")
         self._inlet = lsl.StreamInlet(found[0], max_buflen=_BUFFER_S, recover=False)
         self._lost = lsl.util.LostError
         try:
             info = self._inlet.info(_RESOLVE_S)
             self._inlet.open_stream(_RESOLVE_S)
         except (self._lost, lsl.util.TimeoutError) as reason:
-            raise DeviceError(f"{self._port}: the stream does not answer ({type(reason).__name__})") from reason
+            raise DeviceError(f"{self._port}: the stream does not respond ({type(reason).__name__})") from reason
         if info.channel_format() == lsl.cf_string:
             raise SettingError(f"{self._port} is a stream of texts: rows are numbers")
         labels = info.get_channel_labels() or ()
@@ -50,7 +50,7 @@ class LslReader(RowReader):
         self._labels = tuple(labels) if named else None
 
     def read(self, timeout_s: float) -> Sequence[Row]:
-        """Return the samples that came in."""
+        """Return the samples that arrived."""
         try:
             first, stamp = self._inlet.pull_sample(timeout_s)
             if first is None:

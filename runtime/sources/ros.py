@@ -4,8 +4,8 @@
     ros:/TOPIC?type=UInt8MultiArray    std_msgs: columns in the order of `columns`
     ros:/TOPIC?type=Float32MultiArray  the same
 
-A JointState's stamp is the sender's clock, unless it is zero. Nodes of this machine are heard, others where
-CYCLONEDDS_URI or `&public` lets them; ROS_DOMAIN_ID says in which domain.
+A JointState's stamp is the sender's clock, unless it is zero. Nodes of this machine are received, others if
+CYCLONEDDS_URI or `&public` allows them; ROS_DOMAIN_ID sets the domain.
 """
 
 import re
@@ -36,10 +36,10 @@ class RosReader(RowReader):
         self._domain: Any = None
 
     def open(self) -> None:
-        """Subscribe; whether somebody publishes shows later."""
+        """Subscribe to the topic, which may not have a publisher yet."""
         found = _PORT.fullmatch(self._port)
         if found is None:
-            ways = f"ros:/TOPIC, and behind it ?type= one of {', '.join(_TYPES)}, or ?public"
+            ways = f"ros:/TOPIC, optionally followed by ?type= one of {', '.join(_TYPES)}, or ?public"
             raise SettingError(f"{shortened(repr(self._port))} names no topic: write {ways}")
         try:
             from cyclonedds.core import DDSException, ReadCondition, WaitSet
@@ -59,7 +59,7 @@ class RosReader(RowReader):
             raise DeviceError(f"{self._port} cannot be opened in domain {number}: {reason}") from None
 
     def read(self, timeout_s: float) -> Sequence[Row]:
-        """Return the rows of the messages that came in."""
+        """Return the rows of the messages that arrived."""
         from cyclonedds.core import DDSException
 
         try:
@@ -78,11 +78,11 @@ class RosReader(RowReader):
                     continue
                 time_s = stamp.sec + stamp.nanosec / 1e9 if stamp.sec or stamp.nanosec else None
                 yield Row(names, tuple(map(finite, sample.position)), time_s)
-            elif hasattr(sample, "data"):  # and no word of a writer that has gone
+            elif hasattr(sample, "data"):  # not the notice of a writer that has gone
                 yield Row(None, tuple(finite(float(value)) for value in sample.data))
 
     def counts(self) -> LineCounts:
-        """Return how many messages were no rows."""
+        """Return the number of messages that were not rows."""
         return self._counts
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Rows of numbers, whatever carries them, as frames: which column is a switch, a joint or a taxel says `[[stream]]`."""
+"""Rows of numbers, over any transport, as frames: `[[stream]]` says which column is a switch, a joint or a taxel."""
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -16,28 +16,28 @@ from ..scanning.scanmap import ScanMap
 from ..taxels import Level, Taxels, calibration_of
 from .base import SHORTEST_US, Source, SourceKind, counted, debouncer_of, pause_us
 
-# Codes of joints are bytes, as a CyberGlove's; 0 is a joint of which nothing came. A taxel's whole numbers are its
-# codes; numbers that lie closer are coded in so many steps.
+# Codes of joints are bytes, as a CyberGlove's; 0 is a joint without a value. A taxel's whole numbers are its codes;
+# closer numbers are coded in this many steps.
 JOINT_CODES = (1, 255)
 _TAXEL_STEPS, _FEWEST_STEPS, _MOST_STEPS = 4095, 255, 65_534
 _UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0}
-# A clock that goes back further, or ahead of ours by more, has begun anew.
+# A clock that goes back further, or ahead of ours by more, has restarted.
 _BACK_US, _AHEAD_US = 1_000_000, 10_000_000
-# The quickest row of so many periods, twice as many at most, sets a sender's clock against ours. Resonators of boards
-# are off by half a percent: over more rows that alone would make new rows old.
+# The fastest row of this many periods, twice as many at most, sets a sender's clock against ours. Resonators of boards
+# are off by half a percent: over more rows that error alone would make new rows late.
 _WINDOW = 10
-# A break in what arrives is none before it is longer: serial adapters and radios hand rows over in bunches.
+# A shorter break between rows is not counted: serial adapters and radios deliver rows in bunches.
 _BUNCH_US = 50_000
 _SLOW = 0.75
-# A serial adapter, or a radio, may hold a row back for so long though all is well.
+# A serial adapter, or a radio, may hold a row back for this long in normal operation.
 _WAY_US = 20_000
-# What a column may become of a frame.
+# What a column may become in a frame.
 _LATE = -1
 
 
 class SenderClock:
-    """The time of this computer at which a sender stamped a row: no later than it came, and by the quickest of the last
-    rows, which come every `period_us`.
+    """Converts a sender's time stamps to this computer's time: no later than the row came, and by the fastest of the
+    last rows, which come every `period_us`.
     """
 
     def __init__(self, period_us: int) -> None:
@@ -47,8 +47,8 @@ class SenderClock:
         self._offsets = [0.0, 0.0]
 
     def host_us(self, sent_us: float, came_us: int) -> int | None:
-        """Return the time of a row that was stamped `sent_us` by its sender; _LATE if it comes after a later one, None
-        if its clock has begun anew, and this clock with it.
+        """Return the time of a row that its sender stamped `sent_us`; _LATE if it comes after a later one, None if the
+        sender's clock has restarted, and this clock with it.
         """
         last = self.last_us
         if last is not None:
@@ -70,15 +70,15 @@ class SenderClock:
 
 @dataclass(slots=True)
 class RowCounts:
-    """What came of a sender's rows, since the source was made.
+    """Counts of a sender's rows, since the source was made.
 
     wrong_columns  rows without the columns that are used, or of another number of them
-    missing        values that were no number, of columns that are used; a row without its clock is left out
-    out_of_range   values beyond the range that glove.toml gives, held to it
+    missing        values of used columns that were not numbers; a row without its clock is left out
+    out_of_range   values beyond the range in glove.toml, clipped to it
     repeated       rows that came twice
     late           rows that came after a later one, and were left out
-    restarts       how often the sender's clock began anew
-    gaps, lost     breaks between two rows, and the rows that are lacking there
+    restarts       restarts of the sender's clock
+    gaps, lost     breaks between two rows, and the rows that are missing there
     """
 
     rows: int = 0
@@ -94,7 +94,7 @@ class RowCounts:
 
 @dataclass(slots=True)
 class RowWatch:
-    """How rows come: gaps and the rate, by the sender's clock where there is one."""
+    """The arrival of rows: gaps and the rate, by the sender's clock if there is one."""
 
     period_us: int
     counts: RowCounts = field(default_factory=RowCounts)
@@ -104,7 +104,7 @@ class RowWatch:
     _rows: int = 0
 
     def begin(self) -> None:
-        """Begin anew, after a break that is no gap between rows."""
+        """Start afresh, after a break that is not a gap between rows."""
         self._last_us = self._since_us = None
 
     def row(self, came_us: int, sent_us: float | None) -> None:
@@ -126,7 +126,7 @@ class RowWatch:
 
 
 class Columns:
-    """Finds the columns that are used in rows that are named, or in the order of glove.toml."""
+    """Finds the used columns in rows with names, or by the order in glove.toml."""
 
     def __init__(self, wanted: Sequence[str], columns: Sequence[str], time: str | None) -> None:
         self._wanted, self._columns, self._time = tuple(wanted), tuple(columns), time
@@ -135,7 +135,7 @@ class Columns:
         self.found: tuple[str, ...] | None = None
 
     def of(self, row: Row) -> tuple[float | None, ...] | None:
-        """Return the values of the columns wanted, None for one that is not there; None for a row of other columns."""
+        """Return the values of the wanted columns, None for a missing one; None for a row of other columns."""
         if self._places is None or row.names != self._names:
             self._names, self._places = row.names, self._placed(row.names)
         if self._places is not None and (row.names is not None or len(row.values) == len(self._columns)):
@@ -145,17 +145,17 @@ class Columns:
 
     def _placed(self, names: tuple[str, ...] | None) -> tuple[int | None, ...] | None:
         if names is not None and set(names).isdisjoint(self._wanted) and len(names) == len(self._columns):
-            names = None  # a header, or a message taken for one, of other names: their order counts
+            names = None  # a header of other names, or a message mistaken for one: the order of columns counts
         order = self._columns if names is None else names
         places = {name: place for place, name in enumerate(order) if name}
         found = tuple(places.get(name) for name in self._wanted)
-        # One that lacks a sensor counts; one that lacks its clock, or most of what is used, is no row of this glove.
+        # A row that lacks a sensor counts; one that lacks its clock, or most used columns, is not from this glove.
         clocked = self._time is None or self._time in places
         return found if clocked and 2 * found.count(None) < len(found) else None
 
 
 class RowSource(Source):
-    """Stream number `number` of a harness: switches as `scan` has them, all joints, all taxels."""
+    """Stream number `number` of a harness: switches as in `scan`, all joints, all taxels."""
 
     def __init__(self, reader: RowReader, harness: Harness, number: int, names: Sequence[str], scan: ScanMap) -> None:
         wiring, read = harness.streams[number], scan.streams[number]
@@ -206,7 +206,7 @@ class RowSource(Source):
         self._begin()
 
     def read(self, timeout_s: float) -> SwitchFrame | GloveFrame | None:
-        """Return the next frame; a row with joints and switches is two."""
+        """Return the next frame; a row with joints and switches makes two."""
         if not self._ready:
             rows = self.reader.read(timeout_s)
             came_us = now_us()
@@ -221,7 +221,7 @@ class RowSource(Source):
             return
         counts.missing += values.count(None)
         if self.wiring.time is not None and values[-1] is None:
-            return  # nobody knows when it was
+            return  # its time is unknown
         time_us, sent_us = came_us, self._sent_us(row, values)
         if sent_us is not None:
             if (sent_us, values) == self._last:
@@ -256,7 +256,7 @@ class RowSource(Source):
             self._ready.append(glove)
 
     def _switch_frame(self, time_us: int, values: Sequence[float | None], glove: GloveFrame | None) -> SwitchFrame:
-        """Return the switches and taxels of a row, and its joints: no moment joins them with those of another row."""
+        """Return the switches and taxels of a row, and its joints: they are never combined with another row's."""
         closed = known = 0
         for place, threshold, low, bit in self._switches:
             if (value := values[place]) is not None:
@@ -283,21 +283,21 @@ class RowSource(Source):
         return held
 
     def counts(self) -> tuple[Count, ...]:
-        """Return how many rows come, and what was wrong with some."""
+        """Return the rate of rows, and counts of their faults."""
         rate = Count("rows a second", round(self.watch.hz or 0))
         return (rate, *counted(self.watch.counts), *counted(self.reader.counts()))
 
     def trouble(self) -> str:
-        """Return what is wrong though rows, or lines, come; "" if nothing is."""
+        """Return the fault of arriving rows or lines; "" if there is none."""
         counts, found, hz = self.watch.counts, self._columns.found, self.watch.hz
         if not counts.rows and found is not None:
             wanted = list_names([name for name in self.wiring.columns if name] or self.wiring.used)
             has = list_names([shortened(name) for name in found])
             return f"its rows have other columns than glove.toml: {has}, not {wanted}"
         if not counts.rows and (odd := self.reader.odd):
-            return f"what comes holds no rows: {odd}"
+            return f"the data holds no rows: {odd}"
         if hz is not None and hz < _SLOW * self.wiring.rate_hz:
-            return f"{hz:.3g} rows a second come, glove.toml says {self.wiring.rate_hz:g}: write rate_hz = {hz:.2g}"
+            return f"{hz:.3g} rows a second arrive, but glove.toml says {self.wiring.rate_hz:g}: set rate_hz = {hz:.2g}"
         faulty = [f"{each.names[0]}: {each.faults[0]}" for each in self._taxels if each.faults[0] not in ("", "silent")]
         return f"taxels with faults: {list_names(faulty)}" if faulty else ""
 
@@ -307,7 +307,7 @@ class RowSource(Source):
 
 
 class _Grid:
-    """The grid that numbers of a range are coded on: the code of its one end is `first`, of the other `last`."""
+    """The grid on which numbers of a range are coded: one end has the code `first`, the other `last`."""
 
     __slots__ = ("_low", "_span", "first", "last")
 
@@ -316,7 +316,7 @@ class _Grid:
         self._span, self.first, self.last = high - self._low, first, last
 
     def code(self, value: float) -> int:
-        """Return the code of a number, beyond first and last where it is out of the range. Of whole numbers in a range
+        """Return the code of a number, beyond first and last if it is out of the range. For whole numbers in a range
         with whole ends it is exact: divided last, and rounded once.
         """
         far = (value - self._low) * (self.last - self.first) / self._span
@@ -324,9 +324,7 @@ class _Grid:
 
 
 def steps_of(limits: Range) -> int:
-    """Return how many steps the range of a taxel is coded in: as many as there are whole numbers in it, if it has whole
-    ends and enough of them.
-    """
+    """Return the number of steps for a taxel's range: its whole numbers, if it has whole ends and enough of them."""
     span = abs(limits[1] - limits[0])
     whole = all(float(end).is_integer() for end in limits) and _FEWEST_STEPS <= span <= _MOST_STEPS
     return int(span) if whole else _TAXEL_STEPS
@@ -339,7 +337,7 @@ def joint_number(limits: Range, code: int) -> float:
 
 
 def stream_period_us(wiring: StreamWiring) -> int:
-    """Return how often a stream should deliver at least, the way that a row takes on a good line included."""
+    """Return the longest expected period of a stream, including the transport of a row on a good line."""
     return max(SHORTEST_US, wiring.period_us) + _WAY_US // PERIODS
 
 
@@ -348,7 +346,7 @@ class RowKind(SourceKind):
     """A kind of source that delivers rows.
 
     takes   whether it opens a port of this text; of several kinds the first by rank does
-    reader  what reads the rows of a stream; its constructor opens nothing
+    reader  makes the reader of a stream's rows; its constructor opens nothing
     """
 
     takes: Callable[[str], bool] = lambda _port: False
@@ -358,7 +356,7 @@ class RowKind(SourceKind):
 def row_kinds(
     name: str, help_: str, takes: Callable[[str], bool], reader: Callable[[StreamWiring], RowReader], rank: int
 ) -> tuple[RowKind, RowKind]:
-    """Return a kind for streams with switches or taxels, and one for those of joints alone."""
+    """Return a kind for streams with switches or taxels, and one for those with joints only."""
 
     def of(joints: bool) -> Callable[[Harness, Sequence[str], ScanMap], Iterator[Source]]:
         def sources(harness: Harness, names: Sequence[str], scan: ScanMap) -> Iterator[Source]:

@@ -16,19 +16,19 @@ from ..scanning.timing import analog_us
 from ..taxels import Level, Taxels, calibration_of
 from .base import SHORTEST_US, Source, SourceKind, counted, debouncer_of, pause_us
 
-# A board that speaks less often is asked for a heartbeat, beside an event for every change: silence is missed sooner.
+# A board that sends less often is asked for a heartbeat, next to an event for every change, to notice silence sooner.
 STATE_US = SHORTEST_US
 
-# The round trip of a PING on a good line: an adapter's 16 ms and the board's answer; and its bytes, both ways.
+# The round trip of a PING on a good line: an adapter's 16 ms and the board's reply; and its bytes, both ways.
 _ANSWERED_US = 20_000
 _PING_BYTES = 8 + 41
 
 
 class _BoardTaxels:
-    """The taxels of board number `number`: those with levels in `scan`; all that are wired where `scan` has no levels.
+    """The taxels of board number `number`: those with levels in `scan`, or all wired ones if `scan` has no levels.
 
-    channels  those wanted, as bits; 0: the board is not asked for any
-    period_us from frame to frame; the line is free for half of the time at least
+    channels  the wanted ones, as bits; 0: none is requested from the board
+    period_us from frame to frame; the line is free for at least half of the time
     """
 
     def __init__(self, harness: Harness, number: int, scan: ScanMap) -> None:
@@ -49,7 +49,7 @@ class _BoardTaxels:
         self.begin()
 
     def begin(self) -> None:
-        """Begin anew: nothing is known."""
+        """Start afresh: nothing is known."""
         self.taxels: Taxels | None = None
         self._state: tuple[Mask, Mask, tuple[int | None, ...] | None] = 0, self.owned, None
         self._until_us = -1
@@ -70,7 +70,7 @@ class _BoardTaxels:
         self._until_us = time_us + PERIODS * measured.analog_us + STATE_US
 
     def at(self, time_us: int) -> tuple[Mask, Mask, tuple[int | None, ...] | None]:
-        """Return closed and lost levels and the codes at a time: codes of long ago are none."""
+        """Return closed and lost levels and the codes at a time; codes that are too old are dropped."""
         return self._state if time_us <= self._until_us else (0, self.owned, None)
 
 
@@ -79,8 +79,8 @@ def _bits(mask: Mask) -> list[int]:
 
 
 class ScannerDevice(Source):
-    """Scanner board number `number` of a harness: keys, debounced and turned into the switches that are asked for, and
-    levels of its taxels as `scan` has them, limits in counts.
+    """Scanner board number `number` of a harness: keys, debounced and mapped to the requested switches, and levels of
+    its taxels as in `scan`, limits in counts.
     """
 
     def __init__(self, harness: Harness, number: int, switch_names: Sequence[str], scan: ScanMap) -> None:
@@ -97,9 +97,9 @@ class ScannerDevice(Source):
         self._debouncer, self._pauses = debouncer_of(debounce), Pauses(pause_us(debounce))
 
     def open(self) -> None:
-        """Open the board, and see to it that it is not silent for long while all is well."""
+        """Open the board, and make it send often enough to notice silence."""
         hello = self.driver.open()
-        # What was closed before the board was away is no reason to believe it closed now.
+        # A switch that was closed before the board was away must not be assumed closed now.
         self._debouncer, self._pauses = debouncer_of(self._debounce), Pauses(pause_us(self._debounce))
         fast = 0 < hello.period_us <= STATE_US
         self.period_us = hello.period_us if fast else STATE_US
@@ -130,11 +130,11 @@ class ScannerDevice(Source):
         return SwitchFrame(self._time_us, closed, self.owned & ~known, taxels=taxels)
 
     def counts(self) -> tuple[Count, ...]:
-        """Return what the driver counts."""
+        """Return the driver's counters."""
         return counted(self.driver.counts)
 
     def trouble(self) -> str:
-        """Return what is wrong with taxels; "" if nothing is."""
+        """Return the faults of taxels; "" if there are none."""
         if (taxels := self.taxels.taxels) is None:
             return ""
         faulty = [f"{name}: {fault}" for name, fault in zip(taxels.names, taxels.faults, strict=True) if fault]
@@ -146,7 +146,7 @@ class ScannerDevice(Source):
 
 
 def _usual_trip_us(wiring: ScannerWiring) -> int:
-    """Return how long a PING to a board so wired and its answer may take on a good line."""
+    """Return the usual maximum time for a PING to a board with this wiring, and its reply, on a good line."""
     return _ANSWERED_US + round(_PING_BYTES * BITS_A_BYTE * 1e6 / wiring.baud)
 
 
@@ -155,7 +155,7 @@ def _sources(harness: Harness, names: Sequence[str], scan: ScanMap) -> Iterator[
 
 
 def _periods_us(harness: Harness, scan: ScanMap) -> Iterator[int]:
-    """Yield for each board that is read how often it should be heard of, the round trip of a good line included."""
+    """Yield the longest expected period of each board, including the round trip of a good line."""
     boards = zip(harness.scanners, scan.scanners, scan.taxels or [()] * len(scan.scanners), strict=True)
     return (STATE_US + ceil(_usual_trip_us(wiring) / PERIODS) for wiring, keys, levels in boards if keys or levels)
 

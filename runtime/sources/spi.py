@@ -14,14 +14,14 @@ from ..taxels import calibration_of
 from .base import SHORTEST_US, Source, SourceKind
 from .i2c import PortLevels, taxel_faults
 
-# Conversions take some tens of microseconds: a converter is not asked more often than this.
+# Conversions take tens of microseconds: a converter is read no more often than this.
 _PERIOD_S = 0.001
 
 
 class SpiConverter(Source):
-    """SPI device number `number` of a harness, read as `scan` has it, whose levels are limits in counts.
+    """SPI device number `number` of a harness, read as in `scan`, whose levels are limits in counts.
 
-    silent  whether the last answers were no converter's
+    silent  whether the last replies were not a converter's
     """
 
     def __init__(self, harness: Harness, number: int, scan: ScanMap) -> None:
@@ -46,23 +46,23 @@ class SpiConverter(Source):
         """Convert all channels once."""
         time.sleep(min(max(0.0, self._due - time.monotonic()), timeout_s))
         self._due = time.monotonic() + _PERIOD_S
-        answers = self.run()
-        self.silent = None in answers
+        replies = self.run()
+        self.silent = None in replies
         closed = lost = 0
         codes: list[int | None] = [None] * self._everything
-        for taxel, answer in zip(self.taxels, answers, strict=True):
-            shut, silent = taxel.states(answer)
+        for taxel, reply in zip(self.taxels, replies, strict=True):
+            shut, silent = taxel.states(reply)
             closed, lost = closed | shut, lost | silent
-            codes[taxel.place] = answer
+            codes[taxel.place] = reply
         return SwitchFrame(now_us(), closed, lost, taxels=tuple(codes))
 
     def counts(self) -> tuple[Count, ...]:
-        """Return how many transfers there were, and how many answers were no converter's."""
+        """Return the numbers of transfers, and of replies that were not a converter's."""
         return (Count("transfers", self.device.calls), Count("silent", self.device.silent))
 
     def trouble(self) -> str:
-        """Return what is wrong with the converter or its taxels; "" if nothing is."""
-        silent = [f"{self.device.chip.name} does not answer: check its supply, its wires and its chip select"]
+        """Return the fault of the converter or its taxels; "" if there is none."""
+        silent = [f"{self.device.chip.name} does not reply: check its supply, its wires and its chip select"]
         return "; ".join(silent if self.silent else taxel_faults(self.taxels))
 
     def close(self) -> None:
@@ -79,7 +79,7 @@ def _periods_us(harness: Harness, scan: ScanMap) -> Iterator[int]:
 
 
 def _numbers(harness: Harness, scan: ScanMap) -> list[int]:
-    """Return which SPI devices are read."""
+    """Return the numbers of the SPI devices that are read."""
     buses = len(harness.buses)
     return sorted({port.bus - buses for port in scan.ports if port.bus >= buses})
 

@@ -1,1 +1,1 @@
-"""Pages in a browser, of a run or of its recording: the server and what it shows (extra `web`)."""
+"""Pages in a browser, of a run or of its recording: the server and the views (extra `web`)."""

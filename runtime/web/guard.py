@@ -1,9 +1,9 @@
-"""Who may see a page: the checks of a request's Host, Origin and token, and the headers of every answer.
+"""Access control of a page: checks of a request's Host, Origin and token, and the headers of every response.
 
 A page of another site that is open in the same browser can send requests to this machine. Two checks keep it out. A
-WebSocket must come from the very page that this server served (Origin). And the server must have been asked by a name
-that nobody else can make to point at it (Host): an address in digits, localhost, or this machine's own name. A name in
-the DNS can be made to point anywhere (DNS rebinding).
+WebSocket must come from the page that this server served (Origin). And the server must be addressed by a name that
+nobody else can point at it (Host): a numeric address, localhost, or this machine's name. A DNS name can be made to
+point anywhere (DNS rebinding).
 """
 
 import hmac
@@ -15,13 +15,13 @@ from contextlib import suppress
 
 from thenar.drivers.errors import SettingError
 
-# Enough that nobody tries them all; what we make ourselves has 32.
+# Too many to try; tokens made here have 32.
 LEAST_TOKEN = 16
 _TOKEN = re.compile(rf"[A-Za-z0-9_-]{{{LEAST_TOKEN},128}}")
 _HOST = re.compile(r"(?:\[([0-9A-Fa-f:.]+)\]|([^][:/@\s]+))(?::[0-9]{1,5})?")
 
-# What the browser may do with a page: nothing but what is listed. Nothing inline, no other site, no frame around it;
-# and no text becomes markup in a script (Trusted Types).
+# What the browser may do with a page: only what is listed. Nothing inline, no other site, no frame around it; and no
+# text becomes markup in a script (Trusted Types).
 POLICY = "; ".join(
     (
         "default-src 'none'",
@@ -54,11 +54,11 @@ def new_token() -> str:
 
 
 class Guard:
-    """Decides which requests are answered.
+    """Decides which requests are served.
 
-    The token comes once, in the address that the user opens. It is answered with a cookie and an address without it, so
-    that it stands neither in the browser's history nor on the screen. The cookie holds another secret, which dies with
-    the server.
+    The token comes once, in the address that the user opens. The server replies with a cookie and redirects to an
+    address without it, so that it is neither in the browser's history nor on the screen. The cookie holds another
+    secret, which expires with the server.
 
     Parameters
     ----------
@@ -69,23 +69,23 @@ class Guard:
     port : int
         Cookies are sent to all ports of a host, so its name has the port.
     token : str or None
-        What a user must know. None: nothing, which only a loopback address allows.
+        The secret that a user must know. None: nothing, which only a loopback address allows.
 
     Raises
     ------
     SettingError
-        About an address that others can reach without a token, and about a token that can be guessed.
+        For an address that others can reach without a token, and for a token that can be guessed.
     """
 
     def __init__(self, name: str, address: str, port: int, token: str | None) -> None:
         self._loopback = ipaddress.ip_address(address.partition("%")[0]).is_loopback
         if token is None and not self._loopback:
             raise SettingError(
-                f"{name} is an address that other machines can reach: add --web-token, so that only those see the page "
-                "who know the address with the token in it, or take 127.0.0.1"
+                f"{name} is an address that other machines can reach: add --web-token, so that only those who know the "
+                "address with its token see the page, or use 127.0.0.1"
             )
         if token is not None and not _TOKEN.fullmatch(token):
-            raise SettingError(f"a token has {LEAST_TOKEN} to 128 letters, digits, - or _, drawn at random")
+            raise SettingError(f"a token must have {LEAST_TOKEN} to 128 random letters, digits, - or _")
         self._token = token
         self._names = {name.lower(), "localhost"}
         if not self._loopback:
@@ -105,15 +105,15 @@ class Guard:
         return name in self._names
 
     def same_origin(self, origin: str | None, host: str) -> bool:
-        """Return whether a WebSocket is asked for by a page of this server; one that does not say so is refused."""
+        """Return whether a WebSocket request names this server's page as its origin; one without origin is rejected."""
         return origin in (f"http://{host}", f"https://{host}")
 
     def takes_token(self, token: str | None) -> bool:
-        """Return whether this is the token. It takes as long for every token of the same length."""
+        """Return whether this is the token, in equal time for all tokens of the same length."""
         return self._token is not None and token is not None and _same(token, self._token)
 
     def lets_in(self, cookie: str | None) -> bool:
-        """Return whether a request needs no token, or once had it."""
+        """Return whether a request needs no token, or has shown it before."""
         return self._token is None or (cookie is not None and _same(cookie, self.secret))
 
 

@@ -1,6 +1,6 @@
-"""The page of a guided collection: what it shows of the Guide, and the keys that are pressed there.
+"""The page of a guided collection: its view of the Guide, and the keys pressed there.
 
-Every browser that is open shows the same, and the same keys count in each.
+Every open browser shows the same, and keys count in each.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +15,7 @@ from ..recording.session import Session
 from .presses import Presses
 from .server import Server, message
 
-# So often the page is told of a hand that moves. A change of stage is told at once.
+# Interval at which the page is sent hand movements. A change of stage is sent at once.
 _PERIOD_US = 50_000
 
 
@@ -27,12 +27,12 @@ class GuidePage:
     address, token
         As for `Server`.
     session : Session
-        What is recorded; it has a collection.
+        The recorded session, which has a collection.
     hands : mapping
-        What hand.js draws: "glove", whose bits are the session's switches and whose joints are its sensors, and "pose",
-        whose joints are those of a pose.
+        The drawings of hand.js: "glove", whose bits are the session's switches and whose joints are its sensors,
+        and "pose", whose joints are those of a pose.
     shown : callable
-        Returns how a trial is shown: "title", "detail", and a "pose" of joints in degrees or None.
+        Returns the page's view of a trial: "title", "detail", and a "pose" of joints in degrees or None.
 
     Raises
     ------
@@ -71,12 +71,12 @@ class GuidePage:
         self.url = self._server.url
 
     def press(self, now_us: int, guide: Guide) -> None:
-        """Press what was pressed on a page since the last call and was meant for what `guide` is at."""
+        """Pass the keys pressed since the last call to `guide`, if they were meant for its current step."""
         for key in self._presses.due(lambda: guide.step):
             guide.press(now_us, key)
 
     def show(self, now_us: int, guide: Guide, devices: Sequence[DeviceState]) -> None:
-        """Show where `guide` stands, if it is time to, or news."""
+        """Show the state of `guide`, if it changed or the next refresh is due."""
         if now_us < self._due_us and guide.step == self._step:
             return
         self._due_us, self._step = now_us + _PERIOD_US, guide.step
@@ -104,11 +104,11 @@ class GuidePage:
         )
 
     def tell(self, study: Mapping[str, object]) -> None:
-        """Show what recognition is so far, or why that is not known."""
+        """Show the accuracy so far, or why it is not known."""
         self._server.publish("study", message("study", **study))
 
     def close(self) -> None:
-        """End the page."""
+        """Close the page."""
         self._server.close()
 
     def __enter__(self) -> Self:
@@ -120,8 +120,8 @@ class GuidePage:
         self.close()
 
     def _seen(self, switches: SwitchFrame | None, glove: GloveFrame | None) -> dict[str, object]:
-        """Return what the glove sees: a character a switch, "1" closed, "0" open, "x" not read; the joints' values, in
-        degrees where they are calibrated, null where they are not measured; how far each taxel is pressed, 0 to 1.
+        """Return the glove's readings: one character per switch, "1" closed, "0" open, "x" not read; the joint values,
+        in degrees if calibrated, null if not measured; how far each taxel is pressed, 0 to 1.
         """
         joints: list[float | None] = []
         if glove is not None and glove.plugged:
@@ -144,7 +144,7 @@ def _letters(frame: SwitchFrame, switches: int) -> str:
 
 
 class _Pads:
-    """How far taxels are pressed: from rest to press where they are calibrated, else in the range seen here."""
+    """How far taxels are pressed: from rest to press if calibrated, else within the range seen so far."""
 
     def __init__(self, session: Session) -> None:
         given = session.taxel_calibration
@@ -155,7 +155,7 @@ class _Pads:
         self._fixed = [ends is not None for ends in self._ends]
 
     def pressed(self, codes: Sequence[int | None]) -> list[float | None]:
-        """Return the share of each taxel, 0 to 1; None of one that was not read."""
+        """Return the share of each taxel, 0 to 1, or None if it was not read."""
         found: list[float | None] = []
         for place, code in enumerate(codes):
             if code is None:

@@ -1,6 +1,6 @@
-"""The live page of a run: what it shows of each moment, and what it may ask for.
+"""The live page of a run: its view of each moment, and the requests that it may send.
 
-In the loop of the run a moment costs a reference or two; its text is made on the server's thread, when a page is open.
+In the loop of the run a moment costs a reference or two; its text is made on the server's thread, if a page is open.
 """
 
 from collections import deque
@@ -24,7 +24,7 @@ from ..taxels import calibration_of
 from .recordings import Recordings
 from .server import Server, message
 
-# How much of the past a page that is opened now gets to see, and how finely.
+# Length and resolution of the past that a newly opened page gets.
 PAST_US, _STEP_US = 30_000_000, 10_000
 _encode = msgspec.json.Encoder().encode
 _FRAME = b'{"topic":"frame",'
@@ -36,18 +36,18 @@ class LivePage:
     Parameters
     ----------
     glove : Glove
-        What runs; it is `recordable`.
+        The running glove; it is `recordable`.
     folder : Path
-        The build's, whose hand is drawn.
+        The build's folder, whose hand is drawn.
     address, token
         As for `Server`.
     recordings : Path
-        The one folder into which a page can record.
+        The only folder into which a page can record.
 
     Attributes
     ----------
     server : Server
-        What serves it; `server.url` is its address.
+        The server of the page; `server.url` is its address.
 
     Raises
     ------
@@ -81,7 +81,7 @@ class LivePage:
         self._tell_recording()
 
     def show(self, moment: Moment) -> None:
-        """Show what the glove has just published, and do what pages asked for. For the thread of the run."""
+        """Show the moment that the glove has just published, and carry out requests. For the thread of the run."""
         grasp, glove = moment.grasp, self._glove
         self.server.publish("frame", partial(self._frames, moment))
         self._past.add(grasp)
@@ -96,11 +96,11 @@ class LivePage:
 
     @property
     def recorded(self) -> Sequence[Recorder]:
-        """The recordings that pages began."""
+        """The recordings begun by pages."""
         return self._recordings.made
 
     def close(self) -> None:
-        """End the page, and a recording that it began."""
+        """Close the page, and a recording that it began."""
         self.server.close()
         self._recordings.close()
 
@@ -120,21 +120,21 @@ class LivePage:
 
 
 class Past:
-    """What was recognised lately, for pages that are opened later. `add` and `text` may be called on two threads."""
+    """The latest predictions, for pages opened later. `add` and `text` may be called on two threads."""
 
     def __init__(self) -> None:
         self._grasps: deque[LiveGrasp] = deque(maxlen=PAST_US // _STEP_US)
         self._newest_us, self._due_us = 0, 0
 
     def add(self, grasp: LiveGrasp) -> None:
-        """Take what was recognised."""
+        """Take a prediction."""
         if grasp.time_us >= self._due_us or grasp.time_us < self._newest_us:
             self._due_us = grasp.time_us + _STEP_US
             self._grasps.append(grasp)
         self._newest_us = grasp.time_us
 
     def text(self) -> bytes:
-        """Return the message of it: an entry for every change."""
+        """Return its message: an entry for every change."""
         changes: list[tuple[object, ...]] = []
         until_us = 0
         for grasp in self._grasps.copy():
@@ -149,8 +149,8 @@ class Past:
 
 
 class FrameText:
-    """Makes the text of a moment: the fields of its grasp, preshape and angles as sinks have them, those of `Detail`,
-    and `taxels`: how far each taxel that was read and is calibrated is pressed, by name: 0 at rest, 1 at its press.
+    """Makes the text of a moment: the fields of its grasp, preshape and angles as in sinks, those of `Detail`, and
+    `taxels`: by name, how far each read and calibrated taxel is pressed, from 0 at rest to 1 at its press.
     """
 
     def __init__(self, build: Build, harness: Harness) -> None:

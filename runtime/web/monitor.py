@@ -1,8 +1,7 @@
-"""The page of a run elsewhere: what a run publishes on a socket (`--sink tcp:...` or `unix:...`), read and shown.
+"""The page of a run elsewhere: reads and shows the socket that a run publishes on (`--sink tcp:...` or `unix:...`).
 
-The stream holds what was recognised and how the glove fares. What that came of, switches, joints and the probabilities
-of all types, is in it where the sink was asked for it (`?detail`) and its build is at hand here; otherwise the page
-leaves that out.
+The stream holds the predictions and the glove's health. Switches, joints and the probabilities of all types are in it
+if the sink was opened with `?detail`, and are shown if its build is available here; otherwise the page omits them.
 """
 
 import re
@@ -27,16 +26,16 @@ from .live import Past
 from .server import Server, message
 
 RETRY_S, _WAIT_S = 1.0, 0.2
-# More than any line of a run; of a sender that is none, no more is kept.
+# Longer than any line of a run: more bytes without a newline are not from a run.
 LONGEST_LINE = 1 << 20
 _TCP = re.compile(r"tcp:(?:\[([^][]+)\]|([^][:]+)):([0-9]{1,5})")
 _decode = msgspec.json.Decoder(Line | DetailLine | HealthLine | ProgressLine).decode
-# So long after the last detail a stream counts as one with details: moments without are left out.
+# A stream counts as one with details for this long after the last detail; moments without are left out.
 _DETAILED_US = 1_000_000
 
 
 class Source(msgspec.Struct, frozen=True):
-    """Where the page's moments come from, whether they do, and what is wrong."""
+    """The source of the page's moments, whether it is connected, and its error."""
 
     where: str
     connected: bool
@@ -49,7 +48,7 @@ class StreamMonitor:
     Parameters
     ----------
     where : str
-        "tcp:HOST:PORT" or "unix:PATH", as the run's sink has it.
+        "tcp:HOST:PORT" or "unix:PATH", as in the run's sink.
     address, token
         As for `Server`.
     build : Path, optional
@@ -58,12 +57,12 @@ class StreamMonitor:
     Attributes
     ----------
     server : Server
-        What serves the page.
+        The server of the page.
 
     Raises
     ------
     SettingError
-        About a `where` that names no stream, and as `Server` does.
+        For a `where` that names no stream, and as `Server` does.
     BuildError
         If the build cannot be read.
     """
@@ -78,8 +77,8 @@ class StreamMonitor:
         self.server = Server("live", address, token=token, hello=self._hello)
 
     def run(self, stop: Event, say: Callable[[Source], None] = lambda _: None) -> None:
-        """Read and show until `stop` is set; what is cut is opened again. `say` takes how the stream fares, whenever
-        that changes.
+        """Read and show until `stop` is set, reconnecting if the connection is lost. `say` is called whenever the state
+        of the stream changes.
         """
         self._say = say
         while not stop.is_set():
@@ -89,13 +88,13 @@ class StreamMonitor:
                     for line in _lines(stream, stop):
                         self._show(line)
                 if not stop.is_set():
-                    self._tell(Source(self._where, connected=False, error="the run has ended, or has dropped us"))
+                    self._tell(Source(self._where, connected=False, error="the run has ended, or dropped this page"))
             except (DeviceError, OSError) as reason:
                 self._tell(Source(self._where, connected=False, error=str(reason)))
             stop.wait(RETRY_S)
 
     def close(self) -> None:
-        """End the page."""
+        """Close the page."""
         self.server.close()
 
     def __enter__(self) -> Self:
@@ -108,7 +107,7 @@ class StreamMonitor:
         try:
             line = _decode(text)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
-            raise DeviceError(f"what comes is no stream of thenar: {shortened(str(wrong), 120)}") from None
+            raise DeviceError(f"the data is not a stream of thenar: {shortened(str(wrong), 120)}") from None
         if isinstance(line, Line):
             self._past.add(line)
             self._line = line
@@ -122,11 +121,11 @@ class StreamMonitor:
             self.server.publish("task", partial(message, "task", text=line.text))
 
     def _detail(self, detail: DetailLine) -> None:
-        """Show the newest moment with what it came of, if that is of the build at hand."""
+        """Show the newest moment with its details, if they are of the given build."""
         if not self._build:
             return
         if detail.build != self._build:
-            raise DeviceError("another build runs there than --build names: name that one, or none")
+            raise DeviceError("another build runs there than --build names: name that one, or leave out --build")
         line = self._line
         if line is not None and line.number == detail.number:
             self._detailed_us = line.time_us
@@ -144,7 +143,7 @@ class StreamMonitor:
 
 
 def _first(where: str, folder: Path | None) -> tuple[str, tuple[bytes, ...]]:
-    """Return the checksum of the build in a folder, "" of none, and what a page is told of it first."""
+    """Return the checksum of the build in a folder, "" without one, and the first messages for a page."""
     known = {"name": where, "preshapes": True, "records": False}
     if folder is None:
         return "", (message("build", known, grasps=(), switches=(), joints=(), partial=True),)
@@ -161,7 +160,7 @@ def _place(where: str) -> str | tuple[str, int]:
     found = _TCP.fullmatch(where)
     if found is None or int(found[3]) > 65535:
         raise SettingError(
-            f"{shortened(repr(where))} is no stream of a run: write tcp:HOST:PORT or unix:PATH, as its --sink has it"
+            f"{shortened(repr(where))} is not a stream of a run: write tcp:HOST:PORT or unix:PATH, as in its --sink"
         )
     return found[1] or found[2], int(found[3])
 
@@ -179,7 +178,7 @@ def _connected(place: str | tuple[str, int], where: str) -> socket.socket:
             raise
     except (OSError, UnicodeError) as reason:
         why = getattr(reason, "strerror", None) or str(reason)
-        raise DeviceError(f"{where} cannot be opened: {why}; does the run go on, with --sink {where}?") from None
+        raise DeviceError(f"{where} cannot be opened: {why}; is the run going, with --sink {where}?") from None
     return stream
 
 
@@ -196,5 +195,5 @@ def _lines(stream: socket.socket, stop: Event) -> Iterator[bytes]:
             return
         *lines, rest = (rest + data).split(b"\n")
         if len(rest) > LONGEST_LINE:
-            raise DeviceError("what comes is no stream of thenar: a line without an end")
+            raise DeviceError("the data is not a stream of thenar: a line does not end")
         yield from filter(None, lines)

@@ -1,4 +1,4 @@
-"""The page of a guided calibration: the pose to hold, each sensor's byte live, and the keys that are pressed there."""
+"""The page of a guided calibration: the pose to hold, each sensor's byte live, and the keys pressed there."""
 
 from collections.abc import Mapping
 from types import TracebackType
@@ -19,7 +19,7 @@ class PosePage:
     address, token
         As for `Server`.
     guide : PoseGuide
-        What it shows.
+        The guide that it shows.
     hand : object
         The drawing on which hand.js shows a pose.
     pictures : mapping
@@ -49,7 +49,7 @@ class PosePage:
         self.url = self._server.url
 
     def step(self, now_us: int) -> None:
-        """Press what was pressed on a page, and show where the guide stands, if it is time to, or news."""
+        """Pass the pressed keys to the guide, and show the guide's state if it changed or the next refresh is due."""
         guide = self._guide
         for key in self._presses.due(lambda: guide.step):
             guide.press(now_us, key)
@@ -80,11 +80,11 @@ class PosePage:
         )
 
     def say(self, sentence: str) -> None:
-        """Show how it ended."""
+        """Show how the calibration ended."""
         self._server.publish("end", message("end", text=sentence))
 
     def close(self) -> None:
-        """End the page, once it shows the last that was published."""
+        """Close the page, once it shows the last message."""
         self._server.close()
 
     def __enter__(self) -> Self:

@@ -1,8 +1,8 @@
 """Recordings that a page begins, marks and ends while the glove runs.
 
-They are those of `thenar run --record`, of the same glove by the same recorder, in one folder: what a page sends is
-part of a file's name, never a path. The files are made and closed on other threads than that of the run, which only
-changes where it records to: no disk holds it up.
+They equal those of `thenar run --record`, of the same glove by the same recorder, in one folder: a page sends part of a
+file's name, never a path. The files are created and closed on other threads than that of the run, which only changes
+its recorder: no disk delays it.
 """
 
 import re
@@ -27,16 +27,16 @@ _NAME = re.compile(rf"[A-Za-z0-9][A-Za-z0-9_-]{{0,{MOST_LETTERS - 1}}}")
 
 
 class RecordingState(msgspec.Struct, frozen=True):
-    """What a page shows of recordings.
+    """The state of recordings, as shown by a page.
 
-    folder    where they go
+    folder    their folder
     on        whether one is being written
     name      of the file, the newest one's if none is being written; "" before the first
-    fixed     whether the command began it (`--record`), and so no page can end it
+    fixed     whether the command began it (`--record`), so that no page can end it
     since_s   when it began, in seconds since 1970
-    messages  how many it holds
-    marks     how many moments were marked
-    failure   why nothing more is recorded; "" while all is well
+    messages  its number of messages
+    marks     its number of marks
+    failure   why recording stopped; "" while there is no error
     """
 
     folder: str
@@ -50,7 +50,7 @@ class RecordingState(msgspec.Struct, frozen=True):
 
 
 class Recordings:
-    """The recordings of one run of `glove`, which is `recordable`, in `folder`; `made` are those that pages began.
+    """The recordings of one run of `glove`, which is `recordable`, in `folder`; `made` are those begun by pages.
 
     `take` may be called on any one thread, `step` on that of the run; `changed` is called, on either, after the state
     has changed.
@@ -67,7 +67,7 @@ class Recordings:
 
     @property
     def state(self) -> RecordingState:
-        """How things stand."""
+        """The current state."""
         shown = self._glove.recorder or self._own
         if shown is None:
             return RecordingState(str(self._folder))
@@ -83,7 +83,7 @@ class Recordings:
         )
 
     def take(self, message: Mapping[str, object]) -> None:
-        """Do what a page asks for. Raises SettingError about what cannot be done."""
+        """Carry out a page's request. Raises SettingError if it is impossible."""
         do = message["do"]
         if do == "record":
             recorder = self._begun(message.get("name", ""))
@@ -95,10 +95,10 @@ class Recordings:
             self._check_ours()
             self._asked.append(None)
         else:
-            raise SettingError(f"a page can ask to record, mark or stop, not {str(do)[:20]!r}")
+            raise SettingError(f"a page can request record, mark or stop, not {str(do)[:20]!r}")
 
     def step(self) -> None:
-        """Let what was asked for happen, between two moments of the glove."""
+        """Carry out pending requests, between two moments of the glove."""
         while self._asked:
             asked = self._asked.popleft()
             if isinstance(asked, Mark):
@@ -110,7 +110,7 @@ class Recordings:
             self._changed()
 
     def close(self) -> None:
-        """End the recording that a page began, and wait until all are whole on the disk."""
+        """End the recording that a page began, and wait until all are complete on the disk."""
         self.step()
         if self._own is not None and self._glove.recorder is self._own:
             self._replace(None)
@@ -119,7 +119,7 @@ class Recordings:
 
     def _begun(self, name: object) -> Recorder:
         if self._beginning or self._glove.recorder is not None:
-            raise SettingError("a recording goes on: stop that first")
+            raise SettingError("a recording is running: stop it first")
         if not isinstance(name, str) or not (name == "" or _NAME.fullmatch(name)):
             raise SettingError(f"a recording's name has at most {MOST_LETTERS} letters of a to z, digits, - and _")
         moment = datetime.now().strftime("%Y%m%d-%H%M%S")
@@ -131,7 +131,7 @@ class Recordings:
 
     def _mark(self, text: object) -> Mark:
         if self._glove.recorder is None:
-            raise SettingError("nothing is being recorded: there is nothing to mark")
+            raise SettingError("no recording is running, so there is nothing to mark: start one first")
         if not isinstance(text, str) or len(text) > MOST_TEXT:
             raise SettingError(f"a mark has at most {MOST_TEXT} letters")
         return Mark(now_us(), text)
@@ -139,12 +139,12 @@ class Recordings:
     def _check_ours(self) -> None:
         recorder = self._glove.recorder
         if recorder is None:
-            raise SettingError("nothing is being recorded")
+            raise SettingError("no recording is running")
         if recorder is not self._own:
             raise SettingError(f"{recorder.path.name} was begun by the command (--record), and ends with it")
 
     def _replace(self, recorder: Recorder | None) -> None:
-        """Record into this from now on, or nowhere; close what was recorded into."""
+        """Record into this from now on, or nowhere; close the previous recording."""
         before = self._glove.recorder
         if recorder is not None:
             self._own, self._since_s, self._marks = recorder, time(), 0

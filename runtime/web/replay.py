@@ -1,6 +1,6 @@
-"""The page of a recording: what the glove saw and what was recognised at any moment of it, beside what was labelled.
+"""The page of a recording: the glove's readings and the prediction at any moment, next to the labels.
 
-The file is scanned while the page is open already; what was scanned can be shown. All pages show the same moment.
+The file is scanned while the page is open; the scanned part can be shown at once. All pages show the same moment.
 """
 
 from bisect import bisect_left
@@ -29,9 +29,9 @@ from .live import PAST_US, FrameText
 from .server import Server, message
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
-# What is recognised again is so from this long before the moment that is shown, so that it has settled.
+# Recognition starts this long before the moment that is shown, so that it has settled.
 LEAD_US = 1_500_000
-# Of the answers of a run one is looked at in so long; of changes so many are kept.
+# Predictions of a run are sampled at this interval; this many changes are kept.
 _SAMPLE_US, _MOST_CHANGES = 20_000, 100_000
 _FRAME_S, _IDLE_S, _TOLD_S = 0.02, 0.2, 0.5
 _PERIODS_OF = 20_000
@@ -40,10 +40,10 @@ _encode = msgspec.json.Encoder().encode
 
 
 class State(msgspec.Struct, frozen=True):
-    """Where the pages are: moments in microseconds since 1970; `share` of the file was scanned, `faults` are its.
+    """The position of the pages: moments in microseconds since 1970; `share` of the file was scanned, with `faults`.
 
     first_us, last_us  the span that can be shown
-    truth              the grasp type that was labelled at `at_us`; null without a label
+    truth              the label at `at_us`; null without one
     """
 
     at_us: int
@@ -60,9 +60,9 @@ Change = tuple[int, str, str, str, str, int, str, int | None]
 
 
 class Overview:
-    """What a whole recording comes to: changes of what is recognised, spans that were labelled, marks.
+    """The overview of a whole recording: changes of the prediction, labelled spans, marks.
 
-    A trial's span is from its beginning to its judgement; what was done again has none.
+    A trial's span lasts from its beginning to its judgement; a repeated trial has none.
     """
 
     def __init__(self) -> None:
@@ -72,7 +72,7 @@ class Overview:
         self._begun: tuple[int, str] | None = None
 
     def take(self, unix_us: int, entry: object) -> None:
-        """Take an entry, or what was recognised."""
+        """Take an entry, or a prediction."""
         if isinstance(entry, LiveGrasp):
             self._change(entry)
         elif isinstance(entry, Label):
@@ -83,31 +83,31 @@ class Overview:
             self._begun = None
 
     def truth_at(self, unix_us: int) -> str | None:
-        """Return what was labelled at a moment."""
+        """Return the label at a moment."""
         at = bisect_left(self.truth, (unix_us + 1,)) - 1
         return self.truth[at][2] if at >= 0 and unix_us < self.truth[at][1] else None
 
     def past(self, unix_us: int) -> bytes:
-        """Return the message of what was recognised before a moment, as of a live run."""
+        """Return the message of the predictions before a moment, in the form of a live run."""
         first = max(bisect_left(self.changes, (unix_us - PAST_US,)) - 1, 0)
         last = bisect_left(self.changes, (unix_us,))
         return message("past", changes=self.changes[first:last], until_us=unix_us)
 
     def text(self) -> bytes:
-        """Return the message of all of it: spans of what was announced, and of what was labelled, and marks."""
+        """Return the overview's message: spans of predictions, spans of labels, and marks."""
         spans: list[tuple[int, str]] = []
         for unix_us, _, grasp, *_ in self.changes:
             if not spans or spans[-1][1] != grasp:
                 spans.append((unix_us, grasp))
-        return message("overview", answers=spans, truth=self.truth, marks=self.marks)
+        return message("overview", predictions=spans, truth=self.truth, marks=self.marks)
 
     def _change(self, grasp: LiveGrasp) -> None:
         entry = grasp.candidate, grasp.grasp, grasp.health, grasp.state, grasp.segment, grasp.segment_type
         change = (grasp.time_us, *entry, grasp.segment_us)
         last = self.changes[-1] if self.changes else None
-        if last is not None and grasp.time_us < last[0]:  # clocks of two sessions that overlap
+        if last is not None and grasp.time_us < last[0]:  # clocks of two overlapping sessions
             return
-        # Of a recording without end, changes of what is announced are kept for longest.
+        # In very long recordings, changes of the announced grasp are kept longest.
         most = _MOST_CHANGES if last is None or change[2] == last[2] else 2 * _MOST_CHANGES
         if (last is None or change[1:] != last[1:]) and len(self.changes) < most:
             self.changes.append(change)
@@ -131,18 +131,18 @@ class ReplayPage:
     address, token
         As for `Server`.
     build : Path, optional
-        The folder of a build: the hand is drawn, and every frame scored by it. What a run of the same build recognised
-        is shown as it was then; of other recordings, what this build recognises.
+        The folder of a build: the hand is drawn, and every frame scored by it. For a run of the same build, its own
+        predictions are shown; for other recordings, the predictions of this build.
 
     Attributes
     ----------
     server : Server
-        What serves it.
+        The server of the page.
 
     Raises
     ------
     McapError, OSError
-        If `path` is no recording of thenar's.
+        If `path` is not a recording of thenar.
     BuildError, SettingError
         If the build cannot be read, or the recording lacks an input of it; and as `Server` does.
     """
@@ -157,7 +157,7 @@ class ReplayPage:
         self._faults = list[str]()
         if build is None:
             which = "the one that ran" if first.build else "any that reads these inputs"
-            self._faults.append(f"Without a build there is no hand: name one with --build, {which}.")
+            self._faults.append(f"Without a build the hand cannot be drawn: name one with --build, {which}.")
         self._at_us, self._playing, self._speed, self._sought = 0, False, 1.0, True
         self._first = self._described(path.name, build)
         self._scanned = Event()
@@ -167,7 +167,7 @@ class ReplayPage:
         self.server = Server("replay", address, token=token, on_message=self._take, hello=lambda: self._first)
 
     def run(self, stop: Event) -> None:
-        """Show the recording, as pages ask for it, until `stop` is set."""
+        """Show the recording, as pages request it, until `stop` is set."""
         self._thread.start()
         before = monotonic()
         while not stop.is_set():
@@ -178,7 +178,7 @@ class ReplayPage:
             self._show()
 
     def close(self) -> None:
-        """End the page."""
+        """Close the page."""
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()
@@ -212,9 +212,9 @@ class ReplayPage:
         return described, message("hand", load_hand(folder, build.manifest))
 
     def _scan(self) -> None:
-        """Find out what the whole recording comes to."""
+        """Scan the whole recording for its overview."""
         try:
-            for unix_us, entry in self._answered():
+            for unix_us, entry in self._predicted():
                 self._overview.take(unix_us, entry)
                 if self._stop.is_set():
                     return
@@ -226,8 +226,8 @@ class ReplayPage:
             self._faults.append(self._index.fault)
         self._scanned.set()
 
-    def _answered(self) -> Iterator[tuple[int, object]]:
-        """Yield labels, marks, and what was recognised; by the build where the recording is not its own."""
+    def _predicted(self) -> Iterator[tuple[int, object]]:
+        """Yield labels, marks and predictions; those of the build if the recording is not its own."""
         if self._build is None or self._own:
             for unix_us, entry in self._index.scan(_SAMPLE_US):
                 clock_us = unix_us - entry.time_us if isinstance(entry, LiveGrasp) else 0
@@ -242,15 +242,15 @@ class ReplayPage:
         do, value = asked["do"], asked.get("value")
         number = value if isinstance(value, int | float) and not isinstance(value, bool) else None
         if do not in ("seek", "play", "pause", "speed"):
-            raise SettingError(f"a page can ask to seek, play, pause or for a speed, not {str(do)[:20]!r}")
+            raise SettingError(f"a page can request seek, play, pause or a speed, not {str(do)[:20]!r}")
         if do == "seek" and (number is None or not abs(number) < 2**62):
-            raise SettingError("a moment is a number of microseconds since 1970")
+            raise SettingError("a moment must be a number of microseconds since 1970")
         if do == "speed" and number not in SPEEDS:
-            raise SettingError(f"a speed is one of {', '.join(map(str, SPEEDS))}")
+            raise SettingError(f"a speed must be one of {', '.join(map(str, SPEEDS))}")
         self._asked.put(asked)
 
     def _do(self, wait_s: float) -> None:
-        """Do what pages ask for, waiting for it a little."""
+        """Carry out the requests of pages, waiting briefly for them."""
         try:
             asked: Mapping[str, Any] = self._asked.get(timeout=wait_s)
             while True:
@@ -303,7 +303,7 @@ class ReplayPage:
 
 
 class _Walk:
-    """Goes through a recording to any moment, and knows what was there."""
+    """Moves through a recording to any moment, and holds the state there."""
 
     def __init__(self, index: Index, build: Build | None) -> None:
         self._index, self._build = index, build
@@ -323,7 +323,7 @@ class _Walk:
         self._moment: Any = None
 
     def to(self, unix_us: int) -> bool:
-        """Go to a moment; return whether what is to be shown is another than before."""
+        """Go to a moment; return whether there is something new to show."""
         if not self._at_us <= unix_us <= self._at_us + 2 * LEAD_US:
             self._entries = self._index.since(unix_us - LEAD_US)
             self._stepper = None if self._build is None else Stepper(self._build, self._index.path.name, self.periods)
@@ -332,7 +332,7 @@ class _Walk:
         while True:
             if self._next is None:
                 self._next = next(self._entries, None)
-            # Where nothing was recognised yet, the first that is, is shown.
+            # Before the first prediction, the first one is shown.
             none_yet = self._moment is None and self._grasp is None
             if self._next is None or self._next[0] > unix_us + LEAD_US * none_yet:
                 break
@@ -341,7 +341,7 @@ class _Walk:
         newest = self._moment or self._grasp
         changed, self._shown = newest is not None and newest is not self._shown, newest
         if self._next is None:
-            self._at_us = -1  # what is scanned later begins anew
+            self._at_us = -1  # the part that is scanned later starts afresh
         return changed
 
     def text(self) -> bytes:
@@ -366,6 +366,6 @@ class _Walk:
 
 
 def _dated(grasp: LiveGrasp, clock_us: int) -> LiveGrasp:
-    """Return a grasp with times since 1970 in place of those of its session's clock."""
+    """Return a grasp with times since 1970 instead of its session's clock."""
     began_us = None if grasp.segment_us is None else grasp.segment_us + clock_us
     return replace(grasp, time_us=grasp.time_us + clock_us, segment_us=began_us)

@@ -1,9 +1,8 @@
-"""`Server`: one page, its files, and what happens now, to every browser that has it open.
+"""`Server`: serves one page, its files, and live messages to every browser that has it open.
 
-It runs on a thread of its own. Whoever publishes leaves a reference and goes on; a message is made when it is sent, and
-none is while nobody looks. Every browser gets the newest message of each topic, at most 100 times a second. What waits
-for a browser is what the system buffers: a slow one sees fewer moments, one that reads nothing for five seconds is
-dropped.
+It runs on a separate thread. A publisher leaves a reference and goes on; a message is made when it is sent, and none is
+made while no page is open. Every browser gets the newest message of each topic, at most 100 times a second. Only the
+system buffers for a browser: a slow one sees fewer moments, and one that reads nothing for five seconds is dropped.
 """
 
 import asyncio
@@ -26,7 +25,7 @@ from .guard import HEADERS, Guard
 Message = bytes | Callable[[], bytes]
 
 _log = logging.getLogger("thenar")
-# Neither of them writes what a stranger sent into our log.
+# Neither of them writes a stranger's input into our log.
 _quiet = logging.getLogger("thenar.web")
 _quiet.setLevel(logging.CRITICAL)
 
@@ -34,16 +33,16 @@ PAGES = Path(__file__).parent / "pages"
 _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 
 PERIOD_S = 0.01
-# Pages that are open at a time, and connections, some of which fetch files.
+# Pages open at the same time, and connections, some of which fetch files.
 MOST_PAGES, MOST_CONNECTIONS = 32, 96
-# A connection that is no page has so long for all that it wants.
+# Time limit of a connection that is not a page.
 _FETCH_S = 20.0
-# A page that takes not a byte for so long hangs.
+# A page that takes no byte for this long hangs.
 HANGING_S = 5.0
 _SEND_BUFFER = 65_536
-# One that vanished is noticed by the system.
+# The system notices one that vanished.
 _GONE_MS = 20_000
-# A page sends a few words, when somebody presses a button or holds a key.
+# A page sends a few words when a user presses a button or holds a key.
 MOST_BYTES, MOST_PER_S, MOST_AT_ONCE = 16_384, 20.0, 40.0
 _CLOSING_S = 0.5
 _ANY = {"0.0.0.0", "::"}
@@ -61,28 +60,28 @@ class Server:
     Parameters
     ----------
     page : str
-        Which page stands at the address: "live" is `pages/live.html`.
+        Name of the page: "live" is `pages/live.html`.
     address : str
         "127.0.0.1:8080", "localhost:8080", "[::1]:8080" or "8080". Port 0 is any free one.
     token : str or None
-        What the first address must hold besides; None is for loopback addresses alone.
+        The secret that the first address must hold; None is for loopback addresses only.
     on_message : callable, optional
-        Takes what a page sends: an object with "do", a string. It is called on the server's thread. A ThenarError that
-        it raises is told to that page alone, as the message "refused".
+        Takes a page's message: an object with "do", a string. It is called on the server's thread. A ThenarError that
+        it raises is sent to that page only, as the message "refused".
     hello : callable, optional
-        Returns messages that a page gets first. It is called on the server's thread.
+        Returns the first messages for a page. It is called on the server's thread.
 
     Attributes
     ----------
     url : str
-        What to open, the token included.
+        The address to open, including the token.
     thread : Thread
-        On which all of it happens.
+        The server's thread.
 
     Raises
     ------
     SettingError
-        About an address or a token that cannot be.
+        For an invalid address or token.
     SinkError
         If the address is taken.
     """
@@ -116,18 +115,18 @@ class Server:
         self._started.wait()
 
     def publish(self, topic: str, message: Message) -> None:
-        """Let every page have this as the newest message of its topic: its text, or what makes it, on the server's
-        thread, when somebody looks. Never blocks. What is not sent before the next message of its topic never is.
+        """Make this the newest message of its topic for every page: its text, or a function that makes it on the
+        server's thread when a page is open. Never blocks. A message not sent before the next of its topic is dropped.
         """
         self._latest[topic] = message
 
     @property
     def pages(self) -> int:
-        """How many pages are open."""
+        """The number of open pages."""
         return len(self._pages)
 
     def close(self) -> None:
-        """End; may be called again."""
+        """End the server; may be called again."""
         if self.thread.is_alive():
             self._loop.call_soon_threadsafe(self._closing.set)
             self.thread.join()
@@ -141,15 +140,15 @@ class Server:
     def _run(self) -> None:
         try:
             asyncio.run(self._serve())
-        except Exception:  # a fault of ours, which must not end the run
-            _log.exception("the page's server: a fault of the program")
+        except Exception:  # a bug of ours, which must not end the run
+            _log.exception("the page's server: a bug in the program")
         finally:
             self._started.set()
 
     async def _serve(self) -> None:
         self._loop, self._closing, self._somebody = asyncio.get_running_loop(), asyncio.Event(), asyncio.Event()
         self._server = web.Server(
-            self._answer, access_log=None, logger=_quiet, keepalive_timeout=_FETCH_S, lingering_time=0
+            self._respond, access_log=None, logger=_quiet, keepalive_timeout=_FETCH_S, lingering_time=0
         )
         with self._listener:
             working = [asyncio.create_task(self._let_in()), asyncio.create_task(self._tick())]
@@ -164,7 +163,7 @@ class Server:
                 for task in (closing, *working):
                     task.cancel()
                 await asyncio.gather(*working, return_exceptions=True)
-                # How it ended is the last that a page shows.
+                # The last message that a page shows is how it ended.
                 last = [_text(made) for made in self._latest.copy().values()]
                 for page in tuple(self._pages):
                     for text in last:
@@ -177,7 +176,7 @@ class Server:
         while True:
             try:
                 reader, _ = await self._loop.sock_accept(self._listener)
-            except OSError:  # gone between knocking and entering, or no descriptors left
+            except OSError:  # gone before it was accepted, or no descriptors left
                 await asyncio.sleep(PERIOD_S)
                 continue
             if len(self._server.connections) >= MOST_CONNECTIONS:
@@ -196,7 +195,7 @@ class Server:
             transport.abort()
 
     async def _tick(self) -> None:
-        """Send what is new to every page, as long as there is one."""
+        """Send new messages to every page, while any is open."""
         sent: dict[str, Message] = {}
         due_s = self._loop.time()
         while True:
@@ -212,16 +211,16 @@ class Server:
             for page in tuple(self._pages):
                 await page.send(new, self._loop.time())
 
-    async def _answer(self, request: web.BaseRequest) -> web.StreamResponse:
+    async def _respond(self, request: web.BaseRequest) -> web.StreamResponse:
         guard = self._guard
         if not guard.knows_host(request.headers.get("Host", "")):
-            return _said(403, "This page is open under its address in digits, localhost, or this machine's name.")
+            return _said(403, "Open this page by its numeric address, by localhost, or by this machine's name.")
         if request.method not in ("GET", "HEAD") or request.body_exists:
-            return _said(405, "Nothing can be sent here.")
+            return _said(405, "This server accepts no data.")
         if guard.takes_token(request.query.get("token")):
             return _welcome(guard)
         if not guard.lets_in(request.cookies.get(guard.cookie)):
-            return _said(403, "Open the address that thenar has printed, with the token in it.")
+            return _said(403, "Open the full address that thenar printed, including its token.")
         if request.path == "/live":
             return await self._live(request)
         file = self._files.get(request.path)
@@ -231,10 +230,10 @@ class Server:
 
     async def _live(self, request: web.BaseRequest) -> web.StreamResponse:
         if not self._guard.same_origin(request.headers.get("Origin"), request.headers.get("Host", "")):
-            return _said(403, "Only thenar's own page is served here.")
+            return _said(403, "This server only serves thenar's own page.")
         transport = request.transport
         if transport is None or len(self._pages) >= MOST_PAGES:
-            return _said(503, f"{MOST_PAGES} pages are open already: close one.")
+            return _said(503, f"{MOST_PAGES} pages are already open: close one.")
         live = web.WebSocketResponse(
             autoping=False, compress=False, max_msg_size=MOST_BYTES, timeout=_CLOSING_S, decode_text=False
         )
@@ -267,30 +266,30 @@ class Server:
                 return
 
     async def _take(self, page: "_Page", text: bytes) -> None:
-        """Hand on what a page asks for; what cannot be is told to it."""
+        """Pass on a page's request; report an invalid one to it."""
         asked: dict[str, object] = {}
         try:
             asked = msgspec.json.decode(text, type=dict[str, object])
             if not isinstance(asked.get("do"), str):
                 raise msgspec.ValidationError("it has no `do`")
             if self._on_message is None:
-                raise ThenarError("this page only shows")
+                raise ThenarError("this page takes no requests")
             self._on_message(asked)
         except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as wrong:
-            await page.say(message("refused", why=f"what the page sent means nothing: {wrong}"))
+            await page.say(message("refused", why=f"the page sent an invalid message: {wrong}"))
         except ThenarError as reason:
             await page.say(message("refused", do=asked.get("do"), why=str(reason)))
-        except Exception as fault:  # of ours
-            _log.exception("the page's server: a fault of the program")
-            await page.say(message("refused", do=asked.get("do"), why=f"a fault of thenar: {type(fault).__name__}"))
+        except Exception as fault:  # a bug of ours
+            _log.exception("the page's server: a bug in the program")
+            await page.say(message("refused", do=asked.get("do"), why=f"a bug in thenar: {type(fault).__name__}"))
 
 
 class _Page:
-    """A page that is open in a browser: its WebSocket, and what waits for it."""
+    """A page that is open in a browser: its WebSocket, and the messages waiting for it."""
 
     def __init__(self, live: web.WebSocketResponse, transport: asyncio.Transport, now_s: float) -> None:
         self.socket, self.transport = live, transport
-        # Nothing is sent before all that was is with the system: writing never has to wait.
+        # Nothing is sent until the system has taken everything before it: writing never has to wait.
         transport.set_write_buffer_limits(high=2**30)
         self._waiting: dict[str, bytes] = {}
         self._stalled_s: float | None = None
@@ -313,47 +312,47 @@ class _Page:
             await self.say(text)
 
     async def say(self, text: bytes) -> None:
-        """Send one message; to a page that is gone, nothing."""
+        """Send one message; to a page that is gone, send nothing."""
         with suppress(OSError, RuntimeError):
             if text:
                 await self.socket.send_frame(text, WSMsgType.TEXT)
 
     def may_speak(self, now_s: float) -> bool:
-        """Return whether the page has sent no more than it may."""
+        """Return whether the page is within its message limit."""
         self._may = min(MOST_AT_ONCE, self._may + (now_s - self._spoke_s) * MOST_PER_S) - 1
         self._spoke_s = now_s
         return self._may >= 0
 
     async def close(self, code: int) -> None:
-        """End it."""
+        """Close the connection."""
         with suppress(OSError, RuntimeError):
             await self.socket.close(code=code)
 
 
 def _files(page: str) -> dict[str, tuple[bytes, str]]:
-    """Return content and type of each file, by the path under which a browser asks for it: nothing else can be read."""
+    """Return content and type of each file, by its request path: nothing else can be read."""
     found = {f"/{path.name}": (path.read_bytes(), _TYPES[path.suffix]) for path in PAGES.iterdir() if path.is_file()}
     return {"/": found[f"/{page}.html"]} | {path: file for path, file in found.items() if file[1] != "text/html"}
 
 
 def _text(made: Message) -> bytes:
-    """Return the text of a message; b"" of one that cannot be made, which the log says."""
+    """Return the text of a message, or b"" and a log entry if it cannot be made."""
     if isinstance(made, bytes):
         return made
     try:
         return made()
-    except Exception:  # of ours, or of a program that publishes here
+    except Exception:  # a bug of ours, or of a program that publishes here
         _log.exception("the page's server: a message could not be made")
         return b""
 
 
 def _said(status: int, sentence: str) -> web.Response:
-    answer = web.Response(status=status, text=sentence + "\n", headers=HEADERS)
-    answer.force_close()
-    return answer
+    response = web.Response(status=status, text=sentence + "\n", headers=HEADERS)
+    response.force_close()
+    return response
 
 
 def _welcome(guard: Guard) -> web.Response:
-    answer = web.Response(status=303, headers=HEADERS | {"Location": "/"})
-    answer.set_cookie(guard.cookie, guard.secret, httponly=True, samesite="Lax", path="/")
-    return answer
+    response = web.Response(status=303, headers=HEADERS | {"Location": "/"})
+    response.set_cookie(guard.cookie, guard.secret, httponly=True, samesite="Lax", path="/")
+    return response

@@ -78,5 +78,5 @@ def test_presses_have_no_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     (tmp_path / "glove.toml").write_text('[[scanner]]\nport = "nowhere"\ntaxels = ["p0"]\n')
     asked = ["calibrate", str(tmp_path / "glove.toml"), "--taxels", "-o", str(tmp_path / "pads.toml"), "--web"]
     assert run([*asked, "127.0.0.1:0"]) == 2
-    assert "leave it out with --taxels" in capsys.readouterr().err
+    assert "leave out --web or --taxels" in capsys.readouterr().err
     assert not (tmp_path / "pads.toml").exists()

@@ -43,5 +43,5 @@ def test_an_output_that_is_a_pipe_or_device_is_refused_before_any_work(tmp_path:
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_folder_that_may_not_be_written_into_is_refused_before_any_work(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
-    with pytest.raises(click.BadParameter, match="Nothing may be written into folder"):
+    with pytest.raises(click.BadParameter, match="is not writable"):
         OutputFile(".grasps").convert(str(tmp_path / "set.grasps"), None, None)

@@ -84,13 +84,13 @@ def test_a_wiring_is_in_the_report_and_its_spec_agrees(thenar: Thenar, gloved_fi
 
 def test_a_hand_length_needs_a_spec_to_be_used_in(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
     given = ("compile", gloved_file, "-o", tmp_path / "build", *QUICK, "--hand-length", 180, "--no-report")
-    assert "--no-report leaves out" in refused(thenar(*given))
+    assert "--no-report omits" in refused(thenar(*given))
     assert not (tmp_path / "build").exists()
 
 
 def test_a_hand_length_needs_switches_whose_places_are_known(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
     given = ("compile", set_file, "-o", tmp_path / "build", *QUICK, "--hand-length", 180)
-    assert "these switches are not on it: give a --layout instead" in refused(thenar(*given))
+    assert "these switches are not on it: use --layout instead" in refused(thenar(*given))
     assert not (tmp_path / "build").exists()
 
 

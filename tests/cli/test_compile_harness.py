@@ -27,7 +27,7 @@ def test_a_proposed_harness_is_loaded_and_reads_every_kept_switch_in_one_go(
     assert (harness.name, harness.switches) == ("glove", kept)
     # Its joints are not called as a CyberGlove's.
     assert harness.cyberglove is None
-    assert "have to be read by a source of your own" in " ".join(done.stdout.split())
+    assert "need a source of your own" in " ".join(done.stdout.split())
 
     done = thenar("compile", set_file, "-o", build, *FEW, "--glove", glove)
     assert done.returncode == 0, done.stderr
@@ -79,7 +79,7 @@ def test_a_file_is_replaced_only_if_asked(thenar: Thenar, set_file: Path, tmp_pa
     given = ("compile", set_file, "-o", tmp_path / "build", *FEW, "--propose", glove, "--chip", "pcf8574")
     done = thenar(*given)
     assert done.returncode == 2
-    assert "is there already: add --overwrite" in " ".join(done.stderr.split())
+    assert "already exists: add --overwrite" in " ".join(done.stderr.split())
     assert glove.read_text() == "mine"
     assert not (tmp_path / "build").exists()
     assert thenar(*given, "--overwrite").returncode == 0
@@ -91,7 +91,7 @@ def test_options_that_do_not_go_together_are_refused(thenar: Thenar, set_file: P
     glove.write_text("")
     refused = [
         (("--glove", glove, "--propose", tmp_path / "new.toml"), "give one of them"),
-        (("--chip", "mcp23017"), "says how to --propose a harness"),
+        (("--chip", "mcp23017"), "sets the chips of a proposed harness"),
         (
             ("--propose", tmp_path / "new.toml", "--chip", "mcp23018"),
             "there is no chip 'mcp23018'",

@@ -128,7 +128,7 @@ def test_of_a_board_that_recognises_by_itself_it_says_so(
         done = thenar("doctor", tmp_path / "glove.toml")
     assert done.returncode == 0, done.stderr
     said = (
-        "it recognises by itself, at last grasp type 2 of the build that it carries, counted from 0; "
+        "it recognises grasps by itself, last grasp type 2 of the build that it carries, counted from 0; "
         "it follows segments, 7 so far, the newest held"
     )
     assert (said in " ".join(done.stdout.split())) is remark

@@ -102,7 +102,9 @@ def test_a_set_of_another_glove_is_refused_by_its_first_strange_switch(
 ) -> None:
     for options in ([], ["--place"], ["--per-grasp"]):
         assert run(["draw", str(set_file), *options, "-o", str(tmp_path / "no.svg")]) == 2
-        assert "where switch 's0' lies is not known: --layout takes a drawing of your glove" in capsys.readouterr().err
+        assert (
+            "the position of switch 's0' is unknown: give --layout a drawing of your glove" in capsys.readouterr().err
+        )
     assert not (tmp_path / "no.svg").exists()
 
 
@@ -111,12 +113,12 @@ def test_a_set_of_another_glove_is_refused_by_its_first_strange_switch(
     [
         (b"", "keeps no switches"),
         (b"[]", "keeps no switches"),
-        (b'{"rates": []}', "is no list of switches (Object missing required field `switches`)"),
+        (b'{"rates": []}', "is not a list of switches (Object missing required field `switches`)"),
         (b'["a", "\\u001b[2J"]', r"switch '\x1b[2J' holds a control character (U+001B)"),
         (b"palm_heel_1\n\x1b[2J", r"switch '\x1b[2J' holds a control character (U+001B)"),
-        (b"[1, 2]", "is no list of switches (Expected `str`, got `int` - at `$[0]`)"),
-        (b'["palm_heel_1", ', "is no list of switches (Input data was truncated)"),
-        (b"\xff\xfe\x00", "is no text"),
+        (b"[1, 2]", "is not a list of switches (Expected `str`, got `int` - at `$[0]`)"),
+        (b'["palm_heel_1", ', "is not a list of switches (Input data was truncated)"),
+        (b"\xff\xfe\x00", "is not a text file"),
         (b"palm_heel_1\npalm_hel_2", "'palm_hel_2' is no switch of the glove murakami160 (did you mean 'palm_heel_2'"),
         (b"palm_heel_1\npalm_heel_1", "switch 'palm_heel_1' is kept twice"),
     ],
@@ -137,15 +139,15 @@ def test_a_folder_that_is_no_build_is_refused(tmp_path: Path, capsys: pytest.Cap
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        (["--per-grasp"], "need GRASPS"),
-        (["--place"], "need GRASPS"),
-        (["--prune", "3"], "--prune belongs to --place"),
+        (["--per-grasp"], "need recordings"),
+        (["--place"], "need recordings"),
+        (["--prune", "3"], "--prune needs --place"),
         (["--kept", "nowhere.json"], "There is no file or folder 'nowhere.json'"),
         (["--kept", "=x"], "'=x' is not NAME=PATH"),
         (["GRASPS", "--numbers"], "leave GRASPS out"),
         (["GRASPS", "--kept", "GRASPS"], "leave GRASPS out"),
-        (["--numbers", "--kept", "GRASPS"], "leave --numbers out"),
-        (["GRASPS", "--place", "--per-grasp"], "take one of them"),
+        (["--numbers", "--kept", "GRASPS"], "leave out --numbers"),
+        (["GRASPS", "--place", "--per-grasp"], "give one of them"),
         (["-o", "glove.pdf"], "ends in .svg or .png"),
         (["-o", "no/such/glove.svg"], "There is no folder 'no/such'"),
     ],

@@ -146,8 +146,11 @@ def test_a_grasp_type_too_rare_for_the_folds_is_a_warning_on_stderr(
         (["--by", "block", "--folds", "20"], "8 trial numbers cannot be cut into 20 folds"),
         (["--folds", "100"], "24 rows cannot be cut into 100 folds"),
         (["--folds", "1"], "--folds"),
-        (["--confusion", "--tables", "pruning"], "--confusion and --plot show the compositions: name them"),
-        (["--plot", "pictures", "--tables", "baselines"], "--confusion and --plot show the compositions: name them"),
+        (["--confusion", "--tables", "pruning"], "--confusion and --plot show the compositions: name one of them"),
+        (
+            ["--plot", "pictures", "--tables", "baselines"],
+            "--confusion and --plot show the compositions: name one of them",
+        ),
         (["-o", "no/such/result.json"], "There is no folder 'no/such'"),
         (["--plot", __file__], "is a file"),
         (["--prune-list", "0,x"], "'0,x' is not a list of whole numbers such as 0,13,62"),

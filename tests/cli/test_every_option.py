@@ -134,7 +134,7 @@ def _tried(line: list[str], place: Path, capfd: pytest.CaptureFixture[str]) -> t
     printed, said = capfd.readouterr()
     after = _holds(place)
     assert "Traceback" not in printed + said
-    assert "mistake in thenar" not in said, said
+    assert "bug in thenar" not in said, said
     assert {name: after.get(name) for name in before} == before, "a file that was there has changed"
     new = sorted(after.keys() - before.keys(), key=len)
     if code == 2:
@@ -194,6 +194,6 @@ def test_names_beyond_ascii_are_said_in_any_locale(command: str, place: Path) ->
         [sys.executable, "-m", "thenar.cli", command, *words], capture_output=True, env=environment, check=False
     )
     assert b"Traceback" not in done.stderr
-    assert b"mistake in thenar" not in done.stderr, done.stderr
+    assert b"bug in thenar" not in done.stderr, done.stderr
     assert done.returncode in (0, 1, 2)
     assert (done.stdout + done.stderr).isascii()

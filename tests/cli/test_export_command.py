@@ -62,7 +62,7 @@ def test_simulated_grasps_stay_simulated_on_the_way_through_a_table(grasps: Path
 def test_a_table_of_another_kind_is_refused(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["export", str(grasps), "-o", str(grasps.with_name("t.xlsx"))]) == 2
     assert (
-        "t.xlsx: a file to write here ends in .csv, .csv.gz, .tsv, .tsv.gz, .arff or .parquet."
+        "t.xlsx: the name of the output file must end in .csv, .csv.gz, .tsv, .tsv.gz, .arff or .parquet."
         in capsys.readouterr().err
     )
 
@@ -80,7 +80,7 @@ def test_neither_the_set_nor_the_table_is_overwritten(
     before = grasps.read_bytes()
     more = [] if columns is None else ["--columns", str(grasps.with_name(columns))]
     assert run(["export", str(grasps), "-o", str(grasps.with_name(table)), "--overwrite", *more]) == 2
-    assert ": a file to write here ends in " in capsys.readouterr().err
+    assert ": the name of the output file must end in " in capsys.readouterr().err
     assert [path.name for path in grasps.parent.iterdir()] == ["set.grasps"]
     assert grasps.read_bytes() == before
 

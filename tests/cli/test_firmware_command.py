@@ -36,8 +36,8 @@ NEXT_STEP = {
     "cortex-m0plus": "`make -C {made} check` compiles and tests it",
     "cortex-m4": "`make -C {made} check` compiles and tests it",
     "rv32imac": "`make -C {made} check` compiles and tests it",
-    "arduino": "put it into `libraries` of your sketchbook; {made}/README.md says what else takes it",
-    "esp32": "{made}/README.md says how each ecosystem takes it",
+    "arduino": "copy it into `libraries` of your sketchbook; {made}/README.md lists other build systems",
+    "esp32": "{made}/README.md explains how to use it in each ecosystem",
 }
 
 
@@ -121,9 +121,9 @@ def test_a_flash_limit_is_kept(thenar: Thenar, build: Path, tmp_path: Path) -> N
     done = thenar(*limit, least - 1)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
-        f"thenar: the smallest layout for atmega328p takes {least} bytes of flash and {ram} of RAM, "
+        f"thenar: the smallest layout for atmega328p takes {least} bytes of flash and {ram} of RAM, but "
         f"{least - 1} and 2048 are allowed: compile with a higher --prune, "
-        "fewer --rounds or --table-bits 8, or take a larger part\n"
+        "fewer --rounds or --table-bits 8, or use a larger part\n"
     )
 
 
@@ -150,7 +150,7 @@ def test_what_was_measured_stands_in_the_header_beside_its_bounds(
 def test_on_this_machine_there_is_nothing_to_count(thenar: Thenar, build: Path, flag: str) -> None:
     done = thenar("firmware", build, "--target", "host", flag)
     assert done.returncode == 2
-    assert "On this machine nothing is counted" in done.stderr
+    assert "The host has no cycle counts" in done.stderr
 
 
 def test_a_board_that_scans_is_written(thenar: Thenar, build: Path, board: Path, tmp_path: Path) -> None:
@@ -168,7 +168,7 @@ def test_firmware_is_replaced_when_asked_and_the_users_files_stay(thenar: Thenar
     (tmp_path / "made" / "mine.c").write_text("int mine;\n")
     again = thenar(*made)
     assert again.returncode == 2
-    assert "holds firmware already: name another folder, or add --overwrite" in again.stderr
+    assert "already holds firmware: name another folder, or add --overwrite" in again.stderr
     assert thenar(*made, "--name", "left_hand", "--overwrite").returncode == 0
     assert {"mine.c", "thenar_left_hand.c"} <= content(tmp_path / "made").keys()
     assert "thenar_glove.c" not in content(tmp_path / "made")
@@ -193,20 +193,20 @@ def test_a_glove_s_ranges_are_what_its_pins_read_and_boards_that_fit_are_told(
     glove.write_text(glove.read_text().replace("[0, 1023]", "[0, 3.3]"))
     done = thenar("firmware", build, "--target", "arduino", "--glove", glove, "-o", tmp_path / "none")
     assert done.returncode == 2
-    assert "0 to 3.3, is not of whole numbers" in done.stderr
+    assert "0 to 3.3, must be whole numbers" in done.stderr
     assert not (tmp_path / "none").exists()
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--target", "avr328p"), "Name a folder to write with -o"),
+        (("--target", "avr328p"), "name a folder to write with -o"),
         (("--target", "pdp11", "-o", "made"), "there is no target 'pdp11': choose one of host"),
         (("--target", "avr328p", "--mode", "scan", "-o", "made"), "the mode scan needs a board.toml"),
-        (("--target", "avr328p", "--mode", "scan", "--measure"), "A board that only scans holds no classifier"),
+        (("--target", "avr328p", "--mode", "scan", "--measure"), "A board that only scans has no classifier"),
         (
             ("--target", "avr328p", "--mode", "scan", "--calibration", "{board}", "-o", "made"),
-            "a board that scans reads no CyberGlove",
+            "a scanning board reads no CyberGlove",
         ),
         (
             ("--target", "avr328p", "--mode", "glove", "--glove", "{board}", "-o", "made"),
@@ -214,7 +214,7 @@ def test_a_glove_s_ranges_are_what_its_pins_read_and_boards_that_fit_are_told(
         ),
         (
             ("--target", "avr328p", "--calibration", "{board}", "--glove", "{board}", "-o", "made"),
-            "leave --calibration out, or --glove",
+            "leave out --calibration, or --glove",
         ),
         (("--target", "avr328p", "--board", "{board}", "-o", "made"), "the mode classify reads no board"),
         (
@@ -222,7 +222,7 @@ def test_a_glove_s_ranges_are_what_its_pins_read_and_boards_that_fit_are_told(
             "the board has an atmega328p, the target avr2560 is an atmega2560",
         ),
         (("--target", "avr328p", "--flash-limit", "32769", "-o", "made"), "an atmega328p has 32768 bytes"),
-        (("--target", "avr328p", "--name", "../x", "-o", "made"), "'../x' cannot be the name: it takes lower-case"),
+        (("--target", "avr328p", "--name", "../x", "-o", "made"), "'../x' cannot be the name: use lower-case"),
         (("--target", "avr328p", "-o", "nowhere/made"), "nowhere is no folder: make it first"),
     ],
 )

@@ -55,24 +55,27 @@ def test_a_glove_that_the_point_is_not_wired_as_is_named(
     (tmp_path / "glove.toml").write_text(harness_to_toml(propose_harness(names, "pca9555", name="mine")))
     code, complaint = compiled(lambda point: point, "--glove", str(tmp_path / "glove.toml"))
     assert code == 0
-    assert "the scan map is of the wiring that point 1 was found with, not of" in complaint
+    assert "the scan map uses the wiring that point 1 was found with, not" in complaint
     assert compiled(lambda point: point)[1].count("scan map") == 0
 
 
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (_setting(placement=PlacementChoice("nonsense", 6.0)), "takes a method that is not there: 'nonsense'"),
+        (_setting(placement=PlacementChoice("nonsense", 6.0)), "has an unknown method: 'nonsense'"),
         (
             _setting(placement=PlacementChoice("elimination", 0.0)),
-            "takes 0.0 for its method: it is a whole number from 1 on",
+            "has 0.0 as its method's parameter: it must be an integer from 1 on",
         ),
-        (_setting(placement=PlacementChoice("id3", 0.5)), "takes 0.5 for its method: it is a whole number from 0 on"),
+        (
+            _setting(placement=PlacementChoice("id3", 0.5)),
+            "has 0.5 as its method's parameter: it must be an integer from 0 on",
+        ),
         (_setting(placement=PlacementChoice("id3", -1.0)), "is not a frontier's"),
         (_setting(clock_hz=0), "has switches without a wiring or its clock"),
         (_setting(clock_hz=1), "runs its mcp23017 at 1 Hz, which it cannot"),
         (_setting(clock_hz=12_000_000), "runs its mcp23017 at 12000000 Hz, which it cannot"),
-        (_setting(wiring="nonsense"), "takes a wiring that is not there: 'nonsense'"),
+        (_setting(wiring="nonsense"), "has an unknown wiring: 'nonsense'"),
         (_setting(rounds=0), "is not a frontier's"),
         (_setting(width=99), "is not a frontier's"),
         (_setting(inputs="joints"), "keeps 6 switches for inputs 'joints'"),

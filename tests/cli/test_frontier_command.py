@@ -129,7 +129,7 @@ def test_options_that_the_point_settles_cannot_be_given_as_well(
         "compile", set_file, "-o", tmp_path / "b", "--from", found_folder / "frontier.json", "--point", 1, "--rounds", 5
     )
     assert done.returncode == 2
-    assert "--rounds is settled by the point" in done.stderr
+    assert "--rounds is set by the point" in done.stderr
 
 
 def test_a_frontier_of_other_recordings_is_refused(
@@ -157,5 +157,5 @@ def test_a_budget_that_nothing_meets_ends_with_a_code(
     shutil.copytree(found_folder, again)
     done = thenar("frontier", set_file, "-o", again, *QUICK, "--budget-us", 0.001)
     assert done.returncode == 1
-    assert "no point suits" in done.stderr
+    assert "no point qualifies" in done.stderr
     assert (again / "frontier.json").exists()

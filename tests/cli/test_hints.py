@@ -62,7 +62,7 @@ def test_a_target_that_is_none_is_answered_with_the_one_for_all_others(capsys: p
         line = capsys.readouterr().err
         assert f"there is no target '{wrong}'" in line
         assert said in line
-        assert "`generic` is for any other part that has a C99 compiler" in line
+        assert "Use `generic` for any other part with a C99 compiler" in line
 
 
 def test_help_is_a_command_too(capsys: pytest.CaptureFixture[str]) -> None:

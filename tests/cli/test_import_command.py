@@ -70,7 +70,7 @@ def test_a_faulty_table_is_one_sentence_and_exit_code_2(folder: Path, capsys: py
 
 def test_a_set_must_be_called_grasps(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert thenar_import(folder, output="set.csv") == 2
-    assert "set.csv: a file to write here ends in .grasps" in capsys.readouterr().err
+    assert "set.csv: the name of the output file must end in .grasps" in capsys.readouterr().err
 
 
 def test_the_old_set_stays_when_the_import_fails(folder: Path) -> None:
@@ -162,7 +162,7 @@ def test_a_table_is_imported_without_a_columns_toml(glove: Path, capsys: pytest.
     assert run(["import", "my glove.csv", "-o", "third.grasps", "--yes", "--json"]) == 0
     said = capsys.readouterr()
     assert json.loads(said.out)["trials"] == 12
-    assert said.err == "columns.toml: what was found\n"
+    assert said.err == "columns.toml: the detected columns\n"
     assert sorted(path.name for path in glove.glob("*.toml")) == ["columns.toml"]
 
 
@@ -197,9 +197,7 @@ def test_without_a_terminal_nothing_is_imported_and_the_next_command_is_said(
     said = capsys.readouterr()
     assert "Versuch │ trial" in said.out
     again = "thenar import 'my glove.csv' -o set.grasps --columns columns-2.toml\n"
-    assert (
-        said.err == f"thenar: nobody could be asked whether this is right: look over columns-2.toml, then run: {again}"
-    )
+    assert said.err == f"thenar: nobody confirmed the columns on a terminal: review columns-2.toml, then run: {again}"
     assert (glove / "columns.toml").read_text() == "# mine\n"
     assert not (glove / "set.grasps").exists()
     assert run(shlex.split(again)[1:]) == 0

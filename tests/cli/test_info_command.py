@@ -70,7 +70,7 @@ def test_a_picture_is_drawn_when_asked_for(grasps: Path, suffix: str, start: byt
 
 def test_a_picture_of_another_kind_is_refused(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["info", str(grasps), "--plot", "set.gif"]) == 2
-    assert "set.gif: a file to write here ends in .svg or .png" in capsys.readouterr().err
+    assert "set.gif: the name of the output file must end in .svg or .png" in capsys.readouterr().err
 
 
 def test_another_file_is_refused_with_the_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -95,5 +95,5 @@ def test_too_little_memory_is_one_sentence(
     monkeypatch.setattr(GraspSet, "load", too_much)
     assert run(["info", str(grasps)]) == 2
     assert capsys.readouterr().err == (
-        "thenar: not enough memory (Unable to allocate 7 TiB): take fewer rows or columns\n"
+        "thenar: not enough memory (Unable to allocate 7 TiB): use fewer rows or columns\n"
     )

@@ -52,7 +52,7 @@ def test_what_contradicts_or_is_not_known_is_refused(thenar: Thenar, set_file: P
         (("--budget-us", 0), "--never and --budget-us leave nothing"),
         (("--at-most", 3, "pads"), "'pads' is not"),
         (("--population", "--keep", 2, "--robust"), "--population looks for the placement of many subjects"),
-        (where, "--layout says where switches lie, for --apart-mm"),
+        (where, "--layout gives positions for --apart-mm: add that"),
     ):
         done = thenar("place", set_file, *asked)
         assert (done.returncode, done.stdout) == (2, "")
@@ -69,7 +69,7 @@ def test_a_build_says_what_it_obeys_and_its_report_how_to_make_it_again(
     options = manifest_from_bytes((build / "build.json").read_bytes()).options
     assert (options.never, options.keep_these, options.at_most_taxels) == (("s2",), ("s5", "s0"), 4)
     assert options.robust
-    assert "--budget-us limits the scan of switches and taxels alone" in done.stderr
+    assert "--budget-us limits only the scan of switches and taxels" in done.stderr
     assert {"s5", "s0"} <= {each.name for each in manifest_from_bytes((build / "build.json").read_bytes()).switches}
     page = html.unescape((build / "report.html").read_text())
     line = next(each for each in re.findall(r"thenar compile SET.grasps -o build/ .*", page) if "--prune" in each)

@@ -114,7 +114,7 @@ def test_what_is_in_quarantine_is_drawn_with_the_reason_with_or_without_status()
     health = HealthReport(0, (), (), (), (), 100.0, 90.0, 120, 0, 0, 0, quarantined=wrong)
     with LiveView(Console(file=terminal, force_terminal=True, width=80)) as view:
         view.show(grasp("first"), nobody, health)
-        terminal.until("palm", "stuck closed, treated as lost", "chattering, used all the same")
+        terminal.until("palm", "stuck closed, treated as lost", "chattering, still used")
 
 
 def test_the_newest_grasp_is_drawn() -> None:

@@ -58,9 +58,12 @@ def test_files_of_one_name_of_trials_are_told_apart_by_their_session(
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("merge", "{anna}", "{ben}", "-o", "{folder}/all.csv"), "all.csv: a file to write here ends in .grasps"),
+        (
+            ("merge", "{anna}", "{ben}", "-o", "{folder}/all.csv"),
+            "all.csv: the name of the output file must end in .grasps",
+        ),
         (("merge", "{anna}", "{anna}", "-o", "{folder}/all.grasps"), "is named twice"),
-        (("merge", "{anna}", "{ben}", "-o", "{anna}"), "is there already: add --overwrite"),
+        (("merge", "{anna}", "{ben}", "-o", "{anna}"), "already exists: add --overwrite"),
         (("merge", "{anna}", "{ben}", "-o", "{anna}", "--overwrite"), "is named twice"),
         (("split", "{anna}", "--by", "trial", "-o", "{folder}/out"), "'trial' is not one of"),
         (("split", "{anna}", "--by", "subject", "-o", "{folder}/no/such"), "is no folder: make it first"),

@@ -81,15 +81,15 @@ def test_a_build_its_report_and_its_spec_are_of_this_glove(
 ) -> None:
     build, glove = tmp_path / "build", tmp_path / "glove.toml"
     said = worked(thenar("compile", grasps, "-o", build, *QUICK, "--layout", layout, "--propose", glove))
-    assert "joints flex_thumb, flex_index have to be read by a source of your own" in said
+    assert "joints flex_thumb, flex_index need a source of your own" in said
     assert load_harness(glove).cyberglove is None
     worked(thenar("compile", grasps, "-o", build, *QUICK, "--layout", layout, "--glove", glove))
     report = (build / "report.html").read_text()
-    assert "Joints flex_thumb, flex_index have to be read by a source of your own" in report
+    assert "Joints flex_thumb, flex_index need a source of your own" in report
     assert report.count('class="dot') >= len(PADS)
     said = worked(thenar("spec", build, "--layout", layout, "-o", tmp_path / "spec"))
     assert "switch or pad of your own" in said
-    assert "have to be read by a source of your own" in said
+    assert "need a source of your own" in said
     kept = [switch.name for switch in manifest_from_bytes((build / "build.json").read_bytes()).switches]
     places = {each["name"]: (each["x_mm"], each["y_mm"]) for each in json.loads(_spec(tmp_path))["switches"]}
     assert places == {name: (40.0 + 30 * (n % 3), 190.0 - 40 * (n // 3)) for n, name in enumerate(PADS) if name in kept}
@@ -109,7 +109,7 @@ def test_the_live_commands_say_that_nothing_reads_the_joints(thenar: Thenar, gra
     for done in (looked, thenar("run", build, "--glove", glove, "--frames", 1)):
         words = " ".join((done.stdout + done.stderr).split())
         assert "nothing in 'glove' reads the build's joints" in words
-        assert "have to be read by a source of your own" in words
+        assert "need a source of your own" in words
         assert not FOREIGN.search(words)
 
 
@@ -118,11 +118,11 @@ def test_without_a_layout_nothing_is_drawn_and_with_one_everything_is(
 ) -> None:
     refused = thenar("draw", grasps, "-o", tmp_path / "no.svg")
     assert refused.returncode == 2
-    assert "where switch 'pad_thumb_1' lies is not known: --layout takes a drawing" in refused.stderr
+    assert "the position of switch 'pad_thumb_1' is unknown: give --layout a drawing" in refused.stderr
     build = tmp_path / "build"
     refused = thenar("compile", grasps, "-o", build, *QUICK, "--hand-length", 180)
     assert refused.returncode == 2
-    assert "give a --layout instead" in refused.stderr
+    assert "use --layout instead" in refused.stderr
     layout.with_name("few.toml").write_text("[places]\npad_thumb_1 = [1, 2]\n")
     refused = thenar("compile", grasps, "-o", build, *QUICK, "--layout", layout.with_name("few.toml"))
     assert refused.returncode == 2
@@ -147,7 +147,7 @@ def test_a_frontier_leaves_the_unknown_time_of_joints_out_and_says_so_or_takes_w
             (tmp_path / name).mkdir()
             copy(tmp_path / "left out" / "store.jsonl", tmp_path / name)
         said = worked(thenar("frontier", grasps, "-o", tmp_path / name, *few, *settled, "--target", "avr328p", *more))
-        assert ("what reading the joints (flex_thumb, flex_index) takes is not known" in said) == (name == "left out")
+        assert ("the time of reading the joints (flex_thumb, flex_index) is unknown" in said) == (name == "left out")
         points = json.loads((tmp_path / name / "frontier.json").read_text())["points"]
         found[name] = [point for point in points if point["setting"]["inputs"] != "switches"]
         assert found[name]

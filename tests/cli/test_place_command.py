@@ -74,7 +74,7 @@ def test_a_set_without_switches_is_refused(
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        (["--draw", "tree.pdf"], "tree.pdf: a file to write here ends in .svg or .png"),
+        (["--draw", "tree.pdf"], "tree.pdf: the name of the output file must end in .svg or .png"),
         (["--draw", "no/such/tree.svg"], "There is no folder 'no/such'"),
         (["--tree", "--json"], "--tree is for people and --json for machines"),
         (["--prune", "-1"], "-1 is not in the range x>=0"),
@@ -90,7 +90,7 @@ def test_a_mistake_is_one_sentence_and_code_two(
 @pytest.mark.parametrize(
     ("grasps", "options", "remark"),
     [
-        (["cup", "cup"], [], "all rows are of one grasp type: there is nothing to tell apart"),
+        (["cup", "cup"], [], "all rows are of one grasp type: there is nothing to distinguish"),
         (["cup", "pen"], ["--prune", "3"], "no decision was made: the 2 rows are fewer than S = 3"),
         (["cup", "pen"], [], "at 1 leaf rows of several classes agree in every switch"),
     ],

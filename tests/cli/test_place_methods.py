@@ -83,7 +83,7 @@ def test_a_glove_that_lacks_a_switch_says_nothing_of_its_cost(
     (tmp_path / "glove.toml").write_text(harness_to_toml(propose_harness([f"s{number}" for number in range(9)])))
     how = ["--keep", "2", "--glove", str(tmp_path / "glove.toml")]
     assert run(["place", str(near_and_far), "--method", "id3-cost", *how]) == 2
-    assert "has no place for 's9'" in " ".join(capsys.readouterr().err.split())
+    assert "does not wire 's9'" in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.slow
@@ -103,7 +103,7 @@ def test_the_paper_s_placement_is_held_beside_the_best_of_as_many(
 def test_people_read_how_far_a_placement_is_from_the_best(set_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["place", str(set_file), "--method", "random", "--keep", "2", "--exact"]) == 0
     said = capsys.readouterr().out
-    for words in ("2 of 6 switches", "of 1,200 pairs of rows", "which is proved", "points from the best"):
+    for words in ("2 of 6 switches", "of 1,200 pairs of rows", "which is proved optimal", "points from the best"):
         assert words in said
 
 
@@ -117,7 +117,7 @@ def test_a_standard_placement_is_printed_stored_and_drawn(
     said = capsys.readouterr().out
     for words in (
         "Standard placement",
-        "Trials recognised of 2 held-out subjects (new subject)",
+        "Accuracy on trials of 2 held-out subjects (new subject)",
         "worst tenth, %",
         "of all 12 subjects",
     ):
@@ -142,10 +142,10 @@ def test_a_standard_placement_is_printed_stored_and_drawn(
         (["--population", "--keep", "3", "--exact"], "--exact judges one placement"),
         (["--population", "--method", "id3", "--keep", "3"], "--population takes a method that keeps M switches"),
         (["--population", "--keep", "3"], "the set has 1 subject(s)"),
-        (["--joints"], "--joints is for other methods"),
-        (["--glove", "GLOVE"], "--glove says what scans cost"),
+        (["--joints"], "--joints is for methods other"),
+        (["--glove", "GLOVE"], "--glove gives the scan costs"),
         (["--method", "elimination", "--keep", "3", "--glove", "GLOVE"], "weighs that: elimination-cost, id3-cost"),
-        (["--population", "--method", "id3-cost", "--keep", "3", "--glove", "GLOVE"], "--glove says what scans cost"),
+        (["--population", "--method", "id3-cost", "--keep", "3", "--glove", "GLOVE"], "--glove gives the scan costs"),
     ],
 )
 def test_what_does_not_go_together_is_one_sentence_and_code_two(

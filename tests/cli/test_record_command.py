@@ -252,7 +252,7 @@ def test_redone_and_left_is_what_was_accepted(folder: Path, start: Start, scanne
     terminal.press(b"q")
     code, said = terminal.finish()
     assert code == 0, said
-    assert "1 of 4 trials are done; the same command goes on" in said
+    assert "1 of 4 trials are done; run the same command to continue" in said
     assert len(GraspSet.load(folder / "set.grasps")) == 1
 
 
@@ -337,7 +337,7 @@ def test_a_full_disk_ends_it_with_a_sentence_and_room_lets_it_go_on(folder: Path
     assert code == 2
     words = " ".join(said.split())
     assert "File too large: the recording has stopped after" in words
-    assert "make room, and the same command goes on" in words
+    assert "free some space, and the same command goes on" in words
     again = start()
     again.until(rb"Enter: start the countdown")
     again.press(b"q")
@@ -374,10 +374,10 @@ def test_a_device_that_is_gone_is_no_grasp(folder: Path, start: Start, glove: Em
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (["--subject", "B"], "was begun with other subject than asked for now (A, not B)"),
-        (["--repetitions", "3"], "was begun with other repetitions"),
-        (["--seed", "6"], "was begun with other seed"),
-        (["--none"], "was begun with other tasks"),
+        (["--subject", "B"], "was begun with a different value of subject (A, not B)"),
+        (["--repetitions", "3"], "was begun with a different value of repetitions"),
+        (["--seed", "6"], "was begun with a different value of seed"),
+        (["--none"], "was begun with a different value of tasks"),
     ],
 )
 def test_another_collection_does_not_go_into_the_same_file(

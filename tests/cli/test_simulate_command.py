@@ -95,7 +95,7 @@ def test_fresh_grasps_are_asked_for_with_more_and_the_help_says_what_a_seed_draw
     assert made.trials.min() >= 14
     assert run(["simulate", "--help"]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "habits, calibrations, the glove's parts, all grasps. The sizes of the hands stay." in said
+    assert "habits, calibrations, the glove's parts, all grasps. Hand sizes stay." in said
 
 
 HASTY = "\n[effects.contact.quasistatic]\nmost_steps = 12\n"
@@ -119,14 +119,14 @@ def test_what_did_not_settle_is_warned_of_by_name(hasty: Path, tmp_path: Path, c
     for one in unsettled[:10]:
         place = f"subject {one['subject']}, {one['grasp']} with {one['object']}, repetition {one['repetition']}"
         assert f"{place}: {one['why']}" in warning
-    assert ("more, which --json names" in warning) == (len(unsettled) > 10)
+    assert ("more: --json lists them all" in warning) == (len(unsettled) > 10)
     assert len(GraspSet.load(path)) == 28 - len(unsettled)
 
 
 def test_what_did_not_settle_is_kept_when_asked(hasty: Path, tmp_path: Path, capsys: Captured) -> None:
     path = tmp_path / "set.grasps"
     assert run(["simulate", str(hasty), *SMALL, "-o", str(path), "--keep-unsettled"]) == 0
-    assert "cannot be trusted, and are kept as asked" in capsys.readouterr().err
+    assert "did not settle, and are kept as requested" in capsys.readouterr().err
     assert len(GraspSet.load(path)) == 28
 
 
@@ -178,10 +178,10 @@ def test_shipped_scenes_are_listed_with_what_they_are(capsys: Captured) -> None:
     ("arguments", "reason"),
     [
         (["quick"], "say one of --output, --explain, --ablate, --list"),
-        (["quick", "--explain", "--ablate"], "say one of"),
+        (["quick", "--explain", "--ablate"], "choose one mode:"),
         (["--explain"], "name a scene"),
         (["quick", "--list"], "leave out quick"),
-        (["quick", "--explain", "--keep-unsettled"], "--keep-unsettled is about the set"),
+        (["quick", "--explain", "--keep-unsettled"], "--keep-unsettled changes the set"),
         (["quik", "--explain"], "no shipped scene is called 'quik' (did you mean 'quick'?)"),
         (["no/such.toml", "--explain"], "such.toml"),
         (["quick", "--explain", "--subject", "Q"], "scene quick has no subject 'Q'"),

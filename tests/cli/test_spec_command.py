@@ -134,7 +134,7 @@ def test_a_glove_of_ones_own_has_no_pattern_and_no_length(thenar: Thenar, build_
     told = said(thenar("spec", build_folder, "-o", tmp_path / "spec"))
     assert "the positions of this glove's switches are unknown" in told
     assert not (tmp_path / "spec" / "cutting.svg").exists()
-    assert "give a --layout instead" in refused(thenar("spec", build_folder, "--hand-length", 180))
+    assert "use --layout instead" in refused(thenar("spec", build_folder, "--hand-length", 180))
 
 
 def test_a_spec_is_replaced_whole_and_anything_else_is_kept(

@@ -92,7 +92,7 @@ def test_doctor_shows_what_comes_and_proposes_a_harness_that_it_then_finds_sound
     low, high = stream["joints"]["flex"]
     assert 1000 < low < 1700 < 2000 < high < 3000
     done = thenar("doctor", "--line", moving.port, "--seconds", "0.5", "--names", "ms,n")
-    assert (done.returncode, "2 columns are named, and rows have 6" in done.stderr) == (2, True)
+    assert (done.returncode, "2 columns are named, but rows have 6" in done.stderr) == (2, True)
 
 
 def test_names_that_the_sender_gives_say_what_columns_are(thenar: Thenar, tmp_path: Path) -> None:
@@ -116,9 +116,9 @@ def test_names_that_the_sender_gives_say_what_columns_are(thenar: Thenar, tmp_pa
     }
     assert found["stream"]["rate_hz"] == 50
     assert [text.split(", ")[0] for text in found["remarks"]] == [
-        "30 lines were no rows",
+        "30 lines were not rows",
         "the rows came all at once: rate_hz is by their clock",
-        "off: 30 of 30 values were no numbers",
+        "off: 30 of 30 values were not numbers",
     ]
 
 
@@ -132,7 +132,7 @@ def test_a_line_where_nothing_comes_or_nothing_can_is_said(thenar: Thenar, tmp_p
         assert done.returncode == 2
         assert said in done.stderr
         assert "Traceback" not in done.stderr
-    assert "name a glove.toml, or the --line" in thenar("doctor").stderr
+    assert "nothing to check: name a glove.toml, or a port" in thenar("doctor").stderr
 
 
 def right(log: Path, lines: Path) -> float:

@@ -130,7 +130,7 @@ def test_doctor_finds_converters_and_what_is_wrong_with_them(thenar: Thenar, tmp
     ]
     assert [found[key]["present"] for key in there] == [True] * 5
     assert not found["i2c", "ads7828 at 0x48"]["present"]
-    assert "does not answer" in found["i2c", "ads7828 at 0x48"]["remarks"][0]
+    assert "does not reply" in found["i2c", "ads7828 at 0x48"]["remarks"][0]
     assert found["i2c", "taxel gone"]["remarks"] == ["silent"]
     codes = GraspSet.load(grasps).taxels[0]
     for key, code in zip(there[2:], codes, strict=True):

@@ -37,7 +37,9 @@ def test_an_unexpected_error_is_one_sentence_and_a_file_for_its_owner(error: str
     done = _run(program, TMPDIR=str(tmp_path))
     assert (done.returncode, done.stdout) == (2, "")
     (line,) = done.stderr.splitlines()
-    said = re.fullmatch(r"thenar: unexpected (\w+): .*please report it with the file (\S+), which says where", line)
+    said = re.fullmatch(
+        r"thenar: unexpected (\w+): .*please report it with the file (\S+), which holds the traceback", line
+    )
     assert said is not None
     kept = Path(said[2])
     assert error.startswith(said[1])

@@ -43,16 +43,15 @@ def test_the_worst_of_all_frames_is_printed_beside_its_bounds(
     worst = json.loads(thenar("verify", build_folder, set_file, "--json").stdout)["worst"]
     codes = " ".join(map(str, worst["codes"]))
     assert (
-        f"worst frame there is: {worst['leader']} loses {worst['loss']:.3f} steps of its lead over "
-        f"{worst['competitor']}, "
+        f"worst possible frame: {worst['leader']} loses {worst['loss']:.3f} steps of its lead over {worst['competitor']}, "
         f"allowed {worst['bound']:.3f} ({len(worst['closed'])} switches closed, codes {codes})"
     ) in lines
     assert (
-        f"margin above {worst['safe_margin']:.3f} steps, all that the worst frames ask for: "
+        f"margin above {worst['safe_margin']:.3f} steps, which covers the worst frames: "
         f"{worst['covered']} rows, of which 0 change class"
     ) in lines
     assert (
-        f"furthest sum there is, whole or with inputs missing: {worst['reach']} for {worst['reaching']}, allowed 32767"
+        f"largest possible sum, with or without missing inputs: {worst['reach']} for {worst['reaching']}, allowed 32767"
     ) in lines
 
 
@@ -138,7 +137,7 @@ def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[s
         "    compiled: pen, scores 5 6, margin 1, probability 40001 of 65535",
         "  the build carries no firmware",
     ]
-    assert verdict(found).endswith("a fault of thenar or of the compiler: report it, with the first frame shown")
+    assert verdict(found).endswith("a bug of thenar or of the compiler: report it, with the first frame shown")
     assert "compile the build again" not in verdict(found)
 
 
@@ -164,7 +163,7 @@ def test_faults_are_put_to_every_row_and_the_worst_are_in_build_json_report_and_
     for sentence in manifest.faults.sentences:
         assert f"  {sentence}" in printed
         assert f"<li>{sentence.replace(chr(39), '&#39;')}</li>" in page
-    assert f"worst of single inputs lost, rows trained on: {manifest.faults.sentences[0]}" in done.stdout
+    assert f"worst loss of a single input, on training rows: {manifest.faults.sentences[0]}" in done.stdout
     refused = thenar("verify", folder, set_file, "--faults", "--firmware", "host")
     assert refused.returncode == 2
-    assert "take one of them" in refused.stderr
+    assert "give one of them" in refused.stderr

@@ -104,7 +104,7 @@ def test_a_page_of_a_run_records_marks_and_stops(
         ask(live, do="mark", text="here <b>")
         told(live, "recording", lambda state: state["marks"] == 1)
         ask(live, do="record", name="two")
-        assert told(live, "refused")["why"] == "a recording goes on: stop that first"
+        assert told(live, "refused")["why"] == "a recording is running: stop it first"
         ask(live, do="stop")
         told(live, "recording", lambda state: not state["on"])
         ask(live, do="record")
@@ -138,9 +138,9 @@ def test_a_name_that_is_no_part_of_a_files_name_is_refused(
             ask(live, do="record", name=name)
             assert "at most 40 letters of a to z, digits, - and _" in told(live, "refused")["why"], name
         ask(live, do="mark", text="x" * 201)
-        assert "nothing is being recorded" in told(live, "refused")["why"]
+        assert "no recording is running" in told(live, "refused")["why"]
         ask(live, do="format")
-        assert "a page can ask to record, mark or stop, not 'format'" in told(live, "refused")["why"]
+        assert "a page can request record, mark or stop, not 'format'" in told(live, "refused")["why"]
     assert run.end() == 0
     assert set(tmp_path.rglob("*")) == before
 
@@ -174,11 +174,14 @@ def test_the_token_is_said_once_and_asked_for(start: Callable[..., Command], bui
     ("options", "said"),
     [
         (("--web", "0.0.0.0:0"), "other machines can reach: add --web-token"),
-        (("--web", "nowhere"), "--web nowhere is no address: write it as 127.0.0.1:8080, with a port from 0 to 65535"),
+        (
+            ("--web", "nowhere"),
+            "--web nowhere is not an address: write it as 127.0.0.1:8080, with a port from 0 to 65535",
+        ),
         (("--web", ""), "is no address"),
         (("--web", "no.such.host.invalid:80"), "there is no host no.such.host.invalid"),
-        (("--web-token",), "--web-token changes nothing without --web: leave it out"),
-        (("--recordings", "folder"), "--recordings changes nothing without --web: leave it out"),
+        (("--web-token",), "--web-token has no effect without --web: leave it out"),
+        (("--recordings", "folder"), "--recordings has no effect without --web: leave it out"),
     ],
 )
 def test_what_cannot_be_is_one_sentence(
@@ -214,7 +217,7 @@ def test_monitor_shows_a_run_elsewhere(
         detailed = told(live, "frame", lambda frame: "closed" in frame)
         assert (detailed["closed"], detailed["joints"], detailed["probabilities"]) == (5 * "0", None, None)
         ask(live, do="record")
-        assert told(live, "refused")["why"] == "this page only shows"
+        assert told(live, "refused")["why"] == "this page takes no requests"
         assert run.end() == 0
         told(live, "source", lambda source: not source["connected"])
     assert monitor.end() == 0
@@ -239,7 +242,7 @@ def test_a_recording_is_shown_from_any_moment_of_it(
         assert told(live, "hand")["switches"]
         state = told(live, "replay", lambda state: state["share"] == 1)
         assert (state["playing"], state["speed"], state["truth"], state["faults"]) == (False, 1.0, None, [])
-        assert told(live, "overview")["answers"][0][1] == "unknown"
+        assert told(live, "overview")["predictions"][0][1] == "unknown"
         ask(live, do="seek", value=state["last_us"])
         assert told(live, "frame", lambda frame: frame["number"] == 19)["time_us"] == state["last_us"]
         ask(live, do="seek", value=0)
@@ -250,17 +253,17 @@ def test_a_recording_is_shown_from_any_moment_of_it(
         told(live, "replay", lambda state: not state["playing"])
         for wrong in ({"do": "seek", "value": "x"}, {"do": "seek", "value": 2**70}, {"do": "seek", "value": True}):
             ask(live, **wrong)
-            assert "a moment is a number of microseconds" in told(live, "refused")["why"]
+            assert "a moment must be a number of microseconds" in told(live, "refused")["why"]
         ask(live, do="speed", value=1e9)
-        assert "a speed is one of 0.1, 0.25" in told(live, "refused")["why"]
+        assert "a speed must be one of 0.1, 0.25" in told(live, "refused")["why"]
         ask(live, do="delete")
-        assert "a page can ask to seek, play, pause or for a speed, not 'delete'" in told(live, "refused")["why"]
+        assert "a page can request seek, play, pause or a speed, not 'delete'" in told(live, "refused")["why"]
     assert monitor.end() == 0
 
 
 def test_what_is_no_recording_is_refused(thenar: Thenar, build_folder: Path, recording: Path, tmp_path: Path) -> None:
     (tmp_path / "text.mcap").write_text("no")
-    for name, said in (("none.mcap", "does not exist"), ("text.mcap", "does not begin as an MCAP file does")):
+    for name, said in (("none.mcap", "does not exist"), ("text.mcap", "does not begin like an MCAP file")):
         done = thenar("monitor", tmp_path / name)
         assert done.returncode == 2, done.stderr
         assert said in " ".join(done.stderr.split())

@@ -121,7 +121,9 @@ class Unreadable:
 
 
 def test_work_that_a_worker_cannot_read_is_told_with_what_to_install(scheduler: str) -> None:
-    with pytest.raises(ClusterError, match=r"cannot read its work \(No module named 'no_such.*needs what is installed"):
+    with pytest.raises(
+        ClusterError, match=r"cannot read its task \(No module named 'no_such.*needs the packages installed"
+    ):
         list(in_workers(unread, [Unreadable()], 1, scheduler))
 
 
@@ -132,14 +134,14 @@ def test_an_address_where_no_scheduler_answers_is_told_within_seconds(
     address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(under_test, "CONNECT_S", 0.5)
-    with pytest.raises(ClusterError, match=f"no Dask scheduler answers at '{address}'"):
+    with pytest.raises(ClusterError, match=f"no Dask scheduler replies at '{address}'"):
         list(in_workers(operator.neg, [1], 1, address))
 
 
 def test_where_nobody_answers_no_client_is_left_to_hold_up_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(under_test, "CONNECT_S", 0.5)
     for address in ("nonsense", "foo://127.0.0.1:1"):
-        with pytest.raises(ClusterError, match="no Dask scheduler answers"):
+        with pytest.raises(ClusterError, match="no Dask scheduler replies"):
             list(in_workers(operator.neg, [1], 1, address))
     assert not [thing for thing in gc.get_objects() if type(thing) is Client and thing.status == "connecting"]
 
@@ -177,7 +179,7 @@ def killed(_number: int) -> None:
 
 
 def test_work_that_kills_every_worker_it_meets_is_an_error_and_the_cluster_lives_on(scheduler: str) -> None:
-    with pytest.raises(ClusterError, match="one piece of work ended 4 workers"):
+    with pytest.raises(ClusterError, match="one task ended 4 workers"):
         list(in_workers(killed, [0], 1, scheduler))
     assert list(in_workers(operator.neg, [1], 1, scheduler)) == [-1]
 
@@ -232,7 +234,7 @@ def test_a_scheduler_without_workers_is_told(served: Served, monkeypatch: pytest
         list(in_workers(operator.neg, [1], 1, served.address))
 
 
-@pytest.mark.parametrize(("who", "said"), [("worker", "has no workers"), ("scheduler", "is lost")])
+@pytest.mark.parametrize(("who", "said"), [("worker", "has no workers"), ("scheduler", "are lost")])
 def test_a_cluster_that_is_lost_on_the_way_is_an_error(
     served: Served, who: str, said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

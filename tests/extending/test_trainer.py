@@ -47,7 +47,7 @@ def test_a_trainer_of_another_package_is_chosen_by_its_name_and_makes_a_build_th
 ) -> None:
     build = tmp_path / "build"
     words = " ".join(installed.thenar("compile", "--help").split())
-    assert "--trainer TRAINER What makes the model: logitboost (" in words
+    assert "--trainer TRAINER What trains the model: logitboost (" in words
     assert "(naive Bayes: inputs are independent within a grasp type)" in words
     assert "--joint-bins INTEGER RANGE Into how many bins naive Bayes cuts a joint. [default: 8; x>=2]" in words
 
@@ -79,7 +79,7 @@ def test_a_frontier_of_the_trainer_has_one_stage_and_its_points_are_built(
     installed: Any, recordings: Path, tmp_path: Path
 ) -> None:
     words = " ".join(installed.thenar("frontier", "--help").split())
-    of_trainer = words[words.index("--trainer TRAINER What makes the model: ") :].partition(" --")[0]
+    of_trainer = words[words.index("--trainer TRAINER What trains the model: ") :].partition(" --")[0]
     assert "naive-bayes (" in of_trainer
     assert "--joint-bins INTEGER RANGE Into how many bins naive Bayes cuts a joint. [default: 8; x>=2]" in words
 
@@ -94,12 +94,12 @@ def test_a_frontier_of_the_trainer_has_one_stage_and_its_points_are_built(
     header, *lines = (folder / "frontier.csv").read_text().splitlines()
     assert header.endswith(",trainer,settings")
     assert all(line.endswith(",naive-bayes,joint-bins 5") for line in lines)
-    assert "--rounds is no setting of --trainer naive-bayes" in installed.thenar(*given, "--rounds", "9", code=2)
+    assert "--rounds is not a setting of --trainer naive-bayes" in installed.thenar(*given, "--rounds", "9", code=2)
 
     point = max(found["points"], key=lambda each: each["rate"]["mean"])
     chosen = ("--from", str(folder / "frontier.json"), "--point", str(point["number"]))
     made = ("compile", str(recordings), "-o", str(build), *chosen)
-    assert "--trainer is settled by the point" in installed.thenar(*made, "--trainer", "logitboost", code=2)
+    assert "--trainer is set by the point" in installed.thenar(*made, "--trainer", "logitboost", code=2)
     installed.thenar(*made)
     document = json.loads((build / "build.json").read_bytes())
     assert document["options"]["trainer"] == "naive-bayes"

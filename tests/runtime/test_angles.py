@@ -29,5 +29,5 @@ def test_the_two_points_of_a_calibration_are_hit() -> None:
 
 
 def test_a_calibration_of_another_glove_is_refused() -> None:
-    with pytest.raises(SettingError, match="knows none of the glove's sensors"):
+    with pytest.raises(SettingError, match="has none of the glove's sensors"):
         AngleReader(("wrist_pitch",), GloveCalibration(subject="anna", sensors=(INDEX,)))

@@ -49,7 +49,7 @@ def test_a_file_is_as_its_docstring_shows_it(tmp_path: Path) -> None:
         ("subject = ", "not valid TOML: Invalid value"),
         ('subject = "anna"', "line 1: the key sensor is missing"),
         (f"sensor = [{SENSOR}]\nunit = 'rad'", "line 2: unit: 'rad' is not among its values"),
-        (f"sensor = [{SENSOR}]\nhand = 'left'", "line 2: hand: there is no such key"),
+        (f"sensor = [{SENSOR}]\nhand = 'left'", "line 2: hand: this key is unknown"),
         (f"sensor = [{SENSOR}, {SENSOR}]", "'index_mpj' is calibrated twice"),
         (f"sensor = [{SENSOR.replace('96', '0')}]", r"sensor\[0\]\.raw_a: must be at (least|most)"),
         (f"sensor = [{SENSOR.replace('96', '256')}]", r"sensor\[0\]\.raw_a: must be at (least|most)"),

@@ -77,7 +77,7 @@ def test_a_calibration_that_does_not_fit_is_refused() -> None:
     calibration = GloveCalibration(subject="anna", sensors=(SensorCalibration("b", 1, 0.0, 2, 1.0),))
     with pytest.raises(SettingError, match="has no sensor 'a'"):
         CodeTables([joint()], ["a"], calibration)
-    with pytest.raises(SettingError, match=r"in 'deg', joint 'b' of the build is in 'raw'"):
+    with pytest.raises(SettingError, match=r"in 'deg', joint 'b' of the build in 'raw'"):
         CodeTables([raw_joint("b")], ["b"], calibration)
 
 

@@ -84,15 +84,15 @@ def test_codes_may_come_in_any_integers(make_tables: MakeTables, kind: type) -> 
 @pytest.mark.parametrize(
     ("bits", "codes", "reason"),
     [
-        (np.zeros(8, bool), [0, 0, 0], r"switches of shape \(8,\), the build has 9"),
+        (np.zeros(8, bool), [0, 0, 0], r"switches of shape \(8,\), but the build has 9"),
         (np.zeros((9, 1), bool), [0, 0, 0], "the build has 9"),
-        ([2] + [0] * 8, [0, 0, 0], "0 or 1, this frame has 2"),
-        (np.full(9, np.nan), [0, 0, 0], "0 or 1, this frame has nan"),
-        (np.zeros(9, bool), [0, 0], r"codes of shape \(2,\), the build has 3 joints"),
-        (np.zeros(9, bool), [0, -1, 0], "0 to 65535, this frame has -1"),
-        (np.zeros(9, bool), [0, 65536, 0], "0 to 65535, this frame has 65536"),
-        (np.zeros(9, bool), [0, 1.5, 0], "codes are integers, this frame has float64"),
-        (np.zeros(9, bool), ["a", "b", "c"], "codes are integers"),
+        ([2] + [0] * 8, [0, 0, 0], "0 or 1, but this frame has 2"),
+        (np.full(9, np.nan), [0, 0, 0], "0 or 1, but this frame has nan"),
+        (np.zeros(9, bool), [0, 0], r"codes of shape \(2,\), but the build has 3 joints"),
+        (np.zeros(9, bool), [0, -1, 0], "0 to 65535, but this frame has -1"),
+        (np.zeros(9, bool), [0, 65536, 0], "0 to 65535, but this frame has 65536"),
+        (np.zeros(9, bool), [0, 1.5, 0], "codes must be integers, but this frame has float64"),
+        (np.zeros(9, bool), ["a", "b", "c"], "codes must be integers"),
     ],
 )
 def test_a_frame_that_does_not_fit_is_refused(
@@ -111,9 +111,9 @@ def test_masks_that_do_not_fit_are_refused(make_tables: MakeTables) -> None:
 @pytest.mark.parametrize(
     ("lost_bits", "lost_codes", "reason"),
     [
-        (np.zeros(8, bool), np.zeros(3, bool), r"^a frame with lost switches of shape \(8,\), the build has 9$"),
-        (np.zeros(9, bool), np.zeros(4, bool), r"^a frame with lost joints of shape \(4,\), the build has 3$"),
-        ([3] + [0] * 8, np.zeros(3, bool), "^lost switches are 0 or 1, this frame has 3$"),
+        (np.zeros(8, bool), np.zeros(3, bool), r"^a frame with lost switches of shape \(8,\), but the build has 9$"),
+        (np.zeros(9, bool), np.zeros(4, bool), r"^a frame with lost joints of shape \(4,\), but the build has 3$"),
+        ([3] + [0] * 8, np.zeros(3, bool), "^lost switches must be 0 or 1, but this frame has 3$"),
     ],
 )
 def test_a_mask_that_does_not_fit_is_named(

@@ -81,7 +81,7 @@ def test_the_bytes_of_slopes_are_as_documented() -> None:
     "ends", [(9, 9, 0), (9, 8, 0), (0, 65536, -9), (0, 65535, -8), (0, 255, 0), (0, 20, 4), (0, 20, -5), (0, 20, -17)]
 )
 def test_a_slope_that_fits_no_byte_is_refused(ends: tuple[int, int, int]) -> None:
-    with pytest.raises(BuildError, match="fits no byte"):
+    with pytest.raises(BuildError, match="does not fit a byte"):
         Slope(0, *ends, np.zeros(2, np.int8))
 
 

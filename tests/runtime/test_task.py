@@ -106,7 +106,7 @@ def test_what_is_held_beyond_its_limit_is_too_long_once() -> None:
 )
 def test_what_is_no_task_is_refused_by_name(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "task.json").write_bytes(content)
-    with pytest.raises(SettingError, match=r"task\.json is no task of `thenar teach`"):
+    with pytest.raises(SettingError, match=r"task\.json is not a task of `thenar teach`"):
         load_task(tmp_path / "task.json")
 
 

@@ -99,7 +99,7 @@ def test_a_key_in_another_unit_is_told_the_unit(key: str, advice: str) -> None:
 
 
 def test_an_unknown_key_is_told_the_nearest() -> None:
-    assert "line 2: thing.widht_mm: there is no such key here (did you mean 'width_mm'" in complaint("widht_mm = 1")
+    assert "line 2: thing.widht_mm: this key is unknown (did you mean 'width_mm'" in complaint("widht_mm = 1")
 
 
 @pytest.mark.parametrize("number", ["nan", "-nan", "inf", "-inf"])
@@ -117,13 +117,13 @@ def test_what_is_no_table_is_refused() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[[in]]\n[[in]]\nwidht_mm = 1", "line 3: in[1].widht_mm: there is no such key here (did you mean 'width_mm'"),
+        ("[[in]]\n[[in]]\nwidht_mm = 1", "line 3: in[1].widht_mm: this key is unknown (did you mean 'width_mm'"),
         ("[[in]]\nwidth_cm = 1", "line 2: in[0].width_cm: lengths are in millimetres: width_mm"),
         ("[one]\nside = 'lefd'", "line 2: one.side: 'lefd' is not among its values (did you mean 'left'"),
         ("[one]\ncount = 31", "line 2: one.count: 31 is not among its values (there are: 18, 22)"),
         ("[one]\nnames = { a = 'x', b = 3 }", "line 2: one.names.b: must be text, not 3"),
         ("[one.names]\na = 'x'\nb = []", "line 3: one.names.b: must be text, not an empty list"),
-        ("[one]\n[xyz]", "line 2: xyz: there is no such key here (there are: in, one)"),
+        ("[one]\n[xyz]", "line 2: xyz: this key is unknown (there are: in, one)"),
     ],
 )
 def test_a_wrong_key_or_value_of_an_inner_table_is_named_likewise(text: str, message: str) -> None:

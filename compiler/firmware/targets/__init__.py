@@ -1,4 +1,4 @@
-"""What firmware is made for: a file for each target, or for a family of them, and their registry."""
+"""The targets of firmware: a file for each target, or for a family of them, and their registry."""
 
 from thenar.drivers.members import Members
 
@@ -16,10 +16,10 @@ def kinds() -> tuple[str, ...]:
 
 
 def wired() -> dict[str, Wired]:
-    """Return the parts that firmware of a board is written for, by what board.toml calls them."""
+    """Return the parts that board firmware supports, by their names in board.toml."""
     return {target.part: target for target in TARGETS.values() if isinstance(target, Wired)}
 
 
 def timed() -> tuple[str, ...]:
-    """Return the names of what a frontier is timed for: parts with a clock, and where Python classifies."""
+    """Return the names that a Pareto front can be timed for: parts with a clock, and hosts that classify in Python."""
     return (*(name for name, target in TARGETS.items() if target.clock_hz is not None), "host", "pi")

@@ -1,4 +1,4 @@
-"""AVRs: the parts of Arduino's Uno and Mega, with the pins and the baud rates that firmware of a board needs."""
+"""AVRs: the parts of Arduino's Uno and Mega, with the pins and the baud rates for board firmware."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from .wired import Wired
 if TYPE_CHECKING:
     from ..classifier import Library
     from ..layout import Layout
-    from ..probes import Answers, Frames, Lost
+    from ..probes import Frames, Lost, Predictions
 
 _DIVIDERS = 4096
 _USUAL = (9600, 19_200, 38_400, 57_600, 76_800, 115_200, 230_400, 250_000, 500_000, 1_000_000, 2_000_000)
@@ -21,11 +21,11 @@ _EXACT = 0.005
 
 @dataclass(frozen=True, kw_only=True)
 class Avr(Wired):
-    """An AVR. Its pins are those without crystal and reset.
+    """An AVR. Its pins exclude crystal and reset.
 
-    jtag      pins that the JTAG interface holds until it is switched off
-    avrdude   what avrdude calls it, and `programmer` the boot loader of the usual boards with it
-    brown_out what its fuses should say of brown-out at its highest clock
+    jtag      pins that the JTAG interface occupies until it is disabled
+    avrdude   its name in avrdude, and `programmer` the usual boards' boot loader there
+    brown_out the recommended brown-out fuses at its highest clock
     """
 
     avr: ClassVar[bool] = True
@@ -37,13 +37,13 @@ class Avr(Wired):
     brown_out: str = "4.3 V, extended fuse 0xFC; at 8 MHz or less 2.7 V, 0xFD"
 
     def cost(self, layout: "Layout") -> Cost:
-        """Return the cost of the worst frame that one could think of, counted instruction by instruction."""
+        """Return the worst-case cost over all possible frames, counted instruction by instruction."""
         from ..avr_costs import AvrCosts
 
         return AvrCosts(layout, self.flash).cost
 
     def files(self, library: "Library") -> dict[str, str]:
-        """Return path -> text: the library, a Makefile (program, size, flash) and a main() to start from."""
+        """Return path -> text: the library, a Makefile (program, size, flash) and an initial main()."""
         from thenar.firmware_templates.rendering import render
 
         name, layout = library.name, library.layout
@@ -56,7 +56,7 @@ class Avr(Wired):
         }
 
     def missing(self) -> str | None:
-        """Return what is missing of avr-gcc and simavr."""
+        """Return which of avr-gcc and simavr is missing, and how to install it; None if neither is."""
         from ..simavr import missing
 
         return missing()
@@ -70,8 +70,8 @@ class Avr(Wired):
         *,
         incremental: bool = False,
         lost: "Lost | None" = None,
-    ) -> "Answers":
-        """Return the answers to frames (n, F) in simavr, as the base says, with their cycles and their stack."""
+    ) -> "Predictions":
+        """Return the predictions for frames (n, F) in simavr, as in the base class, with their cycles and stack."""
         from ..simavr import run
 
         return run(files, name, layout, frames, self.part, self.flags, incremental=incremental, lost=lost)
@@ -79,7 +79,7 @@ class Avr(Wired):
 
 @dataclass(frozen=True, slots=True)
 class BaudSetting:
-    """What to write to UBRRn, whether to set U2Xn, and by how much the rate is then off, as a share."""
+    """The values of UBRRn and of U2Xn, and the resulting error of the rate, as a fraction."""
 
     ubrr: int
     double: bool
@@ -87,16 +87,16 @@ class BaudSetting:
 
 
 def best_setting(baud: int, clock_hz: int) -> BaudSetting | None:
-    """Return the divider of the clock, times 16 or 8 (U2X), that is nearest to `baud`, None if there is none.
+    """Return the setting nearest to `baud`, with a clock divider of 16 or 8 (U2X) times UBRRn + 1; None if none exists.
 
-    Of equally near ones it is the one without U2X, whose receiver samples twice as often and forgives more.
+    Of equally near ones it is the one without U2X, whose receiver samples twice as often and tolerates more error.
     """
     found = [setting for double in (False, True) if (setting := _setting(baud, clock_hz, double))]
     return min(found, key=lambda setting: (abs(setting.error), setting.double), default=None)
 
 
 def near_rates(baud: int, clock_hz: int) -> tuple[int, ...]:
-    """Return the usual rates that are made within half a percent, the four nearest to `baud` in rising order."""
+    """Return the four standard rates nearest to `baud` with an error of at most half a percent, in rising order."""
     good = [rate for rate in _USUAL if (best := best_setting(rate, clock_hz)) and abs(best.error) < _EXACT]
     return tuple(sorted(sorted(good, key=lambda rate: abs(rate - baud))[:4]))
 
@@ -115,11 +115,11 @@ def _channels(*ports: str) -> dict[str, str]:
     return {f"ADC{8 * place + bit}": f"P{port}{bit}" for place, port in enumerate(ports) for bit in range(8)}
 
 
-# `lpm` reaches the first 64 KiB of the flash, and the tables share them with whatever else is constant. The clocks are
-# those of Arduino's boards.
+# `lpm` reaches the first 64 KiB of the flash, which the tables share with all other constants. The clocks are those of
+# Arduino's boards.
 _avr = partial(
     Avr,
-    help="a library with a Makefile, or all of a board's firmware",
+    help="a library with a Makefile, or the complete firmware of a board",
     next_step="`make -C {folder}` compiles it",
     carried=True,
     alike=True,
@@ -130,8 +130,8 @@ _avr = partial(
     size=(("avr-size",), "binutils-avr"),
 )
 
-# ATmega48A/PA/88A/PA/168A/PA/328/P, DS40002061: PB6 and PB7 carry the crystal, PC6 is RESET; ADC6 and ADC7 are pins of
-# their own, which only the packages with 32 leads have.
+# ATmega48A/PA/88A/PA/168A/PA/328/P, DS40002061: PB6 and PB7 carry the crystal, PC6 is RESET; ADC6 and ADC7 have
+# separate pins, which only the packages with 32 leads have.
 _ATMEGA328P = _avr(
     name="avr328p",
     part="atmega328p",
@@ -149,7 +149,7 @@ _ATMEGA328P = _avr(
     programmer="arduino",
 )
 
-# ATmega640/1280/1281/2560/2561, DS40002211: crystal and RESET have pins of their own.
+# ATmega640/1280/1281/2560/2561, DS40002211: crystal and RESET have separate pins.
 _ATMEGA2560 = _avr(
     name="avr2560",
     part="atmega2560",
@@ -169,4 +169,4 @@ _ATMEGA2560 = _avr(
 
 MEMBER = (_ATMEGA328P, _ATMEGA2560)
 AVRS: Mapping[str, Avr] = {part.part: part for part in MEMBER}
-"""The parts that firmware of a board is written for, by what board.toml calls them."""
+"""The parts that board firmware supports, by their names in board.toml."""

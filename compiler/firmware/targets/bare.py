@@ -1,4 +1,4 @@
-"""Bare cores of 32 bits: start-up, linker script and Makefile, and the machine of qemu that runs their code.
+"""Bare 32-bit cores: start-up, linker script and Makefile, and the qemu machine that runs their code.
 
 Instructions are counted by a timer of the machine. Under `-icount` qemu's clock advances by 2^shift ns with every
 instruction and by nothing else, which is one or several ticks: the difference between two readings, less that of a
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
     from ..classifier import Library
     from ..layout import Layout
-    from ..probes import Answers, Frames, Lost
+    from ..probes import Frames, Lost, Predictions
 
 Architecture = Literal["arm", "riscv", "xtensa"]
-STACK = 512  # bytes that the linker keeps free: main() and an answer take less
+STACK = 512  # bytes that the linker reserves: main() and a prediction need less
 
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """A machine of qemu: memory's bytes and places, clock and shift by which it counts, its core if it has several."""
+    """A qemu machine: sizes and addresses of its memories, clock and shift for counting, its core if it has several."""
 
     name: str
     flash: int
@@ -39,7 +39,7 @@ class Machine:
     cpu: str = ""
 
     def instructions(self, ticks: "NDArray[np.uint32]", of_one: int) -> "NDArray[np.uint32]":
-        """Return the instructions in so many ticks each, where one instruction took `of_one`."""
+        """Return the instructions for each number of ticks, where one instruction took `of_one`."""
         import numpy as np
 
         return 1 + np.rint((ticks.astype(np.int64) - of_one) * 1e9 / (self.hz << self.shift)).astype(np.uint32)
@@ -47,9 +47,9 @@ class Machine:
 
 @dataclass(frozen=True, kw_only=True)
 class Bare(Target):
-    """A core without an operating system, and the machine of qemu that runs its code.
+    """A core without an operating system, and the qemu machine that runs its code.
 
-    prefix    what the names of its compiler's programs begin with
+    prefix    of the names of its compiler's programs
     emulator  the program of qemu
     board     a board with the core, by openocd's name, for an example in the Makefile
     """
@@ -81,7 +81,7 @@ class Bare(Target):
         }
 
     def bare_files(self, flash: int, ram: int) -> dict[str, str]:
-        """Return path -> text of what the core needs where it has so many bytes of flash and RAM."""
+        """Return path -> text of the files that the core needs with `flash` and `ram` bytes of memory."""
         from thenar.firmware_templates.rendering import render
 
         origins = {"flash_origin": f"0x{self.machine.flash_at:08x}", "ram_origin": f"0x{self.machine.ram_at:08x}"}
@@ -89,7 +89,7 @@ class Bare(Target):
         return {name: render(f"bare/{name}.j2", **values) for name in ("link.ld", "startup.c", "semihosting.h")}
 
     def missing(self) -> str | None:
-        """Return what is missing of compiler and emulator."""
+        """Return which of compiler and emulator is missing, and how to install it; None if neither is."""
         assert self.compiler is not None
         return lacking(self.compiler, self.emulator)
 
@@ -103,10 +103,10 @@ class Bare(Target):
         incremental: bool = False,
         lost: "Lost | None" = None,
         limit_s: float = LIMIT_S,
-    ) -> "Answers":
-        """Return the answers to frames (n, F) in qemu, as the base says, with the instructions that they took.
+    ) -> "Predictions":
+        """Return the predictions for frames (n, F) in qemu, as in the base class, with their numbers of instructions.
 
-        limit_s  the emulator is stopped after that time, which is an error
+        limit_s  time after which the emulator is stopped with an error
         """
         from thenar.firmware_templates.rendering import render
 
@@ -121,15 +121,15 @@ class Bare(Target):
     def emulate(
         self, files: Mapping[str, str | bytes], limit_s: float = LIMIT_S, flags: Sequence[str] = STRICT
     ) -> bytes:
-        """Compile all C of `files` with `flags`, run it in qemu and return what it wrote to the file "answers".
+        """Compile all C of `files` with `flags`, run it in qemu and return the contents of its file "predictions".
 
-        Raises FirmwareError as `run` does.
+        Raises FirmwareError like `run`.
         """
         assert self.compiler is not None
         compiler, emulator, machine = find(self.compiler), find(self.emulator), self.machine
         bare = self.bare_files(machine.flash, machine.ram)
         sources = sorted(path for path in (*files, "startup.c") if path.endswith(".c"))
-        # What is not called is not linked: an ESP8266 has the division of probability() in its ROM, not in libgcc.
+        # Uncalled code is not linked: an ESP8266 has the division of probability() in its ROM, not in libgcc.
         linked = ["-ffunction-sections", "-Wl,--gc-sections", "-nostdlib", "-T", "link.ld"]
         linked += [*sources, "-lgcc", "-o", "classifier.elf"]
         quiet = ["-display", "none", "-monitor", "none", "-serial", "none"]
@@ -147,11 +147,11 @@ class Bare(Target):
                 "classifier.elf",
             ]
             call(emulating, folder, limit_s=limit_s)
-            return (folder / "answers").read_bytes()
+            return (folder / "predictions").read_bytes()
 
 
-def _counted(written: bytes, frames: "Frames", layout: "Layout", machine: Machine) -> "Answers":
-    """Return the answers in what the program wrote: names, the ticks of one instruction, each answer and its ticks."""
+def _counted(written: bytes, frames: "Frames", layout: "Layout", machine: Machine) -> "Predictions":
+    """Return the predictions from the output: names, the ticks of one instruction, each prediction and its ticks."""
     import numpy as np
 
     from ..probes import answers_from, names_in
@@ -159,9 +159,9 @@ def _counted(written: bytes, frames: "Frames", layout: "Layout", machine: Machin
     size = 2 * len(layout.start) + 6
     names, written = names_in(written, layout)
     if len(written) != 4 + (size + 4) * len(frames):
-        raise FirmwareError(f"the program on {machine.name} answered {len(written)} bytes for {len(frames)} frames")
+        raise FirmwareError(f"the program on {machine.name} wrote {len(written)} bytes for {len(frames)} frames")
     records = np.frombuffer(written, np.uint8, offset=4).reshape(len(frames), size + 4)
     ticks = np.ascontiguousarray(records[:, size:]).view("<u4")[:, 0]
-    answers = answers_from(records[:, :size].tobytes(), frames, layout)
+    predictions = answers_from(records[:, :size].tobytes(), frames, layout)
     instructions = machine.instructions(ticks, int.from_bytes(written[:4], "little"))
-    return replace(answers, cost=instructions, unit="instructions", names=names)
+    return replace(predictions, cost=instructions, unit="instructions", names=names)

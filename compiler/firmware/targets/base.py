@@ -1,4 +1,4 @@
-"""The shape of a firmware target: what whoever adds one supplies."""
+"""The interface of a firmware target, which a new target implements."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,53 +11,53 @@ from ..tools import Tool
 if TYPE_CHECKING:
     from ..classifier import Library
     from ..layout import Layout
-    from ..probes import Answers, Frames, Lost
+    from ..probes import Frames, Lost, Predictions
 
 Mode = Literal["classify", "scan", "glove"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
-    """What firmware is made for: a core with a compiler and perhaps a simulator, or a package for a build system.
+    """A firmware target: a core with a compiler and perhaps a simulator, or a package for a build system.
 
-    A target is an object of this class, or of one derived from it that overrides `files`, `cost`, `run` or `missing`.
-    Importing it imports neither numpy nor jinja2: its methods import what they need, so that `--help` is quick.
+    A target is an object of this class, or of a derived class that overrides `files`, `cost`, `run` or `missing`.
+    Importing it imports neither numpy nor jinja2, so that `--help` is fast: its methods import what they need.
 
     Parameters
     ----------
     name : str
-        What `--target` calls it.
+        Its name for `--target`.
     part : str
-        What compilers and messages call it, and what is written; a board.toml as well.
+        Its name for compilers, messages and board.toml, and in generated files.
     title : str, optional
-        What prose calls it, if not by its part.
+        Its name in prose, by default that of the part.
     help : str
-        What is written for it, in a few words.
+        A short description of the files written for it.
     next_step : str
-        What to do with the folder that was written, which is put in for `{folder}`.
+        How to use the folder that was written, whose path replaces `{folder}`.
     rank : int, optional
         Targets are listed, and tried, in the order of their ranks.
     own_layout : bool, optional
-        Whether layouts are chosen for its flash, RAM and costs. If not, it takes that of the smallest part of ours that
-        holds the build, and nothing is counted on it.
+        Whether layouts are chosen for its flash, RAM and costs. If not, it uses the layout for the smallest of our
+        parts that holds the build, and its costs are not counted.
     any_part : bool, optional
-        Whether it is a package for the smallest part that holds the build, and not for a part of its own.
+        Whether it is a package for the smallest part that holds the build, and not for one part.
     carried : bool, optional
         Whether the firmware that a build carries may be laid out for it.
     alike : bool, optional
-        Whether targets of its kind differ in memory alone: one of them is then enough to be verified.
+        Whether targets of its kind differ in memory alone, so that verifying one of them is enough.
     flash, ram : int, optional
         Memory in bytes.
     most_flash : int, optional
-        How much of the flash a classifier takes at most unless one asks for more.
+        The default limit of flash for a classifier.
     clock_hz : int, optional
-        Usual clock, by which a frontier makes times of counts; without it `thenar frontier` does not offer the target.
+        Usual clock, which converts counts to times on a Pareto front; `thenar frontier` requires it.
     core : Core, optional
-        What the portable C takes there, for `cost`.
+        The costs of portable C on it, for `cost`.
     kind : str, optional
-        What `thenar verify --firmware` calls targets that run alike; "" where `run` can run nothing.
+        The name in `thenar verify --firmware` of targets that run alike; "" where `run` cannot run anything.
     compiler, size : Tool, optional
-        The C compiler, which takes `flags`, and the program `size` that goes with it: what `--measure` needs.
+        The C compiler, called with `flags`, and its program `size`: `--measure` needs both.
     """
 
     avr: ClassVar[bool] = False
@@ -86,12 +86,12 @@ class Target:
 
     @property
     def unit(self) -> Literal["cycles", "instructions"]:
-        """What the time of a frame is counted in."""
+        """The unit of the time of a frame."""
         return "cycles" if self.avr else "instructions"
 
     @property
     def bound(self) -> str:
-        """What stands before a cost: it is a bound or an estimate."""
+        """The words before a cost, which is either a bound or an estimate."""
         return "at most" if self.avr else "about"
 
     @property
@@ -101,27 +101,27 @@ class Target:
 
     @property
     def counted_on(self) -> str:
-        """Where `run` counts, for a sentence: "Measured on atmega328p"."""
+        """The part on which `run` counts, for a sentence: "Measured on atmega328p"."""
         return self.part
 
     def cost(self, layout: "Layout") -> Cost:
-        """Return a bound on what the classifier of that layout costs, or an estimate that is not too low."""
+        """Return a bound on the cost of the classifier of that layout, or an estimate that is not too low."""
         return word_cost(layout, self.core)
 
     def files(self, library: "Library") -> dict[str, str]:
-        """Return path -> text of all that is written for it: as it is here, the C99 of the library alone."""
+        """Return path -> text of all files for the target; by default only the C99 of the library."""
         return dict(library.whole)
 
     def sources(self, library: "Library") -> dict[str, str]:
-        """Return path -> text of the classifier alone, as `run` takes it: in C, unless the target says otherwise."""
+        """Return path -> text of the classifier alone, for `run`: in C, unless the target overrides it."""
         return library.files
 
     def said(self, library: "Library") -> str:
-        """Return what there is to say of what is written, a sentence without its end; "" if there is nothing."""
+        """Return a remark on the written files, a sentence without its full stop; "" if there is none."""
         return ""
 
     def missing(self) -> str | None:
-        """Return what keeps code from being compiled and run here, and what to install; None if nothing does."""
+        """Return why code cannot be compiled and run here, and what to install; None if it can."""
         return f"thenar has no simulator of {self.named}"
 
     def run(
@@ -133,15 +133,15 @@ class Target:
         *,
         incremental: bool = False,
         lost: "Lost | None" = None,
-    ) -> "Answers":
-        """Return what the classifier `name` answers to frames (n, F), uint8 as `layout.frame_bytes` makes them.
+    ) -> "Predictions":
+        """Return the predictions of the classifier `name` for frames (n, F), uint8 from `layout.frame_bytes`.
 
-        files        of `sources`: path -> text
-        incremental  each answer comes from update(), the change since the frame before, instead of classify()
-        lost         (n, s + j) bool: the switches and the joints that are missing in each frame; what answers then take
-                     is not counted
+        files        from `sources`: path -> text
+        incremental  each prediction comes from update(), given the change since the previous frame, not from classify()
+        lost         (n, s + j) bool: the switches and the joints that are missing in each frame; costs are then not
+                     counted
 
-        Raises FirmwareError if a tool is missing, or the files do not compile without any warning, do not fit, or do
-        not run.
+        Raises FirmwareError if a tool is missing, or the files do not compile without warnings, do not fit, or do not
+        run.
         """
         raise FirmwareError(self.missing())

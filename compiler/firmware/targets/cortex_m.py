@@ -1,8 +1,8 @@
-"""Cortex-M cores with a small memory, which fits the machines of qemu on which such firmware is tested.
+"""Cortex-M cores with small memories, which match the qemu machines that test such firmware.
 
-qemu 7 has no Cortex-M0+, but a Cortex-M0, on the micro:bit, whose instructions are the same (ARMv6-M): it refuses those
-of a larger core. Code for a Cortex-M4 runs on one, of Arm's MPS2 board with image AN386. SysTick counts: its 24 bits
-last for a million instructions.
+qemu 7 has no Cortex-M0+, but a Cortex-M0, on the micro:bit, with the same instructions (ARMv6-M); it rejects those of a
+larger core. Code for a Cortex-M4 runs on Arm's MPS2 board with image AN386, which has that core. SysTick counts
+instructions; its 24 bits are enough for a million.
 """
 
 from functools import partial

@@ -1,4 +1,4 @@
-"""The target host, this machine: portable C, run with sanitizers by what gcc or clang makes of it."""
+"""The target host, this machine: portable C, compiled by gcc or clang and run with sanitizers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from .base import Target
 if TYPE_CHECKING:
     from ..classifier import Library
     from ..layout import Layout
-    from ..probes import Answers, Frames, Lost
+    from ..probes import Frames, Lost, Predictions
 
 _SANITIZE = ("-g1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
@@ -33,7 +33,7 @@ class Host(Target):
         }
 
     def missing(self) -> str | None:
-        """Return which compilers there might be."""
+        """Return how to install a compiler if there is none."""
         return lacking(HOST_COMPILER)
 
     def run(
@@ -47,10 +47,10 @@ class Host(Target):
         lost: "Lost | None" = None,
         compiler: str | None = None,
         sanitize: bool = True,
-    ) -> "Answers":
-        """Return the answers to frames (n, F), as the base says; switches are set by set_switch() for update().
+    ) -> "Predictions":
+        """Return the predictions for frames (n, F), as in the base class; update() gets its switches by set_switch().
 
-        compiler  "gcc" or "clang"; without it, the first that is installed
+        compiler  "gcc" or "clang"; by default the first that is installed
         sanitize  with the address and undefined behaviour sanitizers: a finding is an error
         """
         from ..probes import answers_in, check_frames, record_files, with_lost

@@ -1,5 +1,5 @@
-"""MicroPython: the classifier as a module in Python, which any board takes, and as a user module in C, to be built into
-its firmware. Both have the same classes and functions.
+"""MicroPython: the classifier as a Python module, which runs on any board, and as a user module in C, to be built into
+the board's firmware. Both have the same classes and functions.
 """
 
 import sys
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
     from ..classifier import Library
     from ..layout import Layout
-    from ..probes import Answers, Frames, Lost
+    from ..probes import Frames, Lost, Predictions
 
 _BYTES_PER_LINE, _COLUMNS = 72, 100
-_MODULE = "micropython_unix"  # its Unix port, as a package of Python
+_MODULE = "micropython_unix"  # a Python package of its Unix port
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +30,7 @@ class MicroPython(Target):
     """Any board that runs MicroPython."""
 
     def files(self, library: "Library") -> dict[str, str]:
-        """Return path -> text of the module in Python, and in modules/ of the user module in C."""
+        """Return path -> text of the Python module, and in modules/ of the user module in C."""
         from thenar.firmware_templates.rendering import render
 
         from ..words import answers_of, string
@@ -65,7 +65,7 @@ class MicroPython(Target):
         }
 
     def sources(self, library: "Library") -> dict[str, str]:
-        """Return the module in Python."""
+        """Return the Python module."""
         from thenar.firmware_templates.rendering import render
         from thenar.runtime.softmax import POWERS, Softmax
 
@@ -101,7 +101,7 @@ class MicroPython(Target):
         return {f"thenar_{library.name}.py": text}
 
     def missing(self) -> str | None:
-        """Return how to install the interpreter."""
+        """Return how to install the interpreter if it is missing."""
         if _interpreter():
             return None
         return (
@@ -117,8 +117,8 @@ class MicroPython(Target):
         *,
         incremental: bool = False,
         lost: "Lost | None" = None,
-    ) -> "Answers":
-        """Return the answers to frames (n, F) of the module in Python, as the base says, in MicroPython's Unix port."""
+    ) -> "Predictions":
+        """Return the Python module's predictions for frames (n, F), as in the base class, in the Unix port."""
         from thenar.firmware_templates.rendering import render
 
         from .. import FirmwareError
@@ -132,11 +132,11 @@ class MicroPython(Target):
         main = render("checking/record.py.j2", **values)
         with workshop({**files, "main.py": main, "frames": with_lost(frames, lost).tobytes()}) as folder:
             call([*_interpreter(), "main.py"], folder)
-            return answers_in((folder / "answers").read_bytes(), frames, layout)
+            return answers_in((folder / "predictions").read_bytes(), frames, layout)
 
 
 def _sensor_values(library: "Library") -> dict[str, object]:
-    """Return what the template of the module asks for of the sensors."""
+    """Return the template's values for the sensors."""
     from thenar.runtime.code_line import FARTHEST, FRACTION
 
     sensors, joints = library.sensors, len(library.names.joints)
@@ -158,7 +158,7 @@ def _sensor_values(library: "Library") -> dict[str, object]:
 
 
 def _interpreter() -> list[str]:
-    """Return the command that begins MicroPython; nothing where it is not installed."""
+    """Return the command that starts MicroPython; empty where it is not installed."""
     if path := which("micropython"):
         return [path]
     return [sys.executable, "-m", _MODULE] if find_spec(_MODULE) else []
@@ -176,7 +176,7 @@ def _opening(library: "Library") -> str:
 
 
 def _lines(values: Iterable[object]) -> str:
-    """Return a tuple in Python's words, in lines of 120 columns where no word is longer."""
+    """Return a Python tuple, in lines of 120 columns unless a single word is longer."""
     lines = [""]
     for word in (f"{value!r}," for value in values):
         if lines[-1] and len(lines[-1]) + len(word) > _COLUMNS:
@@ -195,7 +195,7 @@ MEMBER = MicroPython(
     name="micropython",
     part="micropython",
     title="MicroPython",
-    help="a module in Python for any board with MicroPython, and one in C to build into its firmware",
+    help="a Python module for any board with MicroPython, and one in C to build into its firmware",
     next_step="`mpremote cp {folder}/*.py :` copies it to a board",
     rank=40,
     own_layout=False,

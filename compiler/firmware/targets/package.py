@@ -1,5 +1,5 @@
-"""The classifier as a package that every ecosystem of microcontrollers takes: Arduino, PlatformIO, ESP-IDF, Zephyr,
-pico-sdk and plain CMake. Targets differ in the core that the layout is chosen for, and not in what is written.
+"""The classifier as a package for every microcontroller ecosystem: Arduino, PlatformIO, ESP-IDF, Zephyr, pico-sdk and
+plain CMake. Targets differ in the core for which the layout is chosen, not in the files.
 
 Layout and fields of the Arduino library are those of its specification, revision 1.5.
 """
@@ -17,10 +17,10 @@ from .cortex_m import MEMBER as _CORTEX_M
 if TYPE_CHECKING:
     from ..classifier import Library
     from ..layout import Layout
-    from ..probes import Answers, Frames, Lost
+    from ..probes import Frames, Lost, Predictions
 
 _VERSION = "1.0.0"
-_LED = 13  # has the board's LED and its resistor to ground, which outdo a pull-up on some boards
+_LED = 13  # has the board's LED, whose resistor to ground overrides a pull-up on some boards
 _FIRST_PIN = 2  # 0 and 1 are the serial port's
 
 _TYPES = ("class", "switch", "code")
@@ -32,19 +32,19 @@ _CONSTANTS = ("CLASSES", "SWITCHES", "PORTS", "JOINTS")
 class Package(Target):
     """A package for a part of a family, or for any part.
 
-    like   the target on whose core it is counted what the classifier takes, if there is one
+    like   the target on whose core the classifier's costs are counted, if there is one
     """
 
     like: Target | None = None
 
     @property
     def counted_on(self) -> str:
-        """The core that counts, and for what."""
+        """The core that is counted on, and the part that it represents."""
         return self.part if self.like is None else f"{self.like.part}, for {self.part}"
 
     def files(self, library: "Library") -> dict[str, str]:
-        """Return path -> text of the package thenar_NAME: the classifier in src/, what each ecosystem asks for beside
-        it, a self test in check/, and an example for Arduino.
+        """Return path -> text of the package thenar_NAME: the classifier in src/, the files that each ecosystem
+        requires, a self test in check/, and an example for Arduino.
 
         The example's pins are numbered as on an Uno or a Mega: switches from 2 on without 13, sensors from A0 on.
         """
@@ -83,7 +83,7 @@ class Package(Target):
         return str(Wiring.of(library))
 
     def missing(self) -> str | None:
-        """Return what is missing of compiler and emulator."""
+        """Return which of compiler and emulator is missing, and how to install it; None if neither is."""
         return super().missing() if self.like is None else self.like.missing()
 
     def run(
@@ -95,8 +95,8 @@ class Package(Target):
         *,
         incremental: bool = False,
         lost: "Lost | None" = None,
-    ) -> "Answers":
-        """Return the answers to frames (n, F) of a core like its own, as the base says."""
+    ) -> "Predictions":
+        """Return the predictions for frames (n, F) on a similar core, as in the base class."""
         run = super().run if self.like is None else self.like.run
         return run(files, name, layout, frames, incremental=incremental, lost=lost)
 
@@ -117,7 +117,7 @@ _BESIDE = (
 
 
 def _keywords(name: str, segments: bool, codes: bool) -> list[tuple[str, str]]:
-    """Return each word of the library with the kind of keyword that it is to the Arduino editor."""
+    """Return each word of the library with its keyword class in the Arduino editor."""
     of_codes = ("codes_init", "calibrate", "calibrated", "code_of", "set_reading") * codes
     kinds = {
         "KEYWORD1": (*_TYPES, *("codes",) * codes, *("segmenter",) * segments),
@@ -128,15 +128,15 @@ def _keywords(name: str, segments: bool, codes: bool) -> list[tuple[str, str]]:
     return [*words, *((f"THENAR_{name.upper()}_{word}", "LITERAL1") for word in _CONSTANTS)]
 
 
-# Digital pins that are no analog inputs as well, and analog inputs.
+# Digital pins that are not also analog inputs, and analog inputs.
 _BOARDS = {"Uno": (14, 6), "Nano": (14, 8), "Mega": (54, 16)}
 _ON_MULTIPLEXER, _ON_REGISTER = 16, 8
 
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """The pins of the example: of each switch that is one, by its number, of the multiplexers' addresses, and how many
-    sensors there are.
+    """The pins of the example: of each switch that has one, by number, and of the multiplexers' addresses; and the
+    number of sensors.
     """
 
     switches: dict[int, int]
@@ -152,12 +152,12 @@ class Wiring:
         return cls(pins, tuple(free[len(plain) :][:4]), len(library.sensors.every))
 
     def needed(self, *, multiplexed: bool = False) -> int:
-        """Return how many digital pins a board has, at the least, on which every switch has a pin of its own."""
+        """Return the smallest number of digital pins of a board on which every switch has a separate pin."""
         used = [*self.switches.values(), *(self.addresses if multiplexed else ())]
         return max(used, default=0) + 1
 
     def on(self, digital: int, analog: int) -> str:
-        """Return what a board with so many pins needs besides: "2 shift registers 74HC165"."""
+        """Return the additional parts for a board with these numbers of pins: "2 shift registers 74HC165"."""
         multiplexed = analog < self.sensors
         parts = []
         if digital < self.needed(multiplexed=multiplexed):
@@ -167,7 +167,7 @@ class Wiring:
         return " and ".join(f"{count} {part}" for count, part in parts)
 
     def __str__(self) -> str:
-        """Return which boards the example fits, in a sentence without its end."""
+        """Return which boards the example fits, in a sentence without its full stop."""
         needs: dict[str, list[str]] = {}
         for board, pins in _BOARDS.items():
             needs.setdefault(self.on(*pins), []).append(board)
@@ -176,7 +176,7 @@ class Wiring:
 
 
 def _example(library: "Library") -> dict[str, object]:
-    """Return what the template of the example asks for."""
+    """Return the values for the example's template."""
     from ..words import comment
 
     wiring, sensors = Wiring.of(library), library.sensors
@@ -198,7 +198,7 @@ def _example(library: "Library") -> dict[str, object]:
 
 
 M0PLUS, _M4 = _CORTEX_M
-# It takes within 3 % what a Cortex-M4 takes.
+# Its costs are within 3 % of a Cortex-M4's.
 _M33 = replace(
     _M4,
     part="cortex-m33",
@@ -206,8 +206,8 @@ _M33 = replace(
     flags=("-mcpu=cortex-m33", *_M4.flags[1:]),
     machine=Machine("mps2-an505", 4 << 20, 4 << 20, 20_000_000, 9, flash_at=0x10000000, ram_at=0x38000000),
 )
-# The Xtensa core whose compiler and emulator Debian has: an ESP8266's, without an ESP32's windows of registers.
-# Numbers are fitted to what qemu counts, as in `costs`, for 3 to 30 classes and 3 to 27 look-ups: 1 to 38 % above.
+# The Xtensa core whose compiler and emulator Debian has: an ESP8266's, without an ESP32's register windows. Numbers are
+# fitted to qemu's counts, as in `costs`, for 3 to 30 classes and 3 to 27 lookups: 1 to 38 % above.
 XTENSA = Bare(
     architecture="xtensa",
     prefix="xtensa-lx106-elf-",
@@ -236,13 +236,13 @@ XTENSA = Bare(
         product=5,
     ),
 )
-_NEXT = "{folder}/README.md says how each ecosystem takes it"
-# More only where one asks for it: on most, flash is read through a cache of 1 to 32 KiB, and larger tables miss it.
+_NEXT = "{folder}/README.md explains how to use it in each ecosystem"
+# More only on request: on most parts, flash is read through a cache of 1 to 32 KiB, and larger tables miss it.
 _MOST = 64 << 10
 
 
 def family(shape: type[P], name: str, like: Target, what: str, **given: Any) -> P:
-    """Return a package for parts whose core is that of another target, which is simulated."""
+    """Return a package for parts whose core matches that of another target, which is simulated."""
     tools = {"compiler": like.compiler, "size": like.size, "flags": like.flags, "next_step": _NEXT}
     values = {"name": name, "part": name, "help": what, "like": like, "most_flash": _MOST, "core": like.core}
     return shape(**{**values, **tools, **given})
@@ -253,8 +253,8 @@ MEMBER = (
     Package(
         name="arduino",
         part="arduino",
-        help="a package for Arduino's boards with an AVR, and all others; for the smallest part that holds the build",
-        next_step="put it into `libraries` of your sketchbook; {folder}/README.md says what else takes it",
+        help="a package for Arduino's boards, AVR or other; for the smallest part that holds the build",
+        next_step="copy it into `libraries` of your sketchbook; {folder}/README.md lists other build systems",
         rank=30,
         own_layout=False,
         any_part=True,

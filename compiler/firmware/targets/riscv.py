@@ -1,6 +1,6 @@
-"""A RISC-V core of 32 bits with multiplication and compressed instructions: RV32IMAC, as in a GD32VF103 or an FE310.
+"""A 32-bit RISC-V core with multiplication and compressed instructions: RV32IMAC, as in a GD32VF103 or an FE310.
 
-Code runs in qemu on SiFive's board with an E31, which counts the instructions that it has retired.
+Code runs in qemu on SiFive's board with an E31, which counts retired instructions.
 """
 
 from dataclasses import replace
@@ -9,7 +9,7 @@ from ..costs import CORTEX_M4
 from ..tools import RISCV_COMPILER, RISCV_EMULATOR
 from .bare import Bare, Machine
 
-# Flash, RAM and clock are those of the GD32VF103CB (Longan Nano), of whose RAM the emulated board has the half.
+# Flash, RAM and clock are those of the GD32VF103CB (Longan Nano); the emulated board has half of its RAM.
 MEMBER = Bare(
     architecture="riscv",
     prefix="riscv64-unknown-elf-",

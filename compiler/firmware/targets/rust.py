@@ -1,7 +1,7 @@
-"""Rust: the classifier as a crate in Rust alone, `no_std` and without `unsafe`, from the tables and layout of the C.
+"""Rust: the classifier as a pure Rust crate, `no_std` and without `unsafe`, from the tables and layout of the C.
 
-Rust and not a wrapper of the C, because then a project needs no C compiler for its core, no build script and no
-bindings; and whether every score is Python's is tried as it is of the C.
+A wrapper of the C would need a C compiler for the project's core, a build script and bindings; this crate needs none.
+Its scores are compared with Python's in the same way as those of the C.
 """
 
 from collections.abc import Iterable, Mapping
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from ..classifier import Library
     from ..layout import Field, JointLayout, Layout
-    from ..probes import Answers, Frames, Lost
+    from ..probes import Frames, Lost, Predictions
 
 _MOST_COMPARED = 8
 _HIGHEST = 65535
@@ -99,7 +99,7 @@ class Rust(Target):
         return {path: render(f"rust/{of}.j2", **values) for of, path in made.items()}
 
     def missing(self) -> str | None:
-        """Return what is missing of cargo and rustc."""
+        """Return which of cargo and rustc is missing, and how to install it; None if neither is."""
         return lacking(RUST)
 
     def run(
@@ -111,8 +111,8 @@ class Rust(Target):
         *,
         incremental: bool = False,
         lost: "Lost | None" = None,
-    ) -> "Answers":
-        """Return the answers to frames (n, F) of the crate on this machine, as the base says; overflows are errors."""
+    ) -> "Predictions":
+        """Return the crate's predictions for frames (n, F) on this machine, as in the base class; overflows fail."""
         from thenar.firmware_templates.rendering import render
 
         from ..probes import answers_in, check_frames, record_values, with_lost
@@ -127,11 +127,11 @@ class Rust(Target):
         }
         with workshop(given) as folder:
             call([find(RUST), "run", "--quiet", "--offline", "--example", "record"], folder)
-            return answers_in((folder / "answers").read_bytes(), frames, layout)
+            return answers_in((folder / "predictions").read_bytes(), frames, layout)
 
 
 def _sensor_values(library: "Library") -> dict[str, object]:
-    """Return what the templates ask for of the sensors."""
+    """Return the templates' values for the sensors."""
     from thenar.runtime.code_line import FARTHEST, FRACTION
 
     sensors, joints = library.sensors, len(library.names.joints)
@@ -152,7 +152,7 @@ def _sensor_values(library: "Library") -> dict[str, object]:
 
 
 def _variants(kind: str, words: Iterable[str]) -> list[str]:
-    """Return names of variants for identifiers in capitals: INDEX_TIP is IndexTip."""
+    """Return variant names for identifiers in capitals: INDEX_TIP becomes IndexTip."""
     plain = ["".join(part.capitalize() for part in word.split("_")) for word in words]
     found: list[str] = []
     for number, word in enumerate(plain):
@@ -162,7 +162,7 @@ def _variants(kind: str, words: Iterable[str]) -> list[str]:
 
 
 def _string(text: str) -> str:
-    """Return the literal of Rust that is `text`."""
+    """Return the Rust literal of `text`."""
     return '"' + "".join(c if " " <= c <= "~" and c not in '"\\' else f"\\u{{{ord(c):x}}}" for c in text) + '"'
 
 
@@ -171,7 +171,7 @@ def _array(values: "Iterable[object]") -> str:
 
 
 def _words(values: "NDArray[np.integer]") -> str:
-    """Return numbers (K,) as words of two: the second is 65536 times itself more."""
+    """Return numbers (K,) as words of two: low + 65536 high."""
     low, high = values[::2].astype(int), values[1::2].astype(int)
     words = low.copy()
     words[: len(high)] += high << 16
@@ -179,7 +179,7 @@ def _words(values: "NDArray[np.integer]") -> str:
 
 
 def _finds(layout: "Layout") -> list[str]:
-    """Return the expression of the number of each look-up's row."""
+    """Return the expression for the number of each lookup's row."""
     found, table = [], 0
     for lookup in layout.lookups:
         terms = [str(lookup.first_row)] if lookup.first_row else []
@@ -222,7 +222,7 @@ MEMBER = Rust(
     name="rust",
     part="rust",
     title="Rust",
-    help="a crate in Rust, no_std and without dependencies",
+    help="a Rust crate, no_std and without dependencies",
     next_step="`cargo test --manifest-path {folder}/Cargo.toml` compiles and tests it",
     rank=42,
     own_layout=False,

@@ -1,5 +1,5 @@
-"""Parts whose firmware of a board is a sketch for Arduino's cores: the ESP32 and the RP2040. As libraries they are
-packages like others.
+"""Parts whose board firmware is a sketch for Arduino's cores: the ESP32 and the RP2040. As libraries they are packages
+like others.
 """
 
 from collections.abc import Mapping
@@ -11,12 +11,12 @@ from .wired import Wired
 
 @dataclass(frozen=True, kw_only=True)
 class SketchPart(Package, Wired):
-    """A part that one of Arduino's cores is for.
+    """A part supported by one of Arduino's cores.
 
     converter the pins of the converter's channels, and `reference`, the voltage of its highest code
-    conversion_us  what is counted for a conversion
-    arduino_core  Arduino's core, and `fqbn`, what arduino-cli calls the usual board with it
-    platform  PlatformIO's platform, and `pio_board` its usual board; `pio_more` is what its platformio.ini says besides
+    conversion_us  the assumed time of a conversion
+    arduino_core  Arduino's core, and `fqbn`, arduino-cli's name of the usual board with it
+    platform  PlatformIO's platform, and `pio_board` its usual board; `pio_more` further lines of its platformio.ini
     """
 
     converter: Mapping[str, int]
@@ -33,9 +33,9 @@ def _gpio(*numbers: int) -> tuple[str, ...]:
     return tuple(f"GPIO{number}" for number in numbers)
 
 
-# ESP32 series datasheet: GPIO6 to GPIO11 carry the flash, 16 and 17 of a WROVER the PSRAM, 34 to 39 have no pull-ups,
-# 0, 2, 12 and 15 say how the chip boots. ADC2 does not convert while Wi-Fi is on. Pins of bus and UARTs are the core's
-# own but those of UART 1, which lie on the flash: there is a matrix, and any will do.
+# ESP32 series datasheet: GPIO6 to GPIO11 carry the flash, 16 and 17 of a WROVER the PSRAM, 34 to 39 have no pull-ups;
+# 0, 2, 12 and 15 select the boot mode. ADC2 does not convert while Wi-Fi is on. Pins of bus and UARTs are the core's
+# defaults except those of UART 1, which share the flash's: any others will do, since the part has a pin matrix.
 _ESP32_ADC = {"ADC1_CH0": 36, "ADC1_CH3": 39, "ADC1_CH4": 32, "ADC1_CH5": 33, "ADC1_CH6": 34, "ADC1_CH7": 35}
 _ESP32 = family(
     SketchPart,
@@ -60,13 +60,13 @@ _ESP32 = family(
     platform="espressif32",
     pio_board="esp32dev",
     tied={
-        **dict.fromkeys(_gpio(0, 2, 12, 15), "it says how the chip boots"),
-        **dict.fromkeys(_gpio(6, 7, 8, 9, 10, 11), "the flash is on it"),
+        **dict.fromkeys(_gpio(0, 2, 12, 15), "it selects the boot mode"),
+        **dict.fromkeys(_gpio(6, 7, 8, 9, 10, 11), "the flash uses it"),
         **dict.fromkeys(_gpio(34, 35, 36, 37, 38, 39), "it has no pull-up"),
     },
 )
 
-# RP2040 datasheet, Pico W datasheet: 23, 24, 25 and 29 are the module's own.
+# RP2040 datasheet, Pico W datasheet: the module uses 23, 24, 25 and 29 itself.
 _RP2040_ADC = {"ADC0": 26, "ADC1": 27, "ADC2": 28}
 _RP2040 = family(
     SketchPart,
@@ -90,7 +90,7 @@ _RP2040 = family(
     platform="https://github.com/maxgerhardt/platform-raspberrypi.git",
     pio_board="rpipicow",
     pio_more=("board_build.core = earlephilhower",),
-    tied=dict.fromkeys(_gpio(23, 24, 25, 29), "a Pico has it for itself"),
+    tied=dict.fromkeys(_gpio(23, 24, 25, 29), "a Pico uses it itself"),
 )
 
 MEMBER = (_ESP32, _RP2040)

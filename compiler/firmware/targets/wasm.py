@@ -1,4 +1,4 @@
-"""WebAssembly: the C in a .wasm, with a module of JavaScript around it that needs nothing of any runtime but that."""
+"""WebAssembly: the C in a .wasm, with a JavaScript module around it that needs only WebAssembly from its runtime."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -11,17 +11,17 @@ from .base import Target
 if TYPE_CHECKING:
     from ..classifier import Library
     from ..layout import Layout
-    from ..probes import Answers, Frames, Lost
+    from ..probes import Frames, Lost, Predictions
 
 _MAKE = (("make",), "make")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wasm(Target):
-    """Browsers, node, and whatever else runs WebAssembly."""
+    """Browsers, node, and any other WebAssembly runtime."""
 
     def files(self, library: "Library") -> dict[str, str]:
-        """Return path -> text: the library, the module in JavaScript with its types, and what makes the .wasm."""
+        """Return path -> text: the library, the JavaScript module with its types, and the sources of the .wasm."""
         from thenar.firmware_templates.rendering import render
         from thenar.runtime.code_line import FARTHEST
         from thenar.runtime.published import NONE
@@ -31,7 +31,7 @@ class Wasm(Target):
         name, names, files = library.name, library.names, library.whole
         inputs = inputs_in_words(len(names.switches), len(names.joints))
         sentence = f"Recognises {len(names.grasps)} grasp types from {inputs} of a glove."
-        answers = answers_of(names)
+        outputs = answers_of(names)
         values = {
             "name": name,
             "opening": f"thenar_{name}: {sentence} From the tables {names.tables_sha256[:16]}.",
@@ -40,11 +40,11 @@ class Wasm(Target):
             "switches": len(names.switches),
             "joints": len(names.joints),
             "rejection": names.rejection is not None,
-            "none": len(answers) - 1 if answers[-1] == NONE else None,
+            "none": len(outputs) - 1 if outputs[-1] == NONE else None,
             "segments": names.segments is not None,
             "highest_code": (1 << library.layout.code_bits) - 1,
             "grasps": _array(names.grasps),
-            "names": _array(answers),
+            "names": _array(outputs),
             "switch_names": _array(switch.name for switch in names.switches),
             "joint_names": _array(joint.name for joint in names.joints),
             "sensors": len(library.sensors.every),
@@ -63,11 +63,11 @@ class Wasm(Target):
         }
 
     def sources(self, library: "Library") -> dict[str, str]:
-        """Return all files: it is the module in JavaScript that is run."""
+        """Return all files, since `run` runs the JavaScript module."""
         return self.files(library)
 
     def missing(self) -> str | None:
-        """Return what is missing of compiler, linker and node."""
+        """Return which of compiler, linker and node is missing, and how to install it; None if none is."""
         return lacking(WASM_COMPILER, WASM_LINKER, WASM_RUNTIME, _MAKE)
 
     def run(
@@ -79,8 +79,8 @@ class Wasm(Target):
         *,
         incremental: bool = False,
         lost: "Lost | None" = None,
-    ) -> "Answers":
-        """Return the answers to frames (n, F) of the module in JavaScript, as the base says, in node."""
+    ) -> "Predictions":
+        """Return the JavaScript module's predictions for frames (n, F), as in the base class, in node."""
         from thenar.firmware_templates.rendering import render
 
         from ..probes import answers_in, check_frames, record_values, with_lost
@@ -93,11 +93,11 @@ class Wasm(Target):
         with workshop({**files, "main.mjs": main, "frames": with_lost(frames, lost).tobytes()}) as folder:
             call([make, "CFLAGS=-O2 -Werror"], folder)
             call([node, "main.mjs"], folder)
-            return answers_in((folder / "answers").read_bytes(), frames, layout)
+            return answers_in((folder / "predictions").read_bytes(), frames, layout)
 
 
 def _array(texts: Iterable[str]) -> str:
-    """Return an array of strings in JavaScript's words, which cannot be changed."""
+    """Return a frozen JavaScript array of strings."""
     return f"Object.freeze({json.dumps(list(texts), indent=4)})"
 
 
@@ -105,7 +105,7 @@ MEMBER = Wasm(
     name="wasm",
     part="wasm",
     title="WebAssembly",
-    help="a module for browsers and node: WebAssembly, a wrapper in JavaScript and its types",
+    help="a module for browsers and node: WebAssembly, a JavaScript wrapper and its types",
     next_step="`make -C {folder}` compiles it",
     rank=41,
     own_layout=False,

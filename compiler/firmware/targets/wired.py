@@ -1,4 +1,4 @@
-"""What a target must say of its part for firmware of a board to be written for it: pins, UARTs, bus, converter."""
+"""The properties of a part that board firmware needs: pins, UARTs, bus, converter."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,15 +9,15 @@ from .base import Mode, Target
 
 @dataclass(frozen=True, kw_only=True)
 class Wired(Target):
-    """A part on whose pins firmware of a board is written.
+    """A part that board firmware can be written for.
 
-    pins      usable as inputs with a pull-up and as outputs, as the data sheet calls them
+    pins      usable as inputs with a pull-up and as outputs, by their data sheet names
     uarts     the (RXD, TXD) pins of every UART; the first is the host's, () where the host has another line
     twi       the SDA and SCL pins
     analog    the channels of its converter by name, with the pin each shares; "" for a channel without a digital pin
-    tied      pins that are not in `pins` but that one may think of, and why not
+    tied      pins that are not in `pins` although they might seem usable, and the reason
     code_bits of a code of the converter
-    wireless  whether its frames can go by Wi-Fi
+    wireless  whether it can send its frames by Wi-Fi
     """
 
     modes: ClassVar[tuple[Mode, ...]] = ("classify", "scan", "glove")

@@ -5,7 +5,7 @@
   const rows = radios.map((radio) => radio.closest("tr"));
   const markers = [...document.querySelectorAll(".point")];
 
-  // A point's row and its markers, one a chart, look alike.
+  // Highlight a point's row and its markers, one in each chart.
   function mark(number, name, wanted) {
     for (const element of [...rows, ...markers]) {
       if (element.dataset.point === number) element.classList.toggle(name, wanted);

@@ -1,4 +1,4 @@
-// The CyberGlove's serial protocol: drivers/cyberglove_protocol.py in JavaScript, as far as a stream needs it.
+// The CyberGlove's serial protocol: the part of drivers/cyberglove_protocol.py that streaming needs, in JavaScript.
 
 const STOP = 3, STREAM = 0x53, POLL = 0x47;
 const fingers = (digit) => ["mpj", "pij", "dij"].map((joint) => `${digit}_${joint}`);
@@ -14,7 +14,7 @@ export function maskedSensors(mask) {
   return SLOTS.filter((name, slot) => name && (mask[slot >> 3] >> (slot & 7)) & 1);
 }
 
-/** Bytes in, records of so many sensors out; what is none is counted, and skipped to the next NUL. */
+/** Converts bytes to records of `count` sensors; invalid ones are counted, and skipped to the next NUL. */
 export class RecordDecoder {
   constructor(sensors) {
     this.sensors = sensors;
@@ -50,8 +50,8 @@ export class RecordDecoder {
 const latin = (text) => Uint8Array.from(text, (letter) => letter.charCodeAt(0));
 
 /**
- * Ask a glove what it is, and let it stream. `received(bytes)` takes what comes and returns records; `ask()`, to be called
- * every 0.3 s, begins, and asks again what was not answered. names: its sensors in wire order, once it has told.
+ * Query a glove and start its stream. `received(bytes)` takes the bytes received and returns records; `ask()`, called
+ * every 0.3 s, starts, and repeats unanswered queries. names: its sensors in wire order, once known.
  */
 export class CyberGlove {
   constructor(send, names = null) {
@@ -60,14 +60,14 @@ export class CyberGlove {
     this.names = null;
     this.steps = ["?N", "?M", "D\0", "U\0", "T\0\0\0\0"];
     this.heard = [];
-    this.told = {};
+    this.replies = {};
     this.silent = 0;
     this.decoder = null;
   }
 
   ask() {
     if (this.decoder) {
-      // Bytes, but no record, or none at all: begin anew.
+      // No record for a while: start again.
       if (this.silent++ < 3) return;
       this.decoder = null;
       this.steps = ["?N", "?M", "D\0", "U\0", "T\0\0\0\0"];
@@ -83,13 +83,13 @@ export class CyberGlove {
   }
 
   // Letters of the echo, values, and a NUL.
-  #answer() {
+  #reply() {
     const step = this.steps[0], echo = latin(step[0] === "?" ? step : step[0]), size = step === "?N" ? 1 : step === "?M" ? 3 : 0;
     for (let at = 0; at < this.heard.length; at++) {
       if (at && this.heard[at - 1]) continue;
       const end = at + echo.length + size;
       if (echo.every((byte, place) => this.heard[at + place] === byte) && this.heard[end] === 0) return this.heard.slice(at + echo.length, end);
-      // What a box does not know it answers with an error: then it has no such thing.
+      // A box replies with an error to a command that it does not support.
       const text = String.fromCharCode(...this.heard.slice(at));
       if (/^(..?)?e[?nyg]\r?\n?\0/.test(text) && !(step === "?N")) return [];
     }
@@ -103,9 +103,9 @@ export class CyberGlove {
       return found;
     }
     this.heard.push(...chunk);
-    const answer = this.steps.length ? this.#answer() : null;
-    if (answer) {
-      this.told[this.steps.shift()] = answer;
+    const reply = this.steps.length ? this.#reply() : null;
+    if (reply) {
+      this.replies[this.steps.shift()] = reply;
       this.heard = [];
       this.#next();
     } else if (this.heard.length > 4096) this.heard = [];
@@ -113,10 +113,10 @@ export class CyberGlove {
   }
 
   #stream() {
-    const [count] = this.told["?N"], masked = maskedSensors(this.told["?M"] ?? []);
+    const [count] = this.replies["?N"], masked = maskedSensors(this.replies["?M"] ?? []);
     if (this.own && this.own.length === count) this.names = this.own;
     else this.names = masked.length === count ? masked : MASKS[count] ? maskedSensors(MASKS[count]) : null;
-    if (!this.names) throw new Error(`the CyberGlove sends ${count} sensors, and does not say which: switch its box off and on`);
+    if (!this.names) throw new Error(`the CyberGlove sends ${count} sensors, but not which: switch its box off and on`);
     this.decoder = new RecordDecoder(count);
     this.silent = 0;
     this.send(Uint8Array.of(STREAM));

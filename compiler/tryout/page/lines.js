@@ -1,4 +1,4 @@
-// Lines of text that hold rows of numbers: drivers/lines.py in JavaScript; and tables of recorded rows in CSV.
+// Text lines with rows of numbers: drivers/lines.py in JavaScript; and tables of recorded rows in CSV.
 
 const LONGEST = 16384;
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?$/;
@@ -19,7 +19,7 @@ function rowOf(names, fields) {
   return names && !sound(names) ? null : { names, values: fields.map(number) };
 }
 
-/** Return what a line holds: {names, values}, {header}, or null for a misfit. A value that is no number is null. */
+/** Parse a line: {names, values}, {header}, or null for an invalid line. A value that is not a number is null. */
 export function parsedLine(line) {
   const text = line.replace(/^[\ufeff \r\t\0]+|[\ufeff \r\t\0]+$/g, "");
   if (text.startsWith("{") || text.startsWith("[")) {
@@ -45,7 +45,7 @@ export function parsedLine(line) {
   return rowOf(null, fields);
 }
 
-/** Makes rows of chunks of bytes; `misfits` counts lines that hold none, `odd` is the last of them. */
+/** Converts chunks of bytes to rows; `misfits` counts lines without a row, `odd` is the last of them. */
 export class LineParser {
   constructor() {
     this.misfits = 0;

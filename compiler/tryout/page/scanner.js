@@ -49,13 +49,13 @@ function unstuffed(piece) {
   return out;
 }
 
-/** Return a frame as it goes on the wire, its end included. */
+/** Return a frame as sent on the wire, its end included. */
 export function encodeFrame(kind, sequence, payload) {
   const body = [kind, sequence & 0xff, ...payload], sum = crc(body);
   return Uint8Array.from([...stuffed([...body, sum >> 8, sum & 0xff]), 0]);
 }
 
-/** Bytes in, frames {kind, sequence, payload} out, null for what is none; nothing that comes in throws. */
+/** Converts bytes to frames {kind, sequence, payload}, null for invalid ones; no input throws. */
 export class FrameDecoder {
   constructor() {
     this.rest = [];
@@ -90,7 +90,7 @@ export class FrameDecoder {
 const little = (value, size) => Array.from({ length: size }, (_, at) => Math.floor(value / 256 ** at) & 0xff);
 const flagsOf = (bytes, count) => Array.from({ length: count }, (_, at) => Boolean((bytes[at >> 3] >> (at & 7)) & 1));
 
-// Keys of a matrix without diodes that read closed, and may be ghosts of others.
+// Keys of a matrix without diodes that read closed but may be ghosts of others.
 function doubtful(closed, rows, columns) {
   const found = closed.map(() => false);
   for (let one = 0; one < rows; one++) {
@@ -107,9 +107,9 @@ function doubtful(closed, rows, columns) {
 }
 
 /**
- * A scanner board: `received(bytes)` takes what comes and returns the newest reading or null: {closed, known}, by key,
- * and {codes}, by channel. `send` is called with bytes for the board. channels: those that are wanted. Throws Error where a
- * board speaks another protocol.
+ * A scanner board: `received(bytes)` takes the bytes received and returns the newest reading or null: {closed, known}, by
+ * key, and {codes}, by channel. `send` is called with bytes for the board. channels: the requested ones. Throws Error if
+ * the board uses another protocol.
  */
 export class ScannerBoard {
   constructor(send, channels = []) {
@@ -133,7 +133,7 @@ export class ScannerBoard {
     return this.hasBitmap && this.hasLost;
   }
 
-  /** Greet the board, or ask again what is not known yet; to be called every 0.3 s. */
+  /** Greet the board, or repeat the requests without a reply; call it every 0.3 s. */
   ask() {
     if (!this.hello) {
       this.raw(Uint8Array.of(0));
@@ -163,7 +163,7 @@ export class ScannerBoard {
   #take(frame) {
     if (!frame) {
       const was = this.trusted;
-      this.hasBitmap = false; // it may have been an EVENT
+      this.hasBitmap = false; // the lost frame may have been an EVENT
       return was;
     }
     const { kind, sequence, payload } = frame;
@@ -175,13 +175,13 @@ export class ScannerBoard {
     if (gap) this.hasBitmap = this.hasLost = false;
     if (!this.#read(kind, payload, follows, afterLost)) {
       this.misfits++;
-      this.unread = true; // it may have been anything
+      this.unread = true; // the lost frame may have been any message
       this.hasBitmap = this.hasLost = false;
     }
     return true;
   }
 
-  // Return whether the board can have said that.
+  // Return whether the board may have sent this.
   #read(kind, payload, follows, afterLost) {
     const { keys } = this.hello, size = (keys + 7) >> 3, view = new DataView(payload.buffer, payload.byteOffset);
     const bitmap = (from) => {
@@ -229,7 +229,7 @@ export class ScannerBoard {
   }
 
   #greeted(sequence, payload) {
-    if (payload[0] !== PROTOCOL) throw new Error(`the board speaks protocol ${payload[0]}, this is ${PROTOCOL}: update the older of the two`);
+    if (payload[0] !== PROTOCOL) throw new Error(`the board uses protocol ${payload[0]}, this page ${PROTOCOL}: update the older of the two`);
     if (payload.length !== 35) throw new Error(`a HELLO of ${payload.length} bytes, not 35`);
     const view = new DataView(payload.buffer, payload.byteOffset), [rows, columns] = [view.getUint16(11, true), view.getUint16(13, true)];
     const first = !this.hello, booted = !first && sequence === 0 && view.getUint16(2, true) === 0;
@@ -237,7 +237,7 @@ export class ScannerBoard {
     if (first || booted) {
       this.closed = this.lost = Array.from({ length: rows * columns }, () => false);
       this.#restarted();
-      // A heartbeat often, and an event for every change.
+      // Request frequent heartbeats, and an event for every change.
       this.send(ASK.RATE, [...little(view.getUint32(15, true), 4), ...little(0, 4), ...little(BEAT_US, 4)]);
       this.send(ASK.STATE, []);
       if (this.channels.length && payload[1] & ANALOG_FLAG) this.#askChannels();

@@ -1,8 +1,8 @@
-// A glove on Web Serial, as frames of the build: which bits are closed, which codes the joints have, what is lost.
+// A glove on Web Serial, as frames of the build: closed bits, codes of the joints, and lost inputs.
 
 const AGAIN_MS = 300;
 
-/** The last that was heard of every input: {bits, codes, lostSwitches, lostJoints}; at first, all are lost. */
+/** The last state of every input: {bits, codes, lostSwitches, lostJoints}; at first, all are lost. */
 class Inputs {
   constructor(switches, joints) {
     this.bits = switches.map(() => false);
@@ -22,7 +22,7 @@ class Inputs {
   }
 }
 
-/* Each reader: received(bytes) returns whether something is new in `inputs`; ask(); said: a sentence; stop(). */
+/* Each reader: received(bytes) returns whether `inputs` changed; ask(); said: a sentence; stop(). */
 
 class BoardReader {
   constructor(data, inputs, send) {
@@ -47,7 +47,7 @@ class BoardReader {
     });
     for (const [channel, limit, bit] of this.levels) {
       const code = reading.codes?.get(channel) ?? null;
-      // A negative limit closes at counts below its complement: wired the other way round.
+      // A negative limit closes at counts below its complement: the taxel is wired inversely.
       this.inputs.bit(bit, code === null ? null : limit >= 0 ? code > limit : ~code > limit);
     }
     return true;
@@ -93,7 +93,7 @@ class GloveReader {
 
   get said() {
     const { decoder, names } = this.glove;
-    if (!decoder) return "asking the CyberGlove what it is";
+    if (!decoder) return "querying the CyberGlove";
     return `CyberGlove of ${names.length} sensors${this.unplugged ? ", unplugged" : ""}; ${decoder.records} records, ${decoder.bad} damaged`;
   }
 }
@@ -152,8 +152,8 @@ class LineReader {
 
   get said() {
     const { misfits, odd } = this.parser;
-    if (!this.rows && this.strange) return "rows come, but their columns are none of the build's: name them, or send them in its order";
-    return `${this.rows} rows; lines that hold none: ${misfits}${misfits ? `, such as "${odd}"` : ""}`;
+    if (!this.rows && this.strange) return "rows arrive, but without columns of the build: name the columns, or send them in the build's order";
+    return `${this.rows} rows; lines without a row: ${misfits}${misfits ? `, such as "${odd}"` : ""}`;
   }
 }
 
@@ -162,14 +162,14 @@ function onGrid([low, high], first, last, value) {
   return Math.min(Math.max(first + rounded(Math.min(Math.max(far, -1e6), 1e6)), first), last);
 }
 
-/** As columns of the recordings are: a switch above 0.5 is closed; numbers of joints and taxels are in their units. */
+/** In the units of the recordings' columns: a switch above 0.5 is closed; joints and taxels have their units. */
 export const RECORDED = {
   closed: (_name, value) => value > 0.5,
   joint: null,
   taxel: null,
 };
 
-/** Return {some, inputs} of a row: `value(name)` is a number or null; `how` says what the numbers mean. */
+/** Return {some, inputs} of a row: `value(name)` is a number or null; `how` converts the numbers. */
 export function readRow(data, value, how) {
   const inputs = new Inputs(data.switches, data.joints);
   let some = false;
@@ -192,8 +192,8 @@ export function readRow(data, value, how) {
 const READERS = { scanner: BoardReader, cyberglove: GloveReader, lines: LineReader };
 
 /**
- * Open a glove of a kind ("scanner", "cyberglove", "lines") on a port of Web Serial. shown(inputs, said) is called when
- * something came; ended(reason) once, at its end. Returns what closes it.
+ * Open a glove of a kind ("scanner", "cyberglove", "lines") on a port of Web Serial. shown(inputs, said) is called after
+ * changes; ended(reason) once, at its end. Returns the function that closes it.
  */
 export async function openGlove(kind, port, baudRate, data, calibration, shown, ended) {
   const inputs = new Inputs(data.switches, data.joints);

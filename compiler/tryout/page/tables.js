@@ -1,13 +1,13 @@
-// The integer tables of a build, from the bytes of tables.bin, and what they say of a frame: thenar.runtime in
-// JavaScript. No sum leaves 16 bits, which the build has proved; so numbers are exact here.
+// The integer tables of a build, from the bytes of tables.bin, and the prediction for a frame: thenar.runtime in
+// JavaScript. The build has proved that no sum exceeds 16 bits, so JavaScript's numbers are exact.
 
 const HEADER = 56;
 
-/** Return the score tables in the bytes of tables.bin; runtime/tables.py says what they mean. */
+/** Return the score tables in the bytes of tables.bin; runtime/tables.py describes them. */
 export function parseTables(bytes) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const format = view.getUint16(8, true);
-  if (format > 3) throw new Error(`tables.bin has format ${format}, this page reads up to 3`);
+  if (format > 3) throw new Error(`tables.bin has format ${format}, but this page reads formats up to 3`);
   let at = HEADER;
   const words = (count, signed) =>
     Array.from({ length: count }, () => {
@@ -39,13 +39,13 @@ export function parseTables(bytes) {
     for (const pair of pairs) pair.thresholds = pair.counts.map((count) => words(count, false));
     for (const pair of pairs) pair.rows = Array.from({ length: pair.counts[0] + 1 }, () => rows(pair.counts[1] + 1));
   }
-  if (at !== view.byteLength) throw new Error(`tables.bin has ${view.byteLength} bytes, its counts call for ${at}`);
+  if (at !== view.byteLength) throw new Error(`tables.bin has ${view.byteLength} bytes, but its counts require ${at}`);
   return { K, s, j, scale, bias, switchRows, switchMeans, jointMeans, thresholds, jointRows, slopes, pairs };
 }
 
 const gained = ({ gain }, above) => (gain > 0 ? above << gain : above >> -gain);
 
-// How many of rising thresholds are below a code.
+// The number of rising thresholds below a code.
 function bin(thresholds, code) {
   let low = 0, high = thresholds.length;
   while (low < high) {
@@ -56,13 +56,13 @@ function bin(thresholds, code) {
   return low;
 }
 
-/** Recognises frames: arrays of truth for switches, and of codes for joints; `lost` ones count by their means. */
+/** Recognises frames: arrays of booleans for switches, and of codes for joints; `lost` ones are replaced by their means. */
 export class Recogniser {
-  // refusal: least scores, closed, ranges, outside, and leads: by how much none leads a frame that is not refused, and
-  // one that is; null: nothing is refused.
-  constructor(tables, answers, refusal) {
+  // refusal: least scores, closed, ranges, outside, and leads: the lead of none over an accepted frame, and over a rejected
+  // one; null: no frame is rejected.
+  constructor(tables, classes, refusal) {
     this.tables = tables;
-    this.answers = answers;
+    this.classes = classes;
     this.refusal = refusal;
   }
 
@@ -105,8 +105,8 @@ export class Recogniser {
   }
 
   /**
-   * Return what is recognised: grasp; scores of all answers, in steps; margin, the lead over the second best;
-   * probabilities of all answers; and whether something was lost.
+   * Return the prediction: grasp; scores of all classes, in steps; margin, the lead over the second best;
+   * probabilities of all classes; and whether an input was lost.
    */
   recognise(bits, codes, lostSwitches = [], lostJoints = []) {
     const scores = this.scores(bits, codes, lostSwitches, lostJoints);
@@ -119,7 +119,7 @@ export class Recogniser {
     const all = odds.reduce((a, b) => a + b, 0), lost = (flags) => Array.from(flags).some(Boolean);
     return {
       number: winner,
-      grasp: this.answers[winner],
+      grasp: this.classes[winner],
       scores,
       margin: best - second,
       probabilities: odds.map((each) => each / all),
@@ -128,13 +128,13 @@ export class Recogniser {
   }
 }
 
-/** Return a number rounded as Python rounds it: halves to the even one. */
+/** Return a number rounded as in Python: half to even. */
 export function rounded(value) {
   const down = Math.floor(value), part = value - down;
   return part < 0.5 || (part === 0.5 && down % 2 === 0) ? down : down + 1;
 }
 
-/** Return the code of a value of a joint or a taxel, held to 0..65535, by the two points that it was coded by. */
+/** Return the code of a value of a joint or a taxel, clamped to 0..65535, by the two points of its coding. */
 export function codeOf(joint, value) {
   const step = (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a);
   return rounded(Math.min(Math.max(joint.code_a + (value - joint.value_a) / step, 0), 65535));
@@ -145,7 +145,7 @@ export function valueOf(joint, code) {
   return joint.value_a + (code - joint.code_a) * ((joint.value_b - joint.value_a) / (joint.code_b - joint.code_a));
 }
 
-// The line of integers through two readings and their values, as runtime/code_line.py has it.
+// The line of integers through two readings and their values, as in runtime/code_line.py.
 function codeLine(joint, ...ends) {
   const step = (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a);
   const points = ends.map(([reading, value]) => [reading, rounded((joint.code_a + (value - joint.value_a) / step) * 2 ** 24)]);
@@ -188,6 +188,6 @@ export function parseCalibration(text) {
     const [raw_a, value_a, raw_b, value_b] = numbers;
     found.set(JSON.parse(name[1]), { raw_a, value_a, raw_b, value_b });
   }
-  if (!found.size) throw new Error("this is no calibration: it holds no [[sensor]] with name, raw_a, value_a, raw_b, value_b");
+  if (!found.size) throw new Error("this is not a calibration: it has no [[sensor]] with name, raw_a, value_a, raw_b, value_b");
   return found;
 }

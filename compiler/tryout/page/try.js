@@ -1,9 +1,9 @@
-// The page: one state of all inputs, from the hand, from a recorded row or from a glove; and what is recognised of it.
+// The page: one state of all inputs, from the hand, from a recorded row or from a glove; and its prediction.
 
 const data = JSON.parse(document.getElementById("try-data").textContent);
 const at = (id) => document.getElementById(id);
 const bytes = Uint8Array.from(atob(data.tables), (letter) => letter.charCodeAt(0));
-const recogniser = new Recogniser(parseTables(bytes), data.answers, data.refusal);
+const recogniser = new Recogniser(parseTables(bytes), data.classes, data.refusal);
 const { switches, joints } = data;
 
 const state = {
@@ -67,12 +67,12 @@ at("open-all").addEventListener("click", () => {
   byHand();
 });
 
-/* ---- What is recognised ---- */
+/* ---- Prediction ---- */
 
-const bars = data.answers.map((answer) => {
+const bars = data.classes.map((name) => {
   const bar = made("div", { className: "bar" }), behind = made("td", { className: "number" });
   const share = made("td", { className: "number" }), mark = made("span", { className: "mark" });
-  const row = made("tr", {}, made("th", { scope: "row" }, mark, answer), made("td", { className: "track" }, bar), behind, share);
+  const row = made("tr", {}, made("th", { scope: "row" }, mark, name), made("td", { className: "track" }, bar), behind, share);
   at("bars").append(row);
   return { row, bar, behind, share, mark };
 });
@@ -104,7 +104,7 @@ function show() {
   at("margin").textContent =
     `${percent(found.probabilities[found.number])}, ` +
     (found.margin < 1e6 ? `ahead by ${steps(found.margin)}` : "far ahead") +
-    (lost ? `; degraded: ${lost} input${lost === 1 ? " is" : "s are"} lost, means stand in` : "");
+    (lost ? `; degraded: ${lost} input${lost === 1 ? " is" : "s are"} lost, replaced by means` : "");
   return found;
 }
 
@@ -117,7 +117,7 @@ function byHand() {
 /* ---- Recorded rows ---- */
 
 let rows = data.rows.map(([truth, mask, codes]) => ({
-  truth: data.answers[truth] ?? null,
+  truth: data.classes[truth] ?? null,
   bits: switches.map((_, bit) => ((parseInt(mask[bit >> 2], 16) >> (bit & 3)) & 1) === 1),
   codes,
   lostSwitches: switches.map(() => false),
@@ -128,7 +128,7 @@ const slider = at("row");
 
 function counted(title) {
   const known = rows.filter((row) => row.truth !== null);
-  const right = known.filter((row) => answerOf(row) === row.truth).length;
+  const right = known.filter((row) => predictionOf(row) === row.truth).length;
   at("rows-said").textContent = rows.length
     ? `${title}: ${rows.length} rows${known.length ? `, of ${known.length} with a known grasp ${right} are recognised` : ""}.`
     : `${title}: no rows.`;
@@ -137,7 +137,7 @@ function counted(title) {
   for (const one of [slider, at("play"), at("before"), at("after")]) one.disabled = !rows.length;
 }
 
-const answerOf = (row) => recogniser.recognise(row.bits, row.codes, row.lostSwitches, row.lostJoints).grasp;
+const predictionOf = (row) => recogniser.recognise(row.bits, row.codes, row.lostSwitches, row.lostJoints).grasp;
 
 function showRow() {
   const row = rows[slider.valueAsNumber];
@@ -177,8 +177,8 @@ const LARGEST = 64 << 20, MOST = 200_000, LABELS = ["grasp", "grasp_type", "labe
 
 function readTable(text, name) {
   const [head, ...body] = parseCsv(text);
-  if (!head || !body.length) throw new Error(`${name} holds no rows: its first line names the columns`);
-  if (body.length > MOST) throw new Error(`${name} has ${body.length} rows: there may be ${MOST}`);
+  if (!head || !body.length) throw new Error(`${name} has no rows: give the columns in the first line and rows below`);
+  if (body.length > MOST) throw new Error(`${name} has ${body.length} rows: the limit is ${MOST}`);
   const places = new Map(head.map((column, place) => [column.trim().replace(/^'(?=[=+\-@])/, ""), place]));
   const label = LABELS.find((each) => places.has(each)), missing = [];
   for (const input of [...switches.map((each) => each.taxel ?? each), ...joints]) {
@@ -192,7 +192,7 @@ function readTable(text, name) {
     };
     return { truth: label ? (cells[places.get(label)] ?? null) : null, ...readRow(data, value, RECORDED).inputs };
   });
-  const note = missing.length ? `; it lacks ${missing.length} column${missing.length === 1 ? "" : "s"}, such as ${missing[0]}, which count as lost` : "";
+  const note = missing.length ? `; it lacks ${missing.length} column${missing.length === 1 ? "" : "s"}, such as ${missing[0]}, which are treated as lost` : "";
   return [found, note];
 }
 
@@ -200,7 +200,7 @@ at("file").addEventListener("change", async ({ target: { files: [file] } }) => {
   if (!file) return;
   pause();
   try {
-    if (file.size > LARGEST) throw new Error(`${file.name} has ${file.size} bytes: there may be ${LARGEST}`);
+    if (file.size > LARGEST) throw new Error(`${file.name} has ${file.size} bytes: the limit is ${LARGEST}`);
     const [found, note] = readTable(await file.text(), file.name);
     rows = found;
     counted(`${file.name}${note}`);
@@ -268,7 +268,7 @@ if (!navigator.serial) {
   tell("This browser has no Web Serial: Chrome, Edge and Opera on a computer have it.");
 }
 
-// For whoever would ask from the browser's console.
+// For use from the browser's console.
 globalThis.thenar = Object.freeze({
   recognise: (bits, codes, lostSwitches = [], lostJoints = []) => recogniser.recognise(bits, codes, lostSwitches, lostJoints),
 });

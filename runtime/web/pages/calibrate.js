@@ -1,4 +1,4 @@
-// The page of a guided calibration: the pose to hold, what each sensor says meanwhile, and the keys.
+// The page of a guided calibration: the pose to hold, the live value of each sensor, and the keys.
 import { drawHand } from "./hand.js";
 import { keys, leaving } from "./keys.js";
 import { connect, say } from "./wire.js";
@@ -22,20 +22,20 @@ const send = connect({
     else link("not connected", "bad");
     offer({});
   },
-  sensors: (told) => {
+  sensors: (received) => {
     end = "";
-    say($("subject"), told.subject);
-    rows = told.names.map(row);
+    say($("subject"), received.subject);
+    rows = received.names.map(row);
     $("sensors").replaceChildren(...rows.map((one) => one.row));
   },
-  hand: (told) => {
-    pose = drawHand($("pose"), told);
+  hand: (received) => {
+    pose = drawHand($("pose"), received);
   },
   pose: show,
-  end: (told) => {
-    end = told.text;
+  end: (received) => {
+    end = received.text;
     say($("stage"), end);
-    say($("told"), end);
+    say($("spoken"), end);
   },
 });
 
@@ -62,39 +62,39 @@ function row(name) {
   return { row: made, meter, number, flat, state };
 }
 
-function show(told) {
-  now = told;
-  const done = told.stage === "done" || told.stage === "over";
-  say($("count"), done ? `${told.total} of ${told.total} poses taken` : `pose ${told.number} of ${told.total}`);
-  $("progress").max = told.total;
-  $("progress").value = done ? told.total : told.number - 1;
-  $("task").dataset.step = told.step;
-  say($("title"), done ? "All poses are taken" : told.name);
-  say($("detail"), done ? "" : told.instruction);
-  say($("stage"), end || STAGES[told.stage]);
-  if (pose && told.picture) {
-    pose.setPose(told.picture);
-    $("pose").setAttribute("aria-label", `picture of the hand: ${told.name}`);
+function show(received) {
+  now = received;
+  const done = received.stage === "done" || received.stage === "over";
+  say($("count"), done ? `${received.total} of ${received.total} poses taken` : `pose ${received.number} of ${received.total}`);
+  $("progress").max = received.total;
+  $("progress").value = done ? received.total : received.number - 1;
+  $("task").dataset.step = received.step;
+  say($("title"), done ? "All poses are taken" : received.name);
+  say($("detail"), done ? "" : received.instruction);
+  say($("stage"), end || STAGES[received.stage]);
+  if (pose && received.picture) {
+    pose.setPose(received.picture);
+    $("pose").setAttribute("aria-label", `picture of the hand: ${received.name}`);
   }
-  $("pose").toggleAttribute("hidden", !told.picture || done);
-  if ($("problems").children.length !== told.problems.length) {
-    $("problems").replaceChildren(...told.problems.map(() => document.createElement("li")));
+  $("pose").toggleAttribute("hidden", !received.picture || done);
+  if ($("problems").children.length !== received.problems.length) {
+    $("problems").replaceChildren(...received.problems.map(() => document.createElement("li")));
   }
-  told.problems.forEach((problem, at) => say($("problems").children[at], problem));
-  if (read !== told.step) {
-    read = told.step;
-    say($("told"), told.stage === "ready" ? `${told.name}: ${told.instruction} ${STAGES.ready}` : STAGES[told.stage]);
+  received.problems.forEach((problem, at) => say($("problems").children[at], problem));
+  if (read !== received.step) {
+    read = received.step;
+    say($("spoken"), received.stage === "ready" ? `${received.name}: ${received.instruction} ${STAGES.ready}` : STAGES[received.stage]);
   }
   rows.forEach(({ row: made, meter, number, flat, state }, at) => {
-    made.classList.toggle("concerned", told.concerned[at]);
-    meter.value = told.bytes[at] ?? 0;
-    say(number, String(told.bytes[at] ?? "–"));
-    say(flat, told.flat ? String(told.flat[at]) : "");
-    say(state, told.states[at] || (told.concerned[at] ? "this pose's" : ""));
-    state.dataset.is = told.states[at] ? "bad" : "";
+    made.classList.toggle("concerned", received.concerned[at]);
+    meter.value = received.bytes[at] ?? 0;
+    say(number, String(received.bytes[at] ?? "–"));
+    say(flat, received.flat ? String(received.flat[at]) : "");
+    say(state, received.states[at] || (received.concerned[at] ? "this pose's" : ""));
+    state.dataset.is = received.states[at] ? "bad" : "";
   });
-  const wrong = told.states.filter((state) => state).length;
+  const wrong = received.states.filter((state) => state).length;
   say($("sees"), wrong ? `${wrong} of ${rows.length} sensors: see State` : `all ${rows.length} sensors are measured`);
-  offer(told.offered);
-  $("task").dataset.stage = told.stage;
+  offer(received.offered);
+  $("task").dataset.stage = received.stage;
 }

@@ -1,4 +1,4 @@
-// The page of a guided collection: which grasp to take next, the countdown, what the glove sees, and the keys.
+// The page of a guided collection: the next grasp, the countdown, the glove's readings, and the keys.
 import { drawHand } from "./hand.js";
 import { keys, leaving } from "./keys.js";
 import { connect, say } from "./wire.js";
@@ -25,17 +25,17 @@ const send = connect({
     else link("not connected", "bad");
     offer({});
   },
-  collection: (told) => {
-    names = told;
-    say($("subject"), told.subject);
+  collection: (received) => {
+    names = received;
+    say($("subject"), received.subject);
   },
-  hands: (told) => {
-    glove = drawHand($("glove"), told.glove);
-    pose = drawHand($("pose"), told.pose);
+  hands: (received) => {
+    glove = drawHand($("glove"), received.glove);
+    pose = drawHand($("pose"), received.pose);
     shown = "";
     if (now) show(now);
   },
-  guide: (told) => show((now = told)),
+  guide: (received) => show((now = received)),
   study: studied,
 });
 
@@ -78,13 +78,13 @@ function show(guide) {
   $("task").dataset.stage = guide.stage;
 }
 
-// Read out once for each stage of each trial.
+// Read out once per stage of each trial.
 function tell(guide, stage) {
   const what = guide.stage === "countdown" || guide.stage === "ready" ? `${$("title").textContent}, ${$("detail").textContent}: ` : "";
   const time = guide.stage === "countdown" ? ` ${Math.ceil(guide.left_s)} s` : "";
   if (read === `${guide.step}`) return;
   read = `${guide.step}`;
-  say($("told"), `${what}${stage}${time}`);
+  say($("spoken"), `${what}${stage}${time}`);
 }
 
 function task(guide) {
@@ -130,19 +130,19 @@ function sees(guide) {
   });
 }
 
-function studied(told) {
-  if (told.problem) {
-    say($("study"), told.problem);
+function studied(received) {
+  if (received.problem) {
+    say($("study"), received.problem);
     return;
   }
-  const ends = `${percent(told.low)} to ${percent(told.high)} %`;
-  say($("study"), `${told.correct} of ${told.total} trials (${percent(told.correct / told.total)} %; 95 % interval ${ends}), each from all others, by a quick model`);
-  const weak = told.types.filter((type) => type.correct < type.total).slice(0, 3);
-  const why = weak.length ? weak : told.types.slice(0, 1);
+  const ends = `${percent(received.low)} to ${percent(received.high)} %`;
+  say($("study"), `${received.correct} of ${received.total} trials (${percent(received.correct / received.total)} %; 95 % interval ${ends}), each from all others, by a quick model`);
+  const weak = received.types.filter((type) => type.correct < type.total).slice(0, 3);
+  const why = weak.length ? weak : received.types.slice(0, 1);
   say($("more"), `More trials help most with: ${why.map((type) => type.grasp).join(", ")}`);
   $("study-table").hidden = false;
   $("types").replaceChildren(
-    ...told.types.map((type) => {
+    ...received.types.map((type) => {
       const row = document.createElement("tr");
       const cells = [type.grasp, `${type.correct} of ${type.total}`, `${percent(type.low)} to ${percent(type.high)} %`, type.taken_for];
       cells.forEach((text, at) => {

@@ -2,10 +2,10 @@
 
 const SVG = "http://www.w3.org/2000/svg";
 const MARGIN = 5;
-const NARROW = 560; // of a drawing so wide, in pixels, the parts stand one below the other
-const LEAST_UNIT = 0.3; // millimetres that a pixel shows at least: few inputs are not drawn as giants
-const LETTER = 9.5; // pixels that a letter has at least
-const FINGER = 6; // pixels that the half of a button has at least, where there is room
+const NARROW = 560; // up to this width, in pixels, the parts are drawn one below the other
+const LEAST_UNIT = 0.3; // minimum millimetres per pixel, so that few inputs are not drawn huge
+const LETTER = 9.5; // minimum size of a letter, pixels
+const FINGER = 6; // minimum half size of a button, pixels, if there is room
 
 function element(name, attributes = {}, parent = null) {
   const made = document.createElementNS(SVG, name);
@@ -32,7 +32,7 @@ function grown(box, sides, ends = sides) {
   return { left: box.left - sides, top: box.top - ends, width: box.width + 2 * sides, height: box.height + 2 * ends };
 }
 
-// Of a long name its beginning and its end, where numbers are.
+// Keep the beginning of a long name, and its end, which often has a number.
 function shortened(name, most) {
   const letters = [...name], half = (most - 1) / 2;
   return letters.length > most ? `${letters.slice(0, Math.ceil(half)).join("")}…${letters.slice(-Math.floor(half)).join("")}` : name;
@@ -41,7 +41,7 @@ function shortened(name, most) {
 /* ---- The glove laid flat ---- */
 
 class Glove {
-  // states: of each kept bit, whether it is closed and lost. spots: of each kept bit, the group that shows it.
+  // states: for each kept bit, whether it is closed and lost. spots: for each kept bit, the group that shows it.
   constructor(parent, hand, onSwitch) {
     this.group = element("g", {}, parent);
     this.hand = hand;
@@ -111,7 +111,7 @@ class Glove {
     this.switches.push({ bit: each.bit, group });
   }
 
-  // A square; how far it is pressed: a disc in it; all levels closed: the square is full.
+  // A square; a disc in it shows how far it is pressed; with all levels closed the square is full.
   #taxel(each, onSwitch) {
     if (!each.levels?.length) {
       this.taxels.push({ ...each, levels: [], group: null });
@@ -214,7 +214,7 @@ const NEIGHBOUR = { index: ["middle", 1], ring: ["middle", -1], little: ["ring",
 const PALM = [[-21, -4, 0], [-34, 40, 0], "little", "ring", "middle", "index", [30, 45, 2], [21, -4, 0]];
 const STRAIGHT = { rotation: 20 };
 const BENDS = { thumb: ["mcp", "ip"], finger: ["mcp", "pip", "dip"] };
-const SPAN = { abduction: 30, arch: 30, yaw: 40 }; // degrees of what is measured in no angle; of the others 90
+const SPAN = { abduction: 30, arch: 30, yaw: 40 }; // degrees for joints not measured as angles; for others 90
 
 const add = (a, b, by = 1) => a.map((value, at) => value + by * b[at]);
 const dot = (a, b) => a.reduce((sum, value, at) => sum + value * b[at], 0);
@@ -223,7 +223,7 @@ const turned = (ahead, flex, degrees) =>
   add(ahead.map((value) => value * Math.cos(radians(degrees))), flex, Math.sin(radians(degrees)));
 const project = ([x, y, z]) => [x * Math.cos(VIEW) - z * Math.sin(VIEW), y];
 
-// What a joint's value is in degrees: an angle as it is, anything else from straight at its lowest to bent at its most.
+// A joint's value in degrees: an angle as it is, other units from straight at the lowest to bent at the highest.
 function degrees(joint, value) {
   if (joint.unit === "deg") return value;
   if (joint.unit === "rad") return (value * 180) / Math.PI;
@@ -231,7 +231,7 @@ function degrees(joint, value) {
   return span > 0 ? ((value - joint.low) / span) * (SPAN[joint.moves] ?? 90) : 0;
 }
 
-// From what each joint stands at, by digit and what it moves, to points of every digit, of the palm and of the forearm.
+// From joint values, by digit and movement, to points of every digit, of the palm and of the forearm.
 function posed(angles) {
   const at = (digit, moves, otherwise = 0) => angles[digit]?.[moves] ?? otherwise;
   const wrist = (point) => {
@@ -279,7 +279,7 @@ function chain(base, ahead, flex, lengths, bends) {
   return points;
 }
 
-// Where a joint is held: at the end of what it bends; a digit's abduction beyond its tip.
+// The handle of a joint: at the end of the part that it bends; for a digit's abduction beyond its tip.
 function handleOf(joint, pose) {
   const points = pose.chains[joint.digit];
   if (joint.digit === "wrist") return joint.moves === "pitch" ? pose.centre : mixed(pose.palm[4], pose.centre, 0.5);
@@ -416,7 +416,7 @@ class Dials {
   fit() {}
 }
 
-// Points of the drawing to which a pointer drags a group, in the coordinates of `space`.
+// The points to which a pointer drags a group, in the coordinates of `space`.
 function dragging(group, dragged, space = group.parentNode) {
   const move = (event) => {
     const matrix = space.getScreenCTM();
@@ -442,11 +442,11 @@ function dragging(group, dragged, space = group.parentNode) {
  *           drawing is a picture
  * onJoint   called with (joint, value) while a joint is dragged, in the joint's unit
  *
- * Returns what shows a state; each may be called as often as a screen can show it, what has not changed costs nothing:
+ * Returns functions that show a state; each may be called at every screen refresh, and unchanged parts cost nothing:
  *
  * setClosed(bits, lost)  arrays of truth, by the number of the kept switch; `lost` may be left out
- * setTaxels(values)      how far each of hand.taxels is pressed, 0 to 1; null: not known
- * setPose(values)        of each of hand.joints, in its unit; null: lost
+ * setTaxels(values)      how far each of hand.taxels is pressed, 0 to 1; null: unknown
+ * setPose(values)        the value of each of hand.joints, in its unit; null: lost
  */
 export function drawHand(svg, hand, { onSwitch = null, onJoint = null } = {}) {
   svg.replaceChildren();

@@ -1,12 +1,12 @@
-// The buttons of what can be done now, and the same by keys: letters as on the terminal.
+// The buttons of the actions available now, also by keys: the same letters as on the terminal.
 import { say } from "./wire.js";
 
 /**
- * Let the buttons in `bar` and the keys of the page press what is offered.
+ * Make the buttons in `bar` and the keys of the page perform the offered actions.
  * @param {HTMLElement} bar
- * @param {Object<string, string>} letters by what they press: "Enter", or a letter
+ * @param {Object<string, string>} letters by action: "Enter", or a letter
  * @param {function(string): void} press
- * @returns {function(Object<string, string>): void} offer(what is offered: words by what they press)
+ * @returns {function(Object<string, string>): void} offer(the available actions: words by action)
  */
 export function keys(bar, letters, press) {
   let offered = {};
@@ -29,7 +29,7 @@ export function keys(bar, letters, press) {
   document.addEventListener("keydown", (event) => {
     if (event.repeat || event.ctrlKey || event.altKey || event.metaKey || document.querySelector("dialog[open]")) return;
     const key = Object.keys(letters).find((one) => letters[one].toLowerCase() === event.key.toLowerCase());
-    // Enter on a button presses that one.
+    // Enter on a button presses that button.
     if (key === undefined || offered[key] === undefined || (event.key === "Enter" && event.target.closest("button"))) return;
     event.preventDefault();
     press(key);
@@ -39,7 +39,7 @@ export function keys(bar, letters, press) {
     offered = now;
     for (const [key, { button, words }] of buttons) {
       const gone = offered[key] === undefined;
-      // Whoever presses by keyboard stays among the buttons.
+      // Keyboard focus stays among the buttons.
       if (gone && button === document.activeElement) bar.focus();
       button.hidden = gone;
       if (!gone) say(words, offered[key]);
@@ -47,7 +47,7 @@ export function keys(bar, letters, press) {
   };
 }
 
-/** Let a dialog ask before somebody leaves. */
+/** Ask for confirmation in a dialog before leaving. */
 export function leaving(dialog, leave, stay, then) {
   leave.addEventListener("click", () => {
     dialog.close();

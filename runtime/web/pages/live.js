@@ -1,4 +1,4 @@
-// The live page of a run: what comes is shown, what is pressed is asked for.
+// The live page of a run: shows messages and sends requests.
 import { View } from "./view.js";
 import { connect, say } from "./wire.js";
 
@@ -31,14 +31,14 @@ function show({ on, fixed, name, folder, since_s, messages, marks, failure }) {
   $("recording").dataset.on = on ? "yes" : "no";
   const begun = new Date(1000 * since_s).toLocaleTimeString();
   const held = `${messages} messages, ${marks} ${marks === 1 ? "mark" : "marks"}`;
-  const words = on ? `${name}, since ${begun}: ${held}` : name ? `${name} is whole: ${held}` : `none; goes to ${folder}`;
+  const words = on ? `${name}, since ${begun}: ${held}` : name ? `${name} is complete: ${held}` : `none; goes to ${folder}`;
   say($("recording"), failure || words);
   const had = document.activeElement;
   $("record").disabled = on;
   $("record-name").disabled = on;
   $("mark").disabled = !on;
   $("stop").disabled = !on || fixed;
-  // A keyboard stays where it can go on.
+  // Keyboard focus stays where the next action is.
   if (had?.disabled) $(on ? "mark" : "record").focus();
 }
 

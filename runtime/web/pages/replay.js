@@ -1,15 +1,15 @@
-// The page of a recording: where in it the page is, and truth and answer on one timeline.
+// The page of a recording: the position in it, and truth and predictions on one timeline.
 import { COLOURS, DARK_ON } from "./timeline.js";
 import { View } from "./view.js";
 import { connect, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
 const view = new View();
-const LANES = [["truth", "truth"], ["answer", "answers"]];
+const LANES = [["truth", "truth"], ["prediction", "predictions"]];
 const LETTERS = 14;
 let state = null;
-let overview = { answers: [], truth: [], marks: [] };
-let held = false; // while the slider is dragged it is not moved by what comes
+let overview = { predictions: [], truth: [], marks: [] };
+let held = false; // while the slider is dragged, messages do not move it
 let wanted = null;
 
 const send = connect({
@@ -50,7 +50,7 @@ const clock = (seconds) => {
   return `${hours ? `${hours}:${String(minutes).padStart(2, "0")}` : minutes}:${rest}`;
 };
 
-// Only the newest place that is asked for matters: one at a time is on its way.
+// Only the newest requested position matters: one request at a time is pending.
 function seek(seconds) {
   if (!state) return;
   const value = Math.round(state.first_us + 1e6 * seconds);
@@ -107,10 +107,10 @@ addEventListener("keydown", (event) => {
   found();
 });
 
-// To the next label or answer, or to the one before.
+// Go to the next label or prediction, or to the previous one.
 function jump(by) {
   if (!state) return;
-  const marks = [...overview.truth.map(([from]) => from), ...(overview.truth.length ? [] : overview.answers.map(([from]) => from))];
+  const marks = [...overview.truth.map(([from]) => from), ...(overview.truth.length ? [] : overview.predictions.map(([from]) => from))];
   const there = marks.sort((a, b) => a - b).filter((us) => (by > 0 ? us > state.at_us + 1000 : us < state.at_us - 1000));
   if (there.length) seek((there.at(by > 0 ? 0 : -1) - state.first_us) / 1e6);
 }
@@ -124,7 +124,7 @@ function span() {
 
 function spans(kind) {
   if (kind === "truth") return overview.truth;
-  return overview.answers.map(([from, name], at) => [from, overview.answers[at + 1]?.[0] ?? state.last_us, name]);
+  return overview.predictions.map(([from, name], at) => [from, overview.predictions[at + 1]?.[0] ?? state.last_us, name]);
 }
 
 function draw() {
@@ -135,8 +135,8 @@ function draw() {
   const pen = canvas.getContext("2d"), css = getComputedStyle(canvas);
   const colour = (name) => css.getPropertyValue(name).trim();
   const [from, to] = span(), x = (us) => ((us - from) / (to - from)) * wide, tall = high / LANES.length;
-  const names = [...new Set([...overview.truth.map(([, , name]) => name), ...overview.answers.map(([, name]) => name)])];
-  const types = (view.answers?.length ? view.answers : names).filter((name) => name !== "none");
+  const names = [...new Set([...overview.truth.map(([, , name]) => name), ...overview.predictions.map(([, name]) => name)])];
+  const types = (view.classes?.length ? view.classes : names).filter((name) => name !== "none");
   pen.setTransform(dense, 0, 0, dense, 0, 0);
   pen.font = `${LETTERS}px system-ui, sans-serif`;
   pen.textBaseline = "middle";
@@ -161,6 +161,6 @@ function draw() {
   for (const [us] of overview.marks) pen.fillRect(x(us) - 1, 0, 2, 6);
   pen.fillStyle = colour("--text");
   pen.fillRect(x(state.at_us) - 1, 0, 2, high);
-  const counts = `${overview.truth.length} labelled spans, ${overview.answers.length} answers`;
-  canvas.setAttribute("aria-label", `Truth and answer from ${clock((from - state.first_us) / 1e6)} to ${clock((to - state.first_us) / 1e6)}: ${counts}`);
+  const counts = `${overview.truth.length} labelled spans, ${overview.predictions.length} predictions`;
+  canvas.setAttribute("aria-label", `Truth and prediction from ${clock((from - state.first_us) / 1e6)} to ${clock((to - state.first_us) / 1e6)}: ${counts}`);
 }

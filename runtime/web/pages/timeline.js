@@ -1,4 +1,4 @@
-// What was recognised in the last seconds, on a canvas: lanes of spans, each from one change to the next.
+// The predictions of the last seconds on a canvas: lanes of spans, each from one change to the next.
 
 const LANES = [
   { name: "this frame", of: (entry) => entry.candidate },
@@ -7,17 +7,17 @@ const LANES = [
   { name: "health", of: (entry) => entry.health },
 ];
 const HEALTH = { ok: "--good", changing: "--main", degraded: "--warn", unknown: "--bad" };
-// Okabe and Ito's colours; what is of the same colour is told apart by its name, and by a line at its foot.
+// Okabe and Ito's colours; spans of the same colour are distinguished by name, and by a line at the foot.
 export const COLOURS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#999999"];
 export const DARK_ON = new Set(["#e69f00", "#56b4e9", "#f0e442", "#cc79a7", "#999999", "#009e73"]);
 const GAP_US = 1_000_000;
 const LETTERS = 14;
 
-/** The changes of what is recognised, in the order of time, and the canvas that shows the last of them. */
+/** The changes of the prediction in order of time, and the canvas that shows the last of them. */
 export class Timeline {
   /**
    * @param {HTMLCanvasElement} canvas
-   * @param {number} spanS how many seconds it shows
+   * @param {number} spanS the number of seconds that it shows
    */
   constructor(canvas, spanS = 30) {
     this.canvas = canvas;
@@ -29,7 +29,7 @@ export class Timeline {
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => (this.style = null));
   }
 
-  /** Let each of these names have a colour of its own, as far as there are enough. */
+  /** Give each of these names its own colour, as long as there are enough. */
   setNames(names) {
     this.colours.clear();
     names.filter((name) => name !== "none").forEach((name, at) => this.colours.set(name, at));
@@ -40,11 +40,11 @@ export class Timeline {
     this.untilUs = 0;
   }
 
-  /** Take what is recognised at entry.time_us. */
+  /** Take the prediction at entry.time_us. */
   add(entry) {
     const last = this.entries.at(-1);
     if (last && entry.time_us < last.time_us) this.clear(); // another run
-    // Nothing is known of a time in which no frame came.
+    // A time without frames is unknown.
     const silent = last && entry.time_us - this.untilUs > GAP_US;
     if (silent) this.entries.push({ ...last, time_us: this.untilUs, over: true });
     this.untilUs = entry.time_us;
@@ -119,7 +119,7 @@ export class Timeline {
     const long = pen.measureText(name).width + 8, flat = long <= wide;
     if (!flat && !(wide >= LETTERS + 2 && long <= tall)) return;
     pen.save();
-    // Where a name does not fit, it is written upwards.
+    // A name that does not fit is written upwards.
     pen.translate(flat ? left : left + wide / 2, flat ? top + tall / 2 : top + tall);
     if (!flat) pen.rotate(-Math.PI / 2);
     if (striped) {
@@ -155,7 +155,7 @@ function same(one, other) {
   );
 }
 
-/** Yield spans of equal names; a segment that may yet turn out otherwise, or seems to end, is striped. */
+/** Yield spans of equal names; a segment that may still be revoked, or seems to end, is striped. */
 function* spans(entries, of, untilUs) {
   let open = null;
   const isSegment = of === LANES[2].of;

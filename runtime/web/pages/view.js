@@ -1,18 +1,18 @@
-// What the live page shows of a run, wherever its moments come from.
+// The view of a run on the live page, wherever its moments come from.
 import { drawHand } from "./hand.js";
 import { Timeline } from "./timeline.js";
 import { say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
-const WORDS_MS = 200; // numbers and words change five times a second, or nobody could read them
-const SETTLED_MS = 1000; // what is read out has stood for so long
-const QUIET_MS = 3000; // and no sooner after the last
+const WORDS_MS = 200; // numbers and words change five times a second, so that they can be read
+const SETTLED_MS = 1000; // a text must be stable this long before it is read out
+const QUIET_MS = 3000; // minimum time between two texts
 const SHOWN = 8;
 
 const MEANS = {
   ok: "everything is read",
   changing: "everything is read, and the hand changes",
-  degraded: "means stand in for what is lost, or a record is late",
+  degraded: "means replace lost inputs, or a record is late",
   unknown: "too little can be read",
 };
 
@@ -35,7 +35,7 @@ export class View {
     requestAnimationFrame(() => this.#draw());
   }
 
-  /** Take which grasp types, switches and joints there are. */
+  /** Take the grasp types, switches and joints of the build. */
   build(build) {
     say($("name"), build.name);
     this.timeline.setNames(build.grasps);
@@ -47,20 +47,20 @@ export class View {
     for (const grasp of build.grasps) this.#row(grasp);
     $("preshape").hidden = !build.preshapes;
     $("hand-panel").hidden = Boolean(build.partial);
-    this.answers = build.grasps;
+    this.classes = build.grasps;
   }
 
-  /** Take where the inputs of the build are on the hand. */
+  /** Take the positions of the build's inputs on the hand. */
   setHand(hand) {
     this.hand = hand;
     this.drawing = drawHand($("hand"), hand, {});
   }
 
-  /** Take what was recognised before. */
+  /** Take the past predictions. */
   past({ changes, until_us }) {
     this.timeline.clear();
     for (const [time_us, candidate, grasp, health, state, segment, segment_type, segment_us] of changes) {
-      this.timeline.untilUs = time_us; // an entry stands until the next
+      this.timeline.untilUs = time_us; // an entry lasts until the next
       this.timeline.add({ time_us, candidate, grasp, health, state, segment, segment_type, segment_us });
     }
     this.timeline.untilUs = until_us;
@@ -75,7 +75,7 @@ export class View {
     this.timeline.add(frame);
   }
 
-  /** Take how devices and inputs fare. */
+  /** Take the health of devices and inputs. */
   health(report) {
     const rows = report.devices.map((device) => {
       const row = document.createElement("tr"), head = cell("th", device.name);
@@ -87,7 +87,7 @@ export class View {
     });
     $("devices").replaceChildren(...rows);
     this.quarantined = report.quarantined.map(({ name, reason, used }) =>
-      `${name}: ${reason}, ${used ? "used all the same" : "treated as lost"}`,
+      `${name}: ${reason}, ${used ? "still used" : "treated as lost"}`,
     );
     this.suspects = [
       ...report.stuck_open.map((name) => `${name}: was never seen closed`),
@@ -104,7 +104,7 @@ export class View {
     say($("task"), `Task: ${text}`);
   }
 
-  /** Show whether the server is there, and what it says of where its moments come from. */
+  /** Show whether the server is connected, and the state of the source of its moments. */
   link(connected) {
     this.connected = connected;
     this.#link();
@@ -146,7 +146,7 @@ export class View {
     const news = this.shown?.grasp !== frame.grasp;
     this.shown = frame;
     this.#now(frame);
-    // Some streams say nothing of single switches, or of how likely the other types are.
+    // Some streams lack the switches and the probabilities of the other types.
     $("types-say").hidden = frame.closed !== undefined;
     this.#hand(frame);
     this.#bars(frame);
@@ -179,7 +179,7 @@ export class View {
     const lost = new Set(frame.lost), gone = [];
     for (const [name, bit] of this.bits) {
       gone[bit] = lost.has(name);
-      // What was left unread stays as it was read last.
+      // Unread switches keep their last state.
       if (frame.unread[bit] !== "1") this.closed[bit] = frame.closed[bit] === "1";
     }
     this.drawing.setClosed(this.closed, gone);
@@ -190,7 +190,7 @@ export class View {
   #bars(frame) {
     const { probabilities } = frame;
     for (const [grasp, { row, full }] of this.rows) {
-      const share = probabilities?.[this.answers.indexOf(grasp)] ?? (grasp === frame.grasp ? frame.probability : 0);
+      const share = probabilities?.[this.classes.indexOf(grasp)] ?? (grasp === frame.grasp ? frame.probability : 0);
       full.style.transform = `scaleX(${share})`;
       if (grasp === frame.grasp) row.setAttribute("aria-current", "true");
       else row.removeAttribute("aria-current");
@@ -200,7 +200,7 @@ export class View {
 
   #numbers(frame, now) {
     for (const [grasp, { share }] of this.rows) {
-      const at = this.answers.indexOf(grasp);
+      const at = this.classes.indexOf(grasp);
       const value = frame.probabilities?.[at] ?? (grasp === frame.grasp ? frame.probability : null);
       say(share, value === null ? "–" : `${(100 * value).toFixed(value > 0.9995 || value < 0.0005 ? 0 : 1)} %`);
     }
@@ -217,8 +217,8 @@ export class View {
     this.#wrong();
     const segments = this.timeline.segments().slice(0, SHOWN);
     list($("segments"), segments.map(({ number, type, seconds, lasts }) => `${number}: ${type}, ${seconds.toFixed(1)} s${lasts ? ", now" : ""}`));
-    const told = segments.length ? segments.map(({ type }) => type).reverse().join(", ") : "none";
-    const label = `What was recognised in the last 30 seconds: this frame ${frame.candidate}, announced ${frame.grasp}, segments: ${told}`;
+    const types = segments.length ? segments.map(({ type }) => type).reverse().join(", ") : "none";
+    const label = `Predictions of the last 30 seconds: this frame ${frame.candidate}, announced ${frame.grasp}, segments: ${types}`;
     if ($("past").getAttribute("aria-label") !== label) $("past").setAttribute("aria-label", label);
   }
 
@@ -250,14 +250,14 @@ export class View {
     list($("wrong"), all.length ? all : ["nothing"], all.length ? "" : "none");
   }
 
-  // What a screen reader says: what has stood for a second, and not more often than every third.
+  // For screen readers: a text that was stable for a second, at most every three seconds.
   #announce(grasp, now, atOnce = false) {
     const { said } = this;
     if (said.candidate !== grasp) Object.assign(said, { candidate: grasp, since: now });
     const settled = now - said.since >= SETTLED_MS && now - said.at >= QUIET_MS;
     if (grasp !== said.text && (atOnce || settled)) {
       Object.assign(said, { text: grasp, at: now });
-      say($("told"), grasp);
+      say($("spoken"), grasp);
     }
   }
 }
@@ -276,7 +276,7 @@ function listed(names) {
   return `: ${names.slice(0, SHOWN).join(", ")}${more}`;
 }
 
-// Fill a list, touching only what is another.
+// Fill a list, changing only the entries that differ.
 function list(element, texts, className = "") {
   while (element.children.length > texts.length) element.lastChild.remove();
   texts.forEach((text, at) => {

@@ -1,12 +1,12 @@
-// The WebSocket of a page: every message to the handler of its topic; it comes back by itself when it was cut.
+// The WebSocket of a page: every message to the handler of its topic; it reconnects automatically.
 
 const FIRST_MS = 250;
 const LONGEST_MS = 5000;
 
 /**
  * Connect to the server of this page.
- * @param {Object<string, function(object): void>} handlers by topic; "open" and "closed" are of the connection itself
- * @returns {function(object): boolean} send({do: ..., ...}), which is false while there is no connection
+ * @param {Object<string, function(object): void>} handlers by topic; "open" and "closed" are events of the connection itself
+ * @returns {function(object): boolean} send({do: ..., ...}), which returns false while there is no connection
  */
 export function connect(handlers) {
   let socket = null;
@@ -38,7 +38,7 @@ export function connect(handlers) {
   };
 }
 
-/** Set the text of an element, if it is another: what did not change is not read out again. */
+/** Set the text of an element if it differs: unchanged text is not read out again. */
 export function say(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }

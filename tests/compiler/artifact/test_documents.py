@@ -67,7 +67,7 @@ def test_the_same_recordings_give_the_same_documents(gloved: GraspSet, tmp_path:
 def test_switches_of_nobody_knows_which_glove_have_a_spec_without_a_pattern(
     grasp_set: GraspSet, tmp_path: Path
 ) -> None:
-    assert "Where these switches lie on the hand is not known" in _compile(grasp_set, tmp_path / "build")
+    assert "The positions of these switches on the hand are not known" in _compile(grasp_set, tmp_path / "build")
     assert not list((tmp_path / "build" / "spec").glob("cutting.*"))
 
 
@@ -75,14 +75,14 @@ def test_the_report_has_the_papers_tables_of_the_builds_own_folds(gloved: GraspS
     words = _compile(gloved, tmp_path / "build", folds=3, seed=5)
     assert "Angle + Sel-Co" in words
     assert "3 stratified folds of whole trials, 1 repeat from seed 5; 3 rounds" in words
-    assert "This build's own recipe, within subject, 3 nested folds" in words
+    assert "This build's recipe, within subject, 3 nested folds" in words
 
 
 def test_without_folds_the_report_says_what_it_lacks(gloved: GraspSet, tmp_path: Path) -> None:
     words = _compile(gloved, tmp_path / "build")
     assert "The build was compiled without folds. thenar evaluate SET.grasps prints them." in words
-    assert "It was not measured: the build was compiled without folds." in words
-    assert "what to expect of new grasps was not measured" in words
+    assert "Not measured: the build was compiled without folds." in words
+    assert "the accuracy on new grasps was not measured" in words
 
 
 @pytest.mark.parametrize(("types", "switches", "joints"), [(2, 1, 0), (2, 0, 1), (33, 12, 2), (33, 6, 0)])

@@ -95,7 +95,7 @@ def test_a_link_by_the_name_of_a_folder_of_a_build_is_not_of_a_build(tmp_path: P
 def test_a_parent_that_may_not_be_written_to_is_refused_before_any_work(tmp_path: Path) -> None:
     tmp_path.chmod(0o555)
     try:
-        with pytest.raises(CompileError, match="may not be written to"):
+        with pytest.raises(CompileError, match="is not writable"):
             check_target(tmp_path / "build")
     finally:
         tmp_path.chmod(0o755)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.probes import Answers, Lost, Probes, extreme_frames, joined, random_frames
+from thenar.compiler.firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, random_frames
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Recognised, Switch
 from thenar.runtime.scores import LANE_OFFSET
@@ -83,7 +83,7 @@ def probed() -> Callable[[IntegerTables, int], Probes]:
 def same_as_python() -> Callable[..., None]:
     """Return what compares every score and class with those of a Build, which inputs are `lost` to."""
 
-    def compare(answers: Answers, tables: IntegerTables, frames: Probes, lost: Lost | None = None) -> None:
+    def compare(answers: Predictions, tables: IntegerTables, frames: Probes, lost: Lost | None = None) -> None:
         without = Build(_describe(tables), tables).scorer.lanes_without
         s = tables.n_switches
         gone = np.zeros((len(frames), s + tables.n_joints), bool) if lost is None else lost

@@ -110,7 +110,7 @@ def test_more_columns_than_a_row_has_bits_are_refused(generate: Generate) -> Non
     pins = [f"P{port}{bit}" for port in "ABCLK" for bit in range(8)][:33]
     names = [f"s{n}" for n in range(33)]
     text = f'{MEGA}[matrix]\nrows = ["PF0"]\ncolumns = {pins}\ndiodes = true\nswitches = [{names}]\n'
-    with pytest.raises(FirmwareError, match="33 columns: the firmware reads 32, swap rows and columns"):
+    with pytest.raises(FirmwareError, match="33 columns: the firmware reads at most 32; swap rows and columns"):
         generate(text)
 
 
@@ -215,10 +215,10 @@ def test_analog_joints_are_converted_in_the_builds_order(generate: Generate) -> 
 @pytest.mark.parametrize(
     ("text", "joints", "more", "message"),
     [
-        (UNO + PINS, ("j0",), {}, "needs 1 joints, and the board measures none: add"),
+        (UNO + PINS, ("j0",), {}, "needs 1 joints, but the board measures none: add"),
         (UNO + PINS + ANALOG, ("j0", "j7"), {}, "no channel for j7, which the build needs"),
         (UNO + PINS + ANALOG, ("j0",), {"highest": 300}, "codes above 254"),
-        (UNO + PINS, (), {"classes": 256}, "256 grasp types: a board can tell 255 apart"),
+        (UNO + PINS, (), {"classes": 256}, "256 grasp types: a board can report 255"),
         (MEGA + PINS + "[cyberglove]", ("palm",), {}, "no sensor of that name (did you mean 'palm_arch'"),
         (MEGA + PINS + "[cyberglove]", ("palm_arch",), {"code_a": 0, "unit": "deg"}, "coded in 'deg', not in a Cyber"),
     ],
@@ -351,5 +351,5 @@ def test_a_new_compilers_warning_does_not_stop_the_makefile(generate: Generate) 
 
 
 def test_a_build_without_switches_is_told_how_to_get_some() -> None:
-    with pytest.raises(FirmwareError, match=r"nothing to scan: compile it with --inputs both or switches$"):
+    with pytest.raises(FirmwareError, match=r"nothing to scan: compile it with --inputs both or --inputs switches$"):
         check_switches(parse_board(UNO + PINS), ())

@@ -166,7 +166,7 @@ def test_builds_of_both_widths_share_a_frontier(
 def test_why_is_said_in_a_sentence(tables: IntegerTables, small: Choice) -> None:
     found = small
     assert found.why.startswith("8-bit entries, up to ")
-    assert " switches a look-up, codes " in found.why
+    assert " switches a lookup, codes " in found.why
     times = f"{found.cost.cycles} cycles ({found.cost.update_cycles} by update())"
     assert found.why.endswith(f"bytes of flash, at most {times} and {found.cost.flash} bytes")
     found = choose(tables, TARGETS["cortex-m4"])
@@ -187,7 +187,7 @@ def test_builds_that_lack_a_kind_of_input_have_layouts_too(make_tables: MakeTabl
     for target in TARGETS.values():
         found = choose(tables, target)
         assert np.array_equal(found.layout.scores(*frames), arrange(tables).scores(*frames))
-        assert ("switches a look-up" in found.why, "codes" in found.why) == (switches > 0, joints > 0)
+        assert ("switches per lookup" in found.why, "codes" in found.why) == (switches > 0, joints > 0)
 
 
 def test_tables_without_inputs_are_refused(make_tables: MakeTables) -> None:

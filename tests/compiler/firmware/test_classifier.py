@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import arrange
-from thenar.compiler.firmware.probes import Answers, Probes
+from thenar.compiler.firmware.probes import Predictions, Probes
 from thenar.compiler.firmware.tools import STRICT, call, workshop
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
@@ -16,7 +16,7 @@ from thenar.runtime.tables import IntegerTables
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
 Probed = Callable[[IntegerTables, int], Probes]
-SameAsPython = Callable[[Answers, IntegerTables, Probes], None]
+SameAsPython = Callable[[Predictions, IntegerTables, Probes], None]
 Tool = Callable[[str], str]
 
 

@@ -30,7 +30,7 @@ def test_a_new_or_empty_folder_takes_the_files_and_their_sums(tmp_path: Path, to
 
 
 def test_firmware_is_replaced_only_where_that_is_asked_for(folder: Path) -> None:
-    with pytest.raises(FirmwareError, match="holds firmware already: name another folder, or add --overwrite"):
+    with pytest.raises(FirmwareError, match="already holds firmware: name another folder, or add --overwrite"):
         write_folder(NEW, folder)
     assert content(folder) == {**OLD, SUMS: sums(OLD)}
     write_folder(NEW, folder, overwrite=True)
@@ -67,7 +67,7 @@ def test_a_link_to_what_never_ends_is_refused_unread(folder: Path, name: str) ->
 def test_a_folder_of_somebody_elses_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "firmware").mkdir()
     (tmp_path / "firmware" / "main.c").write_text("mine")
-    with pytest.raises(FirmwareError, match="is not empty and holds no firmware of thenar"):
+    with pytest.raises(FirmwareError, match="is not empty and was not written by thenar"):
         write_folder(NEW, tmp_path / "firmware", overwrite=True)
     assert content(tmp_path / "firmware") == {"main.c": "mine"}
 

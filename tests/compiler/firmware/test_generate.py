@@ -91,7 +91,7 @@ def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
     if platform.startswith(("cortex", "rv32")):
         tool("qemu-system-arm" if platform.startswith("cortex") else "qemu-system-riscv32")
     if not platform.startswith("avr"):
-        assert "\n18 frames, answered as by Python\n" in make(folder, "check")
+        assert "\n18 frames, predicted as by Python\n" in make(folder, "check")
     make(folder, "clean")
     assert {path.name for path in folder.iterdir()} == {*classifier(build, platform), "SHA256SUMS"}
 
@@ -180,13 +180,13 @@ def test_less_flash_is_a_smaller_layout_and_too_little_is_refused(build: Build, 
             "cortex-m4",
             "scan",
             "scan pins",
-            "the mode scan is written for avr328p, avr2560, esp32 and rp2040, not for cortex-m4",
+            "the mode scan is available for avr328p, avr2560, esp32 and rp2040, not for cortex-m4",
         ),
         (
             "arduino",
             "glove",
             "scan pins",
-            "the mode glove is written for avr328p, avr2560, esp32 and rp2040, not for arduino",
+            "the mode glove is available for avr328p, avr2560, esp32 and rp2040, not for arduino",
         ),
         ("avr328p", "scan", None, r"the mode scan needs a board\.toml"),
         ("avr2560", "scan", "scan pins", "the board has an atmega328p, the target avr2560 is an atmega2560"),

@@ -203,14 +203,14 @@ def refused(tables: IntegerTables, **how: object) -> str:
 
 def test_what_cannot_be_laid_out_is_refused(make_tables: MakeTables) -> None:
     wide = make_tables(highest=800)
-    assert "nothing to make firmware of" in refused(make_tables(switches=0, joints=0))
+    assert "uses no switch and no joint" in refused(make_tables(switches=0, joints=0))
     assert "entries of 12 bits" in refused(make_tables(), entry_bits=12)
     assert "groups of 9 switches" in refused(make_tables(), group_size=9)
     assert "1 groups of at most 5 for 9 switches: 2 or more" in refused(make_tables(), n_groups=1)
-    assert '"trimmed" or "search", not "direct"' in refused(wide)
+    assert '"trimmed" or "search", not by "direct"' in refused(wide)
     assert 'found by "search"' in refused(wide, bins="trimmed")
-    assert "compile the build with --table-bits 8" in refused(make_tables(reach=300), entry_bits=8)
-    assert "a look-up of 512 rows" in refused(make_tables(joints=3, bins=8), shared=((None, (0, 1, 2)),))
+    assert "compile with --table-bits 8" in refused(make_tables(reach=300), entry_bits=8)
+    assert "a lookup of 512 rows" in refused(make_tables(joints=3, bins=8), shared=((None, (0, 1, 2)),))
     assert "300 rows" in refused(make_tables(bins=300, highest=3000), bins="search")
 
 

@@ -100,7 +100,7 @@ def test_codes_of_the_runtime_fit() -> None:
 
 @pytest.mark.parametrize("codes", [[], [range(BYTES)] * 2, [range(255)]])
 def test_anything_but_256_codes_a_joint_is_refused(codes: list[range]) -> None:
-    with pytest.raises(FirmwareError, match="256 bytes are needed for each of 1 joints"):
+    with pytest.raises(FirmwareError, match="each of the 1 joints needs the codes of 256 bytes"):
         on_bytes(tables_of([[10]], 1), codes)
 
 

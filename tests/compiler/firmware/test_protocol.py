@@ -104,17 +104,17 @@ def test_a_board_of_33_keys_needs_little_memory(tool: Tool, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"rows": 0}, "rows of the board is 0: it is 1 to 65535"),
+        ({"rows": 0}, "rows of the board is 0: it must be 1 to 65535"),
         ({"columns": 65_536}, "columns of the board is 65536"),
-        ({"columns": MOST_KEYS + 1}, f"the board has 1 x {MOST_KEYS + 1} keys: it can tell of {MOST_KEYS}"),
+        ({"columns": MOST_KEYS + 1}, f"the board has 1 x {MOST_KEYS + 1} keys: it can report at most {MOST_KEYS}"),
         ({"rows": 2, "columns": 981}, "2 x 981 keys"),
         ({"board": 1 << 32}, "board of the board is 4294967296"),
         ({"state_us": -1}, "state_us of the board is -1"),
         ({"heartbeat_us": 1 << 32}, "heartbeat_us"),
-        ({"press_us": 65_536}, "press_us of the board is 65536: it is 0 to 65535"),
+        ({"press_us": 65_536}, "press_us of the board is 65536: it must be 0 to 65535"),
         ({"release_us": 65_536}, "release_us"),
         ({"fastest_us": 0}, "fastest_us"),
-        ({"scan_us": 99}, "scan_us of the board is 99: it scans every 100 us at most"),
+        ({"scan_us": 99}, "scan_us of the board is 99: it must be at least 100 us"),
     ],
 )
 def test_a_board_that_the_protocol_cannot_describe_is_refused(wrong: dict[str, int], said: str) -> None:
@@ -127,7 +127,7 @@ def test_a_board_that_the_protocol_cannot_describe_is_refused(wrong: dict[str, i
     ("ports", "error", "said"),
     [
         ([], FirmwareError, "a scan of 0 ports"),
-        ([[]] * 257, FirmwareError, "a scan of 257 ports: early exit is for 1 to 256"),
+        ([[]] * 257, FirmwareError, "a scan of 257 ports: early exit needs 1 to 256"),
         ([(0, 1, 2), (4, 5)], FirmwareError, "no port reads switch 3"),
         ([(0, 1, 2), (2, 3, 4, 5)], SettingError, "read by two ports"),
         ([(0, 1, 2), (3, 4, 5, 6)], SettingError, "none of the build's"),

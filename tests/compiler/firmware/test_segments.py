@@ -163,5 +163,5 @@ def test_firmware_of_a_build_that_has_costs_of_segments_brings_the_decoder_along
 
 def test_more_types_than_a_byte_numbers_are_refused() -> None:
     assert segment_files("hand", SegmentModel.usual(254, True, 9.0), avr=True)
-    with pytest.raises(FirmwareError, match="255 grasp types: segments are decoded in C of 254 at most"):
+    with pytest.raises(FirmwareError, match="255 grasp types: the segment decoder in C takes at most 254"):
         segment_files("hand", SegmentModel.usual(255, True, 9.0), avr=True)

@@ -27,7 +27,7 @@ TOOLS = {
     "rv32imac": ("riscv64-unknown-elf-gcc", "qemu-system-riscv32"),
 }
 PARTS = tuple(TOOLS)
-AGREED = f"{CHECKS} frames, answered as by Python\n"
+AGREED = f"{CHECKS} frames, predicted as by Python\n"
 SHAPES = {
     "switches_and_joints": {"classes": 14, "switches": 33, "joints": 16},
     "switches_only": {"joints": 0},
@@ -84,7 +84,7 @@ def test_a_classifier_with_a_wrong_entry_fails_its_check(
     assert wrong != files["thenar_hand_tables.c"]
     done = make(part, files | {"thenar_hand_tables.c": wrong}, "check")
     assert done.returncode != 0
-    assert "answers differ from Python's\n" in done.stdout + done.stderr
+    assert "predictions differ from Python's\n" in done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("part", PARTS)
@@ -101,7 +101,7 @@ def test_a_wrong_bit_of_a_switch_and_a_wrong_name_fail_the_check(
     assert text.count(right) == 1
     done = make(part, files | {"thenar_hand_tables.c": text.replace(right, wrong)}, "check")
     assert done.returncode != 0
-    assert "answers differ from Python's" in done.stdout + done.stderr
+    assert "predictions differ from Python's" in done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("part", PARTS)

@@ -11,7 +11,7 @@ from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.firmware import FirmwareError, simavr
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import Adding, Layout, arrange
-from thenar.compiler.firmware.probes import Answers, Probes, random_frames
+from thenar.compiler.firmware.probes import Predictions, Probes, random_frames
 from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime.build import Build
@@ -22,7 +22,7 @@ from thenar.simulator import load_scene, simulate
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
 Probed = Callable[[IntegerTables, int], Probes]
-Compare = Callable[[Answers, IntegerTables, Probes], None]
+Compare = Callable[[Predictions, IntegerTables, Probes], None]
 
 SMALL, LARGE = TARGETS["avr328p"], TARGETS["avr2560"]
 HEADER = """
@@ -90,7 +90,7 @@ def one_switch() -> IntegerTables:
 
 def answered(
     tables: IntegerTables, describe: Describe, layout: Layout, target: Target, frames: Probes, incremental: bool = False
-) -> Answers:
+) -> Predictions:
     files = classifier_files("test", describe(tables), layout, avr=True)
     given = layout.frame_bytes(frames.bits, frames.codes)
     return target.run(files, "test", layout, given, incremental=incremental)

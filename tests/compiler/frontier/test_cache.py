@@ -116,18 +116,18 @@ def test_zeros_that_a_loss_of_power_left_at_the_end_are_cut_off(tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
-    "content", [b"a,b\n1,2\n", b'{"key": 1}\n', HEADER.replace(b"3}", b"4}"), b"\n", bytes(100), b"\xff\xfe"]
+    "content", [b"a,b\n1,2\n", b'{"key": 1}\n', HEADER.replace(b"4}", b"5}"), b"\n", bytes(100), b"\xff\xfe"]
 )
 def test_a_foreign_file_is_refused_and_not_touched(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "mine.csv"
     path.write_bytes(content)
-    with pytest.raises(StoreError, match=r"mine\.csv is no store of answers"):
+    with pytest.raises(StoreError, match=r"mine\.csv is no store of results"):
         Store(path, "set")
     assert path.read_bytes() == content
 
 
 @pytest.mark.parametrize("older", OLD_HEADERS)
-@pytest.mark.parametrize("rest", [b"", b'{"key":"aa","crc":1,"answer":1}\n'])
+@pytest.mark.parametrize("rest", [b"", b'{"key":"aa","crc":1,"result":1}\n'])
 def test_a_store_of_an_older_form_is_emptied_and_says_so(tmp_path: Path, older: bytes, rest: bytes) -> None:
     path = tmp_path / "store"
     path.write_bytes(older + rest)
@@ -203,7 +203,7 @@ def test_a_full_disk_is_told_and_what_was_put_stays(tmp_path: Path) -> None:
     command = [sys.executable, "-c", FULL_DISK, str(path)]
     number, said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split(maxsplit=1)
     assert "File too large" in said
-    assert f"its {number} answers are kept" in said
+    assert f"its {number} results are kept" in said
     assert kept(path, 100) == list(range(int(number)))
 
 
@@ -263,7 +263,7 @@ def test_a_cluster_finds_the_same_answers(tmp_path: Path) -> None:
 
 
 def test_work_for_a_cluster_is_not_done_here(tmp_path: Path) -> None:
-    with pytest.raises(ClusterError, match="no Dask scheduler answers"):
+    with pytest.raises(ClusterError, match="no Dask scheduler replies"):
         asked(tmp_path / "store", calls_in(tmp_path, [1]), cluster="")
 
 
@@ -292,7 +292,7 @@ def test_what_was_found_before_an_error_is_kept(tmp_path: Path) -> None:
 
 
 def test_an_answer_that_json_would_change_is_refused_when_it_is_found(tmp_path: Path) -> None:
-    with Store(tmp_path / "store", "set") as store, pytest.raises(TypeError, match="told_wrongly found does not read"):
+    with Store(tmp_path / "store", "set") as store, pytest.raises(TypeError, match="the result of told_wrongly is no"):
         Cache(store, silent, jobs=1).ask("", [told_wrongly.call(1.0, 1)])
 
 

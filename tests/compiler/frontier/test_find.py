@@ -206,7 +206,7 @@ def test_a_store_of_the_older_form_is_computed_anew_and_that_is_said(tmp_path: P
     store = request["output"] / "store.jsonl"
     store.write_bytes(OLD_HEADERS[-1] + store.read_bytes().split(b"\n", 1)[1])
     again = found_of(request)
-    assert again.skipped[0] == "store.jsonl was an older thenar's, of another form: everything was computed anew"
+    assert again.skipped[0] == "store.jsonl had the form of an older thenar: everything was computed again"
     assert len(again.skipped) == len(first.skipped) + 1
     assert [(point.setting, point.rate) for point in again.points if "switches" in point.fronts] == [
         (point.setting, point.rate) for point in first.points if "switches" in point.fronts
@@ -316,7 +316,7 @@ def test_a_build_is_marked_with_what_it_recognises(tmp_path: Path, make_set: Mak
 def test_a_build_that_does_not_say_what_it_recognises_is_refused(tmp_path: Path, make_set: Make) -> None:
     grasp_set = make_set()
     build = compile_build(grasp_set, tmp_path / "mine", rounds=5, folds=0).folder
-    with pytest.raises(FrontierError, match="does not say what it recognises"):
+    with pytest.raises(FrontierError, match="has no accuracy"):
         found_of(asked(tmp_path / "not" / "there", grasp_set, build=build))
     assert not (tmp_path / "not").exists()
 

@@ -63,7 +63,7 @@ def test_the_papers_placements_are_marked_with_all_inputs_that_there_are() -> No
 
 
 def test_one_type_leaves_nothing_to_tell_apart(grasp_set: GraspSet) -> None:
-    with pytest.raises(FrontierError, match="nothing to tell apart"):
+    with pytest.raises(FrontierError, match="nothing to distinguish"):
         find_frontier(grasp_set.rows(np.arange(0, 96, 4)))
 
 

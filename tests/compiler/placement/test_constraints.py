@@ -128,12 +128,12 @@ def test_a_limit_that_forbids_nothing_changes_nothing_and_one_that_does_is_obeye
     ("asked", "message"),
     [
         ({"keep": ("a",), "never": ("b", "a")}, "--keep-these and --never both name a"),
-        ({"keep": ("a", "b"), "apart_mm": 6.5}, "--keep-these a,b are 6.0 mm apart, --apart-mm asks for 6.5"),
+        ({"keep": ("a", "b"), "apart_mm": 6.5}, "--keep-these a,b are 6.0 mm apart, --apart-mm requires 6.5"),
         ({"keep": ("p", "q"), "taxels": 1}, "--keep-these names more taxels than --at-most 1 taxels"),
         ({"keep": ("a", "c"), "budget_us": 12.0}, "--keep-these takes 15.5 us to read, --budget-us allows 12"),
         ({"budget_us": 5.0}, "--never and --budget-us leave nothing"),
         ({"never": ("pp",)}, "no input 'pp'"),
-        ({"apart_mm": 1.0, "places": {"a": (0.0, 0.0)}}, "--apart-mm: where b, c, p, q lie is not known"),
+        ({"apart_mm": 1.0, "places": {"a": (0.0, 0.0)}}, "--apart-mm: the position of b, c, p, q is unknown"),
     ],
 )
 def test_contradictions_are_refused_by_both_names(asked: dict[str, object], message: str) -> None:
@@ -145,7 +145,7 @@ def test_more_to_keep_than_there_is_room_for_and_a_budget_without_costs_are_refu
     limits = Limits(names=NAMES, n_switches=3, keep=("a", "b", "q"), budget_us=99.0)
     with pytest.raises(PlacementError, match="--keep-these names 3, --keep allows 2"):
         choose(samples_of(1), "cmim", 2, PORTS, limits.on(ELEMENTS, PORTS))
-    with pytest.raises(PlacementError, match="--budget-us needs to know what reading"):
+    with pytest.raises(PlacementError, match="--budget-us needs the cost of reading"):
         limits.on(ELEMENTS, None)
 
 

@@ -11,9 +11,9 @@ from thenar.compiler.placement.inputs import PlacementError
 from thenar.compiler.placement.placement import Aim
 from thenar.compiler.placement.population import (
     EXCHANGES,
-    Asked,
     Population,
     Refining,
+    StudyOptions,
     rates,
     served,
     standard_placement,
@@ -38,7 +38,7 @@ def make_population(people: int = 40, odd: tuple[int, ...] = ODD) -> Population:
     )
 
 
-TAKE = Asked(keep=2, method="cmim", rows=600, rounds=10, repeats=2)
+TAKE = StudyOptions(keep=2, method="cmim", rows=600, rounds=10, repeats=2)
 
 
 def test_two_switches_serve_the_many_and_four_serve_the_odd_ones_too() -> None:
@@ -168,7 +168,7 @@ def elements(*columns: int) -> Elements:
     return tuple(map(Element, columns))
 
 
-def bettered(kept: Columns, spare: Columns, aim: Aim, people: int = PEOPLE) -> Columns:
+def refined(kept: Columns, spare: Columns, aim: Aim, people: int = PEOPLE) -> Columns:
     refining = Refining(edgy(people), elements(*kept), elements(*spare), rows=400, rounds=10, seed=1)
     return columns_of(refining.best(aim))
 
@@ -177,29 +177,29 @@ def bettered(kept: Columns, spare: Columns, aim: Aim, people: int = PEOPLE) -> C
 @pytest.mark.parametrize(("aim", "wanted"), [("plain", {1, 4}), ("mean", {0, 1}), ("worst tenth", {1, 2})])
 def test_each_aim_finds_the_exchange_that_serves_it(aim: Aim, wanted: set[int]) -> None:
     """Without 0 nobody is served well; 0 serves the many to perfection, 2 everybody almost so."""
-    assert set(bettered((1, 4), (0, 2, 5), aim)) == wanted
+    assert set(refined((1, 4), (0, 2, 5), aim)) == wanted
 
 
 @pytest.mark.usefixtures("_twenty_are_enough")
 def test_what_is_exchanged_takes_the_place_of_what_goes() -> None:
-    assert bettered((4, 1), (0, 5), "mean") == (0, 1)
+    assert refined((4, 1), (0, 5), "mean") == (0, 1)
 
 
 @pytest.mark.usefixtures("_twenty_are_enough")
 def test_a_placement_that_nothing_betters_stays_as_it_is() -> None:
-    assert bettered((1, 0), (3, 4, 5), "mean") == (1, 0)
-    assert bettered((1, 0), (), "worst tenth") == (1, 0)
+    assert refined((1, 0), (3, 4, 5), "mean") == (1, 0)
+    assert refined((1, 0), (), "worst tenth") == (1, 0)
 
 
 @pytest.mark.usefixtures("_twenty_are_enough")
 def test_only_the_edge_changes_and_only_so_often() -> None:
-    assert bettered((3, 4, 5, 6), (0, 1, 2), "mean")[:EXCHANGES] != (3, 4)
+    assert refined((3, 4, 5, 6), (0, 1, 2), "mean")[:EXCHANGES] != (3, 4)
     kept = (3, 4, 5, 6)
-    assert len(set(bettered(kept, (0, 1, 2), "mean")) - set(kept)) == EXCHANGES
-    assert bettered((3, 0, 4, 1, 5), (2,), "worst tenth")[0] == 3
+    assert len(set(refined(kept, (0, 1, 2), "mean")) - set(kept)) == EXCHANGES
+    assert refined((3, 0, 4, 1, 5), (2,), "worst tenth")[0] == 3
 
 
 @pytest.mark.usefixtures("_twenty_are_enough")
 def test_few_subjects_are_left_to_the_method() -> None:
-    assert bettered((1, 4), (0, 2), "mean", people=7) == (1, 4)
-    assert bettered((1, 4), (0, 2), "mean", people=8) == (1, 0)
+    assert refined((1, 4), (0, 2), "mean", people=7) == (1, 4)
+    assert refined((1, 4), (0, 2), "mean", people=8) == (1, 0)

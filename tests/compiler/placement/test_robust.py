@@ -81,7 +81,7 @@ def test_options_say_that_training_is_masked() -> None:
 def test_the_worst_lost_switch_costs_other_men_at_most_five_points_and_nothing_else_a_point(
     tmp_path: Path,
 ) -> None:
-    """As in docs/how-to/choose-switches.md, for all repetitions: every fault on every row of unseen men."""
+    """The table of docs/how-to/choose-switches.md with fewer repetitions: every fault on every row of unseen men."""
     learnt, judged = (simulate(load_scene(name).varied(20), 1).grasp_set for name in ("kamakura", "kamakura-def"))
     usual: dict[str, Any] = {"inputs": "switches", "folds": 0, "rounds": 60}
     compile_build(learnt, tmp_path / "paper", prune=62, **usual)

@@ -74,7 +74,7 @@ def altered(tree: Tree, number: int, node: Node) -> bytes:
         (2, Node((1, 0, 0), input=1, values=(0,)), "node 2 is neither a leaf nor a decision"),
         (2, Node((1, 0, 0), gain=0.5), "node 2 is neither a leaf nor a decision"),
         (1, Node((1, 2, 0)), "not one tree in preorder"),
-        (1, Node((1, 2, 0), input=2, values=(0, 2)), "node 1 asks for input 2, there are 2"),
+        (1, Node((1, 2, 0), input=2, values=(0, 2)), "node 1 tests input 2, there are 2"),
         (1, Node((1, 2, 0), input=1, values=(2, 0)), "values that do not ascend"),
         (1, Node((1, 2, 0), input=1, gain=-0.5, values=(0, 2)), "node 1 has a negative gain"),
     ],

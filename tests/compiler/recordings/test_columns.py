@@ -61,10 +61,10 @@ def test_every_key_is_read(tmp_path: Path) -> None:
     [
         ("", "line 1: the key label is missing"),
         ("label = 3", "line 1: label: must be text or a list, not 3"),
-        ('label = "a"\nlables = 1', "line 2: lables: there is no such key here"),
+        ('label = "a"\nlables = 1', "line 2: lables: this key is unknown"),
         (
             'label = "a"\n[[joints]]\ncolumns = ["b"]\ngird = 1',
-            r"line 4: joints\[0\].gird: there is no such key here",
+            r"line 4: joints\[0\].gird: this key is unknown",
         ),
         ('label = "a"\nmissing = "skip"', "line 2: missing: 'skip' is not among its values"),
         ('label = "a"\ndelimiter = ""', "`delimiter` must be one character"),

@@ -265,7 +265,7 @@ def test_what_is_passed_over_is_told_with_its_place(write: Write) -> None:
     _, report = import_recordings([path])
     messages = {warning.kind: warning.message for warning in report.warnings}
     assert messages["records passed over"] == (
-        f"a.mcap holds what thenar does not read, passed over: record of unknown kind 0x85 at byte {place}"
+        f"a.mcap holds records that thenar skips: record of unknown kind 0x85 at byte {place}"
     )
     assert messages["altered recordings"] == "a.mcap is altered: the checksum of its data does not match"
 

@@ -67,7 +67,12 @@ def test_every_section_is_there_and_has_something_to_say(page: Page) -> None:
     ids = [attributes["id"] for _, attributes in page.elements if "id" in attributes]
     assert len(set(ids)) == len(ids)
     assert {link[1:] for link in links if link} <= {name for name in ids if name}
-    for said in ("recognises 4 grasp types", "At worst, over every frame", "A whole scan is", "nested protocol"):
+    for said in (
+        "recognises 4 grasp types",
+        "In the worst case over all possible frames",
+        "A whole scan is",
+        "nested protocol",
+    ):
         assert said in page.text
     assert "No frontier was given" not in page.text
 
@@ -130,7 +135,7 @@ def test_the_command_to_make_the_build_again_is_one_that_compile_understands(bar
 
 
 def test_a_frontier_of_other_recordings_is_called_so(whole: ReportContent, frontier: Frontier) -> None:
-    said = "This frontier is of other recordings than the build."
+    said = "This frontier belongs to other recordings than the build."
     assert said in Page(report_html(whole)).text
     same = msgspec.structs.replace(frontier, fingerprint=whole.manifest.source.fingerprint)
     assert said not in Page(report_html(replace(whole, frontier=same))).text
@@ -143,18 +148,18 @@ def test_what_was_not_asked_for_is_said_with_the_command_that_makes_it(bare: Rep
     text = Page(report_html(little)).text
     for command_line in ("thenar evaluate", "thenar frontier", "--glove glove.toml"):
         assert command_line in text
-    assert "Where these switches lie on the hand is not known" in text
+    assert "The positions of these switches on the hand are not known" in text
 
 
 def test_a_frontier_without_points_is_shown_as_such(whole: ReportContent, frontier: Frontier) -> None:
     empty = msgspec.structs.replace(frontier, points=(), picked=None, tried=(), curves=(), marks=(), checks=())
-    assert "It has no points." in Page(report_html(replace(whole, frontier=empty))).text
+    assert "This frontier has no points." in Page(report_html(replace(whole, frontier=empty))).text
 
 
 def test_parts_that_do_not_belong_together_are_refused(bare: ReportContent) -> None:
-    with pytest.raises(ReportError, match="confusion matrix of 4 grasp types is not"):
+    with pytest.raises(ReportError, match="confusion matrix of 4 grasp types has the shape"):
         replace(bare, confusion=np.zeros((3, 3), np.intp))
-    with pytest.raises(ReportError, match="not of this harness"):
+    with pytest.raises(ReportError, match="does not match the harness"):
         replace(bare, harness=None)
     assert bare.hand is not None
     with pytest.raises(ReportError, match="lacks a kept switch"):

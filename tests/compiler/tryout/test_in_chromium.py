@@ -662,7 +662,7 @@ def test_lines_of_numbers_are_rows_of_the_build(gloved_trier: Trier, folder: Pat
         wanted = said_of(build, bits[row].tolist(), codes[row].tolist())
         trier.wait(lambda wanted=wanted: (trier.text("grasp"), trier.text("margin")) == wanted)  # type: ignore[misc]
         assert bits_now(trier, build) == bits[row].astype(int).tolist()
-    trier.wait(lambda: trier.text("serial-said") == 'Connected: 4 rows; lines that hold none: 1, such as "12,what".')
+    trier.wait(lambda: trier.text("serial-said") == 'Connected: 4 rows; lines without a row: 1, such as "12,what".')
     assert trier.log("browser") == []
 
 

@@ -208,10 +208,10 @@ def test_a_screen_reader_is_told_what_stands_and_not_flooded(run: Callable[[], A
     browser.open(running.page.server.url)
     shown(browser, running.scene, 0)
     answer = browser.text("grasp")
-    browser.wait(lambda: browser.text("told") == answer)
+    browser.wait(lambda: browser.text("spoken") == answer)
     browser.script(
         "window.said = 0; new MutationObserver(() => window.said++)"
-        ".observe(document.getElementById('told'), {childList: true, characterData: true, subtree: true})"
+        ".observe(document.getElementById('spoken'), {childList: true, characterData: true, subtree: true})"
     )
     rows = [row for row in range(1, 25) if running.scene.truth.answer(row) != running.scene.truth.answer(row - 1)]
     for row in rows:
@@ -219,11 +219,11 @@ def test_a_screen_reader_is_told_what_stands_and_not_flooded(run: Callable[[], A
     said = browser.script("return window.said")
     assert said < len(rows) / 2
     answer = browser.text("grasp")
-    browser.wait(lambda: browser.text("told") == answer)
+    browser.wait(lambda: browser.text("spoken") == answer)
     live = browser.script(
         "return [...document.querySelectorAll('[aria-live], [role=status], [role=log]')].map((e) => e.id)"
     )
-    assert live == ["told"]
+    assert live == ["spoken"]
 
 
 def test_a_page_that_comes_late_sees_what_was(run: Callable[[], Any], browser: Any) -> None:

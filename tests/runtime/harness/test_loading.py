@@ -47,7 +47,7 @@ def test_text_that_was_kept_elsewhere_is_read_likewise_its_calibration_as_it_sta
     assert glove is not None
     assert glove.calibration == "anna.toml"
     assert parse_harness('[taxels]\ncalibration = "pads.toml"', "a").taxel_settings.calibration == "pads.toml"
-    with pytest.raises(HarnessError, match=r"a\.mcap, line 1: nam: there is no such key"):
+    with pytest.raises(HarnessError, match=r"a\.mcap, line 1: nam: this key is unknown"):
         parse_harness("nam = 1", "a.mcap")
 
 
@@ -101,7 +101,7 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
             f"[cyberglove]\nport = 'x'\njoints = {['', 'a'] * 9}",
             "line 3: cyberglove.joints[3]: sensor 'a' is cyberglove.joints[1] already",
         ),
-        ("[[scaner]]", "line 1: scaner: there is no such key here (did you mean 'scanner'?)"),
+        ("[[scaner]]", "line 1: scaner: this key is unknown (did you mean 'scanner'?)"),
         ("[[scanner]]\nport = 'x'", "line 1: scanner[0]: the key switches is missing"),
         (
             "[[scanner]]\nport = 'x'\nswitches = ['a', '', '', 'a']",
@@ -109,11 +109,11 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
         ),
         (
             "[[scanner]]\nport = 'x'\nswitches = [' a']",
-            "scanner[0].switches[0]: ' a' is no name of a switch: it begins",
+            "scanner[0].switches[0]: ' a' is not a valid name of a switch: it begins",
         ),
         (
             "[cyberglove]\nport = 'x'\n[[scanner]]\nport = 'x'\nswitches = []",
-            "line 4: scanner[0].port: x is cyberglove.port already: one device, one entry",
+            "line 4: scanner[0].port: x is already cyberglove.port: name each device in one entry only",
         ),
         (BUS + BUS, "line 4: bus[1].device: /dev/i2c-1 is bus[0].device already"),
         (BUS + "clock_hz = 5", "line 3: bus[0].clock_hz: must be at least 1000, not 5"),
@@ -141,14 +141,14 @@ def test_what_is_wrong_with_a_line_or_bus_is_told_with_its_place(load: Load, tex
         ("pins = { GPA7 = 's' }", "bus[0].chip[0].pins.GPA7: must not be an input: since revision D of its data sheet"),
         ("pins = { GPB7 = 's' }", "bus[0].chip[0].pins.GPB7: must not be an input"),
         ("kind = 'mcp23008'\npins = { GP7 = 's' }", "bus[0].chip[0].pins.GP7: must not be an input"),
-        ("pins = { GPA0 = '' }", "bus[0].chip[0].pins.GPA0: '' is no name of a switch: it is empty"),
+        ("pins = { GPA0 = '' }", "bus[0].chip[0].pins.GPA0: '' is not a valid name of a switch: it is empty"),
         ("pins = { GPA0 = 3 }", "bus[0].chip[0].pins.GPA0: must be text, not 3"),
         ("pins = { GPA0 = 'a', GPA0 = 'b' }", "glove.toml is not valid TOML: "),
         (
             "pins = { GPA0 = 'a', GPA1 = 'a' }",
             "bus[0].chip[0].pins.GPA1: switch 'a' is bus[0].chip[0].pins.GPA0 already: a switch has one place",
         ),
-        ("kind = 'pcf8574'\nclosed = 'high'", "bus[0].chip[0].closed: a pcf8574 pulls its inputs up by itself"),
+        ("kind = 'pcf8574'\nclosed = 'high'", "bus[0].chip[0].closed: a pcf8574 pulls its inputs up"),
         ("closed = 'lo'", "bus[0].chip[0].closed: 'lo' is not among its values (did you mean 'low'"),
         ("mux = { address = 0x78, channel = 0 }", "bus[0].chip[0].mux.address: must be at most 119, not 120"),
         ("mux = { address = 0x70, channel = 8 }", "bus[0].chip[0].mux.channel: must be at most 7, not 8"),
@@ -183,7 +183,7 @@ def test_two_chips_that_would_answer_together_are_refused(
 ) -> None:
     text = BUS + "".join(place(*each) for each in places)
     if clash:
-        assert "bus[0].chip[1].address: 0x20 is the address of bus[0].chip[0] too: both answer" in complaint(load, text)
+        assert "bus[0].chip[1].address: 0x20 is the address of bus[0].chip[0] too: change one" in complaint(load, text)
     else:
         load(text)
 
@@ -197,7 +197,7 @@ def test_a_chip_at_the_address_of_a_mux_is_refused(load: Load, monkeypatch: pyte
     for module in (checks, wiring):
         monkeypatch.setattr(module, "CHIPS", kinds)
     text = BUS + "[[bus.chip]]\nkind = 'odd'\naddress = 0x70\n" + place(0x20, 0)
-    assert "bus[0].chip[0].address: 0x70 is the address of a mux on this bus too" in complaint(load, text)
+    assert "bus[0].chip[0].address: 0x70 is also the address of a mux on this bus" in complaint(load, text)
 
 
 @pytest.mark.parametrize(

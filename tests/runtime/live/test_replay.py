@@ -62,5 +62,5 @@ def test_levels_are_read_off_recorded_counts_and_switches_by_their_names(pressed
 
 def test_a_taxel_that_was_not_recorded_is_named(pressed: Build, tmp_path: Path) -> None:
     path = record(tmp_path / "heel.mcap", [SwitchFrame(0, 0, taxels=(7,))], taxels=("heel",))
-    with pytest.raises(SettingError, match=r"heel\.mcap was recorded without pad>60, which the build reads"):
+    with pytest.raises(SettingError, match=r"heel\.mcap was recorded without pad>60, which the build"):
         list(recognised(pressed, path))

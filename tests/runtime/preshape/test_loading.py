@@ -110,7 +110,7 @@ def test_where_the_literature_gives_nothing_the_table_says_so() -> None:
     table = load_preshapes("barrett_bh8")
     assert table.chosen.get("Light tool") is None
     assert table.check(CUTKOSKY_16.types) == (
-        "preshapes Barrett BH8: none for Light tool: nothing is sent to the hand on those"
+        "preshapes Barrett BH8: none for Light tool: nothing is sent to the hand for those"
     )
 
 
@@ -143,14 +143,14 @@ def test_ones_own_table_is_in_rad_and_metres_afterwards(own: Path) -> None:
     ("old", "new", "told"),
     [
         ('unit = "deg"', 'unit = "grad"', "line 6: joints[0].unit: 'grad' is not among its values"),
-        ("[45, 40]", "[45]", "line 16: preshapes[0].positions: must be 2 positions, one a joint, not 1"),
+        ("[45, 40]", "[45]", "line 16: preshapes[0].positions: must be 2 positions, one per joint, not 1"),
         ("[45, 40]", "[45, 41]", "line 16: preshapes[0].positions[1]: 41 mm is outside 0 to 40, the range of slides"),
         ("[45, 40]", '[45, "x"]', "line 16: preshapes[0].positions[1]: must be a number, not 'x'"),
         ("[45, 40]", "[nan, 40]", "line 16: preshapes[0].positions[0]: must be a finite number, not nan"),
         ('["Tip"]', '["PoS"]', "line 22: preshapes[1].grasps[0]: 'PoS' takes preshape 'open' already"),
         ('"closed"', '"open"', "line 20: preshapes[1].name: preshape 'open' is there already"),
         ('"slides"', '"turns"', "line 10: joints[1].name: joint 'turns' is there already"),
-        ("[0, 40]", "[40, 0]", "line 12: joints[1].range: must be the lowest position and then the highest"),
+        ("[0, 40]", "[40, 0]", "line 12: joints[1].range: must be the lowest and then the highest position"),
         ("0.25", "0", "line 2: time_from_start_s: must be above 0, not 0"),
         (
             "time_from_start_s",
@@ -160,7 +160,7 @@ def test_ones_own_table_is_in_rad_and_metres_afterwards(own: Path) -> None:
         (
             "positions",
             "angles",
-            "line 16: preshapes[0].angles: there is no such key here (there are: grasps, name, positions)",
+            "line 16: preshapes[0].angles: this key is unknown (there are: grasps, name, positions)",
         ),
         ('name = "mine"', "", "the key name is missing"),
         ("[45, 40]", "45", "line 16: preshapes[0].positions: must be a list, not 45"),

@@ -71,5 +71,5 @@ def test_a_state_that_no_switch_has_is_refused() -> None:
 
 @pytest.mark.parametrize("length", [17, 20])
 def test_a_glove_of_another_length_is_refused(length: int) -> None:
-    with pytest.raises(McapError, match=f"{length} bytes, its session names 18 sensors"):
+    with pytest.raises(McapError, match=f"{length} bytes, but its session names 18 sensors"):
         glove_frame(0, bytes(length), 18)

@@ -144,5 +144,5 @@ def test_of_a_recording_that_is_damaged_all_before_is_read_and_the_place_named(p
 
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     (tmp_path / "no.mcap").write_bytes(b"no")
-    with pytest.raises(McapError, match="does not begin as an MCAP file does"):
+    with pytest.raises(McapError, match="does not begin like an MCAP file"):
         Index(tmp_path / "no.mcap")

@@ -59,7 +59,7 @@ def test_a_file_that_is_cut_at_any_byte_gives_what_is_whole_and_says_what_is_cut
     for cut in range(len(data), -1, -1):
         os.truncate(path, cut)
         if cut < session_end:
-            with pytest.raises(McapError, match=r"cut.mcap (does not begin as an MCAP file does|holds no session)"):
+            with pytest.raises(McapError, match=r"cut.mcap (does not begin like an MCAP file|holds no session)"):
                 Reader(path)
             continue
         found, reader = read(path)
@@ -210,7 +210,7 @@ def test_what_is_no_mcap_is_named(tmp_path: Path) -> None:
     path = tmp_path / "set.mcap"
     for content in (b"", b"PK\x03\x04", b"\x80\x04\x95pickle"):
         path.write_bytes(content)
-        with pytest.raises(McapError, match=r"set\.mcap does not begin as an MCAP file does"):
+        with pytest.raises(McapError, match=r"set\.mcap does not begin like an MCAP file"):
             Reader(path)
 
 

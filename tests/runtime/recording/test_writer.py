@@ -149,7 +149,7 @@ def test_a_date_that_steps_moves_nothing(tmp_path: Path, session: Session, monke
 
 def test_a_recording_is_never_written_over(recording: Path, session: Session) -> None:
     before = recording.read_bytes()
-    with pytest.raises(SettingError, match="exists, and a recording is never written over"):
+    with pytest.raises(SettingError, match="exists, and a recording is never overwritten"):
         Recorder(recording, session)
     assert recording.read_bytes() == before
 
@@ -169,7 +169,7 @@ def test_nobody_else_may_read_a_recording(tmp_path: Path, session: Session) -> N
 
 
 def test_a_glove_whose_description_no_reader_would_take_is_refused(tmp_path: Path, session: Session) -> None:
-    with pytest.raises(SettingError, match="16777216 at most are recorded: shorten glove"):
+    with pytest.raises(SettingError, match="and at most 16777216 are recorded: shorten glove"):
         Recorder(tmp_path / "a.mcap", replace(session, harness="#" * LARGEST_RECORD))
     with pytest.raises(SettingError, match="this cannot be recorded: its metadata 'sensors' cannot be read"):
         Recorder(tmp_path / "a.mcap", replace(session, sensors=tuple(f"j{number}" for number in range(256))))
@@ -369,7 +369,7 @@ def test_a_recording_without_taxels_has_no_topic_for_them_and_one_with_them_goes
         for frame in frames:
             recorder.switches(frame)
         recorder.switches(SwitchFrame(7, 1))
-        with pytest.raises(FrameError, match="a frame of 1 taxels, 2 are recorded"):
+        with pytest.raises(FrameError, match="a frame has 1 taxels, but 2 are recorded"):
             recorder.switches(SwitchFrame(8, 1, taxels=(1,)))
         with pytest.raises(FrameError, match=r"outside 0\.\.65534"):
             recorder.switches(SwitchFrame(8, 1, taxels=(65535, 1)))

@@ -92,7 +92,7 @@ def test_a_joint_state_of_names_without_positions_is_counted(hear: Hear) -> None
     text = '[[stream]]\nport = "{port}"\njoints = {{ a = [0, 1] }}\n'
     source, frames = hear("JointState", "", {"stamp": [0, 0], "name": ["a", "b"], "position": [1.0]}, text)
     assert not frames
-    assert source.trouble() == "what comes holds no rows: a JointState of 2 names and 1 positions"
+    assert source.trouble() == "the data holds no rows: a JointState of 2 names and 1 positions"
 
 
 @pytest.mark.parametrize("port", ["ros:", "ros:topic", "ros:/t?type=String", "ros:/a b", "ros:/t?x"])

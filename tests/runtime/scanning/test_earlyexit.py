@@ -151,7 +151,7 @@ def test_what_is_left_after_a_port_is_told(make_tables: MakeTables) -> None:
 
 @pytest.mark.parametrize("groups", [[1, 3], [1 << 9], [1, 0, 1]])
 def test_ports_that_do_not_fit_the_build_are_refused(make_tables: MakeTables, groups: list[int]) -> None:
-    with pytest.raises(SettingError, match="read by two ports, or is none of the build's"):
+    with pytest.raises(SettingError, match="read by two ports, or is not in the build"):
         EarlyExit(Scorer(make_tables()), groups)
 
 

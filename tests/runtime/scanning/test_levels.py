@@ -264,5 +264,5 @@ def test_the_converters_of_a_new_glove_may_be_chosen(kind: str) -> None:
 
 
 def test_no_board_has_so_many_channels() -> None:
-    with pytest.raises(HarnessError, match="123 taxels, one board has 122 channels: share them between boards by hand"):
+    with pytest.raises(HarnessError, match="123 taxels, but one board has 122 channels: use several boards, by hand"):
         propose_board([f"t{number}>5" for number in range(123)])

@@ -23,7 +23,7 @@ _USUAL = SegmentModel.usual(3, True, 100.0)
         ({"enter": (), "leave": (), "direct": (), "least": (1,), "stay": (0,)}, "enters 0 types"),
         ({"stay": (0, -1, 0, 0)}, "a cost below 0"),
         ({"least": (0, 1, 1, 1)}, "not 1 to 255 ticks"),
-        ({"shift": 9}, "a frame's cost of"),
+        ({"shift": 9}, "a frame cannot cost"),
         ({"shift": 3, "gain": 20}, "takes a byte to 19, below 48"),
         ({"least": (200, 1, 1, 1), "stay": (0, 99, 0, 0)}, "paths through this segment model may differ by 5"),
     ],
@@ -75,7 +75,7 @@ def test_frames_cost_the_same_live_and_all_at_once(
 
 
 def test_scores_of_other_classes_are_refused() -> None:
-    with pytest.raises(BuildError, match=r"scores of shape \(2, 3\), the segment model takes 4 a frame"):
+    with pytest.raises(BuildError, match=r"scores have shape \(2, 3\), but the segment model takes 4 a frame"):
         emissions(np.zeros((2, 3), int), _USUAL)
 
 

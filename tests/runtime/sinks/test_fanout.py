@@ -44,7 +44,7 @@ def test_one_that_raises_is_left_out_and_the_others_go_on(
     assert faulty.numbers == [0, 1, 2]
     assert file.getvalue().count(b"\n") == 5
     (logged,) = caplog.records
-    assert (logged.name, logged.getMessage()) == ("thenar", "sink Faulty: a fault of the program")
+    assert (logged.name, logged.getMessage()) == ("thenar", "sink Faulty: a bug in the program")
     assert logged.exc_info is not None
     assert logged.exc_info[0] is KeyError
     own, lines = fanout.reports()

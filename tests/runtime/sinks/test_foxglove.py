@@ -285,11 +285,11 @@ def test_who_leaves_is_no_reader_any_more_and_costs_nothing(
 @pytest.mark.parametrize(
     ("where", "said"),
     [
-        ("foxglove:0.0.0.0:8765", r"other machines could read along .* foxglove:0\.0\.0\.0:8765\?public"),
+        ("foxglove:0.0.0.0:8765", r"other machines could read it there .* foxglove:0\.0\.0\.0:8765\?public"),
         ("foxglove:here", r"write it as foxglove:127\.0\.0\.1:8765"),
-        ("foxglove:127.0.0.1:8765?rate=0", "it is 1 to 1000 a second"),
+        ("foxglove:127.0.0.1:8765?rate=0", "is not possible: use 1 to 1000 a second"),
         ("foxglove:127.0.0.1:8765?rate=fast", "a rate of 'fast'"),
-        ("foxglove:127.0.0.1:8765?open", "behind the question mark can only be `public` or `rate=HZ`"),
+        ("foxglove:127.0.0.1:8765?open", "after the question mark only `public` or `rate=HZ` can follow"),
     ],
 )
 def test_an_address_that_cannot_be_is_refused(where: str, said: str) -> None:

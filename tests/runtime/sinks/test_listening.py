@@ -46,7 +46,7 @@ def test_the_socket_of_a_killed_process_is_replaced_and_that_of_a_living_one_is_
 
 def test_a_file_folder_or_link_of_that_name_stays(path: Path) -> None:
     def refused() -> None:
-        with pytest.raises(SinkError, match="something else of that name, which stays"):
+        with pytest.raises(SinkError, match="another file has that name, and it is kept"):
             open_unix(str(path))
 
     path.write_text("precious")

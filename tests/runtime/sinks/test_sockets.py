@@ -187,7 +187,7 @@ def test_where_all_keep_up_the_newest_is_turned_away(
         sink.publish(make_grasp(3), None, None)
         assert {reader.number() for reader in readers[:MAX_READERS]} == {3}
     assert sink.report().readers == MAX_READERS
-    assert "turned away" in sink.report().error
+    assert "rejected" in sink.report().error
     assert not sink.report().over
     assert readers[-1].socket.recv(1) == b""
     assert sink.report().dropped == 0
@@ -276,7 +276,7 @@ def test_one_other_machine_never_takes_every_place(make_grasp: MakeGrasp) -> Non
     there = crowd("127.0.0.2")
     sink.publish(make_grasp(1), None, None)
     assert sink.report().readers == MAX_OF_ONE
-    assert sink.report().error == "more than 8 readers on 127.0.0.2: the newest were turned away"
+    assert sink.report().error == "more than 8 readers on 127.0.0.2: the newest were rejected"
     elsewhere = crowd("127.0.0.3")
     sink.publish(make_grasp(2), None, None)
     here = crowd("127.0.0.1")

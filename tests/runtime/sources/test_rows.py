@@ -191,9 +191,9 @@ def test_what_is_wrong_with_all_rows_is_said(play: Play) -> None:
         "ms, thumb, index, pad, flex and 1 more"
     )
     source, _ = play([(0, b"rst:0x10\n")])
-    assert source.trouble() == "what comes holds no rows: 'rst:0x10'"
+    assert source.trouble() == "the data holds no rows: 'rst:0x10'"
     source, _ = play([(100_000 * n, b"%d,0,0,0,0,0,0\n" % (100 * n)) for n in range(12)])
-    assert source.trouble() == "10 rows a second come, glove.toml says 100: write rate_hz = 10"
+    assert source.trouble() == "10 rows a second arrive, but glove.toml says 100: set rate_hz = 10"
 
 
 @pytest.mark.parametrize(
@@ -214,7 +214,7 @@ def test_what_cannot_be_is_said_with_its_line(change: tuple[str, str], said: str
 
 
 def test_joints_come_from_one_device() -> None:
-    with pytest.raises(HarnessError, match="another device measures joints already"):
+    with pytest.raises(HarnessError, match="joints must come from one device"):
         parse_harness(GLOVE + '[cyberglove]\nport = "y"\n', "glove.toml")
 
 

@@ -59,7 +59,7 @@ def test_where_no_converter_answers_levels_are_lost_and_it_says_so(answers: list
     device = SpiConverter(HARNESS, 1, whole_scan(HARNESS, NAMES))
     answers.append([None, None])
     assert device.read(0.1) == SwitchFrame(5, 0, lost=0b10101, taxels=(None, None, None))
-    assert "mcp3008 does not answer" in device.trouble()
+    assert "mcp3008 does not reply" in device.trouble()
 
 
 def test_a_saturated_taxel_is_lost_and_named(answers: list[list[int | None]], tmp_path: Path) -> None:

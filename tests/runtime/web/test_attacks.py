@@ -44,7 +44,7 @@ def test_an_address_that_others_reach_takes_a_token(address: str) -> None:
 
 @pytest.mark.parametrize("token", ["", "short", "a" * 15, "a" * 129, "white space, and more of it", "ä" * 20])
 def test_a_token_that_can_be_guessed_or_is_none_is_refused(token: str) -> None:
-    with pytest.raises(SettingError, match="drawn at random"):
+    with pytest.raises(SettingError, match="random letters, digits"):
         Server("live", "127.0.0.1:0", token=token)
 
 
@@ -59,7 +59,7 @@ def test_without_the_token_nothing_is_served(serve: Callable[..., Any], path: st
     client = serve(token=guard.new_token())
     answer = client.ask(path)
     assert answer.status == 403
-    assert b"Open the address that thenar has printed" in answer.content
+    assert b"Open the full address that thenar printed" in answer.content
     assert "Set-Cookie" not in answer.headers
     assert client.ask(path, Cookie=f"thenar-{client.port}=guessed").status == 403
     assert refused(client) == 403

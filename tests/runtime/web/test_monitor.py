@@ -102,7 +102,7 @@ def test_a_run_that_comes_later_is_found(tmp_path: Path, hear_one: Any, monkeypa
     where = f"unix:{tmp_path}/run"
     with shown(where, []) as made, page(made) as live:
         lacking = hear(live, hear_one, lambda told: told["topic"] == "source" and told["error"].startswith(where))
-        assert lacking["error"].endswith(f"does the run go on, with --sink {where}?")
+        assert lacking["error"].endswith(f"is the run going, with --sink {where}?")
         sink = open_sink(where)
         sink.publish(grasp(1), None, None)
         assert hear(live, hear_one, lambda told: told["topic"] == "source" and told["connected"])
@@ -127,12 +127,12 @@ def test_what_is_no_stream_is_said_and_ends_nothing(sent: bytes, tmp_path: Path,
         thread = Thread(target=send)
         thread.start()
         with shown(f"unix:{tmp_path}/run", []) as made, page(made) as live:
-            found = hear(live, hear_one, lambda told: "no stream of thenar" in told.get("error", ""))
+            found = hear(live, hear_one, lambda told: "not a stream of thenar" in told.get("error", ""))
             assert len(found["error"]) < 300
             thread.join()
 
 
 @pytest.mark.parametrize("where", ["tcp:", "unix:", "tcp:host", "tcp:host:99999", "http://x", "", "ros:/thenar"])
 def test_what_names_no_stream_is_refused(where: str) -> None:
-    with pytest.raises(SettingError, match="is no stream of a run: write tcp:HOST:PORT or unix:PATH"):
+    with pytest.raises(SettingError, match="is not a stream of a run: write tcp:HOST:PORT or unix:PATH"):
         StreamMonitor(where, "127.0.0.1:0", token=None)

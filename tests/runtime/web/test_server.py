@@ -39,7 +39,7 @@ def test_what_a_page_asks_for_is_handed_on_and_a_refusal_told(
         assert asked == [{"do": "record", "name": "a"}]
         for nothing in ("", "[]", "{}", '{"do": 1}', "[" * 5000):
             live.send(nothing)
-            assert hear(live)["why"].startswith("what the page sent means nothing")
+            assert hear(live)["why"].startswith("the page sent an invalid message")
         assert len(asked) == 1
 
 

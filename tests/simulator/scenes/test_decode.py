@@ -132,7 +132,7 @@ def test_objects_of_ones_own_are_read_like_a_catalogue(scene: Load) -> None:
         ("seed = 1", "seed = -1", "line 1: seed: must be at least 0, not -1"),
         ("seed = 1", "seed = 1.5", "line 1: seed: must be a whole number, not 1.5"),
         ("seed = 1", "", "line 1: the key seed is missing"),
-        ("seed = 1", "sed = 1", "line 1: sed: there is no such key here (did you mean 'seed'"),
+        ("seed = 1", "sed = 1", "line 1: sed: this key is unknown (did you mean 'seed'"),
         ("seed = 1", "seed = 1; name = '?'", "mine.toml is not valid TOML: "),
         ("repetitions = 4", "repetitions = 0", "line 4: repetitions: must be at least 1, not 0"),
         ('my = "kamakura14"', 'my = "feix"', "line 2: taxonomy: no taxonomy is called 'feix': take one of"),

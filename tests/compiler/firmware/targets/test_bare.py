@@ -7,7 +7,7 @@ import pytest
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import Layout, arrange
-from thenar.compiler.firmware.probes import Answers, Probes
+from thenar.compiler.firmware.probes import Predictions, Probes
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.bare import Bare
 from thenar.runtime.manifest import Manifest
@@ -31,7 +31,7 @@ MOST_INSTRUCTIONS = {
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
 Probed = Callable[[IntegerTables, int], Probes]
-SameAsPython = Callable[[Answers, IntegerTables, Probes], None]
+SameAsPython = Callable[[Predictions, IntegerTables, Probes], None]
 
 
 @pytest.fixture(autouse=True)
@@ -215,7 +215,7 @@ def test_update_is_called_for_every_frame_and_then_switches_are_set_one_by_one(l
 
 @pytest.mark.parametrize("part", PARTS)
 def test_a_classifier_that_hangs_is_stopped_and_is_an_error(layout: Layout, part: str) -> None:
-    with pytest.raises(FirmwareError, match=r"qemu-system-\w+ had not ended after 2 s and was stopped"):
+    with pytest.raises(FirmwareError, match=r"qemu-system-\w+ was stopped, since it had not ended after 2 s"):
         CORES[part].run(stand_in(HANGING), "hand", layout, np.zeros((1, 5), np.uint8), limit_s=2)
 
 

@@ -40,7 +40,7 @@ void thenar_fault(void)
 int main(void)
 {
     static thenar_hand_codes codes;
-    const uint32_t answers = semihosting_open("answers", 7, SEMIHOSTING_WB);
+    const uint32_t answers = semihosting_open("predictions", 11, SEMIHOSTING_WB);
     bool whole = true;
 
     thenar_hand_codes_init(&codes);

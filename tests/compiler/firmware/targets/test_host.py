@@ -7,7 +7,7 @@ import pytest
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import Layout, arrange
-from thenar.compiler.firmware.probes import Answers, Probes
+from thenar.compiler.firmware.probes import Predictions, Probes
 from thenar.compiler.firmware.targets.host import MEMBER as HOST
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
@@ -15,7 +15,7 @@ from thenar.runtime.tables import IntegerTables
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
 Probed = Callable[[IntegerTables, int], Probes]
-SameAsPython = Callable[[Answers, IntegerTables, Probes], None]
+SameAsPython = Callable[[Predictions, IntegerTables, Probes], None]
 
 
 @pytest.fixture

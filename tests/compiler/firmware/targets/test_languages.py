@@ -14,7 +14,7 @@ from msgspec import structs
 
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout, arrange
-from thenar.compiler.firmware.probes import Answers, Probes, lost_inputs
+from thenar.compiler.firmware.probes import Predictions, Probes, lost_inputs
 from thenar.compiler.firmware.sensors import Sensor, sensors_of
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.tools import call, find
@@ -47,7 +47,7 @@ def language(request: pytest.FixtureRequest, tool: Callable[[str], str]) -> str:
     return str(request.param)
 
 
-def answers(language: str, layout: Layout, manifest: Manifest, frames: Probes, **how: Any) -> Answers:
+def answers(language: str, layout: Layout, manifest: Manifest, frames: Probes, **how: Any) -> Predictions:
     target = TARGETS[language]
     sent = layout.frame_bytes(frames.bits, frames.codes)
     return target.run(target.sources(Library("hand", manifest, layout, avr=False)), "hand", layout, sent, **how)

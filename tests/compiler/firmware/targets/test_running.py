@@ -6,7 +6,7 @@ import pytest
 
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import arrange
-from thenar.compiler.firmware.probes import Answers, Probes
+from thenar.compiler.firmware.probes import Predictions, Probes
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
@@ -31,7 +31,7 @@ def test_every_target_answers_as_python_does(
     make_tables: Callable[..., IntegerTables],
     describe: Callable[[IntegerTables], Manifest],
     probed: Callable[[IntegerTables, int], Probes],
-    same_as_python: Callable[[Answers, IntegerTables, Probes], None],
+    same_as_python: Callable[[Predictions, IntegerTables, Probes], None],
     part: str,
     incremental: bool,
 ) -> None:

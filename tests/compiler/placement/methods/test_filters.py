@@ -128,5 +128,5 @@ def test_other_seeds_draw_other_placements() -> None:
 
 
 def test_a_negative_size_is_refused() -> None:
-    with pytest.raises(PlacementError, match="-1 inputs were asked for"):
+    with pytest.raises(PlacementError, match="-1 inputs were requested"):
         random_placement(5, -1, 0)

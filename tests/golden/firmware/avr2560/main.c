@@ -1,8 +1,8 @@
-/* A program around the classifier, to start from: read the glove where the comment is. */
+/* An initial program around the classifier: read the glove at the comments. */
 #include "thenar_glove.h"
 
 static thenar_glove glove;
-static volatile thenar_glove_class recognised; /* for whoever shows or sends it */
+static volatile thenar_glove_class recognised; /* for the code that shows or sends it */
 
 int main(void)
 {

@@ -1,4 +1,4 @@
-/* thenar_glove_tables.h: what the library's own files know of the tables; no program needs it.
+/* thenar_glove_tables.h: definitions of the tables for the library's own files; programs do not need it.
 
    From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME_tables.h.j2. */
 #ifndef THENAR_GLOVE_TABLES_H
@@ -35,21 +35,21 @@ typedef uint32_t thenar_glove_row[WORDS];
 extern const thenar_glove_row thenar_glove_rows[PARTS * ROWS];
 extern const char thenar_glove_names[4][14];
 
-/* Where the input has a switch: byte and bit. */
+/* The place of a switch in the input: byte and bit. */
 typedef struct {
     uint8_t port;
     uint8_t bit;
 } thenar_glove_place;
 extern const thenar_glove_place thenar_glove_places[THENAR_GLOVE_SWITCHES];
 
-/* What an input adds while it is missing, beyond what it does open or at code 0: switches, then joints. */
+/* The contribution of a missing input, relative to open or code 0: switches, then joints. */
 typedef int16_t thenar_glove_mean;
 extern const thenar_glove_mean thenar_glove_means[INPUTS][CLASSES];
 
 /* 2 to the power of 15 - i / 64. */
 extern const uint16_t thenar_glove_powers[65];
 
-/* What scores begin with, before any row is added. */
+/* The initial scores, before any row is added. */
 #ifdef __AVR__
 extern const int16_t thenar_glove_start[CLASSES];
 #else

@@ -102,7 +102,7 @@ const thenar_glove_row thenar_glove_rows[PARTS * ROWS] IN_FLASH = {
 #define PAGED
 #endif
 
-/* What joints' codes add to the numbers of rows. */
+/* The contributions of joints' codes to the numbers of rows. */
 const uint8_t thenar_glove_bins[512] IN_FLASH PAGED = {
     /* thumb_rotation, from code 0 on */
     3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3,
@@ -175,7 +175,7 @@ const int16_t thenar_glove_start[CLASSES] IN_FLASH = {
     120, -40, 7,
 };
 #else
-/* Sums begin 2^15 too high, so that no lane is negative in the end, when all have taken what they borrowed. */
+/* Sums start 2^15 too high, so that no lane is negative at the end, after all borrows. */
 #define LANE(start, shift) (((uint32_t)(int32_t)(start) + 32768u) << (shift))
 #define START(a, b) (LANE(a, 0) + LANE(b, 16))
 

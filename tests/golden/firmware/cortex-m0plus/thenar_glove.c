@@ -1,4 +1,4 @@
-/* thenar_glove.c: integer arithmetic; the header says how it is used.
+/* thenar_glove.c: integer arithmetic; the header describes its use.
 
    From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.c.j2. */
 #include "thenar_glove_tables.h"
@@ -46,7 +46,7 @@ uint16_t thenar_glove_margin(const thenar_glove *glove)
         } else if (score > second) {
             second = score;
         } else {
-            /* no competitor */
+            /* no second best */
         }
     }
     return (uint16_t)((uint16_t)best - (uint16_t)second);
@@ -62,7 +62,7 @@ uint16_t thenar_glove_probability(const thenar_glove *glove, thenar_glove_class 
         best = (glove->scores[k] > best) ? glove->scores[k] : best;
     }
     for (uint16_t k = 0u; k < CLASSES; k++) {
-        /* How far it is behind, in 64ths of what halves a probability; and between two of these, in 256ths. */
+        /* The lag, in 64ths of a halving of the probability, and the rest in 256ths of such a step. */
         const uint16_t behind = (uint16_t)((uint16_t)best - (uint16_t)glove->scores[k]);
         const uint32_t steps = (uint32_t)behind * 60511u;
         const uint32_t halves = steps >> 22;
@@ -81,7 +81,7 @@ uint16_t thenar_glove_probability(const thenar_glove *glove, thenar_glove_class 
     return (uint16_t)(((own * 65535u) + (all / 2u)) / all);
 }
 
-/* Open the switches that are missing, and make the codes of such joints 0. */
+/* Open the missing switches, and set the codes of missing joints to 0. */
 static void leave_out(thenar_glove *glove)
 {
     for (uint16_t port = 0u; port < THENAR_GLOVE_PORTS; port++) {
@@ -94,15 +94,15 @@ static void leave_out(thenar_glove *glove)
     }
 }
 
-/* Compilers that may reorder look-ups load many rows before they add one, and run out of registers; and where they know
-   how many bytes a row has, or where it lies, they work that out in more steps than a product takes. A core of ARMv6-M
-   has too few registers to gain by it: there all rows are found first. */
+/* Compilers that may reorder lookups load many rows before they add one, and run out of registers; and if they know the
+   size or the place of a row, they compute its address in more steps than a product takes. A core of ARMv6-M has too
+   few registers to gain from this: there all rows are found first. */
 #if defined(__GNUC__) && !defined(__ARM_ARCH_6M__)
 #define HIDE(value) __asm volatile("" : "+r"(value))
 #else
 #define HIDE(value) ((void)0)
 #endif
-/* RISC-V takes two instructions for a large constant: there it stays in a register. */
+/* RISC-V needs two instructions for a large constant, so it is kept in a register. */
 #if defined(__GNUC__) && defined(__riscv)
 #define KEEP(constant) HIDE(constant)
 #else
@@ -123,13 +123,13 @@ typedef struct {
     uint_fast16_t grasp;
 } largest;
 
-/* Store what is in the lowest sixteen bits as a score. */
+/* Store the lowest sixteen bits as a score. */
 static void store(uint32_t sum, int16_t *score)
 {
     *score = (int16_t)(uint16_t)((sum ^ 0x8000u) & 0xFFFFu);
 }
 
-/* Store both sums of a word as scores: where the second comes last in memory, at once. */
+/* Store both sums of a word as scores, in one access if the second comes last in memory. */
 static void store_two(uint32_t sums, int16_t *score)
 {
     const uint32_t scores = sums ^ 0x80008000u;
@@ -142,7 +142,7 @@ static void store_two(uint32_t sums, int16_t *score)
 #endif
 }
 
-/* Take the upper bits of the word, the sum of class k, for the largest sum if it is. */
+/* Make the upper bits of the word, the sum of class k, the largest sum if they are. */
 static void take(uint32_t word, uint_fast16_t k, uint32_t ones, largest *best)
 {
     if (word > best->sum) {
@@ -151,8 +151,8 @@ static void take(uint32_t word, uint_fast16_t k, uint32_t ones, largest *best)
     }
 }
 
-/* Store the sums of a part as scores, and take them. */
-#define ANSWER(first, best) do { \
+/* Store the sums of a part as scores, and update the largest sum. */
+#define PREDICT(first, best) do { \
     uint32_t ones = 0xFFFFu; \
     KEEP(ones); \
     store_two(s0, &glove->scores[0]); \
@@ -210,7 +210,7 @@ static void add_up(thenar_glove *glove, largest *best)
             + input->codes[1]]));
     s0 += start[0];
     s1 += start[1];
-    ANSWER(0u, best);
+    PREDICT(0u, best);
 }
 
 thenar_glove_class thenar_glove_classify(thenar_glove *glove)
@@ -225,7 +225,7 @@ thenar_glove_class thenar_glove_classify(thenar_glove *glove)
     return (thenar_glove_class)best.grasp;
 }
 
-/* Replace in the sums of a part what was found before. */
+/* Replace the earlier rows in the sums of a part. */
 static void replace_all(thenar_glove *glove, uint_fast16_t part, const thenar_glove_seen *found)
 {
     uint32_t *const sum = glove->sums[part];
@@ -271,12 +271,12 @@ thenar_glove_class thenar_glove_update(thenar_glove *glove)
         replace_all(glove, part, &found);
         const uint32_t s0 = sum[0];
         const uint32_t s1 = sum[1];
-        ANSWER(0u, &best);
+        PREDICT(0u, &best);
     }
     return (thenar_glove_class)best.grasp;
 }
 
-/* Add steps to what the score of a class begins with. */
+/* Add steps to the initial score of a class. */
 static void shift_start(thenar_glove *glove, uint16_t k, uint16_t steps)
 {
     for (uint16_t part = 0u; part < PARTS; part++) {
@@ -291,7 +291,7 @@ static void shift_start(thenar_glove *glove, uint16_t k, uint16_t steps)
     }
 }
 
-/* Take the mean of an input that is missing into what scores begin with, or out of it. */
+/* Add the mean of a missing input to the initial scores, or subtract it again. */
 static void replace_by_mean(thenar_glove *glove, uint16_t input, bool lost)
 {
     for (uint16_t k = 0u; k < CLASSES; k++) {

@@ -1,4 +1,4 @@
-/* From readings to codes; the header says how it is used.
+/* Conversion of readings to codes; the header describes its use.
 
    thenar 0.1.0, template codes/thenar_NAME_codes.c.j2. */
 #include "thenar_glove_codes.h"
@@ -8,7 +8,7 @@
 
 #define SENSORS THENAR_GLOVE_SENSORS
 #define FARTHEST 65535
-#define FRACTION 24u /* bits of a point's code behind the point */
+#define FRACTION 24u /* fractional bits of a point's code */
 
 /* The codes of the two points of each sensor. */
 typedef struct {
@@ -31,7 +31,7 @@ static const point_readings known[SENSORS] IN_FLASH = {
     {0, 0},
 };
 
-/* Return the code that is nearest on the line through two points, of two the even one, 0 to `most`. */
+/* Return the nearest code on the line through two points, rounding half to even, 0 to `most`. */
 static uint16_t nearest(const point_readings *at, const point_codes *codes, int32_t reading, uint16_t most)
 {
     const bool rises = at->first < at->second;
@@ -56,14 +56,14 @@ static uint16_t nearest(const point_readings *at, const point_codes *codes, int3
 
             code = times / divisor;
             if (((code * divisor) == times) && ((whole << FRACTION) == (uint64_t)sum)) {
-                code -= code & 1u; /* midway between two */
+                code -= code & 1u; /* halfway between two */
             }
         }
     }
     return (code < most) ? (uint16_t)code : most;
 }
 
-/* Return a reading as it is compared with those at the points. */
+/* Return a reading in the units of the readings at the points. */
 static int32_t coded(uint16_t sensor, int32_t reading)
 {
     int32_t found = reading;

@@ -1,11 +1,11 @@
 /**
  * @file thenar_glove_codes.h
- * @brief From what sensors read to what the tables expect: the same as Python's, for every reading.
+ * @brief Conversion of sensor readings to the codes of the tables: the same as Python's, for every reading.
  *
- * A sensor is calibrated by what it reads at two points, which are named below. A straight line runs through their
- * codes.
- * What it reads there is not known: `thenar firmware --glove glove.toml` takes it from a glove, calibrate() from the
- * program.
+ * A sensor is calibrated by its readings at two points, which are named below, and converted by the straight line
+ * through their codes.
+ * The readings at these points are not known: `thenar firmware --glove glove.toml` takes them from a glove, or the
+ * program calls calibrate().
  *
  * thenar 0.1.0, template codes/thenar_NAME_codes.h.j2.
  */
@@ -21,7 +21,7 @@ extern "C" {
 #define THENAR_GLOVE_SENSORS 2u /**< Joints. */
 #define THENAR_GLOVE_CALIBRATED 0 /**< Whether codes_init() knows all readings. */
 
-/** The sensors, and the two points at which each is read to calibrate it. */
+/** The sensors, and the two points at which each is calibrated. */
 enum {
     /** thumb_rotation: code 1 and code 255 */
     THENAR_GLOVE_SENSOR_THUMB_ROTATION = 0,
@@ -29,26 +29,26 @@ enum {
     THENAR_GLOVE_SENSOR_INDEX_PIJ = 1,
 };
 
-/** What each sensor reads at its two points. A copy is another calibration. */
+/** The readings of each sensor at its two points. A copy is another calibration. */
 typedef struct {
-    int32_t readings[THENAR_GLOVE_SENSORS][2]; /* equal: not known */
+    int32_t readings[THENAR_GLOVE_SENSORS][2]; /* equal: unknown */
 } thenar_glove_codes;
 
-/** Begin with the readings that are known. */
+/** Initialise with the known readings. */
 void thenar_glove_codes_init(thenar_glove_codes *codes);
 
 /**
- * Say what a sensor reads at its two points.
+ * Set the readings of a sensor at its two points.
  *
- * @return false, and nothing has changed, where that makes no line: one reading at both, further apart than 65535, or
- *         no such sensor
+ * @return false, without a change, if they give no line: equal readings, readings further apart than 65535, or no such
+ *         sensor
  */
 bool thenar_glove_calibrate(thenar_glove_codes *codes, uint16_t sensor, int32_t at_first, int32_t at_second);
 
-/** Whether it is known what a sensor reads. */
+/** Whether a sensor is calibrated. */
 bool thenar_glove_calibrated(const thenar_glove_codes *codes, uint16_t sensor);
 
-/** The code of a reading, -65535 to 65535; 0 of a sensor that is not calibrated. */
+/** The code of a reading, -65535 to 65535; 0 for a sensor that is not calibrated. */
 uint16_t thenar_glove_code_of(const thenar_glove_codes *codes, uint16_t sensor, int32_t reading);
 
 /** Put a reading into the input: the code of a joint. */

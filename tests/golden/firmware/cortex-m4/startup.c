@@ -3,8 +3,8 @@
 #include <stdint.h>
 
 extern const uint32_t thenar_data_load[];                     /* link.ld: the initial values of .data in flash, */
-extern uint32_t thenar_data_start[], thenar_data_end[];       /* where they belong in RAM, */
-extern uint32_t thenar_bss_start[], thenar_bss_end[];         /* what starts as zero, */
+extern uint32_t thenar_data_start[], thenar_data_end[];       /* their place in RAM, */
+extern uint32_t thenar_bss_start[], thenar_bss_end[];         /* zero-initialised variables, */
 extern uint32_t thenar_stack_top[];                           /* and the end of RAM */
 
 int main(void);
@@ -25,11 +25,11 @@ void thenar_reset(void)
         *to = 0u;
     }
     (void)main();
-    thenar_fault(); /* firmware has nowhere to return to */
+    thenar_fault(); /* firmware cannot return */
 }
 
-/* HardFault, or an exception that nobody handles: a debugger stops here, and without one the core locks up rather than
-   run on. A program may have a thenar_fault() of its own. */
+/* HardFault, or an unhandled exception: a debugger stops here, and without one the core locks up instead of running on.
+   A program may define another thenar_fault(). */
 __attribute__((weak)) void thenar_fault(void)
 {
     for (;;) {
@@ -37,7 +37,7 @@ __attribute__((weak)) void thenar_fault(void)
     }
 }
 
-/* The compiler may call these two whatever the program does (GCC manual, "Standards"). */
+/* The compiler may call these two in any program (GCC manual, "Standards"). */
 __attribute__((weak)) void *memcpy(void *to, const void *from, size_t size)
 {
     uint8_t *into = to;

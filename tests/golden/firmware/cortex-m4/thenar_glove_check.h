@@ -1,4 +1,4 @@
-/* Frames, and the answers that Python computed for them: thenar_glove_check() asks the compiled classifier. */
+/* Frames, and Python's predictions for them: thenar_glove_check() compares the compiled classifier with these. */
 #ifndef THENAR_GLOVE_CHECK_H
 #define THENAR_GLOVE_CHECK_H
 
@@ -269,8 +269,8 @@ static bool thenar_glove_agrees(const thenar_glove *glove, unsigned check, uint1
     return same;
 }
 
-/* Return how many of the frames are answered otherwise than by Python, by update() or by classify(), and how many grasp
-   types are called otherwise. */
+/* Return the number of frames whose prediction differs from Python's, by update() or by classify(), plus the number of
+   grasp types with another name. */
 static unsigned thenar_glove_check(void)
 {
     static thenar_glove glove;

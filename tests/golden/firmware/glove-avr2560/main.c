@@ -1,7 +1,7 @@
-/* A glove that recognises by itself. It reads switches on port expanders, and tells the host of them and of the
-   grasp type (protocol 1 of thenar's scanner board).
+/* A glove that recognises grasps on its board. It reads switches on port expanders, and sends them and the grasp
+   type to the host (protocol 1 of thenar's scanner board).
 
-   A reset at any moment, even in the middle of a frame, ends that frame with a 00 and begins with a HELLO.
+   A reset at any moment, even in the middle of a frame, ends that frame with a 00 and sends a HELLO.
 
    thenar 0.1.0, template avr/main.c.j2. */
 #include <avr/interrupt.h>

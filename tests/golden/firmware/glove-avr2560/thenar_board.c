@@ -1,5 +1,5 @@
-/* The scanner board without its line and its keys; thenar_board.h says what it is, thenar's documentation of the
-   scanner board every byte.
+/* The scanner board's protocol, without its line and its keys; described in thenar_board.h, and byte by byte in
+   thenar's documentation of the scanner board.
 
    thenar 0.1.0, template board/thenar_board.c.j2. */
 #include "thenar_board.h"
@@ -26,7 +26,7 @@
 #define GET_STATE 0x13u
 #define PING 0x14u
 
-/* Of payloads. */
+/* Sizes of payloads. */
 #define HELLO_BYTES 35u
 #define STATE_BYTES THENAR_BITMAP_BYTES
 #define EVENT_BYTES 7u
@@ -50,7 +50,7 @@
 #define BUFFER_BYTES (THENAR_FRAME_OVERHEAD + HELLO_BYTES)
 #endif
 
-/* What is sent again and again: due at every whole period since the last time that it was set. */
+/* A periodic message: due at every whole period since it was last set. */
 typedef struct {
     uint32_t period_us;  /* 0: never */
     uint32_t passed_us;  /* since the last whole period, less than one */
@@ -58,11 +58,11 @@ typedef struct {
 } schedule;
 
 typedef struct {
-    uint32_t time_us;  /* when it last did anything */
+    uint32_t time_us;  /* time of the last call */
     uint32_t scan_us;
     schedule state;
     schedule heartbeat;
-    uint32_t error_in_us;  /* from then on an ERROR may be sent */
+    uint32_t error_in_us;  /* time until an ERROR may be sent */
     uint32_t overruns;
     uint32_t refused;
     uint32_t dropped;
@@ -70,8 +70,8 @@ typedef struct {
     uint16_t press_us;
     uint16_t release_us;
     bool news;         /* a count has grown since the last ERROR */
-    bool tell_grasp;   /* the next one, whatever it is */
-    uint8_t grasp;     /* what was told last */
+    bool tell_grasp;   /* report the next one, even if unchanged */
+    uint8_t grasp;     /* the last one reported */
     uint8_t degraded;
     uint8_t sequence;
     bool scanned;      /* all keys, at least once */
@@ -84,7 +84,7 @@ static board_state board;
 static thenar_decoder decoder;
 static uint8_t buffer[BUFFER_BYTES];
 
-/* Little-endian, into the buffer and out of what came in. */
+/* Little-endian, into the buffer and from received bytes. */
 
 static uint8_t *put16(uint8_t *to, uint16_t value)
 {
@@ -156,8 +156,8 @@ static void count(uint32_t *what)
 /* Where the payload of the next frame is written. */
 #define PAYLOAD (&buffer[THENAR_FRAME_PAYLOAD_AT])
 
-/* Send the frame whose payload stands in the buffer. A frame that is dropped takes its number with it: the host sees
-   that one is missing. Return whether it was sent: what was due still is, if not. */
+/* Send the frame whose payload is in the buffer. A dropped frame uses up its sequence number, so the host notices the
+   loss. Return whether it was sent: if not, whatever was due is still due. */
 static bool send(uint8_t kind, uint8_t payload_length)
 {
     const uint16_t length = thenar_frames_encode(buffer, kind, board.sequence, payload_length);
@@ -222,7 +222,7 @@ static void send_heartbeat(uint32_t now_us)
     }
 }
 
-/* All keys: those that are lost, if that is news or there are any before a HEARTBEAT, and the HEARTBEAT. */
+/* Send all keys: first LOST if the lost keys changed, or if any are lost before a HEARTBEAT; then the HEARTBEAT. */
 static void send_keys(bool lost, bool beats, uint32_t now_us)
 {
     if (lost || (beats && board.loses)) {
@@ -254,9 +254,9 @@ static void send_error(uint32_t now_us)
     (void)send(ERROR, ERROR_BYTES);
 }
 
-/* What the host asks for */
+/* Requests of the host */
 
-/* Return a period that the host asks for as the board can keep it: never shorter than its scans'; 0: none. */
+/* Return the period closest to the host's request, never shorter than that of its scans; 0: none. */
 static uint32_t possible(uint32_t period_us)
 {
     return ((period_us > 0u) && (period_us < board.scan_us)) ? board.scan_us : period_us;
@@ -278,7 +278,7 @@ static void set_debounce(uint16_t press_us, uint16_t release_us)
     thenar_debounce_set(press_us, release_us);
 }
 
-/* Return how long the payload of a message from the host is; 0xFF: there is no such message. */
+/* Return the length of a host message's payload; 0xFF: there is no such message. */
 static uint8_t length_of(uint8_t kind)
 {
     uint8_t length;
@@ -303,11 +303,11 @@ static uint8_t length_of(uint8_t kind)
     return length;
 }
 
-static void answer(uint8_t kind, const uint8_t *payload, uint32_t now_us)
+static void reply(uint8_t kind, const uint8_t *payload, uint32_t now_us)
 {
     run_to(now_us);
     if (kind == GET_STATE) {
-        send_keys(false, board.scanned, now_us); /* before the first scan, that one answers */
+        send_keys(false, board.scanned, now_us); /* before the first scan, that scan sends the reply */
     } else if (kind == PING) {
         send_hello(get16(payload), now_us);
     } else {
@@ -328,7 +328,7 @@ void thenar_board_receive(uint8_t byte, uint32_t now_us)
         const uint8_t kind = decoder.body[0];
 
         if (thenar_decoder_payload(&decoder) == length_of(kind)) {
-            answer(kind, &decoder.body[2], now_us);
+            reply(kind, &decoder.body[2], now_us);
         } else {
             count(&board.refused);
         }
@@ -339,7 +339,7 @@ void thenar_board_receive(uint8_t byte, uint32_t now_us)
     }
 }
 
-/* What the port tells */
+/* Events from the port */
 
 void thenar_board_boot(uint32_t now_us)
 {
@@ -380,7 +380,7 @@ void thenar_board_found(const uint8_t *known_bitmap)
     }
 }
 
-/* Take which of eight keys are lost, and return whether that changed. */
+/* Update which of eight keys are lost, and return whether that changed. */
 static bool lose(uint16_t byte, uint8_t lost)
 {
     const bool changed = board.lost[byte] != lost;
@@ -390,7 +390,7 @@ static bool lose(uint16_t byte, uint8_t lost)
     return changed;
 }
 
-/* Take eight keys, and send an EVENT for each that changed, if EVENTs are asked for and this is not the first scan. */
+/* Take eight keys, and send an EVENT for each that changed, if EVENTs are requested and it is not the first scan. */
 static void take(uint16_t byte, uint8_t closed, uint32_t now_us)
 {
     const uint8_t changed = (uint8_t)(board.closed[byte] ^ closed);
@@ -407,7 +407,7 @@ static void take(uint16_t byte, uint8_t closed, uint32_t now_us)
     }
 }
 
-/* Take the keys and send what is due of them. The first time it tells all of them. */
+/* Take the keys and send the messages that are due. The first call sends all keys. */
 static void take_all(const uint8_t *closed_bitmap, const uint8_t *known_bitmap, bool whole, uint32_t now_us)
 {
     bool news = false;

@@ -1,4 +1,4 @@
-/* Timer 1 counts an eighth of 16000000 Hz and starts again every 20 ms, which its interrupt adds up. Interrupts must
+/* Timer 1 counts an eighth of 16000000 Hz and restarts every 20 ms; its interrupt adds these up. Interrupts must
    never be off for 10000 us.
 
    thenar 0.1.0, template avr/thenar_clock.c.j2. */
@@ -8,7 +8,7 @@
 #include <avr/io.h>
 
 #define PERIOD_US 20000u
-#define COUNTS 40000u /* of the timer in that time */
+#define COUNTS 40000u /* timer counts per period */
 #define US_A_COUNT UINT32_C(32768) /* 65536ths of a microsecond, rounded down */
 
 static volatile uint32_t periods_us;
@@ -39,7 +39,7 @@ uint32_t thenar_clock_us(void)
     cli();
     us = periods_us;
     count = TCNT1;
-    /* The timer may have started again just before it was read, while its interrupt has to wait. */
+    /* The timer may have restarted just before it was read, with its interrupt still pending. */
     if (((TIFR1 & _BV(OCF1A)) != 0u) && (count < (COUNTS / 2u))) {
         us += PERIOD_US;
     }

@@ -1,8 +1,8 @@
 /* A CyberGlove of 18 sensors on UART 1, which streams records: S, a byte a sensor (1 to 255), 00.
 
-   It is made to stop whatever it does, told to add neither time stamps nor its status, how often to send, and then to
-   stream. When it is silent for a second, all of that is done again. A record is what lies between two 00, if it has
-   the right length; `eg` before its end says that no glove is plugged into the box, `es` that it sends at full speed.
+   It is stopped, set to send neither time stamps nor its status, set to its rate, and started. After a second of
+   silence all of that is repeated. A record is a sequence between two 00 that has the right length; `eg` before its
+   end means that no glove is plugged into the box, `es` that it sends at full speed.
 
    joint 0: byte 1, thumb_rotation
    joint 1: byte 6, index_pij
@@ -19,13 +19,13 @@
 #define SENSORS 18u
 #define JOINTS 2u
 #define RECORD (1u + SENSORS) /* without its end */
-#define FAULTY (RECORD + 2u)  /* with `e` and what is wrong */
-#define BYTES_A_TURN 16u /* so many are taken before all else has its turn: they may come without end */
-#define LOST_US UINT32_C(16994) /* two periods of the records: an older one counts no more */
+#define FAULTY (RECORD + 2u)  /* with `e` and the fault's letter */
+#define BYTES_A_TURN 16u /* bytes taken per turn: the glove may send without pause */
+#define LOST_US UINT32_C(16994) /* two periods of the records: an older one is stale */
 #define SILENT_US UINT32_C(1000000)
-#define PAUSE_US UINT32_C(100000) /* longer than a record that is still on its way, and than the box takes to answer */
+#define PAUSE_US UINT32_C(100000) /* longer than a pending record, and than the box takes to reply */
 
-/* What the box is told, one message a pause. */
+/* The messages to the box, one per pause. */
 typedef struct {
     uint8_t length;
     uint8_t bytes[5];
@@ -42,15 +42,15 @@ static const message messages[] PROGMEM = {
 
 #define MESSAGES (sizeof(messages) / sizeof(messages[0]))
 
-/* Where in a record each joint stands. */
+/* The place of each joint in a record. */
 static const uint8_t places[JOINTS] PROGMEM = { 1u, 6u };
 
 static uint8_t piece[FAULTY];
 static uint8_t size;       /* of the piece; more than FAULTY: too long */
-static uint8_t told;       /* messages so far */
-static uint32_t told_us;   /* when the last one was sent, or a record came in */
-static uint32_t record_us; /* when the newest record came in */
-static bool fresh;         /* it is one to go by */
+static uint8_t sent;       /* messages sent so far */
+static uint32_t active_us;   /* time of the last message sent or record received */
+static uint32_t record_us; /* time of the newest record */
+static bool fresh;         /* it can be used */
 static uint8_t codes[JOINTS]; /* of the newest record */
 
 /* Return whether the piece is a record, with `es` or `eg` before its end or not. */
@@ -62,11 +62,11 @@ static bool is_record(void)
     return (piece[0] == (uint8_t)'S') && ((size == RECORD) || faulty);
 }
 
-/* Take a piece that has ended. */
+/* Process a complete piece. */
 static void take_piece(uint32_t now_us)
 {
     if (is_record()) {
-        told_us = now_us;
+        active_us = now_us;
         record_us = now_us;
         fresh = (size == RECORD) || (piece[RECORD + 1u] == (uint8_t)'s');
         for (uint8_t at = 0u; fresh && (at < JOINTS); at++) {
@@ -88,27 +88,27 @@ static void take(uint8_t byte, uint32_t now_us)
     }
 }
 
-/* Send the next message, when it is time for it. */
+/* Send the next message if it is due. */
 static void tell(uint32_t now_us)
 {
-    const uint32_t silent_us = now_us - told_us;
+    const uint32_t silent_us = now_us - active_us;
     message next;
 
-    if ((told == MESSAGES) && (silent_us > SILENT_US)) {
-        told = 0u;
+    if ((sent == MESSAGES) && (silent_us > SILENT_US)) {
+        sent = 0u;
     }
-    if ((told < MESSAGES) && (silent_us > PAUSE_US)) {
-        (void)memcpy_P(&next, &messages[told], sizeof next);
+    if ((sent < MESSAGES) && (silent_us > PAUSE_US)) {
+        (void)memcpy_P(&next, &messages[sent], sizeof next);
         (void)thenar_uart1_send(next.bytes, next.length);
-        told++;
-        told_us = now_us;
+        sent++;
+        active_us = now_us;
     }
 }
 
 void thenar_joints_begin(void)
 {
     thenar_uart1_begin();
-    told_us = thenar_clock_us();
+    active_us = thenar_clock_us();
 }
 
 void thenar_joints_attend(uint32_t now_us)

@@ -1,4 +1,4 @@
-/* Port expanders on the I2C bus: set up, read, watched, and set up again when they have lost their supply.
+/* Port expanders on the I2C bus: set up, read, monitored, and set up again after a loss of supply.
 
    mcp23017 at 0x20
    pca9555 at 0x21
@@ -18,15 +18,15 @@
 #define MOST_PORTS 2u
 #define NO_KEY 0xFFu
 
-/* So often one chip is looked at: each once in a second. */
+/* The period of checks of one chip, so that each is checked once a second. */
 #define ATTEND_US (UINT32_C(1000000) / CHIPS)
 
-/* A register and what is written to it and its successors; and what must then be read there, if anything. */
+/* A register, the bytes written from it on, and the bytes expected there afterwards, if any. */
 typedef struct {
     uint8_t written;
     uint8_t bytes[MOST_WRITTEN];
     uint8_t expected;
-    uint8_t answer[MOST_READ];
+    uint8_t reply[MOST_READ];
 } chip_write;
 
 static const chip_write writes[] PROGMEM = {
@@ -41,7 +41,7 @@ static const chip_write writes[] PROGMEM = {
     {3u, {0x02u, 0xAAu, 0x55u}, 2u, {0xAAu, 0x55u}},
 };
 
-/* A chip, and which of the writes set it up. A supply that failed undoes the last of them. */
+/* A chip, and the writes that set it up. A supply failure undoes the last of them. */
 typedef struct {
     uint8_t address;
     uint8_t first;
@@ -53,7 +53,7 @@ static const chip_at chips[CHIPS] PROGMEM = {
     {0x21u, 4u, 6u}, /* pca9555 at 0x21 */
 };
 
-/* One reading of a chip: the register, and how many bytes. `high` holds the bits that a chip in order keeps at 1, and
+/* One reading of a chip: the register and the number of bytes. `high` has the bits that a working chip keeps at 1, and
    `closed_low` is 0xFF where a switch that is closed reads 0. */
 typedef struct {
     uint8_t chip;
@@ -61,10 +61,10 @@ typedef struct {
     uint8_t length;
     uint8_t high[MOST_PORTS];
     uint8_t closed_low;
-    uint8_t keys[8u * MOST_PORTS]; /* of the answer's bits */
+    uint8_t keys[8u * MOST_PORTS]; /* of the reply's bits */
 } port_at;
 
-/* In the order in which they are read: what can change the scores most per microsecond comes first. */
+/* In the order of reading: those that can change the scores most per microsecond come first. */
 static const port_at ports[THENAR_KEYS_PORTS] PROGMEM = {
     /* pca9555 at 0x21, port 0: palm radial, palm ulnar */
     {1u, 0x00u, 1u, {0x00u}, 0xFFu, {
@@ -91,16 +91,16 @@ static bool transfer(uint8_t address, const uint8_t *written, uint8_t to_write, 
     return done;
 }
 
-/* Return whether what was written still stands in the chip. */
+/* Return whether the chip still holds the bytes written. */
 static bool holds(uint8_t address, const chip_write *write)
 {
-    uint8_t answer[MOST_READ];
+    uint8_t reply[MOST_READ];
 
-    return transfer(address, write->bytes, 1u, answer, write->expected)
-        && (memcmp(answer, write->answer, write->expected) == 0);
+    return transfer(address, write->bytes, 1u, reply, write->expected)
+        && (memcmp(reply, write->reply, write->expected) == 0);
 }
 
-/* Write what makes inputs of a chip's pins. A chip that only acknowledges is not believed. */
+/* Configure a chip's pins as inputs, and verify it: an acknowledgement alone is not trusted. */
 static void set_up(uint8_t number)
 {
     chip_at chip;
@@ -131,7 +131,7 @@ void thenar_keys_begin(void)
     thenar_twi_begin();
     for (uint8_t number = 0u; number < CHIPS; number++) {
         set_up(number);
-        if (!present[number]) { /* what disturbed it may be over: it would wait for its turn */
+        if (!present[number]) { /* the disturbance may be over: try again at once */
             set_up(number);
         }
     }
@@ -148,37 +148,37 @@ void thenar_keys_attend(uint32_t now_us)
     }
 }
 
-/* Read a port, twice if need be; a chip that still does not answer is absent. */
-static bool answered(const port_at *port, uint8_t *answer)
+/* Read a port, twice if needed; a chip that still does not reply is absent. */
+static bool replied(const port_at *port, uint8_t *reply)
 {
     chip_at chip;
     bool done;
 
     (void)memcpy_P(&chip, &chips[port->chip], sizeof chip);
-    done = transfer(chip.address, &port->command, 1u, answer, port->length)
-        || transfer(chip.address, &port->command, 1u, answer, port->length);
+    done = transfer(chip.address, &port->command, 1u, reply, port->length)
+        || transfer(chip.address, &port->command, 1u, reply, port->length);
     present[port->chip] = done;
     return done;
 }
 
-/* Return whether the bits that the chip keeps at 1 are 1: else it has lost its registers. */
-static bool keeps_high(const port_at *port, const uint8_t *answer)
+/* Return whether the bits that the chip keeps at 1 are 1; if not, it has lost its registers. */
+static bool keeps_high(const port_at *port, const uint8_t *reply)
 {
     uint8_t missing = 0u;
 
     for (uint8_t byte = 0u; byte < port->length; byte++) {
-        missing |= (uint8_t)(port->high[byte] & (uint8_t)~answer[byte]);
+        missing |= (uint8_t)(port->high[byte] & (uint8_t)~reply[byte]);
     }
     return missing == 0u;
 }
 
-/* Sort the bits of an answer into the bitmaps. */
-static void sort(const port_at *port, const uint8_t *answer, uint8_t *closed, uint8_t *known)
+/* Sort the bits of a reply into the bitmaps. */
+static void sort(const port_at *port, const uint8_t *reply, uint8_t *closed, uint8_t *known)
 {
     const uint8_t *key = port->keys;
 
     for (uint8_t byte = 0u; byte < port->length; byte++) {
-        uint8_t left = (uint8_t)(answer[byte] ^ port->closed_low);
+        uint8_t left = (uint8_t)(reply[byte] ^ port->closed_low);
 
         for (uint8_t bit = 0u; bit < 8u; bit++) {
             if (*key != NO_KEY) {
@@ -198,17 +198,17 @@ static void sort(const port_at *port, const uint8_t *answer, uint8_t *closed, ui
 bool thenar_keys_read(uint8_t number, uint8_t *closed, uint8_t *known)
 {
     port_at port;
-    uint8_t answer[MOST_PORTS];
+    uint8_t reply[MOST_PORTS];
     bool fine;
 
     (void)memcpy_P(&port, &ports[number], sizeof port);
-    fine = present[port.chip] && answered(&port, answer);
-    if (fine && !keeps_high(&port, answer)) {
+    fine = present[port.chip] && replied(&port, reply);
+    if (fine && !keeps_high(&port, reply)) {
         set_up(port.chip);
         fine = false;
     }
     if (fine) {
-        sort(&port, answer, closed, known);
+        sort(&port, reply, closed, known);
     }
     return fine;
 }

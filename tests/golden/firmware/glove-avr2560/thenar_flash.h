@@ -1,4 +1,4 @@
-/* Tables in flash: an AVR reads them by instructions of their own, all others as they read everything.
+/* Tables in flash: an AVR needs special instructions to read them, other parts do not.
 
    thenar 0.1.0, template board/thenar_flash.h.j2. */
 #ifndef THENAR_FLASH_H

@@ -1,4 +1,4 @@
-/* Whether a scan may stop; thenar_glove_decided.h says when.
+/* Early exit of a scan; described in thenar_glove_decided.h.
 
    thenar 0.1.0, template board/thenar_NAME_decided.c.j2. */
 #include "thenar_glove_decided.h"

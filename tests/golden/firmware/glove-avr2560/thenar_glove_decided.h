@@ -1,4 +1,5 @@
-/* Whether a scan may stop: no state of the unread switches, open, closed or lost, could change which grasp type wins.
+/* Early exit of a scan: it may stop when no state of the unread switches, open, closed or lost, could change the grasp
+   type.
 
    thenar 0.1.0, template board/thenar_NAME_decided.h.j2. */
 #ifndef THENAR_GLOVE_DECIDED_H
@@ -8,10 +9,10 @@
 
 #define THENAR_GLOVE_SCANNED_PORTS 2u
 
-/* Return whether the ports after `port` (numbers from 0, in the order in which they are read) can be left out.
+/* Return whether the ports after `port` (numbered from 0, in the order in which they are read) can be left out.
 
-   leader: what classify or update has just returned, with the switches of the ports up to this one as they were read,
-   and those of all later ports open. No input is missing. After the last port the answer is true.
+   leader: the result of classify or update with the switches of the ports up to this one as they were read, and those
+   of all later ports open. No input is missing. After the last port the result is true.
 
    port 0: switches 4, 5
    port 1: switches 0, 1, 2, 3

@@ -131,7 +131,7 @@ const int16_t thenar_glove_start[CLASSES] IN_FLASH = {
     120, -40, 7,
 };
 #else
-/* Sums begin 2^15 too high, so that no lane is negative in the end, when all have taken what they borrowed. */
+/* Sums start 2^15 too high, so that no lane is negative at the end, after all borrows. */
 #define LANE(start, shift) (((uint32_t)(int32_t)(start) + 32768u) << (shift))
 #define START(a, b) (LANE(a, 0) + LANE(b, 16))
 

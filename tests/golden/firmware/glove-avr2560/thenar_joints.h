@@ -9,10 +9,10 @@
 /* Start to measure. */
 void thenar_joints_begin(void);
 
-/* Take some of what has come in, as often as can be. */
+/* Process some received bytes; call it as often as possible. */
 void thenar_joints_attend(uint32_t now_us);
 
-/* Put the newest codes into the glove's input. Return false if there are none, or none that is new enough. */
+/* Copy the newest codes to the glove's input. Return false if there are none, or they are too old. */
 bool thenar_joints_read(thenar_glove *glove, uint32_t now_us);
 
 #endif

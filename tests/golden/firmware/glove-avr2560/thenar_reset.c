@@ -1,4 +1,4 @@
-/* A reset by the watchdog leaves it running, with its shortest time: it is stopped before anything else happens.
+/* A reset by the watchdog leaves it running with its shortest period, so it is stopped before anything else.
 
    thenar 0.1.0, template avr/thenar_reset.c.j2. */
 #include "thenar_reset.h"
@@ -6,7 +6,7 @@
 #include <avr/io.h>
 #include <avr/wdt.h>
 
-/* Runs before variables are set up (.init3), and is part of what comes before main(): it is not called. */
+/* Runs before variables are initialised (.init3), inline in the start-up code: it is not called. */
 void thenar_reset_early(void) __attribute__((naked, used, section(".init3")));
 
 void thenar_reset_early(void)

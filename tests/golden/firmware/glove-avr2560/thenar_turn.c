@@ -1,7 +1,7 @@
-/* A turn of a board that recognises; thenar_turn.h says what that is.
+/* A turn of a board that recognises; described in thenar_turn.h.
 
-   Where an input is missing (a chip that does not answer, joints that do not come) its mean stands in, and the grasp is
-   told as degraded. Without any input it is not known.
+   A missing input (a chip that does not reply, joints that do not arrive) is replaced by its mean, and the grasp is
+   reported as degraded. Without any input the grasp is unknown.
 
    thenar 0.1.0, template board/glove_turn.c.j2. */
 #include "thenar_turn.h"
@@ -17,7 +17,7 @@
 #include "thenar_joints.h"
 #include "thenar_keys.h"
 
-/* So many of the host's bytes are taken before it is looked whether a scan is due: they may come without end. */
+/* Bytes taken from the host before checking whether a scan is due: the host may send without pause. */
 #define BYTES_A_TURN 16u
 
 #if THENAR_GLOVE_PORTS > THENAR_BITMAP_BYTES
@@ -26,13 +26,13 @@
 
 static thenar_glove glove;
 
-/* What was there at the last scan: keys, and joints. */
+/* The inputs available at the last scan: keys, and joints. */
 static uint8_t known_before[THENAR_BITMAP_BYTES];
 static bool joints_before = true;
 #define NOT_YET 0xFFFFu
 static uint16_t switches_lost = NOT_YET; /* switches */
 
-/* Show the classifier which keys are closed: the bytes of its ports are the first of their bitmap. */
+/* Copy the closed keys to the classifier: the bytes of its ports are the first of the bitmap. */
 static void show(const uint8_t *closed)
 {
     (void)memcpy(glove.input.switches, closed, THENAR_GLOVE_PORTS);
@@ -45,7 +45,7 @@ static bool is_known(uint16_t number, const uint8_t *known)
     return (known[key >> 3] & (uint8_t)(1u << (key & 7u))) != 0u;
 }
 
-/* Say to the classifier which inputs are missing, if that has changed. */
+/* Mark the missing inputs in the classifier, if they have changed. */
 static void lose(const uint8_t *known, bool joints)
 {
     if ((switches_lost == NOT_YET) || (memcmp(known, known_before, sizeof known_before) != 0)) {
@@ -82,12 +82,12 @@ static void tell_grasp(uint8_t grasp, uint8_t flags, uint32_t now_us)
     }
 }
 
-/* What was not read keeps its last state for the host, lost or not: so often everything is read. */
+/* Unread keys keep their last state for the host, lost or not, so this is the period of whole scans. */
 #define WHOLE_US UINT32_C(50000)
 
-static uint32_t whole_at_us = 0u - WHOLE_US; /* so the first scan is one */
+static uint32_t whole_at_us = 0u - WHOLE_US; /* so that the first scan is whole */
 
-/* Return whether this scan is to read everything. */
+/* Return whether this scan must read everything. */
 static bool whole_is_due(uint32_t now_us)
 {
     const bool due = (now_us - whole_at_us) >= WHOLE_US;
@@ -98,9 +98,9 @@ static bool whole_is_due(uint32_t now_us)
     return due;
 }
 
-/* Read port by port, until no state of the others could change the grasp type. The classifier is shown the switches as
-   they are read, those not read yet as open; debouncing is for what the host is told of the keys. While an input is
-   missing, everything is read. */
+/* Read port by port, until no state of the others could change the grasp type. The classifier gets the switches as
+   read, unread ones as open; debouncing applies only to the keys reported to the host. While an input is missing,
+   everything is read. */
 static void scan(uint32_t now_us)
 {
     const bool joints = thenar_joints_read(&glove, now_us);

@@ -10,13 +10,13 @@
 #include "thenar_clock.h"
 
 #define TIMEOUT_US UINT32_C(1800)
-#define HALF_SCL_CYCLES 80u /* 5 us: clocks that free the bus come at 100 kHz */
+#define HALF_SCL_CYCLES 80u /* 5 us: the clocks that free the bus run at 100 kHz */
 #define RECOVERY_CLOCKS 9u /* a byte and its acknowledgement */
 
-/* What a TWI interrupt ends with: go on, with whatever else is asked for. */
+/* The last action of a TWI interrupt: continue, with these additional bits. */
 #define GO_ON (_BV(TWINT) | _BV(TWEN) | _BV(TWIE))
 
-/* What the program writes, the interrupt reads, and the other way round: neither may be kept in registers meanwhile. */
+/* Shared between program and interrupt, so the compiler must not keep it in registers. */
 #define MEMORY_IS_SHARED() __asm__ __volatile__("" ::: "memory")
 
 typedef enum { UNDER_WAY, DONE, REFUSED, FAULTY } outcome;
@@ -37,7 +37,7 @@ static void finish(outcome state)
     transfer.state = state;
 }
 
-/* Ask for the next byte; the last one is not acknowledged, so that the chip lets go of SDA. */
+/* Request the next byte; the last one is not acknowledged, so that the chip releases SDA. */
 static void ask_for_byte(void)
 {
     TWCR = (transfer.to_read > 1u) ? (GO_ON | _BV(TWEA)) : GO_ON;
@@ -50,7 +50,7 @@ static void take_byte(void)
     transfer.to_read--;
 }
 
-/* Send the next byte, or turn round to read, or end. */
+/* Send the next byte, or switch to reading, or end. */
 static void send_next(void)
 {
     if (transfer.to_write > 0u) {
@@ -93,7 +93,7 @@ ISR(TWI_vect)
     case TW_MR_SLA_NACK:
         finish(REFUSED);
         break;
-    default: /* a START or STOP where none belongs, or another level than was sent: something disturbs the bus */
+    default: /* an unexpected START or STOP, or a wrong level: something disturbs the bus */
         finish(FAULTY);
         break;
     }
@@ -106,12 +106,12 @@ static void take_bus(void)
     TWCR = _BV(TWEN);
 }
 
-/* Free a bus on which a chip holds SDA low, in the middle of a byte that nobody reads any more: clock it out of it, and
+/* Free a bus on which a chip holds SDA low, in the middle of a byte that was abandoned: clock out the rest of it, and
    send a STOP (UM10204, 3.1.16). */
 static void recover(void)
 {
     TWCR = 0u;
-    /* Resistors outside pull the bus up, to a voltage that its chips bear. */
+    /* External resistors pull the bus up, to a voltage that its chips tolerate. */
     PORTD &= (uint8_t)~(_BV(PD1) | _BV(PD0));
     for (uint8_t clock = 0u; clock < RECOVERY_CLOCKS; clock++) {
         DDRD |= _BV(PD0);
@@ -131,7 +131,7 @@ static void recover(void)
 
 void thenar_twi_begin(void)
 {
-    recover(); /* a reset may have come in the middle of a byte of a chip's */
+    recover(); /* a reset may have interrupted a byte from a chip */
 }
 
 /* Wait until the transfer has ended, and its STOP is on the wire. */

@@ -1,4 +1,4 @@
-/* Master of the I2C bus, at 400000 Hz. No chip, present, absent or stuck, can hold it up for long.
+/* Master of the I2C bus, at 400000 Hz. No chip, present, absent or stuck, can block it for long.
 
    thenar 0.1.0, template board/thenar_twi.h.j2. */
 #ifndef THENAR_TWI_H
@@ -7,13 +7,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Free the bus, as far as clocks can do that, and take it. */
+/* Free the bus, if clock pulses can, and start the master. */
 void thenar_twi_begin(void);
 
 /* Write bytes to a chip, then, after a repeated START, read bytes from it; either part may have no bytes, not both.
 
-   Return false if nobody acknowledged, or the bus was stuck: then it was freed, as far as clocks can do that. All of it
-   takes 1800 us at most, and 110 us to free the bus. */
+   Return false if no chip acknowledged, or the bus was stuck; it is then freed, if clock pulses can. The transfer takes
+   1800 us at most, and freeing the bus 110 us. */
 bool thenar_twi_transfer(uint8_t address, const uint8_t *written, uint8_t to_write, uint8_t *read, uint8_t to_read);
 
 #endif

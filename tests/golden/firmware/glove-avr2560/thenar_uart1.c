@@ -1,6 +1,6 @@
 /* Rings of bytes between the program and the interrupts of UART 1.
 
-   Bytes that find no room, or whose stop bit is missing, are left out: what they belong to is then no frame any more.
+   Bytes that find no room, or whose stop bit is missing, are dropped: their frame is then invalid.
 
    thenar 0.1.0, template avr/thenar_uart.c.j2. */
 #include "thenar_uart1.h"
@@ -13,7 +13,7 @@
 #define RECEIVED_MASK (RECEIVED_BYTES - 1u)
 #define SENT_MASK (SENT_BYTES - 1u)
 
-/* Of each ring, head is written where bytes come in and tail where they go out; equal means empty. */
+/* In each ring, head is the place of the next byte in and tail of the next byte out; equal means empty. */
 static volatile uint8_t received[RECEIVED_BYTES];
 static volatile uint8_t received_head;
 static volatile uint8_t received_tail;
@@ -48,7 +48,7 @@ ISR(USART1_UDRE_vect)
 
 void thenar_uart1_begin(void)
 {
-    PORTD |= _BV(PD2); /* a line that nobody drives is to rest high */
+    PORTD |= _BV(PD2); /* an undriven line must idle high */
     UBRR1 = 16u;
     UCSR1A = _BV(U2X1);
     UCSR1C = _BV(UCSZ11) | _BV(UCSZ10);

@@ -1,4 +1,4 @@
-/* Files, messages and an end by way of the debugger or of qemu (ARM, "Semihosting for AArch32 and AArch64", 2.0).
+/* Files, messages and program end through the debugger or qemu (ARM, "Semihosting for AArch32 and AArch64", 2.0).
    On a part without a debugger every call ends in thenar_fault(). */
 #ifndef THENAR_SEMIHOSTING_H
 #define THENAR_SEMIHOSTING_H
@@ -14,9 +14,9 @@ enum {
     SEMIHOSTING_READ = 0x06,
     SEMIHOSTING_EXIT = 0x18,
 };
-enum { SEMIHOSTING_RB = 1, SEMIHOSTING_WB = 5 }; /* how a file is opened: fopen()'s "rb" and "wb" */
+enum { SEMIHOSTING_RB = 1, SEMIHOSTING_WB = 5 }; /* open modes: fopen()'s "rb" and "wb" */
 
-/* The three instructions are one signal: uncompressed, and never on two pages. */
+/* The three instructions form one signal: they must be uncompressed and on one page. */
 static inline uint32_t semihosting(uint32_t operation, uint32_t argument)
 {
     register uint32_t a0 __asm("a0") = operation;
@@ -39,7 +39,7 @@ static inline uint32_t semihosting_open(const char *name, size_t length, uint32_
     return semihosting(SEMIHOSTING_OPEN, (uint32_t)(uintptr_t)block);
 }
 
-/* All of the bytes, or false. */
+/* Read all of the bytes, or return false. */
 static inline bool semihosting_read(uint32_t file, void *bytes, size_t size)
 {
     const uint32_t block[3] = {file, (uint32_t)(uintptr_t)bytes, (uint32_t)size};
@@ -47,7 +47,7 @@ static inline bool semihosting_read(uint32_t file, void *bytes, size_t size)
     return semihosting(SEMIHOSTING_READ, (uint32_t)(uintptr_t)block) == 0u;
 }
 
-/* All of the bytes, or false. */
+/* Write all of the bytes, or return false. */
 static inline bool semihosting_write(uint32_t file, const void *bytes, size_t size)
 {
     const uint32_t block[3] = {file, (uint32_t)(uintptr_t)bytes, (uint32_t)size};
@@ -60,7 +60,7 @@ static inline void semihosting_print(const char *text)
     (void)semihosting(SEMIHOSTING_WRITE0, (uint32_t)(uintptr_t)text);
 }
 
-/* The emulator ends, with status 0 or 1. */
+/* End the emulator with status 0 or 1. */
 static inline void semihosting_exit(bool failed)
 {
     (void)semihosting(SEMIHOSTING_EXIT, failed ? 0x20023u : 0x20026u);

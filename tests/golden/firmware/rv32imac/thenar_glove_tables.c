@@ -91,7 +91,7 @@ const thenar_glove_row thenar_glove_rows[PARTS * ROWS] IN_FLASH = {
     {PAIR(  -510,    220), REST(   310)}, /* thumb_rotation to 60, index_pij to 90 */
 };
 
-/* What joints' codes add to the numbers of rows. */
+/* The contributions of joints' codes to the numbers of rows. */
 const uint8_t thenar_glove_bins[512] IN_FLASH = {
     /* thumb_rotation, from code 0 on */
     3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3,
@@ -159,7 +159,7 @@ const uint16_t thenar_glove_powers[65] IN_FLASH = {
     16384,
 };
 
-/* Sums begin 2^15 too high, so that no lane is negative in the end, when all have taken what they borrowed. */
+/* Sums start 2^15 too high, so that no lane is negative at the end, after all borrows. */
 #define LANE(start, shift) (((uint32_t)(int32_t)(start) + 32768u) << (shift))
 #define START(a, b) (LANE(a, 0) + LANE(b, 16))
 

@@ -1,6 +1,6 @@
-/* A scanner board. It reads switches on pins, and tells the host of them (protocol 1 of thenar's scanner board).
+/* A scanner board. It reads switches on pins, and sends them to the host (protocol 1 of thenar's scanner board).
 
-   A reset at any moment, even in the middle of a frame, ends that frame with a 00 and begins with a HELLO.
+   A reset at any moment, even in the middle of a frame, ends that frame with a 00 and sends a HELLO.
 
    thenar 0.1.0, template avr/main.c.j2. */
 #include <avr/interrupt.h>

@@ -1,4 +1,4 @@
-/* A switch a pin: the pin is pulled up, and low when its switch is closed.
+/* Each switch has a pin, which is pulled up, and low while the switch is closed.
 
    thenar 0.1.0, template avr/thenar_pins.c.j2. */
 #include "thenar_keys.h"
@@ -8,7 +8,7 @@
 
 #include "thenar_board.h"
 
-#define CHARGE_CYCLES 1600u /* 100 us: the wires of the switches rise through the pull-ups */
+#define CHARGE_CYCLES 1600u /* 100 us: for the switches' wires to rise by their pull-ups */
 
 void thenar_keys_begin(void)
 {
@@ -21,7 +21,7 @@ void thenar_keys_begin(void)
 
 bool thenar_keys_scan(uint8_t *closed, uint8_t *known)
 {
-    /* All ports at once, as near as can be: the keys of a hand are read within a microsecond. */
+    /* Read all ports in direct succession: the keys of a hand are sampled within a microsecond. */
     const uint8_t port_b = (uint8_t)~PINB;
     const uint8_t port_d = (uint8_t)~PIND;
 

@@ -6,10 +6,10 @@
 
 #include <stdint.h>
 
-/* A time before the last one by this much at most (16.8 s) has gone back; one that seems further back is later. */
+/* A time at most this much before the last one (16.8 s) counts as backwards; a larger step is a wrap. */
 #define THENAR_BACK_US UINT32_C(0xFFFFFF)
 
-/* Return how long ago *then was, and move it to now. Time that goes back stands still: 0, and *then stays. */
+/* Return the time since *then, and set *then to now. If time goes backwards, return 0 and leave *then. */
 static inline uint32_t thenar_elapsed(uint32_t *then, uint32_t now_us)
 {
     uint32_t elapsed = now_us - *then;

@@ -1,4 +1,4 @@
-/* A turn of a board that scans; thenar_turn.h says what that is.
+/* A turn of a board that scans; described in thenar_turn.h.
 
    thenar 0.1.0, template board/scan_turn.c.j2. */
 #include "thenar_turn.h"
@@ -9,7 +9,7 @@
 #include "thenar_due.h"
 #include "thenar_keys.h"
 
-/* So many of the host's bytes are taken before it is looked whether a scan is due: they may come without end. */
+/* Bytes taken from the host before checking whether a scan is due: the host may send without pause. */
 #define BYTES_A_TURN 16u
 
 static void scan(uint32_t now_us)

@@ -10,10 +10,10 @@
 /* Set the rate and start to receive. */
 void thenar_uart0_begin(void);
 
-/* Take bytes to send, all of them or, where there is no room for all, none: then return false. */
+/* Send all bytes, or none if there is not enough room: then return false. */
 bool thenar_uart0_send(const uint8_t *bytes, uint8_t length);
 
-/* Put the oldest byte that came in into *byte; return false if there is none. */
+/* Put the oldest byte received into *byte; return false if there is none. */
 bool thenar_uart0_receive(uint8_t *byte);
 
 #endif

@@ -2,8 +2,8 @@
  * @file thenar_glove.h
  * @brief Recognises 3 grasp types from 6 switches and 2 joints of a glove.
  *
- * Layout for atmega328p: 16-bit entries, up to 6 switches a look-up, codes looked up in 256 bytes a joint, up to 2
- * joints a look-up, rows added in line: the fastest of 108 layouts in 16384 bytes of flash, at most 134 cycles (298
+ * Layout for atmega328p: 16-bit entries, up to 6 switches a lookup, codes looked up in 256 bytes a joint, up to 2
+ * joints a lookup, rows added in line: the fastest of 108 layouts in 16384 bytes of flash, at most 134 cycles (298
  * by update()) and 2497 bytes.
  *
  * From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.h.j2.
@@ -20,7 +20,7 @@ extern "C" {
 
 #define THENAR_GLOVE_CLASSES 3u /**< Grasp types. */
 #define THENAR_GLOVE_SWITCHES 6u /**< Kept switches. */
-#define THENAR_GLOVE_PORTS 1u /**< Bytes that hold them. */
+#define THENAR_GLOVE_PORTS 1u /**< Bytes for the switches. */
 #define THENAR_GLOVE_JOINTS 2u /**< Joints. */
 
 /** The number of a grasp type. */
@@ -36,7 +36,7 @@ enum {
 /** The number of a switch. */
 typedef uint8_t thenar_glove_switch;
 
-/** The switches, and where the input has them. */
+/** The switches, and their places in the input. */
 enum {
     THENAR_GLOVE_SWITCH_THUMB_TIP = 0, /**< thumb tip: switches[0], 0x01 */
     THENAR_GLOVE_SWITCH_INDEX_TIP = 1, /**< index tip: switches[0], 0x02 */
@@ -46,24 +46,24 @@ enum {
     THENAR_GLOVE_SWITCH_PALM_ULNAR = 5, /**< palm ulnar: switches[0], 0x20 */
 };
 
-/** A joint's code, in the units of the recordings. Of codes above 255: 255. */
+/** A joint's code, in the units of the recordings. For codes above 255 use 255. */
 typedef uint8_t thenar_glove_code;
 
-/** The joints, and what their codes mean. */
+/** The joints, and the meaning of their codes. */
 enum {
     THENAR_GLOVE_JOINT_THUMB_ROTATION = 0, /**< thumb_rotation: the glove's own codes */
     THENAR_GLOVE_JOINT_INDEX_PIJ = 1, /**< index_pij: the glove's own codes */
 };
 
-/** What is read of a glove. */
+/** The readings of a glove. */
 typedef struct {
-    /** The bytes of the ports. A bit is 1 while its switch is closed; one without a switch means nothing. */
+    /** The bytes of the ports. A bit is 1 while its switch is closed; a bit without a switch is ignored. */
     uint8_t switches[THENAR_GLOVE_PORTS];
     /** The joints' codes, by their numbers. */
     thenar_glove_code codes[THENAR_GLOVE_JOINTS];
 } thenar_glove_frame;
 
-/** What is in the sums; private. */
+/** The inputs included in the sums; private. */
 typedef struct {
 #ifdef __AVR__
     uint8_t found[4];
@@ -72,9 +72,9 @@ typedef struct {
 #endif
 } thenar_glove_seen;
 
-/** One glove. A program has as many as it likes; a copy is a glove of its own. */
+/** One glove. A program may have any number; a copy is another glove. */
 typedef struct {
-    int16_t scores[THENAR_GLOVE_CLASSES]; /**< Of the last answer, equal to Python's. */
+    int16_t scores[THENAR_GLOVE_CLASSES]; /**< Of the last prediction, equal to Python's. */
 #ifdef __AVR__
     int16_t start[THENAR_GLOVE_CLASSES];
 #else
@@ -90,45 +90,45 @@ typedef struct {
     uint16_t n_lost;
 } thenar_glove;
 
-/** Begin: all switches open, all codes 0, nothing missing. */
+/** Initialise: all switches open, all codes 0, nothing missing. */
 void thenar_glove_init(thenar_glove *glove);
 
-/** Say in the input whether a switch is closed. Numbers from THENAR_GLOVE_SWITCHES on are ignored. */
+/** Set in the input whether a switch is closed. Numbers from THENAR_GLOVE_SWITCHES on are ignored. */
 void thenar_glove_set_switch(thenar_glove *glove, thenar_glove_switch number, bool closed);
 
 /**
- * Say that a switch cannot be read, or can be read again. While it is missing, classify() and update() open it, and the
- * mean of its rows stands in for it, as in Python. Numbers from THENAR_GLOVE_SWITCHES on are ignored.
+ * Set whether a switch is missing: it cannot be read. While it is missing, classify() and update() open it, and use the
+ * mean of its rows instead, as in Python. Numbers from THENAR_GLOVE_SWITCHES on are ignored.
  */
 void thenar_glove_lose_switch(thenar_glove *glove, thenar_glove_switch number, bool lost);
 
 /**
- * Say that a joint cannot be read, or can be read again. While it is missing, classify() and update() make its code 0,
- * and the mean of its rows stands in for it, as in Python. Numbers from THENAR_GLOVE_JOINTS on are ignored.
+ * Set whether a joint is missing: it cannot be read. While it is missing, classify() and update() set its code to 0,
+ * and use the mean of its rows instead, as in Python. Numbers from THENAR_GLOVE_JOINTS on are ignored.
  */
 void thenar_glove_lose_joint(thenar_glove *glove, uint16_t number, bool lost);
 
 /**
- * Score the input.
+ * Predict the grasp type from the input.
  *
- * @return the first of the grasp types whose score is largest
+ * @return the grasp type with the largest score, the first of equal ones
  */
 thenar_glove_class thenar_glove_classify(thenar_glove *glove);
 
-/** The same answer, by what has changed since the last update(). After init(), classify() or a loss it begins anew. */
+/** The same prediction, from the changes since the last update(); after init(), classify() or a loss from scratch. */
 thenar_glove_class thenar_glove_update(thenar_glove *glove);
 
-/** By how many steps the best score leads the second best. */
+/** The lead of the best score over the second best, in steps. */
 uint16_t thenar_glove_margin(const thenar_glove *glove);
 
 /**
- * How probable a grasp type is: the softmax of the scores in integers, the same as Python's.
+ * The probability of a grasp type: the softmax of the scores in integers, the same as Python's.
  *
- * @return 0 to 65535, which is certain; 0 for a number that is no grasp type
+ * @return 0 to 65535 (certain); 0 for a number that is not a grasp type
  */
 uint16_t thenar_glove_probability(const thenar_glove *glove, thenar_glove_class grasp);
 
-/** The name of a grasp type in UTF-8, "" for a number that is none. On an AVR it lies in flash: strcpy_P(). */
+/** The name of a grasp type in UTF-8, "" for a number that is not one. On an AVR it is in flash: use strcpy_P(). */
 const char *thenar_glove_grasp(thenar_glove_class grasp);
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-/* thenar_glove_avr.S: the adding up, on an AVR.
+/* thenar_glove_avr.S: the addition of rows, on an AVR.
 
    From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME_avr.S.j2. */
 #ifdef __AVR__

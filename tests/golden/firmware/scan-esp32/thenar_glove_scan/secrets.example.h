@@ -1,5 +1,5 @@
-/* The Wi-Fi that the board joins. Copy this file to secrets.h, beside it, and fill that in: thenar neither writes nor
-   reads it, and it belongs into no repository.
+/* The Wi-Fi that the board joins. Copy this file to secrets.h in the same folder, and fill it in: thenar neither writes
+   nor reads that file. Keep it out of your repository.
 
    thenar 0.1.0, template sketch/secrets.example.h.j2. */
 #ifndef THENAR_SECRETS_H

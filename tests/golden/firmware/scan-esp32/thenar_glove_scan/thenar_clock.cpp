@@ -9,7 +9,7 @@ extern "C" {
 
 void thenar_clock_begin(void)
 {
-    /* It runs since boot. */
+    /* It has run since boot. */
 }
 
 uint32_t thenar_clock_us(void)

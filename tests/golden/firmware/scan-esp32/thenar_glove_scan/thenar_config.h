@@ -1,4 +1,4 @@
-/* This very board: its keys, its number, and how it works until the host asks for something else.
+/* The configuration of this board: its keys, its number, and its behaviour until the host requests another.
 
    thenar 0.1.0, template board/thenar_config.h.j2. */
 #ifndef THENAR_CONFIG_H
@@ -6,12 +6,12 @@
 
 #include <stdint.h>
 
-/* Key k stands at row k / THENAR_COLUMNS, column k % THENAR_COLUMNS; keys that are wired directly are one row. */
+/* Key k is at row k / THENAR_COLUMNS, column k % THENAR_COLUMNS; keys that are wired directly are one row. */
 #define THENAR_ROWS 1u
 #define THENAR_COLUMNS 6u
 #define THENAR_KEYS 6u
 
-/* 0: the keys are a matrix without diodes, where three closed corners of a rectangle close the fourth. */
+/* 0: the keys are a matrix without diodes, where three closed corners of a rectangle make the fourth look closed. */
 #define THENAR_DIODES 1
 
 #define THENAR_BOARD_ID UINT32_C(1)
@@ -21,11 +21,11 @@
 #define THENAR_STATE_US UINT32_C(0)
 #define THENAR_HEARTBEAT_US UINT32_C(50000)
 
-/* Debouncing: for so long after a press a key is not looked at; so long it rests open before a release is told. */
+/* Debouncing: how long a key is ignored after a press, and how long it must rest open before a release is reported. */
 #define THENAR_PRESS_US 0u
 #define THENAR_RELEASE_US 0u
 
-/* No host can make it scan more often than this. */
+/* The lower limit of the scan period that a host can request. */
 #define THENAR_FASTEST_US UINT32_C(250)
 
 #endif

@@ -1,4 +1,4 @@
-/* Frames as datagrams; thenar_datagram.h says what they are.
+/* Frames as datagrams; described in thenar_datagram.h.
 
    thenar 0.1.0, template board/thenar_datagram.c.j2. */
 #include "thenar_datagram.h"
@@ -19,12 +19,12 @@ static struct {
     uint32_t boot;
     uint32_t session;
     uint32_t number;      /* of the next frame */
-    uint32_t heard;       /* the newest number from the host, and which came before it */
+    uint32_t heard;       /* the newest number from the host, and a bitmap of earlier ones */
     uint32_t heard_before;
-    uint32_t heard_us;    /* when that came */
+    uint32_t heard_us;    /* its time */
     thenar_peer peer;
-    bool attended;        /* there is a host */
-    bool began;           /* there was one since boot */
+    bool attended;        /* a host is connected */
+    bool began;           /* a host has connected since boot */
 } line;
 
 static uint8_t *put32(uint8_t *to, uint32_t value)
@@ -49,7 +49,7 @@ void thenar_datagram_begin(uint32_t boot)
     line.boot = boot;
 }
 
-/* A host that has been silent for too long is none any more. */
+/* Drop a host that has been silent for too long. */
 static void run_to(uint32_t now_us)
 {
     if (line.attended && ((now_us - line.heard_us) >= SILENT_US)) {
@@ -57,7 +57,7 @@ static void run_to(uint32_t now_us)
     }
 }
 
-/* Return whether these bytes are one sound frame, and nothing besides. */
+/* Return whether these bytes are exactly one valid frame. */
 static bool is_frame(const uint8_t *bytes, uint16_t size)
 {
     thenar_decoder decoder;
@@ -78,13 +78,13 @@ static bool is_host(const thenar_peer *peer, uint32_t session)
     return (session == line.session) && (peer->address == line.peer.address) && (peer->port == line.peer.port);
 }
 
-/* Return whether a number is newer than all that were heard of a session. */
+/* Return whether a number is newer than all numbers of the session. */
 static bool is_newer(uint32_t session, uint32_t number)
 {
     return !line.began || (session != line.session) || ((number != line.heard) && ((number - line.heard) < HALF));
 }
 
-/* Note a number that is newer than all before it. */
+/* Record a number that is newer than all before it. */
 static void hear(uint32_t session, uint32_t number)
 {
     const uint32_t ahead = number - line.heard;
@@ -101,7 +101,7 @@ static void hear(uint32_t session, uint32_t number)
     line.heard = number;
 }
 
-/* Take a frame of a host that may be heard. */
+/* Take a frame of a host that may become the current one. */
 static bool take(const uint8_t *datagram, uint16_t size, const thenar_peer *peer, uint32_t now_us)
 {
     const uint32_t session = get32(&datagram[SESSION_AT]);
@@ -119,7 +119,7 @@ static bool take(const uint8_t *datagram, uint16_t size, const thenar_peer *peer
         line.attended = true;
         taken = true;
     } else {
-        /* somebody else, or an echo of long ago */
+        /* another host, or a datagram from long ago */
     }
     return taken;
 }
@@ -137,7 +137,7 @@ uint16_t thenar_datagram_wrap(
     uint16_t size = 0u;
 
     run_to(now_us);
-    if (length > 1u) { /* a 00 alone ends what was half-sent on a line of bytes: here nothing is */
+    if (length > 1u) { /* on a serial line, a single 00 ends a partial frame: datagrams have none */
         if (line.attended) {
             uint8_t *to = datagram;
 

@@ -1,7 +1,7 @@
-/* Debouncing of the keys of thenar_config.h; thenar_debounce.h says how.
+/* Debouncing of the keys of thenar_config.h; described in thenar_debounce.h.
 
-   A key's time runs in one of two ways: locked (just pressed or just released, not looked at), or opening (closed, but
-   read open). One count of microseconds a key serves both, since the lock after a release lasts for what is left of it.
+   A key's timer runs in one of two states: locked (just pressed or just released, ignored), or opening (closed, but
+   read open). One count of microseconds per key serves both, since the lock after a release lasts for the rest of it.
 
    thenar 0.1.0, template board/thenar_debounce.c.j2. */
 #include "thenar_debounce.h"
@@ -19,7 +19,7 @@ typedef struct {
     uint32_t time_us;    /* of the last scan */
     uint16_t press_us;
     uint16_t release_us;
-    uint16_t period_us;  /* the shortest of late, since so soon the next scan may come; 0: not known yet */
+    uint16_t period_us;  /* the shortest recent one, since the next scan may come as soon; 0: unknown */
     bool begun;
     uint8_t closed[BYTES];
     uint8_t locked[BYTES];
@@ -56,7 +56,7 @@ void thenar_debounce_forget(uint16_t byte, uint8_t forgotten)
     keys.opening[byte] &= (uint8_t)~forgotten;
 }
 
-/* Note the time of a scan; return how long ago the last one was, at most 65535: no time that runs is longer. */
+/* Record the time of a scan; return the time since the last one, at most 65535: no timer runs longer. */
 static uint16_t advance(uint32_t now_us)
 {
     uint32_t interval;
@@ -81,7 +81,7 @@ static uint16_t advance(uint32_t now_us)
     return (uint16_t)interval;
 }
 
-/* Let the times of eight keys run on; the locks that end are no more. */
+/* Advance the timers of eight keys, and clear the locks that end. */
 static void run_on(uint16_t byte, uint16_t elapsed_us)
 {
     const uint8_t running = (uint8_t)(keys.locked[byte] | keys.opening[byte]);
@@ -99,7 +99,7 @@ static void run_on(uint16_t byte, uint16_t elapsed_us)
     }
 }
 
-/* Lock a key for what is left of its time. */
+/* Lock a key for the rest of its time. */
 static void lock(uint16_t byte, uint8_t mask, uint16_t left_us)
 {
     if (left_us > 0u) {
@@ -121,7 +121,7 @@ static void read_open(uint16_t byte, uint8_t mask, uint16_t *left_us)
     }
 }
 
-/* Return which of eight keys were read, and are not locked. */
+/* Return which of eight keys were read and are not locked. */
 static uint8_t looked_at(uint16_t byte, uint8_t known)
 {
     const uint8_t there = (uint8_t)((byte == (BYTES - 1u)) ? KEYS_OF_LAST_BYTE : 0xFFu);
@@ -129,7 +129,7 @@ static uint8_t looked_at(uint16_t byte, uint8_t known)
     return (uint8_t)(known & there & (uint8_t)~keys.locked[byte]);
 }
 
-/* Take which of eight keys changed, of those that are looked at. */
+/* Process the changes of eight keys, except ignored ones. */
 static void change(uint16_t byte, uint8_t pressed, uint8_t opened)
 {
     uint16_t *left = &keys.left_us[byte * 8u];
@@ -143,7 +143,7 @@ static void change(uint16_t byte, uint8_t pressed, uint8_t opened)
             keys.closed[byte] |= mask;
             lock(byte, mask, keys.press_us);
         } else {
-            /* nothing new of this key */
+            /* no change of this key */
         }
         mask = (uint8_t)(mask << 1);
     }
@@ -162,7 +162,7 @@ void thenar_debounce(uint8_t *bitmap, const uint8_t *known, uint32_t now_us)
         }
         free_keys = looked_at(byte, known[byte]);
         changed = (uint8_t)((bitmap[byte] ^ keys.closed[byte]) & free_keys);
-        /* What reads closed again was bounce: the key does not open. */
+        /* A closed reading means that it was bounce: the key does not open. */
         keys.opening[byte] &= (uint8_t)~(bitmap[byte] & free_keys);
         if (changed != 0u) {
             change(byte, (uint8_t)(changed & bitmap[byte]), (uint8_t)(changed & (uint8_t)~bitmap[byte]));

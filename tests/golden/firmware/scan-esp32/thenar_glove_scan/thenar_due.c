@@ -1,4 +1,4 @@
-/* When to scan; thenar_due.h says when that is.
+/* The schedule of scans; described in thenar_due.h.
 
    thenar 0.1.0, template board/thenar_due.c.j2. */
 #include "thenar_due.h"

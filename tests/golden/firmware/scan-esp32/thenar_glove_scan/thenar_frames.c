@@ -1,4 +1,4 @@
-/* Frames of the switch-scanner board; thenar_frames.h says what they are.
+/* Frames of the switch-scanner board; described in thenar_frames.h.
 
    thenar 0.1.0, template board/thenar_frames.c.j2. */
 #include "thenar_frames.h"
@@ -7,7 +7,7 @@
 #define SHORTEST_BODY 4u /* type, sequence, CRC */
 #define LONGEST_PIECE 255u
 
-/* Return the CRC of what `crc` is of and one byte more: the polynomial 1021 by shifts, without a table. */
+/* Extend `crc` by one byte: the polynomial 1021 by shifts, without a table. */
 static uint16_t crc_of(uint16_t crc, uint8_t byte)
 {
     uint8_t high = (uint8_t)((crc >> 8) ^ byte);
@@ -57,7 +57,7 @@ void thenar_decoder_reset(thenar_decoder *decoder)
     decoder->crc = CRC_START;
 }
 
-/* Take a byte of the body, unstuffed. */
+/* Take an unstuffed byte of the body. */
 static void keep(thenar_decoder *decoder, uint8_t byte)
 {
     if (decoder->size < sizeof decoder->body) {
@@ -67,14 +67,14 @@ static void keep(thenar_decoder *decoder, uint8_t byte)
     decoder->crc = crc_of(decoder->crc, byte);
 }
 
-/* Take a byte that is not 0, of a piece that is not too long; decoder->piece counts it already. */
+/* Take a byte other than 0 of a piece that is not too long; decoder->piece already counts it. */
 static void unstuff(thenar_decoder *decoder, uint8_t byte)
 {
     if (decoder->block > 0u) {
         decoder->block--;
         keep(decoder, byte);
     } else {
-        /* A zero stands between blocks. (None does after one of 255 bytes, but that fills a piece, and is the last.) */
+        /* There is a zero between blocks. (None follows one of 255 bytes, but that fills a piece, and is the last.) */
         if (decoder->piece > 1u) {
             keep(decoder, 0u);
         }
@@ -82,7 +82,7 @@ static void unstuff(thenar_decoder *decoder, uint8_t byte)
     }
 }
 
-/* Return what the piece is that a 00 has just ended. */
+/* Return the kind of the piece that a 00 has just ended. */
 static thenar_frame_outcome outcome_of(const thenar_decoder *decoder)
 {
     thenar_frame_outcome outcome = THENAR_FRAME_GOOD;
@@ -98,7 +98,7 @@ static thenar_frame_outcome outcome_of(const thenar_decoder *decoder)
     } else if (decoder->crc != 0u) {
         outcome = THENAR_FRAME_DAMAGED;
     } else {
-        /* a sound frame */
+        /* a valid frame */
     }
     return outcome;
 }

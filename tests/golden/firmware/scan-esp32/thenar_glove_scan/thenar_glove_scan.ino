@@ -1,7 +1,7 @@
-/* A scanner board. It reads switches on pins, and tells the host of them (protocol 1 of thenar's scanner board).
+/* A scanner board. It reads switches on pins, and sends them to the host (protocol 1 of thenar's scanner board).
 
-   README.md, beside this folder, says how to flash it. The files with .c are portable and the same on every board;
-   those with .cpp call Arduino's core.
+   README.md, in the folder above, describes how to flash it. The .c files are portable and the same on every board;
+   the .cpp files call Arduino's core.
 
    thenar 0.1.0, template sketch/NAME.ino.j2. */
 #include "thenar_line.h"

@@ -9,11 +9,11 @@
 
 /* Bitmaps: key k is bit k % 8 of byte k / 8, and the bits beyond the last key are 0. */
 
-/* Make the pins what they are to be. */
+/* Configure the pins. */
 void thenar_keys_begin(void);
 
-/* Read every key into `closed`, and into `known` which of them were read; those that were not are 0 in both. Return
-   whether all were, and none can be a ghost. */
+/* Read every key into `closed`, and the keys that were read into `known`; unread keys are 0 in both. Return whether all
+   were read, and none can be a ghost. */
 bool thenar_keys_scan(uint8_t *closed, uint8_t *known);
 
 #endif

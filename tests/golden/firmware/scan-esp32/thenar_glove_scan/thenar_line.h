@@ -4,8 +4,8 @@
 #ifndef THENAR_LINE_H
 #define THENAR_LINE_H
 
-/* Start to send and to receive, which thenar_port_send() of thenar_board.h and thenar_port_receive() of thenar_turn.h
-   do. */
+/* Start the line; thenar_port_send() of thenar_board.h and thenar_port_receive() of thenar_turn.h then send and
+   receive. */
 void thenar_line_begin();
 
 #endif

@@ -1,6 +1,6 @@
-/* The host in a Wi-Fi, by UDP: one frame a datagram; thenar_datagram.h says what stands before it, and who is heard.
+/* The host on Wi-Fi, by UDP: one frame per datagram; thenar_datagram.h describes the header and the choice of the host.
 
-   The name of the network and its password stand in secrets.h, which is yours: see secrets.example.h.
+   The name of the network and its password are in secrets.h, which you write: see secrets.example.h.
 
    thenar 0.1.0, template sketch/thenar_line_udp.cpp.j2. */
 #include "thenar_line.h"
@@ -10,7 +10,7 @@
 #include <WiFiUdp.h>
 
 #if !__has_include("secrets.h")
-#error "copy secrets.example.h to secrets.h, beside it, and write the name and the password of your Wi-Fi there"
+#error "copy secrets.example.h to secrets.h, and write the name and the password of your Wi-Fi there"
 #endif
 #include "secrets.h"
 
@@ -22,12 +22,12 @@ extern "C" {
 }
 
 #define PORT 5253u
-#define LOOK_US UINT32_C(100000)     /* so often it is looked whether there is a network */
-#define RETRY_US UINT32_C(15000000)  /* and so often it is tried again, which must not disturb what is under way */
+#define LOOK_US UINT32_C(100000)     /* period of checks of the network */
+#define RETRY_US UINT32_C(15000000)  /* period of reconnections, long enough not to disturb one in progress */
 
 static WiFiUDP udp;
 static uint8_t received[THENAR_DATAGRAM_MOST];
-static uint16_t at;    /* of what came in: what is read next, and where it ends */
+static uint16_t at;    /* the next byte to read of those received, and their end */
 static uint16_t end;
 static bool listening;
 static uint32_t looked_us;
@@ -49,12 +49,12 @@ void thenar_line_begin()
 {
     (void)WiFi.mode(WIFI_STA);
     (void)WiFi.setHostname("thenar-1");
-    (void)WiFi.setSleep(false); /* a sleeping radio answers a tenth of a second late */
+    (void)WiFi.setSleep(false); /* a sleeping radio replies a tenth of a second late */
     thenar_datagram_begin(random_number());
     join();
 }
 
-/* Return whether there is a network; listen when it comes. */
+/* Return whether there is a network; start to listen when it appears. */
 static bool attached(uint32_t now_us)
 {
     if ((now_us - looked_us) >= LOOK_US) {
@@ -90,7 +90,7 @@ bool thenar_port_send(const uint8_t *frame, uint8_t length)
     return sent;
 }
 
-/* Take a datagram, if one has come in; whatever is left of a longer one is thrown away. */
+/* Take a datagram, if one has arrived; the rest of a longer one is discarded. */
 static void receive(uint32_t now_us)
 {
     uint8_t scrap[64];

@@ -1,4 +1,4 @@
-/* A switch a pin: the pin is pulled up, and low when its switch is closed.
+/* Each switch has a pin, which is pulled up, and low while the switch is closed.
 
    thenar 0.1.0, template sketch/thenar_pins.cpp.j2. */
 #include <Arduino.h>
@@ -9,7 +9,7 @@ extern "C" {
 #include "thenar_keys.h"
 }
 
-#define CHARGE_US 100u /* the wires of the switches rise through the pull-ups */
+#define CHARGE_US 100u /* for the switches' wires to rise by their pull-ups */
 
 static const uint8_t pins[THENAR_KEYS] = {
     4u, /* 0: thumb tip */

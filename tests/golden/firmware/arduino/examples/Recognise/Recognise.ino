@@ -7,7 +7,7 @@ static thenar_glove_codes codes;
 
 #define SENSORS 2
 
-/* Of a board with fewer analog inputs, multiplexers CD74HC4067 take their place, sixteen sensors each: the first one's
+/* On a board with fewer analog inputs, multiplexers CD74HC4067 replace them, sixteen sensors each: the first one's
    output is on A0, the second's on A1; they share four address pins, S0 to S3. */
 #if NUM_ANALOG_INPUTS < SENSORS && !defined(MULTIPLEXERS)
 #define MULTIPLEXERS
@@ -18,9 +18,9 @@ static thenar_glove_codes codes;
 
 #define DIGITAL_PINS (NUM_DIGITAL_PINS - NUM_ANALOG_INPUTS)
 
-/* Of a board with fewer digital pins, shift registers 74HC165 take their place, eight switches each, with a resistor to
-   the supply at every input: the first switch is on D7 of the chip that is next to the board, the eighth on D0, the
-   ninth on D7 of the chip whose Q7 goes into DS of the first. */
+/* On a board with fewer digital pins, shift registers 74HC165 replace them, eight switches each, with a resistor to the
+   supply at every input: the first switch is on D7 of the chip next to the board, the eighth on D0, the ninth on D7 of
+   the chip whose Q7 is connected to DS of the first. */
 #ifdef MULTIPLEXERS
 #define PINS_NEEDED 12
 #else
@@ -35,7 +35,7 @@ typedef struct {
     int16_t pin;
 } wired_switch;
 
-/* The pin of each switch; closed, it connects the pin to ground. Change them to how the glove is wired. */
+/* The pin of each switch; closed, it connects the pin to ground. Change them to the glove's wiring. */
 static const wired_switch switches[] = {
     {0, 2}, /* thumb tip */
     {1, 3}, /* index tip */
@@ -115,14 +115,14 @@ static int reading_of(uint8_t sensor)
 }
 #endif
 
-/* What reading_of() gives of each sensor at its two points. */
+/* The results of reading_of() for each sensor at its two points. */
 static const int readings[SENSORS][2] = {
     {0, 0}, /* thumb_rotation: code 1 and code 255 */
     {0, 0}, /* index_pij: code 1 and code 255 */
 };
 
 #ifndef CALIBRATED
-#define CALIBRATED 0 /* 1 once the readings stand there */
+#define CALIBRATED 0 /* set to 1 once the readings are filled in */
 #endif
 #if !CALIBRATED && !defined(SHOW_READINGS)
 #error "unknown readings: thenar firmware --glove, or SHOW_READINGS, fill in `readings`, set CALIBRATED: see README.md"
