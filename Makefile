@@ -79,7 +79,7 @@ dist: $(VENV)/installed  ## the sdist and the wheel, in dist/, with their metada
 	$(BIN)/python -m build
 	$(BIN)/twine check --strict dist/*
 
-format: $(VENV)/installed  ## let ruff mend what it can
+format: $(VENV)/installed  ## let ruff fix what it can
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 

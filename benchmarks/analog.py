@@ -1,8 +1,8 @@
-"""What a pad with levels tells that a switch does not: the scenes `kamakura-analog` and `initial-contact`, simulated.
+"""The gain of pads with levels over switches: the scenes `kamakura-analog` and `initial-contact`, simulated.
 
 `python benchmarks/analog.py [--quick]` prints what docs/project/results.md reports: accuracy with the 33 pads that ID3
 chooses inside each fold as switches, read as switches that close at 1 N (the paper's), as three levels each, and as
-codes; and recognition by the force on the pad that is pressed hardest. Folds of trials, additive logit.
+codes; and the accuracy by the force on the hardest pressed pad. Folds of trials, additive logit.
 """
 
 import argparse
@@ -30,7 +30,7 @@ LOGIT = Options(trainer="logit")
 
 
 def read(learning: Samples, test: Samples, pads: GraspSet, reading: Reading) -> tuple[Samples, Samples]:
-    """Return both with the pads that ID3 chooses in the first as switches, read in one way."""
+    """Return both with the pads that ID3 chooses on the first as switches, with one kind of reading."""
     closed = tuple(Element(pad, int(column.code(CLOSES_N))) for pad, column in enumerate(pads.taxel_columns))
     kept = choose(bits_of(learning, closed)).columns[:KEPT]
     if reading == "switches":

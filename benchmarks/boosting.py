@@ -1,11 +1,12 @@
-"""LogitBoost against Weka 3.6, LightGBM and XGBoost, in the same run, on one thread: 100 rounds of decision stumps;
-and a fit of the additive logit on the same rows.
+"""LogitBoost compared with Weka 3.6, LightGBM and XGBoost, in the same run, on one thread: 100 rounds of decision
+stumps; and a fit of the additive logit on the same rows.
 
     python benchmarks/boosting.py [--quick]
 
-Times are of the processor, so that other work on the machine counts little, and each is the least of several trainings,
-data read and binned included. Weka's is that of its process less that of one which trains a single round. A peer that
-is not installed is left out by name: apt-get install weka default-jre-headless, pip install lightgbm xgboost.
+Times are processor times, so that other work on the machine matters little, and each is the minimum of several
+trainings, including reading and binning. Weka's is its process time minus that of a process that trains a single round.
+Peers that are not installed are named and left out: apt-get install weka default-jre-headless, pip install lightgbm
+xgboost.
 """
 
 import os
@@ -35,7 +36,7 @@ from thenar.compiler.boosting.stumps import winners
 
 WEKA_JAR = Path("/usr/share/java/weka.jar")
 CLASSES, ROUNDS = 14, 100
-# Weka takes minutes of more rows.
+# Weka takes minutes with more rows.
 MOST_WEKA_ROWS = 4200
 JOINTS = {"codes": "half degrees", "doubles": "doubles"}
 
@@ -93,7 +94,7 @@ def xgboost(X: NDArray[Any], y: NDArray[np.intp]) -> object:
 
 
 def least(train: Callable[[], object], repeats: int) -> float:
-    """Return the processor's seconds of the fastest of several trainings."""
+    """Return the processor seconds of the fastest of several trainings."""
     times = []
     for _ in range(repeats):
         start = time.process_time()

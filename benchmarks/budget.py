@@ -1,17 +1,17 @@
-"""Placements within a scan time: thenar's methods under --budget-us, and peers that know costs.
+"""Placements within a scan time: thenar's methods under --budget-us, and peers that use costs.
 
     python benchmarks/budget.py SET.grasps [--budgets US ...] [--folds N]
 
-A switch costs the time of its port on the whole glove as wired (MCP23017 at 400 kHz), which all switches of the port
-share. Placement and classifier (LogitBoost, 100 rounds) are learnt from the training part of each fold, and rates are
-means over the folds. Peers know a cost for each switch, its part of its port, and not that a port is shared:
+A switch costs the time of its port on the whole glove as wired (MCP23017 at 400 kHz), shared by all switches of the
+port. Placement and classifier (LogitBoost, 100 rounds) are trained on the training part of each fold, and rates are
+means over the folds. Peers use a cost per switch, its share of its port, and do not know that a port is shared:
 
-- PySensors' CCQR: pivoted QR with costs, which looks at no labels; its costs are scaled to the norms of the columns.
+- PySensors' CCQR: pivoted QR with costs, which ignores labels; its costs are scaled to the norms of the columns.
 - PySensors' SSPOC has no costs: its ranking is cut at the budget.
 - scikit-learn's RFE on logistic regression, with columns scaled by their costs, so that weights are divided by them.
-- scikit-learn's SequentialFeatureSelector, forward, on BernoulliNB: the score is accuracy less PRICE a mean cost.
+- scikit-learn's SequentialFeatureSelector, forward, on BernoulliNB: the score is accuracy less PRICE times mean cost.
 
-Every ranking is cut by thenar's rule: each next switch is taken unless it breaks the budget.
+Every ranking is cut by thenar's rule: each next switch is taken unless it exceeds the budget.
 """
 
 import argparse
@@ -62,7 +62,7 @@ def rfe(bits: Bits, labels: Labels, costs: Costs) -> Columns:
 
 
 def forward(bits: Bits, labels: Labels, costs: Costs) -> Columns:
-    """Return MOST columns by forward selection, those of the largest information first."""
+    """Return MOST columns by forward selection, starting with those of the largest information."""
     from sklearn.feature_selection import SequentialFeatureSelector
     from sklearn.naive_bayes import BernoulliNB
 
@@ -88,14 +88,14 @@ def samples_of(bits: Bits, labels: Labels) -> Samples:
 
 
 def peers_columns(name: str, learning: Samples, costs: Costs, bounds: Sequence[Bound]) -> list[Columns]:
-    """Return what a peer keeps under each budget."""
+    """Return the columns that a peer keeps under each budget."""
     varying = np.flatnonzero(learning.switches.any(axis=0) & ~learning.switches.all(axis=0))
     order = PEERS[name](learning.switches[:, varying], learning.labels, costs[varying])
     return [bound.obeyed(tuple(varying[list(order)].tolist()), learning.n_switches) for bound in bounds]
 
 
 def our_columns(name: str, learning: Samples, ports: PortCosts, bounds: Sequence[Bound]) -> list[Columns]:
-    """Return what a method keeps under each budget, as many switches as fit."""
+    """Return the columns that a method keeps under each budget, as many switches as fit."""
     if METHODS[name].nested:
         order = METHODS[name].chooser(learning, ports)(learning.n_switches)
         return [bound.obeyed(order, learning.n_switches) for bound in bounds]

@@ -1,4 +1,4 @@
-"""Grasps as several contact models solve them, and what tables are made of."""
+"""Solve grasps with several contact models, and format the tables."""
 
 import time
 from collections.abc import Iterable, Iterator, Sequence
@@ -14,15 +14,15 @@ from thenar.simulator.scenes.scene import Scene
 
 
 def solved(model: ContactModel, batches: Sequence[Batch]) -> tuple[list[Contact], float]:
-    """Return what a model makes of batches, solved together, and its processor time in seconds."""
+    """Return a model's contacts for batches, solved together, and its processor time in seconds."""
     start = time.process_time()
     contacts = model.solve([batch.load() for batch in batches])
     seconds = time.process_time() - start
     return contacts, seconds
 
 
-def told(scene: Scene, repetitions: int) -> Iterator[Batch]:
-    """Yield every condition's first repetitions, as the contact model gets them."""
+def poses(scene: Scene, repetitions: int) -> Iterator[Batch]:
+    """Yield every condition's first repetitions, in the form that the contact model takes."""
     pipeline = compile_pipeline(scene)
     before = tuple(stop for stop in pipeline.stops if stop.effect.stage == "posture")
     for session in sessions(scene, Postures.of(scene)):
@@ -33,7 +33,7 @@ def told(scene: Scene, repetitions: int) -> Iterator[Batch]:
 
 
 def jaccard(pairs: Iterable[tuple[np.ndarray, np.ndarray]]) -> float:
-    """Return the switches ON in both over those ON in either, of all grasps together."""
+    """Return the switches ON in both divided by those ON in either, over all grasps."""
     both, either = np.sum([[(a & b).sum(), (a | b).sum()] for a, b in pairs], axis=0)
     return float(both / either) if either else 1.0
 

@@ -1,13 +1,13 @@
-"""What recognising costs a microcontroller, thenar's firmware and its peers, from a frame's raw bytes to the grasp.
+"""The cost of recognition on a microcontroller, for thenar's firmware and its peers, from raw bytes to the grasp.
 
     python benchmarks/firmware.py [--quick]
 
 33 switches and 16 joints (a byte each) of the simulated scene kamakura, 14 grasp types. Switches are placed and models
 trained on the training rows of each fold; accuracy is that of the deployed integers, in four folds and with each
-subject left out. Cycles are counted by libsimavr over the test rows of the first fold, the middle and the most, of
-thenar its worst frame included. Flash and RAM are the whole program's. A row is on the front where none is as good in
-both accuracies, the most cycles and flash, and better in one. Peers that are not installed are left out (`make bench`
-installs them), and those that do not fit an ATmega328P have no place on it.
+subject left out. libsimavr counts cycles over the test rows of the first fold, median and maximum, including the worst
+frame for thenar. Flash and RAM are those of the whole program. A row is on the Pareto front of both accuracies, maximum
+cycles and flash. Peers that are not installed are left out (`make bench` installs them), and those that do not fit an
+ATmega328P are not on the front.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 from firmwarecosts import Cost, instructions, of_ours, of_peer
-from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Answers, Fold, folds, rates, raw, split, two_changed
+from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Fold, Predictor, folds, rates, raw, split, two_changed
 from firmwarepeers import peers
 from numpy.typing import NDArray
 from rich.console import Console
@@ -38,14 +38,14 @@ from thenar.runtime.tables import IntegerTables
 
 AVR, LARGER = TARGETS["avr328p"], TARGETS["avr2560"]
 CORES = (TARGETS["cortex-m0plus"], TARGETS["cortex-m4"])
-CHANGES, SLOW_ROWS = 500, 20  # rows in which two switches change; rows that a peer on the larger part answers
+CHANGES, SLOW_ROWS = 500, 20  # rows in which two switches change; rows for a peer on the larger part
 CONSOLE = Console(width=170)
-COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + stack", "answers differ", "front")
+COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + stack", "differing", "front")
 
 
 @dataclass(frozen=True)
 class Ours:
-    """Tables of a trainer with `settings`, in entries and sums of so many bits, and whether they have joints."""
+    """A trainer with `settings`, with entries and sums of these widths, and with or without joints."""
 
     trainer: str
     bits: int
@@ -55,10 +55,10 @@ class Ours:
 
     @property
     def name(self) -> str:
-        """What the table calls it."""
+        """The name in the table."""
         given = "".join(f", {name} {value}" for name, value in self.settings if name in ("max_bins", "linear"))
         sums = "" if self.width == 16 else f", sums of {self.width}"
-        alone = "" if self.joints else ", switches alone"
+        alone = "" if self.joints else ", switches only"
         return f"thenar, {self.trainer}{given}, {self.bits} bit{sums}{alone}"
 
     def integers(self, fold: Fold) -> IntegerTables:
@@ -67,8 +67,8 @@ class Ours:
         tables = collapse(_trained(self.trainer, self.settings, fold, self.joints), SWITCHES)
         return quantise(tables, samples.switches, samples.codes, self.width, self.bits)
 
-    def answers(self, fold: Fold) -> Answers:
-        """Return what answers rows as the firmware of a fold does."""
+    def predictor(self, fold: Fold) -> Predictor:
+        """Return the predictor of rows that matches the firmware of a fold."""
         layout = choose(self.integers(fold), AVR, entry_bits=self.bits).frontier[-1][0]
         return lambda rows: layout.scores(*split(rows, joints=self.joints)).argmax(axis=1)
 
@@ -108,7 +108,7 @@ class Line:
     compared: bool = field(default=True)
 
     def beats(self, other: "Line") -> bool:
-        """Whether it is nowhere worse than the other, and somewhere better."""
+        """Whether it is nowhere worse than the other, and better somewhere."""
         mine = (*(-rate for rate in self.rates), self.cost.most, self.cost.flash)
         theirs = (*(-rate for rate in other.rates), other.cost.most, other.cost.flash)
         return all(one <= two for one, two in zip(mine, theirs, strict=True)) and mine != theirs
@@ -121,9 +121,9 @@ def _asked(layout: Layout, fold: Fold, *, joints: bool) -> tuple[NDArray[np.bool
 
 
 def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Iterator[Line]:
-    """Yield the layouts of the first fold than which none is both faster and smaller."""
+    """Yield the Pareto front of layouts, by cycles and flash, on the first fold."""
     fold = cuts[CUTS[0]][0]
-    found = rates(cuts, what.answers)
+    found = rates(cuts, what.predictor)
     for layout, expected in choose(what.integers(fold), AVR, entry_bits=what.bits).frontier:
         if expected.flash > flash_shares(AVR)[1]:
             continue
@@ -134,12 +134,12 @@ def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Iterator[Line]:
 
 
 def theirs(cuts: Mapping[str, list[Fold]]) -> Iterator[Line]:
-    """Yield the peers that are installed, those that do not fit the smaller part on the larger one."""
+    """Yield the installed peers; those that do not fit the smaller part are measured on the larger one."""
     fold = cuts[CUTS[0]][0]
     for peer in track([peer for peer in peers() if peer.available], "peers", console=CONSOLE):
         found = rates(cuts, peer.answers_of)
         model = peer.train(fold)
-        expected, files = peer.answers(model)(fold.asked), peer.files(model)
+        expected, files = peer.predictor(model)(fold.asked), peer.files(model)
         rows = raw(fold.asked)
         try:
             yield Line(peer.name, found, of_peer(peer.name, files, rows, expected, AVR, peer.include))
@@ -155,7 +155,7 @@ def theirs(cuts: Mapping[str, list[Fold]]) -> Iterator[Line]:
 
 
 def table(title: str, lines: Sequence[Line], shown: Callable[[Line], bool]) -> Table:
-    """Return the lines that are `shown` as a table, the front marked."""
+    """Return the lines that are `shown` as a table, with the front marked."""
     made = Table(title=title, title_justify="left")
     for column in COLUMNS:
         made.add_column(column, justify="right" if column else "left")
@@ -171,7 +171,7 @@ def _on_front(line: Line, lines: Sequence[Line]) -> bool:
 
 
 def print_changes(cuts: Mapping[str, list[Fold]], what: Ours) -> None:
-    """Print what update() takes where two switches have changed, and what the tables take on cores of 32 bits."""
+    """Print the cost of update() after changes of two switches, and that of the tables on 32-bit cores."""
     fold = cuts[CUTS[0]][0]
     integers = what.integers(fold)
     layout = choose(integers, AVR, entry_bits=what.bits).layout

@@ -1,13 +1,13 @@
-"""What recognising a frame costs cores of 32 bits, in instructions: thenar's layouts and its peers, from raw bytes on.
+"""The cost of recognising a frame on 32-bit cores, in instructions: thenar's layouts and peers, from the raw bytes.
 
     python benchmarks/firmwarecores.py
 
 33 switches and 16 joints (a byte each) of the simulated scene kamakura, 14 grasp types: the first of the four folds of
 benchmarks/firmware.py. Every classifier is compiled by gcc with -O2 and run in qemu, which counts every instruction:
-the middle and the most over 300 test rows. Peers are emlearn's forests, and logistic regression with int8 weights
-written by hand: 13 sums, to which each joint adds a product and each group of switches a row. Lines
-"switches alone" are of builds without joints. A layout is one than which none is both faster and smaller by the cost
-model of a Cortex-M4. emlearn is left out where it is not installed.
+median and maximum over 300 test rows. Peers are emlearn's forests, and handwritten logistic regression with int8
+weights: 13 sums, to which each joint adds a product and each group of switches a row. Lines "switches only" are of
+builds without joints. Layouts are on the Pareto front of time and size in the cost model of a Cortex-M4. emlearn is
+left out if it is not installed.
 """
 
 import sys
@@ -75,16 +75,16 @@ __attribute__((noinline, noclone)) static uint32_t ticks_of(int (*function)(void
 int main(void)
 {{
     const uint32_t frames = semihosting_open("frames", 6, SEMIHOSTING_RB);
-    const uint32_t answers = semihosting_open("predictions", 11, SEMIHOSTING_WB);
-    uint32_t answer[2] = {{0, 0}};
+    const uint32_t results = semihosting_open("predictions", 11, SEMIHOSTING_WB);
+    uint32_t result[2] = {{0, 0}};
 
     start_ticking();
-    answer[1] = ticks_of(nothing);
-    (void)semihosting_write(answers, answer, sizeof answer);
+    result[1] = ticks_of(nothing);
+    (void)semihosting_write(results, result, sizeof result);
     while (semihosting_read(frames, input, sizeof input)) {{
-        answer[1] = ticks_of(predict);
-        answer[0] = (uint32_t)grasp;
-        (void)semihosting_write(answers, answer, sizeof answer);
+        result[1] = ticks_of(predict);
+        result[0] = (uint32_t)grasp;
+        (void)semihosting_write(results, result, sizeof result);
     }}
     semihosting_exit(false);
     return 0;
@@ -94,7 +94,7 @@ int main(void)
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A classifier: its accuracy on the test rows in percent, and for each core the middle and the most it takes."""
+    """A classifier: its accuracy on the test rows in percent, and the median and maximum cost on each core."""
 
     name: str
     accuracy: float
@@ -102,12 +102,12 @@ class Line:
 
     @property
     def ratio(self) -> float:
-        """How much more RISC-V takes than a Cortex-M4, at most."""
+        """The ratio of RISC-V to Cortex-M4, at most."""
         return self.counts[RISCV][1] / self.counts[M4][1]
 
 
 def of_peer(text: str, rows: NDArray[np.uint8], core: Bare) -> tuple[NDArray[np.uint32], tuple[int, int]]:
-    """Return what a peer's `predict` answers to raw rows, and the middle and the most that it takes."""
+    """Return a peer's predictions for raw rows, with median and maximum cost."""
     main = MAIN.format(size=rows.shape[1])
     given: dict[str, str | bytes] = {"peer.c": text, "main.c": main, "ticks.h": render("checking/ticks.h.j2")}
     given["frames"] = rows.tobytes()
@@ -117,16 +117,16 @@ def of_peer(text: str, rows: NDArray[np.uint8], core: Bare) -> tuple[NDArray[np.
 
 
 def of_ours(layout: Layout, rows: NDArray[np.uint8], core: Bare, *, joints: bool) -> tuple[int, int]:
-    """Return the same of a layout, all of whose scores are compared."""
+    """Return the costs of a layout, after comparing all scores."""
     frames, library = split(rows, joints=joints), Library("glove", numbered(layout.tables), layout, avr=False)
-    answers = core.run(library.files, "glove", layout, layout.frame_bytes(*frames))
-    if answers.cost is None or (answers.scores != layout.scores(*frames)).any():
-        raise FirmwareError(f"{core.part} gives other scores than Python")
-    return int(np.median(answers.cost)), answers.most
+    results = core.run(library.files, "glove", layout, layout.frame_bytes(*frames))
+    if results.cost is None or (results.scores != layout.scores(*frames)).any():
+        raise FirmwareError(f"{core.part} gives different scores from Python")
+    return int(np.median(results.cost)), results.most
 
 
 def ours(fold: Fold) -> Iterator[Line]:
-    """Yield every layout of the frontier that fits a Cortex-M4."""
+    """Yield every layout on the front that fits a Cortex-M4."""
     target = TARGETS[M4]
     for what in track(OURS, "thenar"):
         for layout, cost in choose(what.integers(fold), target, entry_bits=what.bits).frontier:
@@ -146,8 +146,8 @@ def theirs(fold: Fold) -> Iterator[Line]:
     made += [(peer.name, peer.files(peer.train(fold))["peer.c"]) for peer in forests if peer.available]
     for name, text in track(made, "peers"):
         found = {core.part: of_peer(text, raw(fold.asked[:ROWS]), core)[1] for core in CORES}
-        answered, _ = of_peer(text, raw(fold.asked), CORES[-1])
-        yield Line(name, 100 * float(np.mean(answered == fold.truth)), found)
+        predicted, _ = of_peer(text, raw(fold.asked), CORES[-1])
+        yield Line(name, 100 * float(np.mean(predicted == fold.truth)), found)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""What a classifier takes of an AVR, from the raw bytes of a frame to the grasp: compiled, linked, and run frame by
+"""The cost of a classifier on an AVR, from the raw bytes of a frame to the grasp: compiled, linked, and run frame by
 frame in libsimavr.
 """
 
@@ -17,16 +17,16 @@ from thenar.compiler.firmware.targets import Target
 from thenar.compiler.firmware.tools import AVR_COMPILER, call, find, workshop
 from thenar.compiler.firmware.words import numbered
 
-# As thenar's Makefiles compile: what is not called is not linked.
+# Flags of thenar's Makefiles: functions that are not called are not linked.
 _HOW = ("-Os", "-w", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections")
 Frames = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """What a classifier takes on `part`: cycles a frame, the middle and the most; bytes of flash, of RAM and of stack.
+    """The cost of a classifier on `part`: cycles per frame, median and maximum; bytes of flash, RAM and stack.
 
-    differing  how many of `rows` answers are not those of its Python
+    differing  how many of `rows` predictions differ from those in Python
     """
 
     part: str
@@ -50,7 +50,7 @@ class Cost:
 
 
 def _linked(folder: Path, sources: Mapping[str, str], part: str, include: Sequence[str] = ()) -> tuple[int, int]:
-    """Link `program.elf` of the sources in the folder; return bytes of flash and RAM. Peers' warnings are theirs."""
+    """Link `program.elf` from the sources in the folder; return bytes of flash and RAM. Ignores warnings of peers."""
     code = sorted(path for path in sources if path.endswith((".c", ".cpp", ".S")))
     paths = [f"-I{path}" for path in include]
     call([find(AVR_COMPILER), f"-mmcu={part}", *_HOW, *paths, *code, "-lm", "-o", "program.elf"], folder)
@@ -61,10 +61,10 @@ def _linked(folder: Path, sources: Mapping[str, str], part: str, include: Sequen
 def of_ours(
     layout: Layout, target: Target, frames: Frames, expected: NDArray[np.int64], *, changes: bool = False
 ) -> Cost:
-    """Return what thenar's classifier takes for frames whose scores (n, K) are known; with `changes`, update()'s cost
-    for every frame but the first, which has nothing to start from.
+    """Return the cost of thenar's classifier for frames with known scores (n, K); with `changes`, update()'s cost.
 
-    The bytes of a frame are read where they come to lie, in its input: there is nothing to fill in.
+    update() runs for every frame but the first, which has no predecessor. The bytes of a frame are written directly
+    into its input: nothing has to be copied.
     """
     files = classifier_files("glove", numbered(layout.tables), layout, avr=True)
     called = ("classify", "update") if changes else ("classify",)
@@ -73,13 +73,13 @@ def of_ours(
     program = {**files, "main.c": main}
     with workshop(program) as folder:
         flash, ram = _linked(folder, program, target.part)
-    answers = target.run(files, "glove", layout, frames, incremental=changes)
-    assert answers.cost is not None
-    assert answers.stack is not None
-    wrong = (answers.scores != expected).any(axis=1) | (answers.classes != expected.argmax(axis=1))
-    cycles = answers.cost[1 if changes else 0 :]
+    results = target.run(files, "glove", layout, frames, incremental=changes)
+    assert results.cost is not None
+    assert results.stack is not None
+    wrong = (results.scores != expected).any(axis=1) | (results.classes != expected.argmax(axis=1))
+    cycles = results.cost[1 if changes else 0 :]
     most, differing = int(cycles.max()), int(np.count_nonzero(wrong))
-    return Cost(target.part, int(np.median(cycles)), most, flash, ram, answers.stack, differing, len(frames))
+    return Cost(target.part, int(np.median(cycles)), most, flash, ram, results.stack, differing, len(frames))
 
 
 def of_peer(
@@ -90,9 +90,9 @@ def of_peer(
     target: Target,
     include: Sequence[str] = (),
 ) -> Cost:
-    """Return what a peer's classifier takes of raw frames, of which its Python gives `expected`, filling included.
+    """Return the cost of a peer's classifier for raw frames, including feature extraction.
 
-    Raises FirmwareError if it does not fit.
+    `expected` are its predictions in Python. Raises FirmwareError if it does not fit.
     """
     program = {**files, "main.c": "int predict(void);\nint main(void) { for (;;) predict(); }\n"}
     with workshop(program) as folder:
@@ -103,18 +103,18 @@ def of_peer(
         at = {word[0]: f"0x{word[2]}" for word in words if len(word) > 2}
         places = [at["predict"], at["_end"], f"{at['input']}:{frames.shape[1]}", f"{at['input']}:1"]
         command = [str(harness("simavr_classify")), target.part, str(target.clock_hz), "program.elf", *places]
-        told = call(command, folder, frames.tobytes())
+        known = call(command, folder, frames.tobytes())
     record = np.dtype([("echo", "u1"), ("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")])
-    found = np.frombuffer(told, record)
+    found = np.frombuffer(known, record)
     differing = int(np.count_nonzero(found["grasp"] != expected))
     middle, most, stack = int(np.median(found["cycles"])), int(found["cycles"].max()), int(found["stack"].max())
     return Cost(target.part, middle, most, flash, ram, stack, differing, len(found))
 
 
 def instructions(layout: Layout, core: Target, frames: Frames, expected: NDArray[np.int64]) -> int:
-    """Return the most instructions that a frame takes on a Cortex-M. Raises FirmwareError if any score is wrong."""
+    """Return the maximum number of instructions per frame on a Cortex-M. Raises FirmwareError for any wrong score."""
     files = classifier_files("glove", numbered(layout.tables), layout, avr=False)
-    answers = core.run(files, "glove", layout, frames)
-    if answers.cost is None or (answers.scores != expected).any():
-        raise FirmwareError(f"{core.part} gives other scores than Python")
-    return int(answers.cost.max())
+    results = core.run(files, "glove", layout, frames)
+    if results.cost is None or (results.scores != expected).any():
+        raise FirmwareError(f"{core.part} gives different scores from Python")
+    return int(results.cost.max())

@@ -1,6 +1,6 @@
-"""The rows on which firmware is measured: 33 switches and 16 joints of simulated grasps, as bytes; folds and rates.
+"""The rows for measuring firmware: 33 switches and 16 joints of simulated grasps, as bytes; folds and rates.
 
-Switches are placed on the training rows of each fold: nothing of a row that is asked was seen before.
+Switches are placed on the training rows of each fold: test rows are never seen before.
 """
 
 from collections.abc import Callable, Mapping
@@ -23,12 +23,12 @@ CUTS = ("four-fold", "subject left out")
 
 Rows = NDArray[np.uint8]
 Labels = NDArray[np.intp]
-Answers = Callable[[Rows], Labels]
+Predictor = Callable[[Rows], Labels]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fold:
-    """Rows to train on and rows to answer: switches first, then joints, as bytes (n, 49); labels (n,)."""
+    """Rows to train on and rows to predict: switches first, then joints, as bytes (n, 49); labels (n,)."""
 
     X: Rows
     y: Labels
@@ -42,9 +42,9 @@ class Fold:
 
 
 def folds(console: Console) -> Mapping[str, list[Fold]]:
-    """Return the folds of each of CUTS, the same for everybody.
+    """Return the folds of each of CUTS, the same for all models.
 
-    Joint codes of half a degree become bytes of one degree: what a glove of 8 bits sends.
+    Joint codes of half a degree become bytes of one degree, as sent by an 8-bit glove.
     """
     grasp_set = simulate(load_scene("kamakura")).grasp_set
     grasps, y = np.unique(grasp_set.labels, return_inverse=True)
@@ -68,12 +68,12 @@ def split(X: Rows, *, joints: bool = True) -> tuple[NDArray[np.bool_], NDArray[n
 
 
 def raw(X: Rows) -> Rows:
-    """Return rows as they come from the wires (n, 21): eight switches a byte, then a byte a joint."""
+    """Return rows in their wire format (n, 21): eight switches per byte, then a byte per joint."""
     return np.hstack([np.packbits(X[:, :SWITCHES], axis=1, bitorder="little"), X[:, SWITCHES:]])
 
 
-def rates(cuts: Mapping[str, list[Fold]], train: Callable[[Fold], Answers]) -> tuple[float, ...]:
-    """Return the share of rows, in percent, that is answered rightly, for each cut."""
+def rates(cuts: Mapping[str, list[Fold]], train: Callable[[Fold], Predictor]) -> tuple[float, ...]:
+    """Return the accuracy by rows in percent, for each cut."""
     found = []
     for parts in cuts.values():
         right = sum(int(np.count_nonzero(train(fold)(fold.asked) == fold.truth)) for fold in parts)
@@ -82,7 +82,7 @@ def rates(cuts: Mapping[str, list[Fold]], train: Callable[[Fold], Answers]) -> t
 
 
 def two_changed(fold: Fold, changes: int, *, joints: bool) -> Rows:
-    """Return rows of which each differs from the one before in two switches, seeded."""
+    """Return rows each of which differs from the previous one in two switches, seeded."""
     rng = np.random.default_rng(SEED)
     rows = [fold.asked[0]]
     for _ in range(changes):

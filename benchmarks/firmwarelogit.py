@@ -1,9 +1,9 @@
-"""Logistic regression in int8 as a careful engineer writes it for an AVR, by hand: joints are multiplied.
+"""Logistic regression in int8, handwritten for an AVR as a careful engineer would: joints are multiplied.
 
 Scores are relative to the last class, so that 13 sums, a pointer and two operands fill the registers. A code is clamped
-to the range that was trained on, and multiplied by an immediate weight of each class (`mulsu`). The sums of the joints
-are `shift` bits finer than the rest. After them come groups of switches, fields of the bytes as they are read, whose
-rows are bytes above the least of a class. No sum leaves 16 bits: that is checked for all rows there can be.
+to its training range, and multiplied by an immediate weight of each class (`mulsu`). The sums of the joints are `shift`
+bits finer than the rest. They are followed by groups of switches, fields of the bytes as read, whose rows are bytes
+above the minimum of a class. No sum exceeds 16 bits, which is checked for all possible rows.
 """
 
 import re
@@ -25,7 +25,7 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Groups:
-    """Groups of at most `size` switches, as many as that takes, and by how many bits the joints are finer."""
+    """Groups of at most `size` switches, as few as possible, and the number of bits by which the joints are finer."""
 
     size: int
     shift: int
@@ -39,7 +39,7 @@ class Groups:
 
     @property
     def fields(self) -> list[list[Field]]:
-        """Where the bits of each group are."""
+        """The position of the bits of each group."""
         found = []
         for numbers in self.numbers:
             parts: dict[int, list[int]] = {}
@@ -66,8 +66,8 @@ class IntegerLogit:
         held = np.clip(codes, self.low, self.high) - self.low
         sums = (held @ self.joints) >> self.groups.shift
         sums += self.bias + bits @ self.switches
-        answers: Labels = np.hstack([sums, np.zeros((len(rows), 1), np.int64)]).argmax(axis=1)
-        return answers
+        predictions: Labels = np.hstack([sums, np.zeros((len(rows), 1), np.int64)]).argmax(axis=1)
+        return predictions
 
     @cached_property
     def tables(self) -> list[Ints]:
@@ -159,7 +159,7 @@ def _saved(how: str) -> list[str]:
 
 
 def _best() -> list[str]:
-    """Return what finds the first of the best: the last class, with 0, comes after all others."""
+    """Return code that finds the first maximum: the last class, with score 0, is compared last."""
     lines = [f"movw r30, r{_SUMS[0]}", "ldi r16, 0"]
     for number, register in enumerate(_SUMS[1:], 1):
         lines += [f"cp r30, r{register}", f"cpc r31, r{register + 1}", "brge 1f", f"movw r30, r{register}"]
@@ -177,7 +177,7 @@ def fitted(fold: Fold) -> tuple[LogisticRegression, NDArray[np.float64], NDArray
 
 
 def integer_logit(fold: Fold, groups: Groups) -> IntegerLogit:
-    """Return the integers of the finest scale at which weights, rows and sums fit."""
+    """Return the integers at the finest scale at which weights, rows and sums fit."""
     model, mean, deviation = fitted(fold)
     codes = split(fold.X)[1].astype(np.int64)
     low, high = codes.min(axis=0), codes.max(axis=0)

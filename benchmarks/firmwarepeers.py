@@ -1,8 +1,8 @@
-"""Other people's models and code generators as C for the AVR, of the same rows and bytes as thenar's firmware.
+"""Other models and code generators in C for the AVR, with the same rows and bytes as thenar's firmware.
 
-A peer's `predict` gets `input`, the bytes of the switches' ports and of the joints as they come from the wires, and
-fills in what it wants of them: that is part of what it takes. emlearn casts thresholds to integers and tests with <, so
-0/1 features come as 0 and 2, and codes doubled, as int16; or, as uint8, in steps of two degrees.
+A peer's `predict` reads `input`, the bytes of the switches' ports and of the joints in their wire format, and extracts
+its features, which is part of its cost. emlearn casts thresholds to integers and tests with <, so 0/1 features become 0
+and 2, and codes are doubled, as int16; or, as uint8, they are in steps of two degrees.
 """
 
 import importlib.util
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from firmwaredata import JOINTS, PORTS, SWITCHES, Answers, Fold, Rows
+from firmwaredata import JOINTS, PORTS, SWITCHES, Fold, Predictor, Rows
 from firmwarelogit import Groups, fitted, integer_logit
 from numpy.typing import NDArray
 
@@ -28,10 +28,11 @@ _FLOATS = "float"
 
 @dataclass(frozen=True, slots=True)
 class Peer:
-    """A peer: what it learns of the training rows, and its code.
+    """A peer: its training, and its code.
 
-    train    gives what answers rows, by its Python
-    files    of what was trained: name -> text, which define `predict` over `input`
+    train    returns a model from a fold's training rows
+    predictor returns the prediction function of a model, in Python
+    files    returns name -> text of a model, which define `predict` over `input`
     needs    packages
     include  folders of headers
     """
@@ -39,13 +40,13 @@ class Peer:
     name: str
     train: Callable[[Fold], Any]
     files: Callable[[Any], dict[str, str]]
-    answers: Callable[[Any], Answers]
+    predictor: Callable[[Any], Predictor]
     needs: tuple[str, ...] = ()
     include: tuple[str, ...] = field(default=())
 
-    def answers_of(self, fold: Fold) -> Answers:
-        """Return what answers rows, trained on a fold's."""
-        return self.answers(self.train(fold))
+    def answers_of(self, fold: Fold) -> Predictor:
+        """Return the predictor of rows after training on a fold."""
+        return self.predictor(self.train(fold))
 
     @property
     def available(self) -> bool:
@@ -54,8 +55,9 @@ class Peer:
 
 
 def _filling(kind: str, *, step: int) -> str:
-    """Return the C that makes features of `input`: switches 0 and `step`; codes in steps of two where kind is uint8_t,
-    else times `step`.
+    """Return the C code that extracts features from `input`.
+
+    Switches become 0 and `step`; codes are in steps of two if kind is uint8_t, otherwise multiplied by `step`.
     """
     lines = []
     for port in range(PORTS):
@@ -91,7 +93,7 @@ def _forest(fold: Fold, trees: int, leaves: int, features: Callable[[Rows], Any]
     return RandomForestClassifier(trees, max_leaf_nodes=leaves, random_state=1, n_jobs=1).fit(features(fold.X), fold.y)
 
 
-def _of(features: Callable[[Rows], Any]) -> Callable[[Any], Answers]:
+def _of(features: Callable[[Rows], Any]) -> Callable[[Any], Predictor]:
     return lambda model: lambda rows: np.asarray(model.predict(features(rows)), np.intp)
 
 
@@ -115,7 +117,7 @@ def _mlp(fold: Fold) -> Any:
 
 
 def _emlearn_mlp(model: Any) -> dict[str, str]:
-    """Return emlearn's network, with the standardisation put into the weights of its first layer."""
+    """Return emlearn's network, with the standardisation folded into the weights of its first layer."""
     import emlearn  # pyright: ignore[reportMissingImports]
 
     scaler, network = model
@@ -165,7 +167,7 @@ def _everywhereml(model: Any) -> dict[str, str]:
 
 
 def _scores(code: str, classes: int) -> dict[str, str]:
-    """Return code that has `score(features, scores)`, with what takes the best."""
+    """Return code with `score(features, scores)`, and a function that takes the best."""
     return {
         "peer.c": f"""#include <stdint.h>
 {code}
@@ -193,7 +195,7 @@ def _m2cgen_logit(model: Any) -> dict[str, str]:
     return _scores(m2cgen.export_to_c(raw), len(raw.classes_))
 
 
-def _logit_answers(model: Any) -> Answers:
+def _logit_answers(model: Any) -> Predictor:
     logit, mean, deviation = model
     return lambda X: logit.predict(np.hstack([X[:, :SWITCHES] > 0, (X[:, SWITCHES:] - mean) / deviation]))
 

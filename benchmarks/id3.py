@@ -1,9 +1,9 @@
-"""thenar's ID3 beside scikit-learn's entropy tree: seconds and memory as the rows grow from 1e3 to 1e6.
+"""thenar's ID3 compared with scikit-learn's entropy tree: seconds and memory as the rows grow from 1e3 to 1e6.
 
 Synthetic grasps: 14 prototypes of 160 bits, each bit flipped with probability 0.1; S = 200 prunes both trees, and
-scikit-learn's may go as deep as thenar's went. Every measurement has a process of its own, limited to one thread.
-Memory is the growth of the process's peak resident size above interpreter and imports, in MiB: all of it, the input
-matrix (one byte a bit for thenar, float32 for scikit-learn) included.
+scikit-learn's may grow as deep as thenar's. Every measurement runs in a separate process, limited to one thread. Memory
+is the growth of the process's peak resident size above interpreter and imports, in MiB, including the input matrix (one
+byte per bit for thenar, float32 for scikit-learn).
 
     python benchmarks/id3.py [--quick] [--plot curves.png]
 """
@@ -26,7 +26,7 @@ MIB = 2**20
 
 
 class Measured(NamedTuple):
-    """Seconds to grow, peak growth in MiB, depth, leaves and rate on the rows grown from."""
+    """Seconds to grow the tree, peak memory growth in MiB, depth, leaves and training accuracy."""
 
     seconds: float
     mib: float
@@ -96,8 +96,8 @@ def in_own_process(*arguments: str) -> Measured:
     runs: list[Measured] = []
     while len(runs) < 3 and (not runs or runs[-1].seconds < 5):
         command = [sys.executable, __file__, "--one", *arguments]
-        answer = subprocess.run(command, env=os.environ | ONE_THREAD, check=True, capture_output=True).stdout
-        runs.append(Measured(*json.loads(answer)))
+        printed = subprocess.run(command, env=os.environ | ONE_THREAD, check=True, capture_output=True).stdout
+        runs.append(Measured(*json.loads(printed)))
     return min(runs)
 
 

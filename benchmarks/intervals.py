@@ -26,7 +26,7 @@ ALIKE = (0.02, 0.05, 0.1, 0.15)
 def recognised(
     random: np.random.Generator, clusters: int, size: int, alike: float, accuracy: float
 ) -> NDArray[np.int64]:
-    """Return how many of `size` units of each cluster (clusters,) were recognised; `alike` is their correlation."""
+    """Return the number of correct units of `size` in each cluster (clusters,); `alike` is their correlation."""
     if alike == 0:
         return random.binomial(size, accuracy, clusters)
     strength = 1 / alike - 1
@@ -44,7 +44,7 @@ def coverage(unit: Unit, clusters: int, size: int, alike: float, accuracy: float
 
 
 def of_frames(draws: int) -> Iterator[tuple[int, float, int, list[float]]]:
-    """Yield frames a trial, design effect, trials, and the coverage at each accuracy."""
+    """Yield frames per trial, design effect, trials, and the coverage at each accuracy."""
     for frames, effect in FRAMES:
         alike = (effect - 1) / (frames - 1) if frames > 1 else 0.0
         for trials in TRIALS:
@@ -64,7 +64,7 @@ def of_subjects(draws: int, trials: int = 100) -> Iterator[tuple[int, float, lis
 
 
 def main() -> None:
-    """Print both tables: the mean over the accuracies, and the least and most of them."""
+    """Print both tables: mean, minimum and maximum over the accuracies."""
     draws = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
     print("| frames a trial | design effect | trials | coverage % | least | most |\n|---|---|---|---|---|---|")
     for frames, effect, trials, found in of_frames(draws):

@@ -1,7 +1,8 @@
-"""What frames of one trial on both sides of a fold add to an accuracy: a set with several frames a trial.
+"""The optimism of an accuracy when frames of one trial are on both sides of a fold: a set with several frames per
+trial.
 
-The nearest neighbour, in the joints' codes and the switches, recognises the grasp type with frames in random folds,
-with trials kept whole, and with each person left out.
+The nearest neighbour, in the joints' codes and the switches, predicts the grasp type with frames in random folds, with
+trials kept whole, and with each person left out.
 
     thenar import frames.csv.gz -o r2g.grasps --columns examples/columns/r2g.toml
     python benchmarks/leaks.py r2g.grasps

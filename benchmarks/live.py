@@ -1,12 +1,13 @@
-"""What the live loop costs, and how near it comes to what the wires allow.
+"""The cost of the live loop, and how close its rate comes to the limit of the wires.
 
     python benchmarks/live.py [--seconds N]
 
-Four tables, and the way of a frame: microseconds of CPU a frame against 150; frames a second on emulated devices
-against the wire's own rate; the kept switches' scan beside that of all 160; which files a frame passes from the bytes
-on the wire to a published grasp, and the calls for a grasp; the peak of a `thenar run` against 80 MiB. Emulated buses
-need umockdev (Debian packages umockdev, gir1.2-umockdev-1.0, python3-gi). Emulated devices and readers work on the same
-cores as the run, so a machine that has other things to do, or but one core, shows worse numbers than a glove would.
+Prints four tables and the path of a frame: microseconds of CPU per frame compared with 150; frames per second on
+emulated devices compared with the wire's limit; the scan of the kept switches compared with that of all 160; the files
+that a frame passes from the bytes on the wire to a published grasp, and the calls per grasp; the peak memory of a
+`thenar run` compared with 80 MiB. Emulated buses need umockdev (Debian packages umockdev, gir1.2-umockdev-1.0,
+python3-gi). Emulated devices and readers run on the same cores as the run, so a busy or single-core machine gives worse
+numbers than a glove would.
 """
 
 import argparse
@@ -48,10 +49,10 @@ from thenar.simulator.playing.bench import Bench
 
 MOST_US, LEAST_SHARE, MOST_MIB, MOST_FILES = 150, 0.9, 80, 20
 FRAMES, TURNS = 500, 8
-# A clock at which the wire takes so long that what emulates it does not matter.
+# A clock so slow that the overhead of the emulation does not matter.
 SLOW_HZ = 10_000
 STAGES = ("the step alone", "and JSON lines, preshape, angles, health", "and MCAP", "and reports", "and a socket")
-# Prints the peak of its only child in KiB: a process's own begins at the size of who started it.
+# Prints the peak of its only child in KiB: a process's own peak starts at the size of its parent.
 PEAK = "import os, subprocess, sys; print(os.wait4(subprocess.Popen(sys.argv[1:]).pid, 0)[2].ru_maxrss)"
 
 
@@ -63,7 +64,7 @@ def table(title: str, *columns: str) -> Table:
 
 
 def loop_costs(scenes: Sequence[Played], folder: Path) -> Table:
-    """Return a line a stage: CPU of the thread, median and 99th percentile, with everything changing in memory."""
+    """Return a line per stage: CPU of the thread, median and 99th percentile, with everything changing in memory."""
     sizes = (f"{len(scene.kept)} switches: median, 99 %" for scene in scenes)
     made = table(f"CPU of the live thread a frame, all switches and joints changing (at most {MOST_US} us)", "", *sizes)
     found = [[np.percentile(spent, (50, 99)) for spent in _stages_us(scene, folder)] for scene in scenes]
@@ -73,7 +74,7 @@ def loop_costs(scenes: Sequence[Played], folder: Path) -> Table:
 
 
 def _stages_us(scene: Played, folder: Path) -> list[list[float]]:
-    """Return microseconds a frame for every stage. They run by turns, so that what else the machine does hits all."""
+    """Return microseconds per frame for every stage. Stages alternate, so that other load affects all."""
     frames = restless(len(scene.kept), FRAMES, seed=1)
     with ExitStack() as stack:
         gloves = [_stage(stage, scene, folder, stack) for stage in range(len(STAGES))]
@@ -90,7 +91,7 @@ def _step_us(run: Callable[[], object], feed: Memory, closed: int, sensors: byte
 
 
 def _stage(stage: int, scene: Played, folder: Path, stack: ExitStack) -> tuple[Callable[[], object], Memory]:
-    """Return what makes one moment with everything up to this stage, and what feeds it."""
+    """Return a function that processes one moment with everything up to this stage, and its feed."""
     own = Path(stack.enter_context(TemporaryDirectory(dir=folder)))
     harness, feed = with_glove(board(scene), glove(scene)), Memory(len(scene.kept))
     if stage == 0:
@@ -119,11 +120,11 @@ def _stage(stage: int, scene: Played, folder: Path, stack: ExitStack) -> tuple[C
 
 
 def rates(scene: Played, seconds: float, folder: Path) -> Table:
-    """Return a line a wire: frames a second, all sinks and the recording on."""
+    """Return a line per wire: frames per second, with all sinks and the recording on."""
     made = table(
         f"Frames a second with everything on (at least {LEAST_SHARE:.0%} of what the wire allows)",
         *("", "wire allows", "device sent", "arrived", "in a grasp", "of the wire", "CPU a grasp: loop, process"),
-        "beside system calls",
+        "between system calls",
     )
     joints, own, whole = joints_alone("quick", folder), scene.kept, scene.performance.switch_names
     found = [of_glove(scene, joints, sensors, seconds) for sensors in (18, 22)]
@@ -146,14 +147,14 @@ def rates(scene: Played, seconds: float, folder: Path) -> Table:
 def _rate(found: Found) -> tuple[str, ...]:
     rates_hz = (found.allowed_hz, found.sent_hz, found.arrived_hz, found.run.recognised_hz)
     cost = f"{found.run.loop_us:.0f} us, {found.run.process_us:.0f} us"
-    beside = f"{found.run.between_us:.0f} us a scan: {found.own_share:.0%}" if found.run.between_us else ""
-    return found.what, *(f"{hz:.0f}" for hz in rates_hz), f"{found.share:.0%}", cost, beside
+    split = f"{found.run.between_us:.0f} us a scan: {found.own_share:.0%}" if found.run.between_us else ""
+    return found.what, *(f"{hz:.0f}" for hz in rates_hz), f"{found.share:.0%}", cost, split
 
 
 def scans(scene: Played) -> Table:
-    """Return a line a way to scan, beside all 160 switches."""
+    """Return a line per way to scan, and one for all 160 switches."""
     made = table(
-        "A scan of the kept switches beside that of all 160, MCP23017 at 100 kHz",
+        "A scan of the kept switches compared with all 160, MCP23017 at 100 kHz",
         *("", "on the wire", "times less", "measured", "times less", "of it Python", "bytes", "system calls"),
     )
     every = list(compared(scene))

@@ -1,4 +1,4 @@
-"""What the benchmarks of the live loop play: scenes, builds of them, gloves wired for them, and frames in memory."""
+"""Inputs for the benchmarks of the live loop: scenes, their builds, gloves wired for them, and frames in memory."""
 
 import subprocess
 import sys
@@ -26,13 +26,13 @@ from thenar.simulator.playing.performance import Performance, of_scene
 _READER = "import socket, sys; s = socket.socket(socket.AF_UNIX); s.connect(sys.argv[1])\nwhile s.recv(65536): pass"
 SENSORS: Literal[18] = 18
 STATUS = ALWAYS | PLUGGED
-# How long a frame from memory counts: a busy computer makes none of them old.
+# How long a frame from memory counts as fresh: even a busy computer makes none of them old.
 _LONGEST_US = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """A performance, the folder of a build of its scene, and the calibration of who performs."""
+    """A performance, the folder of a build of its scene, and the performer's calibration."""
 
     folder: Path
     build: Build
@@ -62,7 +62,7 @@ def played(name: str, folder: Path, prune: int = 0) -> Played:
 
 
 def joints_alone(name: str, folder: Path) -> Path:
-    """Return a build of a shipped scene that uses the joints alone."""
+    """Return a build of a shipped scene that uses only the joints."""
     return compile_build(
         simulate(load_scene(name), 1).grasp_set, folder / "joints", rounds=100, folds=0, inputs="joints"
     ).folder
@@ -74,36 +74,36 @@ def glove(played: Played, port: str = "glove", sensors: Literal[18, 22] = SENSOR
 
 
 def board(played: Played, port: str = "board", keys: int = 0, baud: int = 115_200) -> Harness:
-    """Return a glove whose kept switches hang on the first keys of a board, of so many keys at least."""
+    """Return a glove whose kept switches are wired to the first keys of a board with at least `keys` keys."""
     names = [*played.kept, *[""] * (keys - len(played.kept))]
     text = f'name = "board"\n[[scanner]]\nport = "{port}"\nbaud = {baud}\nswitches = {names!r}\n'
     return parse_harness(text, "board")
 
 
 def with_glove(harness: Harness, wiring: GloveWiring) -> Harness:
-    """Return `harness` with a CyberGlove besides."""
+    """Return `harness` with a CyberGlove added."""
     return msgspec.structs.replace(harness, cyberglove=wiring)
 
 
 class Memory:
-    """A feed of a glove that holds what it was given: no device, no thread, no waiting."""
+    """A feed for a glove that returns what was put into it: no device, no thread, no waiting."""
 
     def __init__(self, switches: int) -> None:
         self._arrivals = Arrivals(switches, [(1 << switches) - 1])
 
     def put(self, time_us: int, closed: int, sensors: bytes | None) -> None:
-        """Let a frame of the switches come in, and before it one of the glove unless there is none."""
+        """Add a frame of the switches, preceded by one of the glove unless that is None."""
         if sensors is not None:
             self._arrivals.put_glove(GloveFrame(time_us, sensors, STATUS), _LONGEST_US)
         self._arrivals.put_switches(0, SwitchFrame(time_us, closed), _LONGEST_US)
 
     def take(self) -> Taken:
-        """Return what came in."""
+        """Return the frames that were put in."""
         return self._arrivals.take()
 
 
 def restless(switches: int, frames: int, seed: int) -> list[tuple[int, bytes]]:
-    """Return frames of which any two have nothing in common but by chance: half of the switches, all sensors change."""
+    """Return frames that differ as much as chance allows: half of the switches, and all sensors, change."""
     rng = np.random.default_rng(seed)
     bits, sensors = rng.random((frames, switches)) < 0.5, rng.integers(1, 256, (frames, SENSORS), dtype=np.uint8)
     return [(mask(row.tolist()), raw.tobytes()) for row, raw in zip(bits, sensors, strict=True)]
@@ -116,7 +116,7 @@ def mask(closed: Sequence[bool]) -> int:
 
 @contextmanager
 def read_along(socket: Path) -> Iterator[None]:
-    """Let a process of its own read a socket."""
+    """Let a separate process read a socket."""
     with subprocess.Popen([sys.executable, "-c", _READER, str(socket)]) as reader:
         try:
             yield

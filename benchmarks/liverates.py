@@ -1,4 +1,4 @@
-"""Frames a second on emulated wires: the devices here, the run in a process of its own (livewire.py)."""
+"""Frames per second on emulated wires: the devices run here, the live loop in a separate process (livewire.py)."""
 
 import os
 import subprocess
@@ -33,7 +33,7 @@ _SAMPLE_S = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Frames a second: what the wire allows, what the emulated device put on it, and what a run made of them."""
+    """Frames per second: the limit of the wire, the output of the emulated device, and the rate of a run."""
 
     what: str
     allowed_hz: float
@@ -43,18 +43,18 @@ class Found:
 
     @property
     def share(self) -> float:
-        """Frames that a grasp was made of, as a share of what the wire allows."""
+        """Frames that led to a grasp, as a share of the wire's limit."""
         return self.run.recognised_hz / self.allowed_hz
 
     @property
     def own_share(self) -> float:
-        """That share of a bus if its system calls took what the wire takes, and what lies between them what it did."""
+        """That share of a bus if system calls took the wire's time, with the measured time between them."""
         wire_us = 1e6 / self.allowed_hz
         return wire_us / (wire_us + self.run.between_us)
 
 
 def of_glove(scene: Played, joints: Path, sensors: Literal[18, 22], seconds: float) -> Found:
-    """Return what comes of a CyberGlove that streams as fast as it can; `joints` is a build that uses no switches."""
+    """Measure a CyberGlove that streams at its maximum rate; `joints` is a build that uses no switches."""
     with (
         TemporaryDirectory() as folder,
         PtyLine(Path(folder, "glove")) as line,
@@ -69,9 +69,7 @@ def of_glove(scene: Played, joints: Path, sensors: Literal[18, 22], seconds: flo
 
 
 def of_board(scene: Played, keys: int, baud: int, hz: int, seconds: float) -> Found:
-    """Return what comes of a board that sends its state so often, 0: as often as its line carries it; beside a
-    CyberGlove.
-    """
+    """Measure a board that sends its state at `hz`, 0: as often as its line permits; together with a CyberGlove."""
     with TemporaryDirectory() as folder:
         harness = with_glove(board(scene, f"{folder}/board", keys, baud), glove(scene, f"{folder}/glove"))
         frame_us = scanner_us(harness.scanners[0])
@@ -92,9 +90,9 @@ def of_board(scene: Played, keys: int, baud: int, hz: int, seconds: float) -> Fo
 
 
 def of_bus(scene: Played, what: str, harness: Harness, seconds: float, *, full: bool) -> Found:
-    """Return what comes of a bus that is scanned without a pause, beside a CyberGlove.
+    """Measure a bus that is scanned without a pause, together with a CyberGlove.
 
-    The wire would allow as many more scans as there was time in which SCL neither ran nor had to rest.
+    The wire would allow more scans in the time in which SCL neither ran nor had to rest.
     """
     with TemporaryDirectory() as folder:
         both = with_glove(harness, glove(scene))
@@ -129,7 +127,7 @@ def _ran(
 
 @contextmanager
 def _every(seconds: float, do: Callable[[], object]) -> Iterator[None]:
-    """Do it again and again, in a thread."""
+    """Repeat an action in a thread."""
     stop = Event()
 
     def run() -> None:
@@ -147,7 +145,7 @@ def _every(seconds: float, do: Callable[[], object]) -> Iterator[None]:
 
 @contextmanager
 def _metered(counted: Callable[[], float]) -> Iterator[Callable[[], float]]:
-    """Yield what returns how much the count grew in a second, the median of those tenths in which it did."""
+    """Yield a function that returns the growth of a count per second, the median of those tenths in which it grew."""
     seen: list[tuple[float, float]] = []
     with _every(_SAMPLE_S, lambda: seen.append((time.perf_counter(), counted()))):
         yield lambda: median(

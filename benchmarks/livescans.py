@@ -1,4 +1,4 @@
-"""The kept switches' scan beside that of all 160: by the arithmetic of the wire, and as measured on an emulated bus."""
+"""The scan of the kept switches compared with that of all 160: by bus arithmetic, and measured on an emulated bus."""
 
 import os
 import subprocess
@@ -31,11 +31,11 @@ ROWS = 40
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class Scan:
     """One way to scan, averaged over rows of the performance.
 
-    predicted_us  what the wire takes, measured_us what a scan took, python_us what of it the thread worked besides
-    its system calls; ioctls and bytes on the wire
+    predicted_us  time on the wire; measured_us: time of a scan; python_us: the thread's work outside system calls;
+    ioctls and bytes on the wire
     """
 
     what: str
@@ -46,26 +46,26 @@ class Beside:
     bytes: float
 
 
-def compared(scene: Played, clock_hz: int = CLOCK_HZ) -> Iterator[Beside]:
-    """Yield all 160 in full; the kept ones on the same glove and on a glove of their own, in full and ended early."""
+def compared(scene: Played, clock_hz: int = CLOCK_HZ) -> Iterator[Scan]:
+    """Yield all 160 in full; the kept ones on the same glove and on a separate glove, in full and ended early."""
     full, reduced = wired(scene, scene.performance.switch_names, clock_hz), wired(scene, scene.kept, clock_hz)
     yield _measured(scene, full, "all", "all 160 switches")
     for harness, where in (
         (full, "kept switches on the glove of 160"),
-        (reduced, "kept switches on a glove of their own"),
+        (reduced, "kept switches on a separate glove"),
     ):
         for which, how in (("full", "in full"), ("early", "ended early")):
             yield _measured(scene, harness, which, f"{where}, {how}")
 
 
 def wired(scene: Played, names: tuple[str, ...], clock_hz: int) -> Harness:
-    """Return a glove of these switches on MCP23017, beside a CyberGlove."""
+    """Return a glove with these switches on MCP23017, and a CyberGlove."""
     proposed = propose_harness(names, device="/dev/i2c-7")
     bus = msgspec.structs.replace(proposed.buses[0], clock_hz=clock_hz)
     return with_glove(msgspec.structs.replace(proposed, buses=(bus,)), glove(scene))
 
 
-def _measured(scene: Played, harness: Harness, which: str, what: str) -> Beside:
+def _measured(scene: Played, harness: Harness, which: str, what: str) -> Scan:
     rows = range(0, len(scene.performance), max(1, len(scene.performance) // ROWS))[:ROWS]
     with TemporaryDirectory() as folder:
         path = Path(folder, "glove.toml")
@@ -76,11 +76,11 @@ def _measured(scene: Played, harness: Harness, which: str, what: str) -> Beside:
             with subprocess.Popen(
                 command, text=True, env=seen, stdin=subprocess.PIPE, stdout=subprocess.PIPE
             ) as client:
-                return Beside(what, _predicted_us(scene, harness, which, rows), *_scanned(scene, bench, client, rows))
+                return Scan(what, _predicted_us(scene, harness, which, rows), *_scanned(scene, bench, client, rows))
 
 
 def _scanned(scene: Played, bench: Bench, client: "subprocess.Popen[str]", rows: Iterable[int]) -> tuple[float, ...]:
-    """Let the client scan row after row; return what a scan took, in the order of Beside."""
+    """Let the client scan row after row; return the measurements of a scan, in the order of Scan."""
     assert bench.i2c is not None
     assert client.stdin is not None
     assert client.stdout is not None
@@ -94,13 +94,13 @@ def _scanned(scene: Played, bench: Bench, client: "subprocess.Popen[str]", rows:
         found.append(msgspec.json.decode(client.stdout.readline(), type=Scanned))
     sent = (bench.i2c.counters(0).total_bytes - before) / (SCANS * len(found))
     client.stdin.close()
-    # Medians of each row, so that a scan that was interrupted does not count; means of the rows, of which all count.
+    # Median per row, so that interrupted scans do not count; mean over rows, all of which count.
     us, python_us = (fmean(map(median, each)) for each in ([f.us for f in found], [f.python_us for f in found]))
     return us, python_us, fmean(f.ioctls for f in found) / SCANS, sent
 
 
 def _predicted_us(scene: Played, harness: Harness, which: str, rows: Iterable[int]) -> float:
-    """Return what a scan takes on the wire by arithmetic, on average over the rows."""
+    """Return the calculated time of a scan on the wire, averaged over the rows."""
     if which == "all":
         return scan_us(whole_scan(harness, harness.switches), harness).us
     scan = plan_scan(scene.kept, scene.build.tables, harness)
@@ -108,7 +108,7 @@ def _predicted_us(scene: Played, harness: Harness, which: str, rows: Iterable[in
 
 
 def _until_decided(scene: Played, harness: Harness, scan: ScanMap, rows: Iterable[int]) -> Iterator[float]:
-    """Yield for each row what the ports take that are read until the scan is decided."""
+    """Yield for each row the time of the ports that are read until the scan is decided."""
     build, costs = scene.build, Costs(scan.ports, harness)
     groups = [sum(1 << switch for switch in port.elements) for port in scan.ports]
     early = EarlyExit(build.scorer, groups, lead=Policy().lead_steps(build.tables.scale))

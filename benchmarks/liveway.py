@@ -1,4 +1,4 @@
-"""The way of a live frame, from the bytes on the wire to a published grasp: which files it passes, how many calls.
+"""The path of a live frame, from the bytes on the wire to a published grasp: its files, and the number of calls.
 
 python benchmarks/liveway.py COUNTS ARGUMENT...   runs `thenar ARGUMENT...` and writes the calls it made to COUNTS
 """
@@ -23,9 +23,9 @@ from thenar.drivers.emulated.scanner import EmulatedScanner
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.harness.writing import harness_to_toml
 
-# Runs of two lengths, of which the difference is the way of a frame without the start and the end.
+# Runs of two lengths, whose difference is the path of a frame without start and end.
 SHORT, LONG = 200, 1200
-# What a frame passes happens at least once in so many grasps; what happens once a second does not.
+# The path of a frame is called at least once in this many grasps; functions called once a second are not.
 _EVERY = 10
 _OURS = f"{os.sep}thenar{os.sep}"
 Calls = dict[str, int]
@@ -33,14 +33,14 @@ Calls = dict[str, int]
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """Files that a frame passes, and calls of functions in them for a grasp, by the thread that makes them."""
+    """Files that a frame passes, and calls of functions in them per grasp, by the thread that makes them."""
 
     files: tuple[str, ...]
     calls: dict[str, float]
 
 
 def way(scene: Played) -> Way:
-    """Return the way of a frame of a scanner board and a CyberGlove, to JSON lines and a preshape."""
+    """Return the path of a frame of a scanner board and a CyberGlove, to JSON lines and a preshape."""
     before, after = _calls(scene, SHORT), _calls(scene, LONG)
     grasps = LONG - SHORT
     found = {key: (count - before.get(key, 0)) / grasps for key, count in after.items()}

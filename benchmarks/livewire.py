@@ -1,10 +1,10 @@
-"""The live side of the benchmark's wires, in a process of its own, as `thenar run` is: benchmarks/live.py starts it.
+"""The live side of the benchmark's wires, in a separate process like `thenar run`; benchmarks/live.py starts it.
 
-    python benchmarks/livewire.py rate BUILD GLOVE.toml SECONDS [full]   everything on: frames a second, and their cost
+    python benchmarks/livewire.py rate BUILD GLOVE.toml SECONDS [full]   all sinks on: frames per second, and their cost
     python benchmarks/livewire.py scans BUILD GLOVE.toml all|full|early  one bus: the glove's bytes a line in, the
                                                                          times of some scans a line out
 
-Both answer in JSON.
+Both print JSON.
 """
 
 import sys
@@ -34,9 +34,9 @@ _LONGEST_US = 1_000_000
 
 
 class Rate(msgspec.Struct):
-    """What a run came to: frames a second of each device that came in; of the switches or, without any, of the glove
-    those that a grasp was made of; microseconds of CPU a grasp, of the loop's thread and of the whole process; of a
-    bus, microseconds a scan between two system calls.
+    """The rates of a run: frames per second received from each device; frames that led to a grasp, of the switches or,
+    without any, of the glove; microseconds of CPU per grasp, of the loop's thread and of the whole process; for a bus,
+    microseconds per scan between two system calls.
     """
 
     switches_hz: float
@@ -48,7 +48,7 @@ class Rate(msgspec.Struct):
 
 
 class Scanned(msgspec.Struct):
-    """What scans took: microseconds each, and of them the Python besides the system calls."""
+    """Times of scans: microseconds each, and the part in Python outside system calls."""
 
     us: list[float]
     python_us: list[float]
@@ -57,7 +57,7 @@ class Scanned(msgspec.Struct):
 
 @dataclass(eq=False)
 class Counted:
-    """Sources, with what they deliver counted."""
+    """Sources that count the frames they deliver."""
 
     sources: Sources
     switches: int = 0
@@ -65,7 +65,7 @@ class Counted:
     recognised: int = 0
 
     def take(self) -> Taken:
-        """Take what the sources have, and count."""
+        """Take frames from the sources, and count them."""
         taken = self.sources.take()
         switches = sum(isinstance(frame, SwitchFrame) for frame in taken.arrived)
         gloves = len(taken.arrived) - switches
@@ -76,7 +76,7 @@ class Counted:
 
 
 def rate(build: str, glove: str, seconds: float, which: str = "early") -> Rate:
-    """Run with all sinks on for so long, once all is well."""
+    """Run with all sinks on for `seconds`, once all devices are ready."""
     with TemporaryDirectory() as name:
         folder = Path(name)
         run = Glove(
@@ -116,7 +116,7 @@ def _clocks() -> tuple[float, float, float]:
 
 
 def _run(glove: Glove, seconds: float, *, until_well: bool = False) -> None:
-    """Run for so long, or until all is well."""
+    """Run for `seconds`, or until all devices are ready."""
     end = time.monotonic() + seconds
     for moment in glove:
         if until_well and moment.grasp.health == "ok":
@@ -124,19 +124,19 @@ def _run(glove: Glove, seconds: float, *, until_well: bool = False) -> None:
         if time.monotonic() > end:
             break
     if until_well:
-        raise SystemExit(f"nothing came of it: {glove.sources.devices()}")
+        raise SystemExit(f"no frames arrived: {glove.sources.devices()}")
 
 
 @dataclass(eq=False)
 class Ioctls:
-    """Stands in the I2C driver and in smbus2 for ioctl, and takes the time that it takes."""
+    """Replaces ioctl in the I2C driver and in smbus2, and measures its time."""
 
     count: int = 0
     cpu_ns: int = 0
     wall_ns: int = 0
 
     def stand_in(self) -> None:
-        """Be there from now on."""
+        """Install the replacement."""
         for module in (smbus2.smbus2, thenar.drivers.i2c.node):
             vars(module)["ioctl"] = self
 
@@ -152,7 +152,7 @@ class Ioctls:
 
 
 def scans(build: str, glove: str, which: str) -> None:
-    """Scan the one bus: all switches that are wired, the kept ones in full, or those until the scan is decided."""
+    """Scan the only bus: all wired switches, the kept ones in full, or until the scan is decided."""
     system = System.of(Build.load(build), load_harness(glove))
     scan = whole_scan(system.harness, system.harness.switches) if which == "all" else system.scan
     device, newest = I2cDevice(system.harness, 0, scan), Newest[GloveFrame]()

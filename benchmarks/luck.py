@@ -1,12 +1,12 @@
-"""How often the interval that a frontier promises for the point that it picks covers that point's rate on fresh grasps.
+"""Coverage, on fresh grasps, of the interval that a frontier promises for the point that it selects.
 
 Usage:
     python benchmarks/luck.py [--cases 100] [--jobs -1] [--by "new subject"]
 
-Each case records the switches of scene kamakura under another seed, a few repetitions, searches, picks the best point
+Each case records the switches of scene kamakura under another seed, a few repetitions, searches, selects the best point
 within a budget, and lets its tables, trained on all rows, classify fresh grasps: of the same hands, or of other ones.
-Printed are how many intervals cover the fresh rate, and the promised rate less the fresh one, with its correction and
-without.
+The output is the number of intervals that cover the fresh rate, and the promised rate minus the fresh one, with and
+without its correction.
 """
 
 import argparse
@@ -37,7 +37,7 @@ from thenar.runtime.tables import tables_from_bytes
 from thenar.simulator import load_scene, simulate
 
 SCENE, TARGET = "kamakura", "avr2560"
-# Of every grasp type by every subject: recorded; fresh ones of the same hands; hands that nobody recorded.
+# Repetitions of every grasp type by every subject: recorded; fresh, of the same hands; of hands that nobody recorded.
 REPETITIONS, MORE, OTHERS = 12, 16, 8
 BUDGET_US = 700.0
 FIRST_OTHER = 100_000
@@ -45,7 +45,7 @@ FIRST_OTHER = 100_000
 
 @dataclass(frozen=True)
 class Case:
-    """Recordings of one seed, and what their best point within a budget promised and reached."""
+    """Recordings of one seed, with the promised and the fresh rate of their best point within a budget."""
 
     rate: Rate
     luck: float
@@ -53,12 +53,12 @@ class Case:
 
     @property
     def covered(self) -> bool:
-        """Whether the promised interval holds the fresh rate."""
+        """Whether the promised interval contains the fresh rate."""
         return self.rate.low <= self.fresh <= self.rate.high
 
 
 def recorded(seed: int, repetitions: int = REPETITIONS, more: int | None = None) -> GraspSet:
-    """Return the switches of grasps of one seed; with `more`, of as many fresh ones of the same hands."""
+    """Return the switches of grasps of one seed; with `more`, of this many fresh ones of the same hands."""
     found = simulate(load_scene(SCENE).varied(repetitions, seed, more=more), jobs=1).grasp_set
     return replace(found, codes=found.codes[:, :0], joints=())
 
@@ -70,7 +70,7 @@ def strangers() -> GraspSet:
 
 
 def played(asked: tuple[int, GraspSet | None, Equipment]) -> Case:
-    """Return the case of one seed: its rate with new subjects on the grasps of `others`, else on those of its own."""
+    """Return the case of one seed: its rate with new subjects on the grasps of `others`, else on its own fresh ones."""
     seed, others, equipment = asked
     grasp_set = recorded(seed)
     search = Search(
@@ -98,10 +98,10 @@ def played(asked: tuple[int, GraspSet | None, Equipment]) -> Case:
     best = [design for design in fronts[0] if design.frame.us <= BUDGET_US or design is fronts[0][0]][-1]
     tables = tables_from_bytes(best.tables.content)
     columns = list(best.close.screened.columns)
-    answers = integer_scores(tables, fresh.switches[:, columns], fresh.codes[:, : tables.n_joints]).argmax(axis=1)
+    predicted = integer_scores(tables, fresh.switches[:, columns], fresh.codes[:, : tables.n_joints]).argmax(axis=1)
     truth = np.array([samples.grasps.index(grasp) for grasp in fresh.grasps.tolist()])
     lucky = luck[best.judged]
-    return Case(corrected(best.judged.rate, lucky), lucky, float((answers == truth).mean()))
+    return Case(corrected(best.judged.rate, lucky), lucky, float((predicted == truth).mean()))
 
 
 def cases(seeds: Iterable[int], by: By, jobs: int) -> list[Case]:
@@ -117,8 +117,8 @@ def cases(seeds: Iterable[int], by: By, jobs: int) -> list[Case]:
     return found
 
 
-def told(found: Sequence[Case]) -> str:
-    """Return how many cases are covered, and by how much rates are off, in a line."""
+def summary(found: Sequence[Case]) -> str:
+    """Return the number of covered cases and the mean errors of rates, in a line."""
     columns = [(case.rate.mean - case.fresh, case.luck, case.fresh, case.rate.high - case.rate.low) for case in found]
     gap, luck, fresh, width = 100 * np.mean(columns, axis=0)
     return (
@@ -128,7 +128,7 @@ def told(found: Sequence[Case]) -> str:
 
 
 def main() -> None:
-    """Print, for each kind of rate, how many cases are covered, and by how much rates are off."""
+    """Print, for each kind of rate, the number of covered cases and the mean errors of rates."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int, default=100)
     parser.add_argument("--jobs", type=int, default=-1)
@@ -136,7 +136,7 @@ def main() -> None:
     asked = parser.parse_args()
     for by in asked.by:
         found = cases(range(1, asked.cases + 1), by, asked.jobs)
-        print(f"{by}, the best within {BUDGET_US:g} us: {told(found)}")
+        print(f"{by}, the best within {BUDGET_US:g} us: {summary(found)}")
 
 
 if __name__ == "__main__":

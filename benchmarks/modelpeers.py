@@ -1,7 +1,7 @@
-"""The models that are compared: thenar's trainers, as they are and as deployed integers, and other people's.
+"""The models in the comparison: thenar's trainers, in floating point and as deployed integers, and others.
 
-Settings are chosen by inner folds of the training rows, grouped as the outer ones are, where several are listed. Models
-marked `slow` take the first on sets of more than `FEW` rows.
+If several settings are listed, they are chosen by inner folds of the training rows, grouped like the outer ones. Models
+marked `slow` use the first on sets of more than `FEW` rows.
 """
 
 import importlib.util
@@ -29,15 +29,15 @@ from thenar.runtime.manifest import AUTO, Options
 WEKA_JAR = Path("/usr/share/java/weka.jar")
 FEW, SEED = 2000, 1
 
-Answers = NDArray[np.intp]
+Classes = NDArray[np.intp]
 Given = Mapping[str, Any]
-# What a model makes of the rows of a fold with given settings: answers, also those of integers.
-Answering = Callable[[Cut, Given], tuple[Answers, Answers | None]]
+# A model's predictions for the rows of a fold with given settings, also those of its integers.
+Predicting = Callable[[Cut, Given], tuple[Classes, Classes | None]]
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A model: its settings to choose from, the first being known good, and what it answers, also as integers.
+    """A model: its candidate settings, the first of which is a good default, and its predictions, also as integers.
 
     needs     a package, or "java", without which it is left out
     additive  whether its scores are a sum over inputs
@@ -45,7 +45,7 @@ class Model:
 
     name: str
     how: str
-    answers: Answering
+    predict: Predicting
     settings: tuple[Given, ...] = ({},)
     additive: bool = False
     slow: bool = False
@@ -54,35 +54,35 @@ class Model:
 
     @property
     def there(self) -> bool:
-        """Whether what it needs is installed."""
+        """Whether its requirements are installed."""
         if self.needs == "java":
             return WEKA_JAR.exists() and shutil.which("java") is not None
         return importlib.util.find_spec(self.needs) is not None
 
-    def answered(self, cut: Cut) -> tuple[Answers, Answers | None]:
-        """Return the class of each row that is tested, and that of the integers, of settings chosen inside."""
+    def predicted(self, cut: Cut) -> tuple[Classes, Classes | None]:
+        """Return the class of each test row, and that by the integers, with settings chosen inside."""
         given = self.settings[0]
         if len(self.settings) > 1 and not (self.slow and len(cut.train.labels) > FEW):
             given = max(self.settings, key=lambda each: self._inside(cut, each))  # the first of equal ones
-        return self.answers(cut, given)
+        return self.predict(cut, given)
 
     def _inside(self, cut: Cut, given: Given) -> int:
         right = 0
         for fold in cut.inner():
             part = replace(cut, train=cut.train.rows(fold.train), test=cut.train.rows(fold.test))
-            right += int(recognised(self.answers(part, given)[0], part.test).sum())
+            right += int(recognised(self.predict(part, given)[0], part.test).sum())
         return right
 
 
-def recognised(answers: Answers, test: Samples) -> NDArray[np.bool_]:
-    """Return whether each trial is recognised as most of its frames are."""
+def recognised(predict: Classes, test: Samples) -> NDArray[np.bool_]:
+    """Return whether each trial is correct by the majority of its frames."""
     _, first, trial = np.unique(test.trials, return_index=True, return_inverse=True)
-    given: NDArray[np.bool_] = decided(answers[np.newaxis], trial)[0] == test.labels[first]
+    given: NDArray[np.bool_] = decided(predict[np.newaxis], trial)[0] == test.labels[first]
     return given
 
 
-def _trained(name: str) -> Answering:
-    def answers(cut: Cut, _: Given) -> tuple[Answers, Answers]:
+def _trained(name: str) -> Predicting:
+    def predict(cut: Cut, _: Given) -> tuple[Classes, Classes]:
         train, test, options = cut.train, cut.test, Options(trainer=name)
         training = Training.of(options)
         if name == AUTO:
@@ -93,11 +93,11 @@ def _trained(name: str) -> Answering:
         floats = model_scores(model, test.switches, test.codes)
         return floats.argmax(axis=1), integer_scores(integers, test.switches, test.codes).argmax(axis=1)
 
-    return answers
+    return predict
 
 
-def _fitted(make: Callable[[Given], Any], *, scaled: bool = False) -> Answering:
-    def answers(cut: Cut, given: Given) -> tuple[Answers, None]:
+def _fitted(make: Callable[[Given], Any], *, scaled: bool = False) -> Predicting:
+    def predict(cut: Cut, given: Given) -> tuple[Classes, None]:
         train = cut.train
         X, asked = (np.hstack([part.switches, part.codes]).astype(np.float64) for part in (train, cut.test))
         if scaled:
@@ -109,7 +109,7 @@ def _fitted(make: Callable[[Given], Any], *, scaled: bool = False) -> Answering:
         classes, labels = np.unique(train.labels, return_inverse=True)
         return classes[np.asarray(make(given).fit(X, labels).predict(asked)).astype(np.intp).ravel()], None
 
-    return answers
+    return predict
 
 
 def _logistic(given: Given) -> Any:
@@ -168,7 +168,7 @@ def _ebm(given: Given) -> Any:
     return ExplainableBoostingClassifier(outer_bags=4, n_jobs=1, random_state=SEED, **given)
 
 
-def _weka(cut: Cut, _: Given) -> tuple[Answers, None]:
+def _weka(cut: Cut, _: Given) -> tuple[Classes, None]:
     with tempfile.TemporaryDirectory() as folder:
         paths = [Path(folder) / name for name in ("train.arff", "test.arff")]
         for path, part in zip(paths, (cut.train, cut.test), strict=True):
@@ -198,9 +198,9 @@ OURS = tuple(
     Model(name, how, _trained(name), additive=True, ours=True, needs="thenar")
     for name, how in (
         ("logitboost", "100 rounds, the paper's"),
-        ("logit", "as it is by default"),
-        ("sum", "as it is by default"),
-        ("pairs", "as it is by default"),
+        ("logit", "default settings"),
+        ("sum", "default settings"),
+        ("pairs", "default settings"),
         (AUTO, "chosen by inner folds"),
     )
 )

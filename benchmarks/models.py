@@ -1,13 +1,13 @@
-"""Additive models held against the best of everybody's, on the same folds.
+"""Additive models compared with the best alternatives, on the same folds.
 
     python benchmarks/models.py [--sets aml icub ...] [--models logit "RBF SVM" ...] [--data FOLDER] [--quick]
     python benchmarks/models.py --learning-curve
 
-Folds keep trials apart, or subjects; the switches (the first 33 of ID3, or all where fewer) are placed inside each
-fold, and settings are chosen inside as well. What is answered is kept in --store: a run that is broken off goes on
-where it was. `--again MODEL` computes that model anew, as after a change of code or of a set. A set may be a .grasps
-file. Real recordings are looked for in --data; peers and sets that are missing are named and left out. All of it takes
-hours, `--quick`, two small sets, minutes.
+Folds separate trials, or subjects; the switches (the first 33 of ID3, or all if there are fewer) are placed inside each
+fold, and settings are chosen inside as well. Predictions are kept in --store, so an interrupted run can be resumed.
+`--again MODEL` recomputes that model, for example after a change of code or of a set. A set may be a .grasps file. Real
+recordings are read from --data; missing peers and sets are named and left out. A full run takes hours, `--quick` with
+two small sets takes minutes.
 """
 
 import argparse
@@ -45,42 +45,42 @@ CURVE_MODELS = (
     "extra trees",
     "RBF SVM",
 )
-# What a baseline may be ahead by.
+# The lead allowed to a baseline.
 WITHIN = 0.5
 
 
-class Answered(msgspec.Struct, frozen=True):
-    """What a model answered to the rows of one fold, in their order; `integers` of its deployed tables."""
+class Predicted(msgspec.Struct, frozen=True, rename={"predictions": "answers"}):  # codespell:ignore answers
+    """The predictions of a model for the rows of one fold, in order; `integers` are those of its deployed tables."""
 
     set: str
     of: Of
     fold: str
     model: str
     cpu_s: float
-    answers: list[int]
+    predictions: list[int]
     integers: list[int] | None = None
 
     @property
     def key(self) -> tuple[str, str, str, str]:
-        """By what it is found again."""
+        """The key under which it is stored."""
         return self.set, self.of, self.fold, self.model
 
 
 Task = tuple[str, Cut, Model]
 Cuts = dict[str, list[Cut]]
-Store = dict[tuple[str, str, str, str], Answered]
+Store = dict[tuple[str, str, str, str], Predicted]
 
 
-def answered(task: Task) -> Answered:
-    """Return what a model answers, with the processor time of this process and of its children."""
+def predicted(task: Task) -> Predicted:
+    """Return a model's predictions, with the processor time of this process and of its children."""
     name, cut, model = task
     warnings.filterwarnings("ignore")
     began = process_time() + _of_children()
     with threadpool_limits(1):
-        answers, integers = model.answered(cut)
+        predictions, integers = model.predicted(cut)
     spent = process_time() + _of_children() - began
     whole = None if integers is None else integers.tolist()
-    return Answered(name, cut.of, cut.name, model.name, round(spent, 3), answers.tolist(), whole)
+    return Predicted(name, cut.of, cut.name, model.name, round(spent, 3), predictions.tolist(), whole)
 
 
 def _of_children() -> float:
@@ -89,13 +89,13 @@ def _of_children() -> float:
 
 
 def stored(path: Path) -> Store:
-    """Return what was answered before."""
+    """Return the predictions stored earlier."""
     lines = path.read_bytes().splitlines() if path.exists() else []
-    return {each.key: each for each in map(msgspec.json.Decoder(Answered).decode, lines)}
+    return {each.key: each for each in map(msgspec.json.Decoder(Predicted).decode, lines)}
 
 
 def fill(store: Store, path: Path, work: Cuts, models: Sequence[Model], jobs: int) -> None:
-    """Let the models answer what is not in the store, and write it there."""
+    """Compute the predictions that are not in the store, and add them."""
     tasks = [
         (name, cut, model)
         for model in models
@@ -107,7 +107,7 @@ def fill(store: Store, path: Path, work: Cuts, models: Sequence[Model], jobs: in
     path.parent.mkdir(parents=True, exist_ok=True)
     with Progress(*columns, console=Console(stderr=True, width=110)) as bar, path.open("ab") as file:
         line = bar.add_task("folds", total=len(tasks))
-        for each in in_workers(answered, tasks, jobs):
+        for each in in_workers(predicted, tasks, jobs):
             file.write(msgspec.json.encode(each) + b"\n")
             file.flush()
             store[each.key] = each
@@ -116,7 +116,7 @@ def fill(store: Store, path: Path, work: Cuts, models: Sequence[Model], jobs: in
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """A model on all folds of a set: its rates, whether it recognised each trial (T,), processor seconds."""
+    """A model on all folds of a set: its rates, whether each trial (T,) is correct, processor seconds."""
 
     model: Model
     rate: Rate
@@ -126,34 +126,36 @@ class Line:
 
 
 def lines(name: str, found: Sequence[Cut], models: Sequence[Model], store: Store) -> list[Line]:
-    """Return a line for each model that has answered all of these folds, the best first."""
+    """Return a line for each model with predictions for all of these folds, the best first."""
     made = []
     for model in models:
-        told = [store.get((name, cut.of, cut.name, model.name)) for cut in found]
-        if all(told):
-            made.append(_line(model, found, [each for each in told if each is not None]))
+        stored_ones = [store.get((name, cut.of, cut.name, model.name)) for cut in found]
+        if all(stored_ones):
+            made.append(_line(model, found, [each for each in stored_ones if each is not None]))
     return sorted(made, key=lambda line: -line.rate.mean)
 
 
-def _line(model: Model, found: Sequence[Cut], told: Sequence[Answered]) -> Line:
+def _line(model: Model, found: Sequence[Cut], stored_ones: Sequence[Predicted]) -> Line:
     labels, trials, subjects = (
         np.concatenate([getattr(cut.test, what) for cut in found]) for what in ("labels", "trials", "subjects")
     )
     of = found[0].of
 
-    def rate(answers: Sequence[list[int]]) -> Rate:
+    def rate(predictions: Sequence[list[int]]) -> Rate:
         groups = subjects if of == "new subject" else None
-        return Rate.predicted(np.concatenate(answers), labels, trials, of=of, groups=groups)
+        return Rate.predicted(np.concatenate(predictions), labels, trials, of=of, groups=groups)
 
-    whole = [each.integers for each in told if each.integers is not None]
-    hits = [recognised(np.array(each.answers, np.intp), cut.test) for each, cut in zip(told, found, strict=True)]
-    integers = rate(whole) if len(whole) == len(told) else None
-    cpu_s = sum(each.cpu_s for each in told)
-    return Line(model, rate([each.answers for each in told]), integers, np.concatenate(hits), cpu_s)
+    whole = [each.integers for each in stored_ones if each.integers is not None]
+    hits = [
+        recognised(np.array(each.predictions, np.intp), cut.test) for each, cut in zip(stored_ones, found, strict=True)
+    ]
+    integers = rate(whole) if len(whole) == len(stored_ones) else None
+    cpu_s = sum(each.cpu_s for each in stored_ones)
+    return Line(model, rate([each.predictions for each in stored_ones]), integers, np.concatenate(hits), cpu_s)
 
 
 def p_value(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
-    """Return McNemar's exact p of two models' trials: a fair coin for each that one alone recognised."""
+    """Return McNemar's exact p of two models' trials: a fair coin for each trial that only one predicts correctly."""
     from scipy.stats import binomtest
 
     only, lost = int((one & ~other).sum()), int((other & ~one).sum())
@@ -161,7 +163,7 @@ def p_value(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
 
 
 def shown(name: str, of: Of, made: Sequence[Line]) -> Table:
-    """Return the table of one set and way to cut it."""
+    """Return the table of one set and kind of folds."""
     table = Table(title=f"{name}, {of}: {made[0].rate.total:,} trials")
     for heading in ("", "additive", "settings"):
         table.add_column(heading)
@@ -183,7 +185,7 @@ def _against(line: Line, baseline: Line) -> tuple[str, str]:
 
 
 def summary(every: dict[tuple[str, Of], list[Line]], name: str) -> Table:
-    """Return how far the best baseline is ahead of model `name` on each set, and the best additive one behind it."""
+    """Return the lead of the best baseline over model `name` on each set, and the best additive baseline."""
     table = Table(title=f"{name}: within {WITHIN} points of the best baseline, ahead of every additive one?")
     for heading in (
         "set",
@@ -213,7 +215,7 @@ def summary(every: dict[tuple[str, Of], list[Line]], name: str) -> Table:
 
 
 def learnt(work: Cuts, models: Sequence[Model], store: Store) -> Table:
-    """Return the learning curve: the mean over training sets, of each number of repetitions."""
+    """Return the learning curve: the mean over training sets, for each number of repetitions."""
     table = Table("repetitions of a type by a person", *map(str, CURVE), title=f"{CURVE_SCENE}, on fresh grasps, %")
     table.add_row("training sets", *map(str, CURVE.values()), end_section=True)
     for model in models:
@@ -227,13 +229,13 @@ def learnt(work: Cuts, models: Sequence[Model], store: Store) -> Table:
 
 
 def asked() -> argparse.Namespace:
-    """Return what the command line asks for."""
+    """Return the command line options."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sets", nargs="+", default=None, help=f"of {', '.join(SETS)}, or .grasps files")
     parser.add_argument("--models", nargs="+", help="of " + ", ".join(model.name for model in OURS + PEERS))
     parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the real recordings")
     parser.add_argument("--store", type=Path, default=Path("build/models.jsonl"))
-    parser.add_argument("--again", nargs="+", default=[], help="models whose stored answers are not used")
+    parser.add_argument("--again", nargs="+", default=[], help="models whose stored predictions are not used")
     parser.add_argument("--quick", action="store_true", help=f"sets {' and '.join(QUICK_SETS)} only")
     parser.add_argument("--learning-curve", action="store_true")
     parser.add_argument("--jobs", type=int, default=1)
@@ -241,7 +243,7 @@ def asked() -> argparse.Namespace:
 
 
 def worked(options: argparse.Namespace) -> Cuts:
-    """Return the folds of each set that is there, or those of the learning curve."""
+    """Return the folds of each available set, or those of the learning curve."""
     work: Cuts = {}
     if options.learning_curve:
         for repetitions, cut in curve():
@@ -256,7 +258,7 @@ def worked(options: argparse.Namespace) -> Cuts:
 
 
 def wanted(options: argparse.Namespace) -> Iterator[Model]:
-    """Yield the models that are asked for and there."""
+    """Yield the requested models that are available."""
     names = options.models or (CURVE_MODELS if options.learning_curve else None)
     for model in OURS + PEERS:
         if names is not None and model.name not in names:
@@ -268,7 +270,7 @@ def wanted(options: argparse.Namespace) -> Iterator[Model]:
 
 
 def main() -> None:
-    """Let the models answer, and print the tables."""
+    """Compute the predictions, and print the tables."""
     options = asked()
     models, work = list(wanted(options)), worked(options)
     store = {key: each for key, each in stored(options.store).items() if each.model not in options.again}

@@ -1,4 +1,4 @@
-"""The sets on which models are compared, and their folds: the same for everybody, with the switches placed inside."""
+"""The sets on which models are compared, and their folds: the same for all, with the switches placed inside."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,11 +27,11 @@ SCENES = ("quick", "kamakura", "cutkosky")
 SETS = ("quick", "icub", "aml", "kamakura", "cutkosky", "r2g")
 
 SWITCHES, FOLDS, INNER, SEED = 33, 4, 3, 1
-# More subjects than these are left out in so many groups, and then trials are not cut any other way.
+# More subjects than this are left out in this many groups, and there are no folds by trial.
 MOST_SUBJECTS = 10
-# Of a trial of several frames, each third one is used: neighbours say little more.
+# Of trials with several frames, each third frame is used: neighbours add little.
 EACH = 3
-# Repetitions of each type by each subject, and of how many training sets of so many the rates are the mean.
+# Repetitions of each type by each subject, and the number of training sets of this size in the mean.
 CURVE = {2: 6, 4: 6, 8: 4, 16: 2, 100: 1}
 CURVE_SCENE, FRESH = "kamakura", 96
 
@@ -40,8 +40,8 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cut:
-    """Rows to train on and to answer, with the switches that the training rows chose; `groups` (n_train,) is what inner
-    folds keep whole.
+    """Rows to train on and to test, with the switches that the training rows chose; inner folds keep `groups`
+    (n_train,) together.
     """
 
     of: Of
@@ -60,7 +60,7 @@ class Cut:
 
 
 def load(name: str, data: Path) -> Samples:
-    """Return a set by its name, or from a .grasps file. Raises FileNotFoundError where its table is not in `data`."""
+    """Return a set by its name, or from a .grasps file. Raises FileNotFoundError if its table is not in `data`."""
     if name in SCENES:
         return Samples.of(simulate(load_scene(name)).grasp_set)
     if name not in RECORDED:
@@ -100,7 +100,7 @@ def _with_switches(of: Of, name: str, train: Samples, test: Samples, groups: Row
 
 
 def curve() -> Iterator[tuple[int, Cut]]:
-    """Yield, of each number of repetitions, training sets of consecutive ones; tested are fresh grasps of the hands."""
+    """Yield, for each number of repetitions, training sets of consecutive ones, tested on fresh grasps of the hands."""
     recorded = simulate(load_scene(CURVE_SCENE)).grasp_set
     fresh = Samples.of(simulate(load_scene(CURVE_SCENE).varied(None, None, more=FRESH)).grasp_set)
     samples = Samples.of(recorded)

@@ -1,8 +1,9 @@
-"""Initial contact: how well grasps are recognised by the time that the taxel pressed hardest reads so many newtons.
+"""Initial contact: the accuracy at the moment when the hardest pressed taxel reads a given force.
 
-Of each trial the row is taken whose hardest pressed taxel reads nearest to each force, if any comes near enough. One
-model learns from the rows of all forces, since a glove does not know how far a grasp has come, and is tested force by
-force on trials that it has not seen. Taxels are read as switches that close at one force, as levels, and as codes.
+From each trial and for each force, the row is taken whose hardest pressed taxel reads closest to that force, if any is
+close enough. One model learns from the rows of all forces, since a glove does not know how far a grasp has progressed,
+and is tested force by force on unseen trials. Taxels are read as switches that close at one force, as levels, and as
+codes.
 """
 
 import argparse
@@ -36,9 +37,10 @@ NEWTONS = tuple(step / 10 for step in range(1, 11))
 
 @dataclass(frozen=True, slots=True)
 class OnsetCurve:
-    """The rates at each force, None where no trial has a row: of taxels read in one way, with or without the joints.
+    """The rates at each force, None where no trial has a row, for one reading of the taxels, with or without the
+    joints.
 
-    Of the reading "nothing", the joints alone are read.
+    With the reading "nothing", only the joints are read.
     """
 
     reading: Reading
@@ -47,7 +49,7 @@ class OnsetCurve:
 
     @property
     def title(self) -> str:
-        """What is read: "levels and joints"."""
+        """The inputs: "levels and joints"."""
         return " and ".join([self.reading] * (self.reading != "nothing") + ["joints"] * self.joints)
 
 
@@ -70,7 +72,7 @@ def onset(
     options: Options | None = None,
     levels: int | None = None,
 ) -> Onset:
-    """Return the curves of initial contact of a set with a row a frame, such as the scene `initial-contact` makes.
+    """Return the curves of initial contact of a set with a row per frame, such as the scene `initial-contact` makes.
 
     Parameters
     ----------
@@ -81,13 +83,13 @@ def onset(
     closes_n : float
         The force that closes a switch: 1 N is the paper's.
     n_folds, seed : int
-        Folds of trials, and what they are cut by.
+        Folds of trials, and their seed.
     jobs : int
-        Worker processes; the answer is the same for any number of them.
+        Worker processes; the result does not depend on their number.
     options : Options, optional
-        What trains; the additive logit, where none are given.
+        The trainer and its settings; the additive logit by default.
     levels : int, optional
-        The most levels of a taxel, found in each fold's training rows; as placements have it, where none is given.
+        The most levels of a taxel, found in each fold's training rows; the default is that of placements.
 
     Raises
     ------
@@ -128,7 +130,7 @@ def onset(
 
 
 def _rows(grasp_set: GraspSet, taxels: list[int], newtons: NDArray[np.float64]) -> list[NDArray[np.intp]]:
-    """Return for each force the numbers of the rows, one a trial at most: the nearest, of equal ones the first."""
+    """Return for each force the row indices, at most one per trial: the nearest, ties to the first."""
     columns = [grasp_set.taxel_columns[place].value(grasp_set.taxels[:, place]) for place in taxels]
     hardest, trials = np.max(columns, axis=0), grasp_set.trial_ids
     reach = float(np.diff(newtons).min()) / 2 if len(newtons) > 1 else float(newtons[0]) / 2
@@ -159,7 +161,7 @@ def _predicted(task: _Task) -> tuple[tuple[Reading, bool], Fold, NDArray[np.intp
 
 
 def _coded(samples: Samples, reading: Reading) -> Samples:
-    """Return samples whose taxels are read as joints are, or neither they nor the switches."""
+    """Return samples whose taxels are read like joints, or without taxels and switches."""
     empty = samples.taxels[:, :0]
     if reading == "nothing":
         return replace(samples, switches=samples.switches[:, :0], taxels=empty)
@@ -190,7 +192,7 @@ def draw(found: Onset, path: Path) -> None:
 
 
 def main(arguments: list[str]) -> None:
-    """Draw the curves of a set, with the additive logit and three levels a taxel."""
+    """Draw the curves of a set, with the additive logit and three levels per taxel."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("set", type=Path, help="a .grasps file with taxels in newtons and frames of the beginning")
     parser.add_argument("-o", "--output", type=Path, required=True, help="the .svg to write")

@@ -1,4 +1,4 @@
-"""What every placement reaches on a set: at given numbers of switches, and with the fewest that recognise enough."""
+"""The results of each placement on a set: at given numbers of switches, and with the fewest that suffice."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us
 
-# Beside the joints, 33 switches are left out: that saves a fifth of the time.
+# With joints, the size of 33 switches is left out, which saves a fifth of the time.
 SHOWN = {False: (8, 16, 33), True: (8, 16)}
 MOST, WITHIN, ROUNDS = 40, 0.005, 100
 CONSOLE = Console(width=150)
@@ -28,7 +28,7 @@ CONSOLE = Console(width=150)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Data:
-    """A set, switches alone or with joints, its folds, and the S that the paper would take."""
+    """A set, with switches only or with joints, its folds, and the S that the paper would choose."""
 
     learning: Samples
     names: tuple[str, ...]
@@ -42,13 +42,13 @@ class Data:
 
     @property
     def shown(self) -> tuple[int, ...]:
-        """Return the sizes whose rates are shown."""
+        """Return the sizes in the table."""
         return SHOWN[self.joints]
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """Means over the folds: recognition rate, number of switches, scan time of a new glove and as wired."""
+    """Means over the folds: accuracy, number of switches, scan time of a new glove and as wired."""
 
     rate: float
     size: float
@@ -58,8 +58,8 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """What one method reaches: at the sizes SHOWN, and with the fewest switches that recognise enough (None: none up to
-    MOST, or not asked); processor seconds of choosing, for a fold.
+    """The results of one method: at the sizes SHOWN, and with the fewest switches that are accurate enough (None: none
+    up to MOST, or not requested); processor seconds of choosing, per fold.
     """
 
     method: str
@@ -71,7 +71,7 @@ class Line:
 
 @dataclass(slots=True)
 class Ways:
-    """One method on all folds; what was measured is known."""
+    """One method on all folds, with a cache of its measurements."""
 
     data: Data
     method: str
@@ -89,17 +89,17 @@ class Ways:
         self.seconds = (process_time() - start) / len(self.data.folds)
 
     def pruned(self) -> Point:
-        """Return what the paper's ID3 reaches under its S."""
+        """Return the result of the paper's ID3 with its S."""
         return self._mean([choose(self.data.prune) for choose in self.chosen])
 
     def at(self, most: int) -> Point:
-        """Return what is reached with at most so many switches; ID3's S is the smallest that leaves no more."""
+        """Return the result with at most `most` switches; ID3's S is the smallest that leaves no more."""
         if most not in self._known:
             self._known[most] = self._mean([self._kept(choose, most) for choose in self.chosen])
         return self._known[most]
 
     def smallest(self, wanted: float) -> Point | None:
-        """Return the smallest placement found that recognises as much."""
+        """Return the smallest placement found with at least this accuracy."""
         enough = next((size for size in (*self.data.shown, MOST) if self.at(size).rate >= wanted), None)
         if enough is None:
             return None
@@ -139,14 +139,14 @@ class Ways:
 
 
 def rate(learning: Samples, fold: Fold, columns: Columns) -> float:
-    """Return the share of the test rows that LogitBoost recognises."""
+    """Return LogitBoost's accuracy on the test rows."""
     X = np.hstack([learning.switches[:, sorted(columns)].astype(np.uint16), learning.codes])
     stumps, _ = boost(X[fold.train], learning.labels[fold.train], learning.n_classes, rounds=ROUNDS)
     return float((winners(stumps.scores(X[fold.test])) == learning.labels[fold.test]).mean())
 
 
 def measure(task: tuple[Data, str, float | None]) -> Line:
-    """Return what one method reaches on a set, where a rate is wanted (None: rates at the sizes SHOWN alone)."""
+    """Return the results of one method on a set, given the wanted accuracy (None: only rates at the sizes SHOWN)."""
     data, method, wanted = task
     ways = Ways(data, method)
     shown = tuple(ways.at(size) for size in data.shown)
@@ -154,23 +154,23 @@ def measure(task: tuple[Data, str, float | None]) -> Line:
 
 
 def papers(data: Data) -> tuple[bool, Point]:
-    """Return what the paper's placement reaches, and whether with joints."""
+    """Return the result of the paper's placement, and whether it is with joints."""
     return data.joints, Ways(data, PAPERS).pruned()
 
 
 def bounded(task: tuple[Data, int]) -> tuple[int, int, Subset]:
-    """Return m, the pairs alike in m switches that elimination keeps of all rows, and what bounded search says."""
+    """Return m, the pairs alike in the m switches kept by elimination on all rows, and the bounds of the search."""
     data, m = task
     columns = METHODS[BEST].chooser(data.learning)(m)
     return m, Pairs(data.learning).alike(columns), best_subset(data.learning, m, starts=(columns,))
 
 
 def measured(alone: Data, with_joints: Data, paper: dict[bool, Point], jobs: int) -> list[Line]:
-    """Return every method's line, switches alone first. Joints are no matter to baselines."""
+    """Return every method's line, switches only first. Joints do not matter to baselines."""
     ours = [name for name, method in METHODS.items() if method.ours]
     baselines = [name for name, method in METHODS.items() if not method.ours and method.installed]
     wanted = {joints: point.rate - WITHIN for joints, point in paper.items()}
-    # What takes longest begins first.
+    # The longest tasks start first.
     tasks: list[tuple[Data, str, float | None]] = [
         (data, name, wanted[data.joints]) for data in (with_joints, alone) for name in reversed(ours)
     ]

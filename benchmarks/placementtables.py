@@ -1,4 +1,4 @@
-"""The tables of `placement.py`: what each placement reaches beside the paper's."""
+"""The tables of `placement.py`: the results of each placement compared with the paper's."""
 
 from collections.abc import Sequence
 
@@ -10,10 +10,10 @@ from thenar.compiler.placement.optimum import Subset
 
 
 def saved(lines: Sequence[Line], joints: bool, paper: Point) -> Table:
-    """Return the table of smallest placements within half a point of the paper's."""
+    """Return the table of smallest placements within half a point of the paper's accuracy."""
     title = f"{kind(joints)}: fewest switches within {100 * WITHIN:g} points of the paper's"
     times = ("scan, new glove, us", "less", "as wired, us", "less")
-    table = Table("method", "switches", "recognition, %", "fewer switches", *times, title=title)
+    table = Table("method", "switches", "accuracy, %", "fewer switches", *times, title=title)
     cells = (f"{paper.size:.1f}", f"{100 * paper.rate:.2f}", "", f"{paper.new_us:.0f}", "", f"{paper.wired_us:.0f}", "")
     table.add_row("the paper's pruned ID3", *cells, end_section=True)
     for line in lines:
@@ -31,7 +31,7 @@ def saved(lines: Sequence[Line], joints: bool, paper: Point) -> Table:
 
 
 def compared(lines: Sequence[Line], joints: bool) -> Table:
-    """Return the table of rates at given numbers of switches; numbers that a tree misses stand beside."""
+    """Return the table of rates at given numbers of switches; numbers that a tree misses are added in brackets."""
     heads = (f"{size} switches, %" for size in SHOWN[joints])
     table = Table("method", *heads, "seconds to choose", title=kind(joints))
     for line in lines:
@@ -42,20 +42,20 @@ def compared(lines: Sequence[Line], joints: bool) -> Table:
 
 
 def cell(point: Point, size: int) -> str:
-    """Return a rate, with the mean number of switches if that is another."""
+    """Return a rate, with the mean number of switches if it differs from `size`."""
     return f"{100 * point.rate:.2f}" + ("" if point.size == size else f" ({point.size:.1f})")
 
 
 def kind(joints: bool) -> str:
-    """Return what is read, in words."""
-    return "switches and joints" if joints else "switches alone"
+    """Return the inputs, in words."""
+    return "switches and joints" if joints else "switches only"
 
 
 def bounds(found: Sequence[tuple[int, int, Subset]]) -> Table:
-    """Return the table of how far elimination is from the best subset of few switches, chosen from all rows."""
+    """Return the table of the gap between elimination and the best subset of few switches, chosen on all rows."""
     found_pairs = (f"{BEST}, %", "best found, %", "none below, %")
     heads = ("switches", *found_pairs, "at most from the best, points", "programs")
-    table = Table(*heads, title="pairs of rows of different types that look alike, switches alone")
+    table = Table(*heads, title="pairs of rows of different types that look alike, switches only")
     for m, alike, best in sorted(found, key=lambda one: one[0]):
         shares = [100 * count / best.pairs for count in (alike, best.alike, best.least)]
         table.add_row(str(m), *(f"{share:.3f}" for share in shares), f"{shares[0] - shares[2]:.3f}", str(best.nodes))

@@ -1,10 +1,10 @@
-"""Faults of single switches under a live recogniser: what they cost with and without quarantine, and false alarms.
+"""Faults of single switches in a live recogniser: their cost with and without quarantine, and false alarms.
 
     python benchmarks/quarantine.py BUILD SET.grasps
 
-BUILD has switches alone; each row of the set, of other subjects as a rule, is a grasp. Subjects take turns; their
-grasps come in random order, with an open hand for a moment in between. Every switch is stuck, closed and open, from one
-of the grasps on. Points are lost against the same grasps without the fault.
+BUILD has only switches; each row of the set, normally of other subjects, is a grasp. Subjects take turns; their grasps
+come in random order, with an open hand for a moment in between. Every switch is stuck, closed and open, from one of the
+grasps on. Points are lost compared with the same grasps without the fault.
 """
 
 import argparse
@@ -28,9 +28,9 @@ _HELD_US = 3 * SETTLED_US
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Points of recognition lost by a fault of one switch, without quarantine, with it, and where the switch is known
-    to be lost: in the first GRASPS grasps, and in as many after them; after how many grasps it was found, None where
-    it was not; and what else was.
+    """Percentage points lost by a fault of one switch: without quarantine, with it, and if the switch is known to be
+    lost; in the first GRASPS grasps, and in the same number after them. Also the number of grasps until it was found,
+    None if it was not, and the number of other quarantines.
     """
 
     name: str
@@ -52,14 +52,14 @@ def held(
     dead: int = 0,
     lost: int = 0,
 ) -> Iterator[tuple[str, frozenset[str]]]:
-    """Yield the candidate for each grasp, and what was in quarantine after it; from grasp `at` on, switches are stuck
+    """Yield the candidate for each grasp, and the quarantined inputs after it; from grasp `at` on, switches are stuck
     closed, or open, or lost. The hand is open for `open_us` between them.
     """
     policy = Policy(lead=0, dwell_us=0, hold_us=0, lag_us=None, quarantine=quarantine)
     live, now_us = LiveRecognizer(build, switch_period_us=_HELD_US, policy=policy), 0
     for number, closed in enumerate(grasps):
         late = number >= at
-        # What a grasp is weighed for counts in the next frame, and so in this grasp.
+        # The evidence of a grasp counts in the next frame, and so in this grasp.
         for pause_us, shown in ((open_us, 0), (1, 0), *[(SETTLED_US, closed)] * (_HELD_US // SETTLED_US)):
             frame = SwitchFrame(now_us, (shown | stuck * late) & ~(dead * late), lost * late)
             grasp = live.step(now_us, 0, frame, None).grasp
@@ -82,7 +82,7 @@ def orders(grasp_set: GraspSet, draws: int, seed: int = 0) -> Iterator[np.ndarra
 
 
 def false_alarms(build: Build, grasp_set: GraspSet, draws: int, open_us: int = 50_000) -> tuple[int, int]:
-    """Return how many times an input was put into quarantine without a fault, and in how many grasps."""
+    """Return how often an input was quarantined without a fault, and in how many grasps."""
     masks, alarms, grasps = masks_of(build, grasp_set), 0, 0
     for order in orders(grasp_set, draws, seed=1):
         before: frozenset[str] = frozenset()
@@ -93,7 +93,7 @@ def false_alarms(build: Build, grasp_set: GraspSet, draws: int, open_us: int = 5
 
 
 def cost(build: Build, grasp_set: GraspSet, closed: bool, draws: int, switch: int, open_us: int = 50_000) -> Cost:
-    """Return what it costs that a switch is stuck closed, or open."""
+    """Return the cost of a switch that is stuck closed, or open."""
     masks, name = masks_of(build, grasp_set), build.manifest.switches[switch].name
     points = np.zeros((3, 2))
     delays, others, bit = list[int | None](), 0, 1 << switch

@@ -1,4 +1,4 @@
-"""How soon `thenar monitor` shows a moment of a long recording, beside reading the recording from its beginning.
+"""The time until `thenar monitor` shows a moment of a long recording, compared with reading it from the start.
 
     python benchmarks/replaying.py [MINUTES]
 
@@ -44,7 +44,7 @@ def timed(work: object) -> float:
 
 
 def until(index: Index, unix_us: int) -> None:
-    """Read as the page does to show a moment."""
+    """Read as much as the page does to show a moment."""
     for at_us, _ in index.since(unix_us - LEAD_US):
         if at_us >= unix_us:
             return

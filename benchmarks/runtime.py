@@ -1,4 +1,4 @@
-"""What the runtime costs: importing it beside numpy, one classification beside scikit-learn's and onnxruntime's.
+"""The cost of the runtime: its import compared with numpy, its classification with scikit-learn and onnxruntime.
 
     python benchmarks/runtime.py
 
@@ -66,7 +66,7 @@ def grasp_set() -> GraspSet:
 
 
 def onnx_call(model: GradientBoostingClassifier, row: np.ndarray) -> Callable[[], object] | None:
-    """Return a call of onnxruntime on `row` (1, d) float32, or None where it or skl2onnx is not installed."""
+    """Return a call of onnxruntime on `row` (1, d) float32, or None if it or skl2onnx is not installed."""
     if not all(importlib.util.find_spec(name) for name in ("onnxruntime", "skl2onnx")):
         return None
     import onnxruntime  # pyright: ignore[reportMissingImports]

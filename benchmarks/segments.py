@@ -1,14 +1,14 @@
-"""What a tick of the decoder of segments takes: 14 types and none, 10 ms a tick, a lag of 150 ms; and a live frame.
+"""The cost of a tick of the segment decoder, with 14 types and none, 10 ms a tick, a lag of 150 ms; and a live frame.
 
     python benchmarks/segments.py
     python benchmarks/segments.py --frames
 
-The first prints a table of the usual costs, of those that `thenar compile` learns of the scene continuous-rest, of
-costs of each type's own, and of a build without a class "none": Python's us on this machine, cycles on an ATmega328P in
-libsimavr, flash, RAM and stack. Every compiled answer is compared to Python's. The second plays whole movements of the
-scene `continuous`, 1,000 frames of the switches and 100 records of the joints a second, again and again, and prints the
-us of a step by what is new in it: the least of all turns of each frame, so that a busy machine matters little, and of
-these the median and the mean.
+The first prints a table for the usual costs, for those that `thenar compile` learns from the scene continuous-rest, for
+separate costs of each type, and for a build without a class "none": Python's us on this machine, cycles on an
+ATmega328P in libsimavr, flash, RAM and stack. Every compiled result is compared with Python's. The second plays whole
+movements of the scene `continuous`, 1,000 frames of the switches and 100 records of the joints per second, repeatedly,
+and prints the us of a step by what is new in it: the minimum over all turns of each frame, so that other load matters
+little, and over these the median and the mean.
 """
 
 import argparse
@@ -46,7 +46,7 @@ _SANITIZE = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover
 Lanes = NDArray[np.int16]
 Flags = NDArray[np.bool_]
 
-# What the decoder needs of the classifier: its scores.
+# The part of the classifier that the decoder needs: its scores.
 _HEADER = """\
 #ifndef THENAR_HAND_H
 #define THENAR_HAND_H
@@ -62,7 +62,7 @@ struct record {{ int16_t lanes[{lanes}]; uint8_t best, refused; }};
 struct record record;
 static thenar_hand glove;
 static thenar_hand_segmenter stream;
-uint8_t answer(void);
+uint8_t decide(void);
 uint8_t copy(void);
 __attribute__((noinline, noclone)) uint8_t copy(void)
 {{
@@ -70,7 +70,7 @@ __attribute__((noinline, noclone)) uint8_t copy(void)
         glove.scores[lane] = record.lanes[lane];
     return record.best;
 }}
-__attribute__((noinline, noclone)) uint8_t answer(void)
+__attribute__((noinline, noclone)) uint8_t decide(void)
 {{
     const uint8_t best = copy();
     return thenar_hand_segment_push(&stream, &glove, best, record.refused != 0u);
@@ -83,7 +83,7 @@ int main(void)
 {{
     thenar_hand_segment_start(&stream);
     while (fread(&record, sizeof record, 1, stdin) == 1)
-        (void)putchar(answer());
+        (void)putchar(decide());
     return fflush(stdout) != 0;
 }}
 """,
@@ -106,12 +106,12 @@ void thenar_fault(void)
 int main(void)
 {{
     const uint32_t given = semihosting_open("frames", 6, SEMIHOSTING_RB);
-    const uint32_t answers = semihosting_open("predictions", 11, SEMIHOSTING_WB);
+    const uint32_t results = semihosting_open("predictions", 11, SEMIHOSTING_WB);
     bool whole = true;
     thenar_hand_segment_start(&stream);
     while (semihosting_read(given, &record, sizeof record)) {{
-        const uint8_t state = answer();
-        whole = semihosting_write(answers, &state, 1) && whole;
+        const uint8_t state = decide();
+        whole = semihosting_write(results, &state, 1) && whole;
     }}
     semihosting_exit(!whole);
     return 0;
@@ -122,7 +122,7 @@ int main(void)
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What a compiled decoder answered; on an AVR also cycles a tick, and bytes of flash, RAM and stack."""
+    """The results of a compiled decoder; on an AVR also cycles per tick, and bytes of flash, RAM and stack."""
 
     states: NDArray[np.uint8]
     cycles: NDArray[np.int64]
@@ -132,13 +132,13 @@ class Run:
 
 
 def records(lanes: Lanes, refused: Flags) -> bytes:
-    """Return what the programs read of each tick: its scores, the number of the best, whether it is refused."""
+    """Return the input of the programs for each tick: its scores, the number of the best, whether it is rejected."""
     held = np.zeros(len(lanes), [("lanes", "<i2", lanes.shape[1:]), ("best", "u1"), ("refused", "u1")])
     held["lanes"], held["best"], held["refused"] = lanes, lanes.argmax(axis=1), refused
     return held.tobytes()
 
 
-def sources(model: SegmentModel, kind: str, function: str = "answer") -> dict[str, str]:
+def sources(model: SegmentModel, kind: str, function: str = "decide") -> dict[str, str]:
     """Return path -> text of a program around the decoder."""
     values = {"lanes": model.n_lanes, "function": function}
     header, main = (text.format(**values) for text in (_HEADER, _COMMON + _MAINS[kind]))
@@ -164,10 +164,10 @@ def run_host(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> Run
 
 
 def run_avr(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> Run:
-    """Run the decoder on an ATmega328P in libsimavr; its cycles are those of push() alone."""
+    """Run the decoder on an ATmega328P in libsimavr; its cycles are those of push() only."""
     given, program = records(lanes, refused), harness("simavr_classify")
     runs, size = [], len(given) // len(lanes)
-    for function in ("answer", "copy"):
+    for function in ("decide", "copy"):
         files = sources(model, "avr", function)
         with workshop(files) as folder:
             command = [find(AVR_COMPILER), "-mmcu=atmega328p", "-Os", *STRICT, _lag(lag)]
@@ -179,14 +179,14 @@ def run_avr(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> Run:
             printed = call([str(program), "atmega328p", "16000000", "program.elf", *places, span, span], folder, given)
             parts = [path for path in _compiled(files) if path != "main.c"]
             call([*command, "-c", *parts], folder)
-            told = call(["avr-size", *(path.rsplit(".", 1)[0] + ".o" for path in parts)], folder)
-            flash = sum(int(line.split()[0]) + int(line.split()[1]) for line in told.decode().splitlines()[1:])
+            given = call(["avr-size", *(path.rsplit(".", 1)[0] + ".o" for path in parts)], folder)
+            flash = sum(int(line.split()[0]) + int(line.split()[1]) for line in given.decode().splitlines()[1:])
             ram = int(words["stream"][3], 16)
         shape = np.dtype([("record", "u1", size), ("state", "u1"), ("r25", "u1"), ("cycles", "<u4"), ("stack", "<u2")])
         runs.append(np.frombuffer(printed, shape))
-    answered, copied = runs
-    cycles = answered["cycles"].astype(np.int64) - copied["cycles"]
-    return Run(answered["state"], cycles, flash, ram, int(answered["stack"].max()))
+    timed, copied = runs
+    cycles = timed["cycles"].astype(np.int64) - copied["cycles"]
+    return Run(timed["state"], cycles, flash, ram, int(timed["stack"].max()))
 
 
 def run_cortex(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int, core: Bare) -> Run:
@@ -197,14 +197,14 @@ def run_cortex(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int, core
 
 
 def python_states(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> NDArray[np.uint8]:
-    """Return what Python's decoder answers, tick by tick."""
+    """Return the states of Python's decoder, tick by tick."""
     decoder = Decoder(model, lag)
     pairs = zip(lanes.tolist(), refused.tolist(), strict=True)
     return np.array([decoder.push(row, no).state for row, no in pairs], np.uint8)
 
 
 def random_lanes(ticks: int, lanes: int, seed: int, reach: int) -> Lanes:
-    """Return scores that dwell about 20 ticks on a level each, with noise of a third."""
+    """Return scores that stay about 20 ticks on a level, with noise of a third."""
     random = np.random.default_rng(seed)
     level = np.cumsum(random.random(ticks) < 0.05)
     levels = random.integers(-reach, reach + 1, (ticks + 1, lanes))
@@ -214,7 +214,7 @@ def random_lanes(ticks: int, lanes: int, seed: int, reach: int) -> Lanes:
 
 
 def models() -> dict[str, SegmentModel]:
-    """Return the costs of which the table is."""
+    """Return the costs in the table."""
     usual = SegmentModel.usual(14, True, SCALE)
     own = replace(
         usual,
@@ -239,14 +239,14 @@ def models() -> dict[str, SegmentModel]:
 
 
 def frame_costs(rows: int = 800, turns: int = 15) -> dict[str, list[float]]:
-    """Return the us of each step, the least of all turns, by what is new in it; of so many rows, each for 10 ms."""
+    """Return the us of each step, the minimum over all turns, by what is new in it; for `rows` rows of 10 ms each."""
     with TemporaryDirectory() as name:
         scene = played("continuous", Path(name))
         system = System.of(scene.build, with_glove(board(scene), glove(scene)))
     row_us, tick_us = scene.performance.period_us, scene.build.manifest.segmenting.tick_us
     keys, records = scene.keys[:rows], [record.tobytes() for record in scene.performance.sensors[:rows]]
     found: dict[str, list[float]] = {}
-    # Records of the joints come with the ticks, and then between them.
+    # Records of the joints come together with the ticks, and then between them.
     for late_us in (0, row_us // 2):
         gloves = [GloveFrame(row * row_us + late_us, record, STATUS) for row, record in enumerate(records)]
         times = range(row_us, rows * row_us, 1000)
@@ -302,7 +302,7 @@ def print_ticks() -> None:
 def main() -> None:
     """Print a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--frames", action="store_true", help="of live frames, not of ticks alone")
+    parser.add_argument("--frames", action="store_true", help="live frames instead of ticks")
     asked = parser.parse_args()
     (print_frames if asked.frames else print_ticks)()
 

@@ -1,9 +1,9 @@
-"""The contact models beside each other, on every grasp of a scene; and what a simulation needs of memory.
+"""The contact models compared on every grasp of a scene; and the memory of a simulation.
 
     python benchmarks/simulator.py [SCENE] [--repetitions N] [--no-memory]
 
-The hands are told the same by both: the scene's own effects vary posture, object and grip. A grasp's ON set are the
-switches that bear more than the scene's threshold. Prints the tables of docs/explanation/simulator.md.
+All models get the same hands: the scene's effects vary posture, object and grip. A grasp's ON set are the switches that
+bear more than the scene's threshold. Prints the tables of docs/explanation/simulator.md.
 """
 
 import argparse
@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
-from contacts import jaccard, of_settled, on_sets, row, solved, table, together, told
+from contacts import jaccard, of_settled, on_sets, poses, row, solved, table, together
 
 from thenar.simulator.contact.model import Contact, ContactModel
 from thenar.simulator.effects import contact_mujoco, contact_quasistatic
@@ -29,12 +29,12 @@ from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import Scene
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-# What is compared, and at most how many milliseconds a grasp may take of each.
+# The models, and the most milliseconds that a grasp may take in each.
 MODELS = {"quasistatic": "0.5", "mujoco": "3", "mujoco, object held softly": ""}
-# The object on the spring that quasistatic holds it with, and longer, since so soft a spring takes longer to rest.
+# The object on the spring of quasistatic, with a longer time, since it takes longer to settle on so soft a spring.
 HELD_SOFTLY = contact_mujoco.Parameters(weld_n_per_m=50.0, weld_nm_per_rad=0.1, steps=200)
 DIGITS = ("thumb", "index", "middle", "ring", "little", "palm")
-# Time settings tried, against the same for five times as long.
+# Time settings, compared with the same for five times as long.
 SETTINGS = ((2.0, 100), (5.0, 30), (5.0, 60), (5.0, 100), (10.0, 30), (20.0, 30), (50.0, 30))
 REFERENCE = (5.0, 300)
 TRIED = 8
@@ -65,14 +65,14 @@ def compare(made: list[ContactModel], batches: list[Batch]) -> list[Compared]:
 
 
 def by_type(compared: list[Compared]) -> Iterator[tuple[str, list[list[Contact]]]]:
-    """Yield each grasp type and `all`, with what every model found."""
+    """Yield each grasp type and `all`, with the contacts of every model."""
     for grasp in [*dict.fromkeys(batch.grasp for batch in compared), "all"]:
         own = [batch.found for batch in compared if grasp in (batch.grasp, "all")]
         yield grasp, [list(found) for found in zip(*own, strict=True)]
 
 
 def agreement(compared: list[Compared], threshold_n: float) -> str:
-    """Return a line a grasp type: ON sets, and what did not settle or balance."""
+    """Return a line per grasp type: ON sets, and how many grasps did not settle or balance."""
     lines = []
     for grasp, found in by_type(compared):
         quasistatic, *others = on = [on_sets(each, threshold_n) for each in found]
@@ -93,7 +93,7 @@ def agreement(compared: list[Compared], threshold_n: float) -> str:
 
 
 def forces(compared: list[Compared]) -> str:
-    """Return a line a grasp type: the mean force on every digit, settled grasps only."""
+    """Return a line per grasp type: the mean force on every digit, for settled grasps only."""
     lines = []
     for grasp, found in by_type(compared):
         capsules_n = np.array([of_settled(each, "capsules_n").mean(axis=0) for each in found])
@@ -104,14 +104,14 @@ def forces(compared: list[Compared]) -> str:
 
 
 def cost(made: list[ContactModel], batches: list[Batch]) -> str:
-    """Return a line a model: milliseconds a grasp, all solved in one go, and those of the dearest type alone."""
+    """Return a line per model: milliseconds per grasp, all solved together, and those of the slowest type."""
     lines = []
     for model, (name, bound) in zip(made, MODELS.items(), strict=True):
         solved(model, batches[:1])
-        dear = {grasp: _milliseconds(model, own) for grasp, own in _by_grasp(batches).items()}
-        dearest = max(dear, key=lambda grasp: dear[grasp])
-        lines.append(row(name, f"{_milliseconds(model, batches):.2f}", bound, f"{dearest}: {dear[dearest]:.2f}"))
-    return table(("contact model", "ms a grasp", "at most", "dearest grasp type, alone"), lines)
+        times = {grasp: _milliseconds(model, own) for grasp, own in _by_grasp(batches).items()}
+        slowest = max(times, key=lambda grasp: times[grasp])
+        lines.append(row(name, f"{_milliseconds(model, batches):.2f}", bound, f"{slowest}: {times[slowest]:.2f}"))
+    return table(("contact model", "ms a grasp", "at most", "slowest grasp type, alone"), lines)
 
 
 def _milliseconds(model: ContactModel, batches: list[Batch]) -> float:
@@ -124,9 +124,9 @@ def _by_grasp(batches: list[Batch]) -> dict[str, list[Batch]]:
 
 
 def settings(scene: Scene) -> str:
-    """Return a line a time setting of MuJoCo: its cost, and its agreement with the reference, on the first subject."""
+    """Return a line per time setting of MuJoCo: its cost, and its agreement with the reference, for one subject."""
     first = msgspec.structs.replace(scene, subjects=scene.subjects[:1])
-    batches, setting = list(told(first, TRIED)), compile_pipeline(scene).setting
+    batches, setting = list(poses(first, TRIED)), compile_pipeline(scene).setting
 
     def run(dt_ms: float, steps: int) -> tuple[list[Contact], float]:
         return solved(contact_mujoco.model(contact_mujoco.Parameters(dt_ms=dt_ms, steps=steps), setting), batches)
@@ -145,12 +145,12 @@ def settings(scene: Scene) -> str:
 
 
 def memory(name: str) -> str:
-    """Return a line a number of repetitions: the peak of a process that simulates the scene."""
+    """Return a line per number of repetitions: the peak memory of a process that simulates the scene."""
     lines = []
     for repetitions in MEMORY_REPETITIONS:
         command = [sys.executable, __file__, name, "--one", str(repetitions)]
-        answer = subprocess.run(command, env=os.environ | ONE_THREAD, check=True, capture_output=True).stdout
-        rows, peak_mib, set_mib = json.loads(answer)
+        result = subprocess.run(command, env=os.environ | ONE_THREAD, check=True, capture_output=True).stdout
+        rows, peak_mib, set_mib = json.loads(result)
         lines.append(row(repetitions, rows, f"{peak_mib:.0f} MiB", f"{set_mib:.1f} MiB"))
     return table(("repetitions a grasp type", "rows", "peak", "of it the set itself"), lines)
 
@@ -175,10 +175,10 @@ def main() -> None:
     if options.one:
         print(json.dumps(one(scene, options.one)))
         return
-    made, batches = models(scene), list(told(scene, options.repetitions))
+    made, batches = models(scene), list(poses(scene, options.repetitions))
     compared = compare(made, batches)
     print(f"{platform.machine()}, one thread; scene {options.scene}, {options.repetitions} repetitions a condition")
-    print(f"Where several numbers stand: {' / '.join(MODELS)}.\n")
+    print(f"Several numbers are for: {' / '.join(MODELS)}.\n")
     threshold_n = scene.glove.threshold_n
     for lines in (cost(made, batches), agreement(compared, threshold_n), forces(compared), settings(scene)):
         print(lines, end="\n\n", flush=True)

@@ -3,8 +3,8 @@
     python benchmarks/soak.py [--minutes N]
 
 A CyberGlove, a scanner board, and expanders on I2C where umockdev is installed; JSON lines, a socket that is read,
-health, preshapes, and a recording until its file has 256 MiB. Prints a line a minute (six lines of a run shorter than
-that) and exits with 1 if memory, threads, file descriptors or the CPU a grasp grew, or if the run ended.
+health, preshapes, and a recording until its file has 256 MiB. Prints a line per minute (six lines in shorter runs) and
+exits with 1 if memory, threads, file descriptors or the CPU per grasp grew, or if the run ended.
 """
 
 import argparse
@@ -33,12 +33,12 @@ from thenar.simulator.playing.bench import Bench
 
 MINUTE_S = 60.0
 MOST_FILE = 256 << 20
-# What may come on top from the first minutes, in which caches fill, to the end.
+# The growth allowed from the first minutes, in which caches fill, to the end.
 MOST_KIB, MOST_SHARE = 2048, 0.5
 WARM_UP = 2
 LEAST_SAMPLES = 3
 _TICKS = os.sysconf("SC_CLK_TCK")
-# In the place of `ulimit -f`, which counts in blocks of a size that shells disagree on.
+# Instead of `ulimit -f`, which counts in blocks whose size depends on the shell.
 LIMITED = (
     "import os, resource as r, sys; r.setrlimit(r.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2);"
     " os.execv(sys.argv[2], sys.argv[2:])"
@@ -72,7 +72,7 @@ class Reader:
                 time.sleep(0.1)
 
     def lines(self, until: float) -> int:
-        """Return how many lines come until a moment of the monotonic clock; fewer if the run ends."""
+        """Return the number of lines until a moment of the monotonic clock; fewer if the run ends."""
         lines = 0
         while (left := until - time.monotonic()) > 0:
             self._socket.settimeout(left)
@@ -87,7 +87,7 @@ class Reader:
 
 
 def glove_of_all(scene: Played) -> Harness:
-    """Return a glove whose kept switches hang half on a board, half on expanders, if these can be emulated."""
+    """Return a glove whose kept switches are half on a board, half on expanders, if these can be emulated."""
     if shutil.which("umockdev-wrapper") is None:
         return with_glove(board(scene), glove(scene))
     half = len(scene.kept) // 2
@@ -105,7 +105,7 @@ def started(scene: Played, bench: Bench, folder: Path) -> "subprocess.Popen[byte
 
 
 def sampled(pid: int, reader: Reader, seconds: float) -> Sample:
-    """Return the state of the run after so long."""
+    """Return the state of the run after `seconds`."""
     before = _cpu_s(pid)
     lines = reader.lines(time.monotonic() + seconds)
     own = Path("/proc", str(pid))
@@ -116,13 +116,13 @@ def sampled(pid: int, reader: Reader, seconds: float) -> Sample:
 
 
 def _cpu_s(pid: int) -> float:
-    """Return what CPU a process has used: fields 14 and 15 of its stat, counted from 1 (proc(5))."""
+    """Return the CPU time of a process: fields 14 and 15 of its stat, counted from 1 (proc(5))."""
     fields = Path("/proc", str(pid), "stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / _TICKS
 
 
 def grown(samples: Sequence[Sample]) -> list[str]:
-    """Return what grew, in words."""
+    """Return the quantities that grew, as sentences."""
     later = samples[min(WARM_UP, len(samples) - LEAST_SAMPLES) :]
     found = []
     if (kib := _growth(later, lambda sample: sample.rss_kib)) > MOST_KIB:
@@ -138,14 +138,14 @@ def grown(samples: Sequence[Sample]) -> list[str]:
 
 
 def _growth(samples: Sequence[Sample], of: Callable[[Sample], float]) -> float:
-    """Return by how much it grows over all samples, if it grows as the median pair of them does."""
+    """Return the growth over all samples, extrapolated from the median pair of them."""
     pairs = combinations(range(len(samples)), 2)
     slope = median((of(samples[later]) - of(samples[first])) / (later - first) for first, later in pairs)
     return slope * (len(samples) - 1)
 
 
 def soak(folder: Path, minutes: float) -> list[str]:
-    """Run for so long; return what was wrong."""
+    """Run for `minutes`; return the faults."""
     scene = played("quick", folder)
     every_s = min(MINUTE_S, minutes * MINUTE_S / 6)
     with ExitStack() as stack:

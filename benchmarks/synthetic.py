@@ -1,4 +1,4 @@
-"""Rows that look like grasps, for benchmarks: seeded, of any number, and harder to part than random ones."""
+"""Rows that resemble grasps, for benchmarks: seeded, of any number, and harder to separate than random ones."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,8 @@ def grasp_like(
 ) -> tuple[NDArray[np.bool_], NDArray[np.uint16], NDArray[np.intp]]:
     """Return bits (rows, switches), codes (rows, joints) of half degrees, labels (rows,): classes in equal shares.
 
-    A grasp type is a pattern of a quarter of the switches ON, of which `flip` of the bits are wrong in every row, and a
-    posture with 10 degrees of spread.
+    A grasp type is a pattern with a quarter of the switches ON, of which `flip` of the bits are wrong in every row, and
+    a posture with a spread of 10 degrees.
     """
     rng = np.random.default_rng(seed)
     patterns = rng.random((classes, switches)) < 0.25

@@ -1,11 +1,11 @@
-"""What a page costs the run that it shows, with nobody looking, one browser, ten, and one of ten that hangs.
+"""The cost of a page for the run that it shows, with no browser, one, ten, and ten with one that hangs.
 
     python benchmarks/web.py [--frames N]
 
-Each frame comes from memory, 400 a second, to a run without a page and to one with it, so that what else the machine
-does hits both. A line a case: CPU of the run's thread a frame, and how much more that is than without a page (at most
-20 us); wall time from a frame to its grasp; how busy the server's thread keeps a core; how many frames a second the
-readers got. Readers are WebSockets in a process of their own, on the same cores.
+Each frame comes from memory, 400 per second, to a run without a page and to one with it, so that other load affects
+both. Each case is a line: CPU of the run's thread per frame, and its increase over a run without a page (at most 20
+us); wall time from a frame to its grasp; the load of the server's thread on a core; the frames per second that the
+readers received. Readers are WebSockets in a separate process, on the same cores.
 """
 
 import argparse
@@ -54,7 +54,7 @@ asyncio.run(main())
 
 @dataclass
 class Case:
-    """A run, and what its frames took."""
+    """A run, and the costs of its frames."""
 
     what: str
     step: Callable[[], object]
@@ -64,7 +64,7 @@ class Case:
 
 
 def measured(cases: Sequence[Case], frames: list[tuple[int, bytes]]) -> None:
-    """Let frames come at their rate, each to every case, and note what it takes."""
+    """Send frames at their rate to every case, and record the costs."""
     due = time.perf_counter()
     for number, (closed, sensors) in enumerate(frames):
         due += 1 / HZ
@@ -91,7 +91,7 @@ def run_of(scene: Played, folder: Path, what: str, stack: ExitStack, *, page: bo
 
 @contextmanager
 def readers(page: LivePage, number: int, hanging: int, found: list[str]) -> Iterator[None]:
-    """Let so many read along; `found` is how many frames a second the slowest and the quickest of them got."""
+    """Run `number` readers; `found` gets the frames per second of the slowest and the fastest of them."""
     place = urlsplit(page.server.url).netloc
     arguments = [f"ws://{place}/live", f"http://{place}", str(number), str(hanging)]
     pipe = subprocess.PIPE
@@ -111,7 +111,7 @@ def readers(page: LivePage, number: int, hanging: int, found: list[str]) -> Iter
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--frames", type=int, default=4000, help="of each case (default 4000)")
+    parser.add_argument("--frames", type=int, default=4000, help="per case (default 4000)")
     options = parser.parse_args()
     console = Console(width=180)
     busy = f"{os.getloadavg()[0]:.1f} processes were busy on {os.cpu_count()} cores when it began"

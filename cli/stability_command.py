@@ -71,12 +71,12 @@ def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int, output
 
 def _run(cases: tuple[str, ...], *, full: bool, jobs: int, output: Path | None) -> int:
     from thenar.stability.report import NAMES, Report, run
-    from thenar.stability.weka import beside_weka
+    from thenar.stability.weka import compare_with_weka
 
     with progress("hard cases") as report:
         found = run(cases, full=full, jobs=jobs, progress=report)
     with progress("comparing with Weka"):
-        weka = beside_weka() if cases == NAMES or output is not None else None
+        weka = compare_with_weka() if cases == NAMES or output is not None else None
     result = Report(full, found, weka, all(case.holds for case in found))
     if output is not None:
         _write(result, jobs, output)
@@ -91,7 +91,7 @@ def _write(result: "Report", jobs: int, path: Path) -> None:
 
     with progress("pictures") as report:
         measured = measure(full=result.full, jobs=jobs, progress=report)
-        pictures = figures(measured, result.beside)
+        pictures = figures(measured, result.weka)
     write_atomically(path, page(result, pictures).encode())
 
 
@@ -105,15 +105,15 @@ def _print_list(cases: "list[Listed]") -> None:
 
 def _print(report: "Report") -> None:
     """Print a table for each case, headed by what could go wrong, then Weka's results and the failures, if any."""
-    from thenar.stability.report import besides, failures, legend, summary
+    from thenar.stability.report import failures, legend, summary, weka_lines
 
     console = out()
     widths = _widths(report, console.width)
     for case in report.cases:
         _print_case(console, case, widths)
-    if report.beside is not None:
+    if report.weka is not None:
         console.print(Text("compared with Weka", "bold"))
-        for line in besides(report.beside):
+        for line in weka_lines(report.weka):
             console.print(line)
         console.print()
     for unit, meaning in legend(report):

@@ -1,6 +1,6 @@
-"""Wire protocols of gloves, scanners and port expanders, and the same devices emulated. Imports nothing else of thenar.
+"""Wire protocols of gloves, scanners and port expanders, and emulations of these devices.
 
-What happens on the wires goes to the loggers `thenar.drivers...`, and nowhere as long as nobody listens.
+Imports no other package of thenar. Logs wire events to the loggers `thenar.drivers...`, which are silent by default.
 """
 
 import logging

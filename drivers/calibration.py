@@ -1,4 +1,4 @@
-"""What a CyberGlove's bytes mean on one hand: two points of each sensor's straight line, in a TOML file.
+"""The calibration of a CyberGlove on one hand: two points of each sensor's straight line, in a TOML file.
 
     subject = "anna"
     unit = "deg"
@@ -6,12 +6,11 @@
         { name = "index_mpj", raw_a = 96, value_a = 0.0, raw_b = 161, value_b = 90.0 },
     ]
 
-Two points say what an offset and a gain only say together with the order in which they are applied.
+Two points are unambiguous; an offset and a gain would also need the order in which they are applied.
 
-The guided calibration finds them from poses that are held. In the first one, the flat hand, every joint counts as 0
-degrees; each later pose bends or spreads some of them. The angles of those poses are what hands commonly reach, not
-measurements of this one (the ranges of motion that orthopaedic textbooks give): who has measured a pose writes its
-angle into the file in place of ours.
+The guided calibration finds the points from held poses. In the first pose, the flat hand, every joint counts as 0
+degrees; each later pose bends or spreads some joints. The angles of those poses are typical ranges of motion from
+orthopaedic textbooks, not measurements of this hand: if you have measured a pose, write its angle into the file.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,9 +26,9 @@ from .names import fault, shortened
 
 Raw = Annotated[int, msgspec.Meta(ge=1, le=255)]
 Name = Annotated[str, msgspec.Meta(min_length=1)]
-# Further than this a sensor does not wander in a hand held still, in counts.
+# The most that a sensor drifts in a hand held still, in counts.
 STEADY = 8
-# Real gloves move 50 to 140 counts from flat hand to fist; what moves less than this was not moved.
+# Real gloves move 50 to 140 counts from flat hand to fist; a joint that moves less than this was not moved.
 LEAST_TRAVEL = 10
 _ENDS = (1, 255)
 _FINGERS = ("index", "middle", "ring", "little")
@@ -38,7 +37,7 @@ _FINGERS = ("index", "middle", "ring", "little")
 class SensorCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The straight line of one sensor: raw byte (1 to 255) and value at each of two points.
 
-    Raises SettingError if the two points are at one byte or a value is no number.
+    Raises SettingError if the two points share a byte or a value is not a number.
     """
 
     name: Name
@@ -79,13 +78,13 @@ class GloveCalibration(
             seen.add(sensor.name)
 
     def to_toml(self) -> str:
-        """Return the calibration as the text of its file; numbers keep every digit."""
+        """Return the text of the calibration file; numbers keep every digit."""
         return msgspec.toml.encode(self).decode("utf-8")
 
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A pose to hold: what to do, and how many degrees each sensor it is for then feels."""
+    """A pose to hold: an instruction, and the angle in degrees at each sensor that the pose calibrates."""
 
     name: str
     instruction: str
@@ -94,7 +93,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """What a pose gave: the middle byte of each sensor, and by how many counts each wandered meanwhile."""
+    """The samples of one held pose: the median byte of each sensor, and its drift in counts."""
 
     raw: bytes
     wander: tuple[int, ...]
@@ -130,8 +129,9 @@ POSES = (
 
 
 def poses_of(names: Sequence[str]) -> tuple[Pose, ...]:
-    """Return the poses that find the lines of sensors of these names, the flat hand first; sensors whose names say
-    nothing of their joint are bent as far as they go, which counts as 90 degrees.
+    """Return the poses that calibrate sensors of these names, the flat hand first.
+
+    A sensor whose name implies no joint is bent as far as it goes, which counts as 90 degrees.
     """
     known = [pose for pose in POSES if set(pose.degrees) & set(names)]
     others = [name for name in names if not any(name in pose.degrees for pose in POSES)]
@@ -142,20 +142,20 @@ def poses_of(names: Sequence[str]) -> tuple[Pose, ...]:
 
 
 def held(samples: Sequence[bytes]) -> Held:
-    """Return what samples of all sensors, at least one, amount to. The middle one: a glitch moves no median."""
+    """Return the median and the drift of at least one sample of all sensors. A glitch does not move a median."""
     columns = list(zip(*samples, strict=True))
     raw = bytes(median_low(column) for column in columns)
     return Held(raw, tuple(max(column) - min(column) for column in columns))
 
 
 def problems(names: Sequence[str], flat: Held | None, pose: Pose, found: Held) -> list[str]:
-    """Return what speaks against taking a pose, in sentences; `flat` is None when the pose is the flat hand itself."""
+    """Return reasons to reject a pose, in sentences; `flat` is None when the pose is the flat hand itself."""
     concerned = [place for place, name in enumerate(names) if flat is None or name in pose.degrees]
     out = []
     for place in concerned:
         name, raw = names[place], found.raw[place]
         if found.wander[place] > STEADY:
-            out.append(f"{name} wandered by {found.wander[place]} counts: hold still")
+            out.append(f"{name} drifted by {found.wander[place]} counts: hold still")
         if raw in _ENDS:
             out.append(f"{name} is at the end of its range ({raw}): does the glove fit, is the sensor whole?")
         if flat is not None and abs(raw - flat.raw[place]) < LEAST_TRAVEL:

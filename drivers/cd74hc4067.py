@@ -19,6 +19,6 @@ PACKAGE = Package(
         "VCC",
     ),
     sure=False,
-    note="compare symbol and footprint before ordering; up to 70 ohm at 4.5 V, more at 3.3 V, beside the pad's own",
+    note="compare symbol and footprint before ordering; up to 70 ohm at 4.5 V, more at 3.3 V, in series with the pad",
     library="Analog_Switch",
 )

@@ -1,15 +1,15 @@
-"""What has to be closed."""
+"""The base class of objects that must be closed."""
 
 from abc import ABC, abstractmethod
 from typing import Self
 
 
 class Closing(ABC):
-    """A context manager that is closed at its end."""
+    """A context manager that calls `close` at its end."""
 
     @abstractmethod
     def close(self) -> None:
-        """Let go of everything. Does no harm twice."""
+        """Release all resources. Closing twice is harmless."""
 
     def __enter__(self) -> Self:
         return self

@@ -1,10 +1,10 @@
-"""The CyberGlove on a serial line: found, set up, read, its light and wrist switch.
+"""The CyberGlove on a serial line: detection, set-up, records, its light and wrist switch.
 
     with CyberGlove("/dev/ttyUSB0") as glove:
         while (timed := glove.read(1.0)) is not None:
             time_us, record = timed
 
-Where the protocol's sources disagree, every variant is accepted or selectable: docs/reference/devices.md.
+Where the sources of the protocol disagree, each variant is accepted or selectable: docs/reference/devices.md.
 """
 
 import logging
@@ -46,29 +46,29 @@ from .serial_line import SerialLine
 
 _LOG = logging.getLogger(__name__)
 
-# An answer's next byte is never further away: 16 ms in an FTDI adapter, 1 ms a byte at 9600 baud, the box's own time.
-_ANSWER_S = 0.2
-# After a Ctrl-C comes the rest of a record at most, which at 9600 baud takes 27 ms.
+# Longest wait for the next byte of a reply: 16 ms in an FTDI adapter, 1 ms a byte at 9600 baud, the box's own time.
+_REPLY_S = 0.2
+# After a Ctrl-C at most the rest of a record follows, which takes 27 ms at 9600 baud.
 _QUIET_S = 0.05
-# What a Ctrl-C itself may be answered with; whether it is, no source says.
+# A possible reply to Ctrl-C; no source says whether the box sends it.
 _STOPPED = STOP + b"\0"
 _LONGEST_S = 1.0
-_LONGEST = 4096  # bytes among which an answer is looked for; the information text has some hundreds
+_LONGEST = 4096  # bytes searched for a reply; the information text has some hundreds
 _TRIES = 3
-# The rates that the box can be set to without a change inside it, the usual first.
+# The rates that the box supports without an internal change, the usual one first.
 BAUD_RATES = (115_200, 38_400, 19_200, 9_600)
-# After it is switched on, a box says for a while that it is not ready.
+# After power-on, a box reports for a while that it is not ready.
 _READY_S = 1.0
 _NAMES = {18: SENSORS_18, 22: SENSORS_22}
-# When a poll is taken for lost: a record takes 27 ms at 9600 baud, an FTDI adapter adds 16.
+# After this time a poll counts as lost: a record takes 27 ms at 9600 baud, an FTDI adapter adds 16.
 _POLLED_S = 0.2
-# When a glove is taken for dead of which no byte comes: soon, for it must be read again within a second of its return.
+# After this time without a byte the glove counts as dead: short, since it must be read within a second of its return.
 _SILENT_S = 0.5
-# And when bytes come, but no record.
+# The same with bytes, but without a record.
 _NOISY_S = 1.0
 _SILENT_PERIODS = 4
-# More than any line brings between two readings: what stood in buffers while the host was held up. It is read up to its
-# end, so far as that comes, before it is given times.
+# More than any line delivers between two reads: a backlog from buffers, after a delay of the host. It is read to its
+# end, up to a limit, before its records get times.
 _BACKLOG = 2048
 _LONGEST_BACKLOG = 1 << 18
 Timed = tuple[int, Record]
@@ -76,61 +76,61 @@ Mode = Literal["stream", "poll"]
 
 
 class Dialogue:
-    """Asks over `line`. What goes wrong on the wire is asked again, after the box was made to stop whatever it does."""
+    """Commands and replies over `line`. After an error the box is stopped, and the command is sent again."""
 
     def __init__(self, line: SerialLine) -> None:
         self._line = line
 
     def hush(self) -> None:
-        """End a stream, and drop what still comes. Raises DeviceError if it does not end."""
+        """End a stream and drop its remaining bytes. Raises DeviceError if it does not end."""
         end = monotonic() + _LONGEST_S
         while monotonic() < end:
             self._line.write(STOP)
             if not self._line.drain(_QUIET_S).strip(_STOPPED):
                 return
         raise DeviceError(
-            f"{self._line.url}: what is there keeps sending after a Ctrl-C at {self._line.baud} baud: is it a"
+            f"{self._line.url}: the device keeps sending after a Ctrl-C at {self._line.baud} baud: is it a"
             " CyberGlove, and is this its baud rate?"
         )
 
     def ask(self, command: Command) -> bytes:
-        """Return the values of the answer. Raises DeviceError if three times none comes, or only errors."""
-        answer = None
+        """Return the values of the reply. Raises DeviceError after three attempts without a reply or with errors."""
+        reply = None
         for attempt in range(_TRIES):
             if attempt:
                 self.hush()
-            answer = self._asked_once(command)
-            if answer is not None and answer.error is None:
-                return answer.values
-        raise DeviceError(f"{self._line.url}: {_complaint(command, answer, self._line.baud)}")
+            reply = self._asked_once(command)
+            if reply is not None and reply.error is None:
+                return reply.values
+        raise DeviceError(f"{self._line.url}: {_complaint(command, reply, self._line.baud)}")
 
     def _asked_once(self, command: Command) -> Answer | None:
         self._line.write(command.request)
         received, end = b"", monotonic() + _LONGEST_S
-        while monotonic() < end and len(received) < _LONGEST and (more := self._line.read(_ANSWER_S)):
+        while monotonic() < end and len(received) < _LONGEST and (more := self._line.read(_REPLY_S)):
             received += more
-            answer = find_answer(command, received)
-            if answer is not None:
-                return answer
+            reply = find_answer(command, received)
+            if reply is not None:
+                return reply
         return find_answer(command, received, last=True)
 
 
-def _complaint(command: Command, answer: Answer | None, baud: int) -> str:
-    if answer is not None:
-        return f"the CyberGlove answers {command.name} with an error: {answer.error}"
-    return f"no CyberGlove answers {command.name} at {baud} baud: check its power, the cable and the baud rate"
+def _complaint(command: Command, reply: Answer | None, baud: int) -> str:
+    if reply is not None:
+        return f"the CyberGlove replies to {command.name} with an error: {reply.error}"
+    return f"no CyberGlove replies to {command.name} at {baud} baud: check its power, the cable and the baud rate"
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """How a glove shall send.
+    """The requested configuration of a glove.
 
     words    the period (`cyberglove_protocol.period_words`)
-    poll     whether it shall be asked for each record, so that the host keeps the period
-    sensors  how many it must have; None: as many as it says
-    status   whether records shall carry the status byte
-    only     places, in wire order, of the sensors that it shall send; None: all
-    filtered  whether its digital filter shall be on; None: as it is
+    poll     whether to request each record, so that the host keeps the period
+    sensors  the required number of sensors; None: as reported
+    status   whether records carry the status byte
+    only     places, in wire order, of the sensors to send; None: all
+    filtered  whether its digital filter is on; None: unchanged
     """
 
     words: Words
@@ -143,19 +143,19 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True)
 class GloveInfo:
-    """What was found at the end of the line.
+    """A detected glove and its configuration.
 
     baud        its rate
-    total       how many sensors the glove has, 18 or 22
-    places      which of them, in wire order, records hold: all, or those that the box's mask lets through
-    names       what these measure, in wire order
-    mask        the software mask, 3 bytes, the lowest bit of the first one first; empty where the box does not tell
-    right_hand  for which hand it is; None where the box does not tell
+    total       number of sensors of the glove, 18 or 22
+    places      places, in wire order, of the sensors in a record: all, or those that the box's mask lets through
+    names       the names of these sensors, in wire order
+    mask        the software mask, 3 bytes, the lowest bit of the first one first; empty if the box does not report it
+    right_hand  whether it is for the right hand; None if the box does not report it
     text        the box's information text
     status      whether records carry the status byte
-    period_us   from one record to the next: as wanted, or the shortest that box and line should manage
-    unmasked    why all sensors are sent though fewer are wanted, in a sentence; "" where that is not so
-    notes       what else is odd, in sentences for the user
+    period_us   time between records: as requested, or the shortest that box and line should manage
+    unmasked    why all sensors are sent though fewer are requested, in a sentence; "" otherwise
+    notes       other anomalies, in sentences for the user
     """
 
     baud: int
@@ -172,12 +172,12 @@ class GloveInfo:
 
     @property
     def sensors(self) -> int:
-        """How many bytes of sensors a record has."""
+        """Number of sensor bytes in a record."""
         return len(self.places)
 
 
 def find_line(url: str, rates: Sequence[int]) -> SerialLine:
-    """Return an open line to a box that answers, at the first of `rates` at which it does. Raises DeviceError else."""
+    """Return an open line at the first of `rates` at which the box replies. Raises DeviceError if it never does."""
     for baud in rates:
         line = SerialLine(url, baud)
         try:
@@ -195,13 +195,13 @@ def find_line(url: str, rates: Sequence[int]) -> SerialLine:
         else:
             return line
     tried = ", ".join(map(str, rates))
-    raise DeviceError(f"{url}: no CyberGlove answers at {tried} baud: check its power and the cable") from failure
+    raise DeviceError(f"{url}: no CyberGlove replies at {tried} baud: check its power and the cable") from failure
 
 
 def set_up(line: SerialLine, wanted: Wanted) -> GloveInfo:
-    """Ask a box that answers what it is, and tell it how to send records.
+    """Identify a box that replies, and configure how it sends records.
 
-    Raises DeviceError if it does not answer, or is no glove that can be read.
+    Raises DeviceError if it does not reply or is not a supported glove.
     """
     dialogue = Dialogue(line)
     notes = _until_ready(dialogue, line.url)
@@ -215,13 +215,14 @@ def set_up(line: SerialLine, wanted: Wanted) -> GloveInfo:
             places, mask = some, fewer
         else:
             _masked(dialogue, mask_of(every))
-            unmasked = f"it takes no sensor mask: all {total} sensors are read, though {len(some)} are asked for"
+            unmasked = f"it accepts no sensor mask: all {total} sensors are read, though {len(some)} are requested"
     right, text = _optional(dialogue, query("R")), _optional(dialogue, INFORMATION) or b""
     status, odd = _configured(dialogue, wanted)
     filtered = _optional(dialogue, query("F")) not in (None, b"\0")
     if wanted.filtered not in (None, filtered):
-        odd += (f"Its digital filter stays {'on' if filtered else 'off'}, whatever it is told.",)
-    told, shortest = told_us(wanted.words), shortest_us(len(places), line.baud, status=status, filtered=filtered)
+        odd += (f"Its digital filter stays {'on' if filtered else 'off'}, contrary to the setting.",)
+    period = told_us(wanted.words)
+    shortest = shortest_us(len(places), line.baud, status=status, filtered=filtered)
     if wanted.poll:
         shortest += sending_us(len(POLL), line.baud)
     return GloveInfo(
@@ -233,14 +234,14 @@ def set_up(line: SerialLine, wanted: Wanted) -> GloveInfo:
         right_hand=None if right is None else right != b"\0",
         text="".join(filter(str.isprintable, text.decode("ascii", "replace"))).strip(),
         status=status,
-        period_us=round(max(told, shortest)),
+        period_us=round(max(period, shortest)),
         unmasked=unmasked,
-        notes=notes + odd + _rate_note(told, shortest),
+        notes=notes + odd + _rate_note(period, shortest),
     )
 
 
 def _masked(dialogue: Dialogue, mask: bytes) -> bool:
-    """Let the box send the sensors of a mask, and return whether it says that it does."""
+    """Set the sensor mask of the box, and return whether it confirms it."""
     count = bytes([len(masked_sensors(mask))])
     if _optional(dialogue, setting("M", mask)) is None:
         return False
@@ -251,15 +252,15 @@ def _masked(dialogue: Dialogue, mask: bytes) -> bool:
 
 
 def _configured(dialogue: Dialogue, wanted: Wanted) -> tuple[bool, tuple[str, ...]]:
-    """Tell the box how to send; return whether its records will carry the status byte, and what it did not take."""
+    """Configure the box; return whether its records will carry the status byte, and notes on rejected settings."""
     words = b"".join(word.to_bytes(2, "big") for word in (FASTEST if wanted.poll else wanted.words))
     dialogue.ask(setting("T", words))
     odd: tuple[str, ...] = ()
     if _optional(dialogue, query("T")) not in (None, words):
-        odd = ("It keeps another period than it is told.",)
+        odd = ("It keeps a period other than the one set.",)
     if wanted.filtered is not None:
         _optional(dialogue, setting("F", bytes([wanted.filtered])))
-    _optional(dialogue, setting("D", b"\0"))  # a box without time stamps has none to switch off
+    _optional(dialogue, setting("D", b"\0"))  # fails on a box without time stamps
     status = _optional(dialogue, setting("U", bytes([wanted.status]))) is not None
     if wanted.status and not status:
         odd += ("It sends no status byte: plug and wrist switch cannot be seen while it streams.",)
@@ -267,25 +268,25 @@ def _configured(dialogue: Dialogue, wanted: Wanted) -> tuple[bool, tuple[str, ..
 
 
 def _until_ready(dialogue: Dialogue, url: str) -> tuple[str, ...]:
-    """Ask until the box is ready. Which of 1 and 2 means what, sources disagree: both pass, with a note."""
+    """Poll until the box is ready. Sources disagree on the meanings of 1 and 2: both pass, with a note."""
     end = monotonic() + _READY_S
     while (state := dialogue.ask(query("G"))[0]) != READY and monotonic() < end:
         dialogue.hush()
     if state == 0:
-        raise DeviceError(f"{url}: the CyberGlove's box is neither initialised nor has it a glove: is one plugged in?")
-    return () if state == READY else (f"?G says {state}, not {READY}: the glove is unplugged or not initialised.",)
+        raise DeviceError(f"{url}: the CyberGlove's box is not initialised and has no glove: is one plugged in?")
+    return () if state == READY else (f"?G returns {state}, not {READY}: the glove is unplugged or not initialised.",)
 
 
 def _sensors(dialogue: Dialogue, url: str, expected: int | None) -> int:
-    answer = _optional(dialogue, query("N")) or _optional(dialogue, query("S"))
-    count = answer[0] if answer else expected
+    reply = _optional(dialogue, query("N")) or _optional(dialogue, query("S"))
+    count = reply[0] if reply else expected
     if count not in (None, *_NAMES):
-        # A program that was cut off left a mask behind: thenar itself, as a rule.
+        # An interrupted program, usually thenar itself, left a mask behind.
         has = _optional(dialogue, query("S"))
         if has is not None and has[0] in _NAMES and _masked(dialogue, mask_of(_NAMES[has[0]])):
             count = has[0]
     if count is None:
-        raise DeviceError(f"{url}: the CyberGlove does not say how many sensors it has: say so (sensors = 18, or 22)")
+        raise DeviceError(f"{url}: the CyberGlove does not report its number of sensors: set `sensors = 18` or 22")
     if expected is not None and count != expected:
         raise SettingError(
             f"{url}: the CyberGlove sends {count} sensors, not {expected}: write `sensors = {count}` under [cyberglove]"
@@ -298,17 +299,17 @@ def _sensors(dialogue: Dialogue, url: str, expected: int | None) -> int:
     return count
 
 
-def _rate_note(told: float, shortest: float) -> tuple[str, ...]:
-    if not 0.0 < told < shortest:
+def _rate_note(period: float, shortest: float) -> tuple[str, ...]:
+    if not 0.0 < period < shortest:
         return ()
     return (
-        f"{1e6 / told:.0f} records a second are asked for, and box and line should manage {1e6 / shortest:.0f}: ask"
-        " for fewer if records come with the fault 'too fast'.",
+        f"{1e6 / period:.0f} records a second are requested, and box and line should manage {1e6 / shortest:.0f}:"
+        " request fewer if records come with the fault 'too fast'.",
     )
 
 
 def _optional(dialogue: Dialogue, command: Command) -> bytes | None:
-    """Return the values of the answer, None where this box does not know the command: never for a lost answer."""
+    """Return the values of the reply, or None if this box does not know the command; a lost reply is retried."""
     try:
         return dialogue.ask(command)
     except DeviceError:
@@ -319,16 +320,16 @@ def _optional(dialogue: Dialogue, command: Command) -> bytes | None:
 class CyberGlove(Closing):
     """A glove at `url`: a device, socket://HOST:PORT or rfc2217://HOST:PORT.
 
-    baud     bits a second; None tries the rates that a box can be set to
-    mode     "stream": the box sends by its own clock; "poll": it is asked for each record
-    rate_hz  records a second; None: as many as there can be
-    sensors  18 or 22; None: as many as the glove says
-    status   whether records shall carry the status byte
-    only     places, in wire order, of the sensors that are wanted; None: all. A box that does not send these alone,
-             by what it says or by what it sends, sends all: `GloveInfo.places` and `unmasked` say so
-    filtered  whether the box's digital filter shall be on; None: as it is
+    baud     bits a second; None tries the rates that a box supports
+    mode     "stream": the box sends by its own clock; "poll": each record is requested
+    rate_hz  records a second; None: as many as possible
+    sensors  18 or 22; None: as reported by the glove
+    status   whether records carry the status byte
+    only     places, in wire order, of the requested sensors; None: all. If the box cannot send only these, by its
+             replies or its records, all are sent: see `GloveInfo.places` and `unmasked`
+    filtered  whether the box's digital filter is on; None: unchanged
 
-    Use it from one thread at a time. Raises SettingError for a rate that no glove can be told.
+    Use it from one thread at a time. Raises SettingError for a rate that no glove can be set to.
     """
 
     def __init__(
@@ -360,9 +361,9 @@ class CyberGlove(Closing):
         self._last_us = 0
 
     def open(self) -> GloveInfo:
-        """Open the line, stop what streams on it, learn what glove it is, set it up, and begin.
+        """Open the line, stop any stream on it, identify the glove, set it up, and start.
 
-        Raises DeviceError if there is no such port, no glove that answers, or none that can be read.
+        Raises DeviceError if there is no such port, or no supported glove replies.
         """
         self.close()
         line = find_line(self.url, self._rates)
@@ -385,15 +386,15 @@ class CyberGlove(Closing):
         return info
 
     def read(self, timeout_s: float) -> Timed | None:
-        """Return the oldest record not yet returned, as (time_us, Record); None if none is in by the timeout.
+        """Return the oldest record not yet returned, as (time_us, Record); None at the timeout.
 
-        time_us is when its last byte was in, in microseconds of the monotonic clock. Of records that come in together
-        each is a period older than the next, and a polled one was in before it was to be asked for again: what stood in
-        a buffer while the host was held up is not taken for new. A record with the fault "unplugged" holds no
+        time_us is the arrival of its last byte, in microseconds of the monotonic clock. Of records that arrive together
+        each is one period older than the next, and a polled one is dated before its repetition was due: a record from a
+        buffer is not mistaken for a new one after a delay of the host. A record with the fault "unplugged" holds no
         measurement.
 
-        Raises DeviceError when the line is gone, or no byte came for half a second, or no record for a second (or for
-        four periods, where these are longer).
+        Raises DeviceError if the line is gone, no byte came for half a second, or no record for a second (or for four
+        periods, if these are longer).
         """
         line, end = self._opened(), monotonic() + timeout_s
         while not self._ready:
@@ -408,22 +409,22 @@ class CyberGlove(Closing):
         return self._ready.popleft()
 
     def light(self, on: bool) -> None:
-        """Switch the light at the wrist. A stream pauses for it. Raises DeviceError as `ask` does."""
+        """Switch the light at the wrist. A stream pauses meanwhile. Raises DeviceError as `ask` does."""
         self._ask(setting("L", bytes([on])))
 
     def switch(self) -> bool:
-        """Return whether the switch at the wrist is on (the status byte of records tells without a pause)."""
+        """Return whether the switch at the wrist is on (the status byte of records reports it without a pause)."""
         return self.ask("W") != b"\0"
 
     def ask(self, letter: str) -> bytes:
-        """Return the values that the box answers to the query of this letter. A stream pauses for it.
+        """Return the values of the box's reply to the query of this letter. A stream pauses meanwhile.
 
-        Raises DeviceError if the line is gone or the box does not answer, SettingError if there is no such query.
+        Raises DeviceError if the line is gone or the box does not reply, SettingError if there is no such query.
         """
         return self._ask(query(letter))
 
     def close(self) -> None:
-        """Stop the stream, let all sensors through again, where that is still possible, and close the line."""
+        """Stop the stream, unmask all sensors, if that is still possible, and close the line."""
         line, self._line = self._line, None
         if line is not None:
             masked = self._info.sensors < self._info.total
@@ -450,7 +451,7 @@ class CyberGlove(Closing):
         return self._line
 
     def _start(self, line: SerialLine) -> None:
-        """Begin, or begin again after the box was asked for something else."""
+        """Start, or start again after another command."""
         self._decoder = RecordDecoder(self._info.sensors, self.counts, self._info.status)
         self._ready: deque[Timed] = deque()
         self._heard_at = self._quiet_from = self._due = self._poll_at = monotonic()
@@ -459,7 +460,7 @@ class CyberGlove(Closing):
             line.write(STREAM)
 
     def _poll(self, line: SerialLine, now: float) -> None:
-        """Ask for a record when one is due, or when the last one is taken for lost."""
+        """Request a record when one is due, or when the last one counts as lost."""
         if now < self._poll_at:
             return
         line.write(POLL)
@@ -470,7 +471,7 @@ class CyberGlove(Closing):
 
     @property
     def _given_up_at(self) -> float:
-        """When the glove is taken for dead if nothing more comes."""
+        """The time at which the glove counts as dead if nothing more arrives."""
         return min(self._heard_at + self._silent_s, self._quiet_from + self._noisy_s)
 
     def _receive(self, line: SerialLine, seconds: float) -> None:
@@ -490,14 +491,14 @@ class CyberGlove(Closing):
             line.check_plugged()
             if self._info.sensors < self._info.total and self.counts.wrong_length > self._misfits:
                 total, self._wanted = self._info.total, replace(self._wanted, only=None)
-                self._unmasked = f"its records are not what its sensor mask says: all {total} sensors are read"
+                self._unmasked = f"its records do not match its sensor mask: all {total} sensors are read"
             silent = now_us / 1e6 - self._heard_at > self._silent_s
             said = f"no byte for {self._silent_s:g}" if silent else f"no record for {self._noisy_s:g}"
             raise DeviceError(f"{self.url}: the CyberGlove has sent {said} s: check its power and the cable")
 
 
 def _waiting(line: SerialLine, seconds: float) -> bytes:
-    """Return what has come in, a backlog up to its end; its last record is then the newest there is."""
+    """Return the received bytes, a backlog up to its end, so that its last record is the newest."""
     data = line.read(max(0.0, seconds))
     if len(data) >= _BACKLOG:
         while len(data) < _LONGEST_BACKLOG and (more := line.read(0.0)):

@@ -1,24 +1,24 @@
-"""The CyberGlove's serial protocol: its sensors, its commands and answers, how fast it sends, its records.
+"""The CyberGlove's serial protocol: sensors, commands and replies, periods, records.
 
-It is the vendor's manual as public drivers quote it (ViSTA, FreeVR, Shadow's serial_glove, VESS, asr, toon);
-docs/reference/devices.md says where they disagree.
+It follows the vendor's manual as public drivers quote it (ViSTA, FreeVR, Shadow's serial_glove, VESS, asr, toon);
+docs/reference/devices.md lists their disagreements.
 
-**Sensors.** The box has 24 slots, of which two are never sent: the abduction of the index, which no glove measures, and
-the last.
+**Sensors.** The box has 24 slots. Two are never sent: the abduction of the index, which no glove measures, and the
+last.
 
-**Commands.** Upper-case letters are binary: what follows them, and what comes back, are bytes. A query is '?' and a
-letter. An answer is an echo of the command's letters, the values, and a NUL; as values may be 0, its exact length tells
-where it ends. Only the information text ends by itself, with CR LF NUL. An answer may also be an error: 'e' and what
-was wrong, with the echo before it or not (both are understood).
+**Commands.** Upper-case letters are binary: their arguments and replies are bytes. A query is '?' and a letter. A reply
+is an echo of the command's letters, the values, and a NUL; as values may be 0, its length determines its end. Only the
+information text has a terminator, CR LF NUL. A reply may also be an error: 'e' and an error letter, with or without the
+echo before it (both are understood).
 
-**Periods.** The period is two 16-bit words; their product counts ticks of 1/115200 s, whatever the baud rate; 0 is "as
-fast as you can". How fast that is, one driver quotes from the vendor's SerialCommands document: a record is digitised
-sensor by sensor, then sent. The driver warns by it and refuses nothing.
+**Periods.** The period is two 16-bit words; their product counts ticks of 1/115200 s at every baud rate; 0 is "as fast
+as you can". One driver quotes from the vendor's SerialCommands document how fast that is: a record is digitised sensor
+by sensor, then sent. This driver only warns of shorter periods.
 
 **Records.** 'G' (polled) or 'S' (streamed), one byte a sensor, the status byte if it is on, NUL. Sensors send 1 to 255,
-never 0, so a NUL is an end; but G and S are sensor values too, so a record is one only if it also has the exact length.
-A glove in trouble puts 'es' (asked for records faster than it can send them) or 'eg' (glove not plugged in) before the
-NUL; 'e', 's' and 'g' are sensor values as well, and only the two bytes too many tell. The highest bit of the status
+never 0, so a NUL is an end; but G and S are sensor values too, so a record must also have the exact length. A glove in
+trouble inserts 'es' (records requested faster than it can send them) or 'eg' (glove not plugged in) before the NUL;
+'e', 's' and 'g' are sensor values as well, so only the two extra bytes show the fault. The highest bit of the status
 byte is always 1. Time stamps, which may hold zeros, are left switched off.
 """
 
@@ -54,7 +54,7 @@ MASK_22 = bytes.fromhex("7F FF 7F")
 STOP = b"\x03"  # Ctrl-C
 RESTART = b"\x12"  # Ctrl-R
 POLL, STREAM = b"G", b"S"  # also what their records begin with
-# What ?G says when all is well: bit 0 initialised, bit 1 glove connected (two of seven sources swap the bits).
+# The reply to ?G when all is well: bit 0 initialised, bit 1 glove connected (two of seven sources swap the bits).
 READY = 3
 _TEXT_END = b"\r\n\0"
 _ERRORS = {
@@ -64,7 +64,7 @@ _ERRORS = {
     b"g": "no glove is plugged in",
     b"s": "sampling too fast",
 }
-# Bytes in the answer to ?X, by X; after X as a setting. docs/reference/devices.md says what each letter means.
+# Bytes in the reply to ?X, by X; below, bytes after X as a setting. docs/reference/devices.md explains each letter.
 ANSWERED: Mapping[str, int] = (
     dict.fromkeys("BDFGJLNQRSUWY", 1) | dict.fromkeys("KMP", 3) | dict.fromkeys("TV", 4) | {"A": 6}
 )
@@ -102,13 +102,13 @@ SENSORS_22 = masked_sensors(MASK_22)
 
 
 def sensors_with(joints: Collection[str]) -> int | None:
-    """Return how many sensors the smallest CyberGlove has that measures all of `joints`; None if there is none."""
+    """Return the sensor count of the smallest CyberGlove that measures all of `joints`; None if there is none."""
     return next((len(names) for names in (SENSORS_18, SENSORS_22) if joints and set(joints) <= set(names)), None)
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What is sent, what the answer begins with, and how many bytes of values it then has; None: text."""
+    """A command: its bytes, the echo that begins its reply, and the number of value bytes in the reply; None: text."""
 
     request: bytes
     echo: bytes
@@ -116,13 +116,13 @@ class Command:
 
     @property
     def name(self) -> str:
-        """The command as a message names it."""
+        """The command's name in messages."""
         return self.echo.decode("ascii")
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What the box answered: values (or text), or else what it complains of."""
+    """A reply of the box: values (or text), or an error."""
 
     values: bytes
     error: str | None = None
@@ -151,15 +151,15 @@ def setting(letter: str, values: bytes) -> Command:
 
 
 def find_answer(command: Command, received: bytes, *, last: bool = False) -> Answer | None:
-    """Return the answer in what was received since the command, or None while there is none yet.
+    """Return the reply among the bytes received since the command, or None if it is not complete yet.
 
-    What comes before it is skipped, NUL by NUL: rests of a stream, the echo of a Ctrl-C. `last` says that nothing more
-    will come: then what could have become a longer answer is taken for what it is.
+    Bytes before it are skipped, NUL by NUL: remains of a stream, the echo of a Ctrl-C. `last` means that nothing more
+    will come: then bytes that could have become a longer reply are accepted as they are.
     """
     while received:
-        answer = _at_start(command, received, last)
-        if answer is not None:
-            return answer
+        reply = _at_start(command, received, last)
+        if reply is not None:
+            return reply
         if not last and received.startswith(command.echo):
             return None
         received = received.partition(b"\0")[2]
@@ -172,33 +172,33 @@ def _at_start(command: Command, received: bytes, last: bool) -> Answer | None:
     if received.startswith(command.echo) and end >= 0 and (values is None or received[end : end + 1] == b"\0"):
         return Answer(received[begin:end])
     found = re.match(rb"(%b)?e([?nygs])(\r\n)?\0" % re.escape(command.echo), received)
-    # With the echo before it, what reads as an error may be the beginning of values.
+    # After the echo, apparent error bytes may be the beginning of values.
     if found is None or (found[1] and not last and values is not None and found.end() <= begin + values):
         return None
     return Answer(b"", _ERRORS[found[2]])
 
 
 def period_words(rate_hz: float | None) -> Words:
-    """Return the two words that ask for the rate nearest to `rate_hz`; without one, for the fastest.
+    """Return the two words for the rate nearest to `rate_hz`; for None, the fastest.
 
-    Raises SettingError if no glove can be told such a rate.
+    Raises SettingError if no glove can be set to such a rate.
     """
     if rate_hz is None:
         return FASTEST
     if not isfinite(rate_hz) or rate_hz <= 0.0 or TICKS_HZ / rate_hz > _WORD * _WORD:
-        raise SettingError(f"a CyberGlove cannot send {rate_hz:g} records a second: ask for 1 to 160")
+        raise SettingError(f"a CyberGlove cannot send {rate_hz:g} records a second: request 1 to 160")
     ticks = max(1, round(TICKS_HZ / rate_hz))
     times = ceil(ticks / _WORD)
     return round(ticks / times), times
 
 
 def told_us(words: Words) -> float:
-    """Return the period in microseconds that the words tell; 0 for the fastest."""
+    """Return the period in microseconds that the words encode; 0 for the fastest."""
     return words[0] * words[1] * 1e6 / TICKS_HZ
 
 
 def digitising_us(sensors: int, filtered: bool = False) -> float:
-    """Return how long the box takes to digitise so many sensors, through its digital filter or not."""
+    """Return the time in microseconds to digitise this number of sensors, with or without the digital filter."""
     return sensors * (DIGITISED_US + FILTERED_US * filtered)
 
 
@@ -208,15 +208,15 @@ def shortest_us(sensors: int, baud: int, *, status: bool = False, filtered: bool
 
 
 def sending_us(size: int, baud: int) -> float:
-    """Return how long `size` bytes take on the line, in microseconds: 8 data bits, a start bit, a stop bit."""
+    """Return the time of `size` bytes on the line, in microseconds: 8 data bits, a start bit, a stop bit each."""
     return size * BITS_A_BYTE * 1e6 / baud
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """One reading: the sensors' bytes in wire order, streamed or polled, what the glove complains of, its status byte.
+    """One reading: the sensors' bytes in wire order, whether streamed or polled, a fault, the status byte.
 
-    Of a glove that is unplugged the sensors mean nothing.
+    The sensor values of an unplugged glove are meaningless.
     """
 
     sensors: bytes
@@ -227,7 +227,7 @@ class Record:
 
 @dataclass(slots=True)
 class RecordCounts:
-    """What came in: good records, those with a fault among them; pieces that were none, by what was wrong."""
+    """Counts of received records (including those with a fault), and of rejected pieces by reason."""
 
     records: int = 0
     too_fast: int = 0
@@ -237,12 +237,12 @@ class RecordCounts:
 
     @property
     def resyncs(self) -> int:
-        """How often bytes were skipped up to the next NUL."""
+        """Number of times that bytes were skipped up to the next NUL."""
         return self.wrong_start + self.wrong_length
 
 
 def encode(record: Record) -> bytes:
-    """Return the record as it goes on the wire, its NUL included. Raises ValueError where sensor or status is 0."""
+    """Return the record's bytes on the wire, with its NUL. Raises ValueError if a sensor or the status is 0."""
     if 0 in record.sensors:
         raise ValueError(f"sensor {record.sensors.index(0)} is 0, which ends a CyberGlove record: values are 1 to 255")
     if record.status == 0:
@@ -254,9 +254,9 @@ def encode(record: Record) -> bytes:
 
 @dataclass(slots=True)
 class RecordDecoder:
-    """Bytes in, records of so many sensors out; what is none is counted and skipped to the next NUL. Nothing raises.
+    """Decodes bytes to records of `sensors` sensors; other bytes are counted and skipped to the next NUL. Never raises.
 
-    status: whether the glove was told to append its status byte.
+    status: whether the glove appends its status byte.
     """
 
     sensors: int = SENSORS
@@ -278,12 +278,12 @@ class RecordDecoder:
         start, ending = piece[:1], piece[self._body :]
         if start not in (POLL, STREAM):
             self.counts.wrong_start += 1
-            _LOG.debug("%d bytes that begin with no G or S were skipped", len(piece))
+            _LOG.debug("%d bytes that do not begin with G or S were skipped", len(piece))
             return None
         fault = _FAULTS.get(ending)
         if len(piece) < self._body or (ending and fault is None):
             self.counts.wrong_length += 1
-            _LOG.debug("a record of %d bytes was skipped: %d are right", len(piece), self._body)
+            _LOG.debug("a record of %d bytes was skipped: expected %d", len(piece), self._body)
             return None
         self.counts.records += 1
         if fault is not None:

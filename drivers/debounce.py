@@ -1,8 +1,8 @@
-"""Debouncing: a press is reported as soon as it is read, a release once the contact has rested.
+"""Debouncing: a press is reported as soon as it is read, a release once the contact has been open long enough.
 
 A snap-action switch bounces for up to 3 ms when it closes and 8 ms when it opens (Panasonic EVQPL; other tact switches
 10 ms). Presses are eager, with a lockout; releases are deferred, as is usual where a press must not wait (QMK's
-`asym_eager_defer_pk`). All switches go through together as bits of one integer; those that change together share their
+`asym_eager_defer_pk`). All switches are processed together as bits of one integer; those that change together share
 timers.
 """
 
@@ -12,15 +12,14 @@ Mask = int
 
 
 class Debouncer:
-    """Which switches are closed, of what is read of them.
+    """Debounced switch states from raw readings.
 
-    press_lockout_us  for so long after a press, readings of the switch are ignored
-    release_us        a switch opens once it was read open for so long without a closed reading in between; a release
-                      is not put off to a scan that comes later than that anyway, so where more than half of it lies
-                      between scans, it takes less than two of them. What would be bounce of that opening, within
-                      release_us, is ignored.
+    press_lockout_us  readings of a switch are ignored for this time after its press
+    release_us        a switch opens once all its readings were open for this time. A release is not deferred to a scan
+                      that comes after this time: if scans are further apart than release_us / 2, a release takes fewer
+                      than two scans. Closed readings within release_us of the opening count as bounce and are ignored.
 
-    Raises SettingError where a time is negative.
+    Raises SettingError for a negative time.
     """
 
     def __init__(self, press_lockout_us: int = 5_000, release_us: int = 10_000) -> None:
@@ -30,14 +29,14 @@ class Debouncer:
         self._closed: Mask = 0
         self._time: int | None = None
         self._period: int | None = None
-        # Ignored until a time; being read open since a time: disjoint, and each switch in one group at most.
+        # Ignored until a time; read open since a time. The two are disjoint, and each switch is in at most one group.
         self._locks: list[tuple[int, Mask]] = []
         self._openings: list[tuple[int, Mask]] = []
 
     def update(self, time_us: int, closed: Mask, known: Mask) -> Mask:
-        """Return which switches are closed, now that those in `known` were read at `time_us`, `closed` among them.
+        """Return the closed switches after a reading of those in `known` at `time_us`, with `closed` among them closed.
 
-        Switches that were not read keep their state, and their times run on. Time that goes back stands still.
+        Switches that were not read keep their state, and their timers run on. A time that goes back is ignored.
         """
         now = self._advance(time_us)
         free = known & ~self._locked(now) if self._locks else known
@@ -51,7 +50,7 @@ class Debouncer:
         return self._closed
 
     def forget(self, switches: Mask) -> None:
-        """Begin anew with these: they are open, and no time of theirs runs."""
+        """Reset these switches: they are open, and their timers are cleared."""
         self._closed &= ~switches
         self._locks, self._openings = (
             [(time, mask & ~switches) for time, mask in timers if mask & ~switches]
@@ -59,7 +58,7 @@ class Debouncer:
         )
 
     def _advance(self, time_us: int) -> int:
-        """Note the time, and how soon the next reading may come: after the shortest of the recent periods."""
+        """Store the time, and the shortest recent period as the earliest time of the next reading."""
         if self._time is None:
             self._time = time_us
         interval = max(0, time_us - self._time)
@@ -82,7 +81,7 @@ class Debouncer:
             self._locks.append((until, mask))
 
     def _released(self, now: int, opened: Mask, closed: Mask) -> Mask:
-        """Return which of the switches that are read open have rested long enough; their bounce is locked out."""
+        """Return the open switches whose release time is over; their bounce is locked out."""
         released, begun, openings = 0, opened, []
         for since, group in self._openings:
             begun &= ~group
@@ -99,7 +98,7 @@ class Debouncer:
         return released
 
     def _go(self, now: int, since: int, group: Mask) -> Mask:
-        """Return `group` if the reading after this one would come too late for its release, else none of it."""
+        """Return `group` if the next reading would come too late for its release, else 0."""
         if not group or now + (self._period or 0) < since + self.release_us:
             return 0
         self._lock(now, since + self.release_us, group)

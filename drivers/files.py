@@ -1,6 +1,6 @@
-"""Files that are read: regular ones only, and never more of them than their reader can use.
+"""Reading files: regular files only, up to a size limit.
 
-It lives in `drivers` for the same reason as `errors`: everybody reads files, and this room imports nobody.
+It is in `drivers` for the same reason as `errors`: every package reads files, and this one imports none.
 """
 
 import errno
@@ -17,8 +17,8 @@ _PIECE = 1 << 20
 def open_file(path: Path, raises: type[ThenarError]) -> BinaryIO:
     """Open a regular file for reading bytes. The caller closes it.
 
-    Raises `raises` where `path` is a device, a pipe or a socket, which may never end; OSError as the operating system
-    gives it, also for a folder.
+    Raises `raises` if `path` is a device, a pipe or a socket, which may never end; OSError from the operating system,
+    also for a folder.
     """
     # A pipe without a writer would block open() itself.
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -37,14 +37,14 @@ def open_file(path: Path, raises: type[ThenarError]) -> BinaryIO:
 def read_file(path: Path, limit: int, raises: type[ThenarError]) -> bytes:
     """Return the content of a regular file of at most `limit` bytes.
 
-    Raises `raises` where the file is larger or no regular file, OSError as the operating system gives it.
+    Raises `raises` if the file is larger or not regular; OSError from the operating system.
     """
     pieces, left = [], limit + 1
     with open_file(path, raises) as file:
-        # read() sets aside all the memory that it is asked for, however short the file.
+        # read() allocates its full argument, however short the file is.
         while piece := file.read(min(left, _PIECE)):
             pieces.append(piece)
             left -= len(piece)
     if not left:
-        raise raises(f"{path} is larger than {limit} bytes, the most that is read of such a file")
+        raise raises(f"{path} is larger than {limit} bytes, the limit for such a file")
     return b"".join(pieces)

@@ -1,4 +1,4 @@
-"""Where lines come from: a serial port, TCP, UDP, a Unix socket, stdin or a WebSocket, all read alike.
+"""Sources of lines: a serial port, TCP, UDP, a Unix socket, stdin or a WebSocket, all read in the same way.
 
 /dev/ttyUSB0          a serial port, also rfc2217://HOST:PORT
 tcp://HOST:PORT       a server that sends lines to whoever connects
@@ -40,28 +40,28 @@ _WAYS = (
 
 
 class RowReader(Closing, ABC):
-    """What delivers rows of numbers. It may be opened again after it was closed.
+    """A source of rows of numbers. It may be reopened after it was closed.
 
-    odd  the last of what came that was no row, to be shown; "" if all was
+    odd  the last input that was not a row, for display; "" if there was none
     """
 
     odd = ""
 
     @abstractmethod
     def open(self) -> None:
-        """Open it. Raises DeviceError where another try may help, SettingError where none does."""
+        """Open it. Raises DeviceError if a retry may help, SettingError if it does not."""
 
     @abstractmethod
     def read(self, timeout_s: float) -> Sequence[Row]:
-        """Return the rows that come in; wait for some until the timeout. Raises DeviceError when it is gone."""
+        """Return the received rows; wait for some until the timeout. Raises DeviceError if the source is gone."""
 
     def counts(self) -> LineCounts:
-        """Return what came that was no row."""
+        """Return the counts of input that was not a row."""
         return LineCounts()
 
 
 class LineReader(RowReader):
-    """Rows of the lines that come from `port`. Its constructor opens nothing."""
+    """Rows of the lines from `port`. The constructor does not open it."""
 
     def __init__(self, port: str, baud: int = 115_200) -> None:
         self.port, self._baud = port, baud
@@ -76,14 +76,14 @@ class LineReader(RowReader):
         self._line = _opened(self.port, self._baud)
 
     def read(self, timeout_s: float) -> Sequence[Row]:
-        """Return the rows that came in."""
+        """Return the received rows."""
         assert isinstance(self._line, SerialLine | _Descriptor | _WebSocket)
         rows = self._parser.feed(self._line.read(timeout_s))
         self.odd = self._parser.odd
         return rows
 
     def counts(self) -> LineCounts:
-        """Return what came that was no row."""
+        """Return the counts of input that was not a row."""
         return self._parser.counts
 
     def close(self) -> None:
@@ -94,19 +94,19 @@ class LineReader(RowReader):
 
 
 def line_port_fault(port: str) -> str:
-    """Return why no lines can come from `port`, or nothing."""
+    """Return why `port` cannot deliver lines, or ""."""
     if port == "-":
         return ""
     if port.startswith("unix:"):
         path = port.removeprefix("unix:")
-        return "" if path and path.isprintable() else f"names no socket: {_WAYS}"
+        return "" if path and path.isprintable() else f"does not name a socket: {_WAYS}"
     if port.startswith(("tcp:", "udp:")):
         found = _NET.fullmatch(port)
-        return "" if found and 0 < int(found[3]) < 65536 else f"is no address: {_WAYS}"
+        return "" if found and 0 < int(found[3]) < 65536 else f"is not an address: {_WAYS}"
     if port.startswith(("ws:", "wss:")):
-        return "" if _is_web(port) else f"is no address: {_WAYS}"
+        return "" if _is_web(port) else f"is not an address: {_WAYS}"
     if "://" in port and not port.startswith(("rfc2217://", "socket://")):
-        return f"is no port that is opened: {_WAYS}"
+        return f"is not a supported port: {_WAYS}"
     return port_fault(port)
 
 
@@ -139,8 +139,8 @@ def _opened(port: str, baud: int) -> "SerialLine | _Descriptor | _WebSocket":
 def _advice(port: str, reason: OSError) -> str:
     said = reason.strerror or str(reason)
     if port.startswith("udp:"):
-        return f"{said}: its host is an address of this computer, and no other program may have the port"
-    return f"{said}: is the sender there, and does it listen?"
+        return f"{said}: use an address of this computer as host, and close other programs that have the port"
+    return f"{said}: is the sender running, and does it listen?"
 
 
 def _connected(family: socket.AddressFamily, path: str) -> socket.socket:
@@ -172,23 +172,23 @@ def _bound(host: str, port: int) -> socket.socket:
 
 
 class _Descriptor(Closing):
-    """A socket, or standard input where there is none."""
+    """A socket, or standard input if there is none."""
 
     def __init__(self, port: str, line: socket.socket | None) -> None:
         self._port, self._line = port, line
         if line is None and sys.stdin is None:
-            raise SettingError("standard input is closed: no lines come from there")
+            raise SettingError("standard input is closed: no lines can come from it")
         self._descriptor = sys.stdin.fileno() if line is None else line.fileno()
         self._datagrams = line is not None and line.type == socket.SOCK_DGRAM
 
     def read(self, timeout_s: float) -> bytes:
-        """Return what has come in until the timeout. Raises DeviceError when the other end is gone."""
+        """Return the bytes received until the timeout. Raises DeviceError if the other end is gone."""
         try:
             ready, _, _ = select.select([self._descriptor], [], [], max(0.0, timeout_s))
             if not ready:
                 return b""
             data = os.read(self._descriptor, _CHUNK)
-        except (OSError, ValueError) as reason:  # the latter: closed meanwhile
+        except (OSError, ValueError) as reason:  # ValueError: closed meanwhile
             raise DeviceError(f"{self._port}: it is gone ({reason})") from reason
         if self._datagrams:
             return data + b"\n"
@@ -203,7 +203,7 @@ class _Descriptor(Closing):
 
 
 class _WebSocket(Closing):
-    """A WebSocket's messages, each of which ends a line."""
+    """The messages of a WebSocket; the end of each ends a line."""
 
     def __init__(self, port: str) -> None:
         try:
@@ -215,11 +215,11 @@ class _WebSocket(Closing):
             self._open = ExitStack()
             line = connect(port, open_timeout=_CONNECT_S, close_timeout=0.2, max_size=4 * LONGEST, proxy=None)
             self._line: ClientConnection = self._open.enter_context(line)
-        except Exception as reason:  # the library's and the socket's errors, of many kinds
-            raise DeviceError(f"{port}: {reason}: is the sender there, and does it listen?") from reason
+        except Exception as reason:  # many kinds, from the library and the socket
+            raise DeviceError(f"{port}: {reason}: is the sender running, and does it listen?") from reason
 
     def read(self, timeout_s: float) -> bytes:
-        """Return the next message. Raises DeviceError when the other end is gone."""
+        """Return the next message. Raises DeviceError if the other end is gone."""
         try:
             message = self._line.recv(timeout_s)
         except TimeoutError:

@@ -1,11 +1,11 @@
-"""Lines of text that hold rows of numbers, as makers' boards print them: CSV, JSON, or `name:value` pairs.
+"""Lines of text with rows of numbers, as hobbyist boards print them: CSV, JSON, or `name:value` pairs.
 
-    12,0,1,1023                          numbers in the order of the columns; also parted by ; tabs or blanks
+    12,0,1,1023                          numbers in the order of the columns; also separated by ; tabs or blanks
     ms,thumb,index,flex                  a header: names of the columns of the lines that follow
     ms:12,thumb:0,flex:1023              names with their values, as the Arduino IDE's plotter reads them
     {"ms": 12, "thumb": 0, "flex": 1023} a JSON object, or a JSON list of numbers in the order of the columns
 
-A line that holds anything else is a misfit. A value that is no number, such as nan, is None; the rest of it counts.
+Any other line is a misfit. A value that is not a finite number, such as nan, is None; the rest of its line counts.
 """
 
 import json
@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from .names import LONGEST_SHOWN, shortened
 
-# A row of two thousand columns of five digits is shorter.
+# Long enough for two thousand columns of five digits.
 LONGEST = 16_384
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 _NO_NUMBER = re.compile(r"|[+-]?nan|[+-]?inf(inity)?|null|none|na|-", re.IGNORECASE)
@@ -26,9 +26,9 @@ _DIGITS = 400
 
 
 class Row(NamedTuple):
-    """What one line holds: values, None where one is no number; and their names, None where only their order says.
+    """The content of one line: values, None where one is not a number; and names, None if only the order is known.
 
-    `time_s` is the sender's clock where what carries the row says it, and not a column.
+    `time_s` is the sender's clock, if the transport carries it outside the columns.
     """
 
     names: tuple[str, ...] | None
@@ -37,7 +37,7 @@ class Row(NamedTuple):
 
 
 class Header(NamedTuple):
-    """A line that names the columns of those that follow."""
+    """A line that names the columns of the lines that follow."""
 
     names: tuple[str, ...]
 
@@ -45,8 +45,8 @@ class Header(NamedTuple):
 class Splitter:
     """Splits a stream of bytes at line feeds.
 
-    A line of more than LONGEST bytes is dropped and counted in `overlong`: a stream without line feeds never fills the
-    memory.
+    A line of more than LONGEST bytes is dropped and counted in `overlong`, so a stream without line feeds cannot fill
+    the memory.
     """
 
     def __init__(self) -> None:
@@ -54,7 +54,7 @@ class Splitter:
         self._rest, self._dropping = b"", False
 
     def feed(self, chunk: bytes) -> list[bytes]:
-        """Return the lines that `chunk` ends, without their ends and without empty ones."""
+        """Return the lines that `chunk` completes, without line ends and without empty lines."""
         pieces = chunk.split(b"\n")
         pieces[0] = self._rest + pieces[0]
         self._rest = pieces.pop()
@@ -71,7 +71,7 @@ class Splitter:
 
 
 def parsed(line: bytes) -> Row | Header | None:
-    """Return what a line holds; None for a misfit."""
+    """Parse a line; None for a misfit."""
     try:
         text = line.decode("utf-8")
     except UnicodeDecodeError:
@@ -82,7 +82,7 @@ def parsed(line: bytes) -> Row | Header | None:
     fields = _fields(text)
     if any(":" in field for field in fields):
         return _of_pairs(fields)
-    # Words parted by blanks are a message.
+    # Words separated by blanks are a message.
     worded = len(fields) == 1 or len(text.split()) < len(fields) or not set(text).isdisjoint(",;\t")
     if worded and all(map(_NAME.fullmatch, fields)) and not all(map(_NO_NUMBER.fullmatch, fields)):
         return Header(tuple(fields)) if _sound(fields) else None
@@ -103,7 +103,7 @@ def _of_pairs(fields: Sequence[str]) -> Row | None:
 
 
 def _row(names: tuple[str, ...] | None, fields: Sequence[str]) -> Row | None:
-    """Return the row of these texts; None where one of them is neither a number nor a spelling of a missing one."""
+    """Return the row of these texts; None if one is neither a number nor a spelling of a missing value."""
     if not fields or not all(_NUMBER.fullmatch(field) or _NO_NUMBER.fullmatch(field) for field in fields):
         return None
     if names is not None and not _sound(names):
@@ -116,13 +116,13 @@ def _number(field: str) -> float | None:
 
 
 def finite(value: float) -> float | None:
-    """Return a finite number as it is, and None in place of any other."""
+    """Return a finite number unchanged, None for any other."""
     return value if math.isfinite(value) else None
 
 
 def _of_json(text: str) -> Row | None:
     try:
-        found: Any = json.loads(text)  # which takes NaN, as Python's own sends it
+        found: Any = json.loads(text)  # accepts NaN, which Python's json writes
     except (ValueError, RecursionError):
         return None
     names = tuple(found) if isinstance(found, dict) else None
@@ -140,15 +140,15 @@ def _of_value(value: Any) -> float | None:
 
 
 def _sound(names: Sequence[str]) -> bool:
-    """Return whether the names of columns are all there and all different."""
+    """Return whether all columns have names, and all names differ."""
     return len(set(names)) == len(names) and "" not in names
 
 
 @dataclass(slots=True)
 class LineCounts:
-    """What came of lines, since the driver was made.
+    """Counts of lines since the driver was made.
 
-    misfits   lines that hold no row: garbage, half a line, a debug message
+    misfits   lines without a row: garbage, half a line, a debug message
     overlong  lines longer than any row
     """
 
@@ -157,19 +157,19 @@ class LineCounts:
 
 
 class LineParser:
-    """Makes rows of chunks of bytes; odd is the last misfit, to be shown."""
+    """Parses rows from chunks of bytes; odd is the last misfit, for display."""
 
     def __init__(self) -> None:
         self.counts, self.odd = LineCounts(), ""
         self.begin()
 
     def begin(self) -> None:
-        """Begin anew: half a line that was under way is forgotten, and so are the names of columns."""
+        """Reset: an incomplete line and the names of the columns are forgotten."""
         self._splitter = Splitter()
         self._names: tuple[str, ...] | None = None
 
     def feed(self, chunk: bytes) -> list[Row]:
-        """Return the rows whose lines `chunk` ends, named where a header came before them."""
+        """Return the rows whose lines `chunk` completes, with names if a header came before them."""
         rows = []
         before = self._splitter.overlong
         for line in self._splitter.feed(chunk):

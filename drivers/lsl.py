@@ -1,4 +1,4 @@
-"""The package of the Lab Streaming Layer, which only those who use it need (extra `lsl`)."""
+"""The Lab Streaming Layer package, an optional dependency (extra `lsl`)."""
 
 import os
 from typing import TYPE_CHECKING
@@ -12,12 +12,12 @@ _THIS_MACHINE = b"[multicast]\nResolveScope=machine\nListenAddress=127.0.0.1\n[p
 
 
 def load_pylsl(place: str) -> "ModuleType":
-    """Return pylsl. Raises SettingError where it, or the library that it wraps, is not installed."""
+    """Return pylsl. Raises SettingError if it, or the library that it wraps, is not installed."""
     try:
         import pylsl
         import pylsl.util
     except (ImportError, RuntimeError, OSError) as reason:  # the library itself may be missing
         raise SettingError(f'{place}: LSL needs a package: pip install "thenar[lsl]" ({reason})') from None
     if "LSLAPICFG" not in os.environ:
-        pylsl.lib.lib.lsl_set_config_content(_THIS_MACHINE)  # which counts before the first stream of a process
+        pylsl.lib.lib.lsl_set_config_content(_THIS_MACHINE)  # effective only before the first stream of a process
     return pylsl  # type: ignore[no-any-return]

@@ -1,4 +1,4 @@
-"""Registries: the members of one kind of thing, thenar's own and those of other packages."""
+"""Registries: all members of one kind, from thenar and from other packages."""
 
 import importlib
 import pkgutil
@@ -12,11 +12,11 @@ from .names import shortened
 
 
 class MemberError(ThenarError, ValueError):
-    """A member of a registry that there is not, or that cannot be loaded."""
+    """A member of a registry that does not exist or cannot be loaded."""
 
 
 class Named(Protocol):
-    """What every member of a registry has: the name by which people choose it."""
+    """The interface of every registry member: a name by which users choose it."""
 
     @property
     def name(self) -> str:
@@ -28,10 +28,10 @@ M = TypeVar("M", bound=Named)
 
 
 class Members(Mapping[str, M], Generic[M]):
-    """All members of a kind by their names: those of a folder, in its order, then those of entry points, by name.
+    """All members of a kind by name: those of a folder in its order, then those of entry points by name.
 
-    Each module of the folder that defines `MEMBER`, one object or a tuple of several, adds what it defines. Another
-    package adds a member with an entry point in `group`, that names the object::
+    Each module of the folder may define `MEMBER`, one object or a tuple of objects. Another package adds a member with
+    an entry point in `group` that names the object::
 
         [project.entry-points."thenar.chips"]
         max7301 = "my_package.max7301:CHIP"
@@ -41,7 +41,7 @@ class Members(Mapping[str, M], Generic[M]):
     Parameters
     ----------
     kind : str
-        What a member is called in messages: "chip".
+        The word for a member in messages, such as "chip".
     shape : type
         The class of all members.
     package : str
@@ -52,7 +52,7 @@ class Members(Mapping[str, M], Generic[M]):
     Raises
     ------
     MemberError
-        On use, if a member of another package cannot be imported, is no `shape`, or has a name that is taken.
+        On use, if a member of another package cannot be imported, is not a `shape`, or has a name that is taken.
     """
 
     def __init__(self, kind: str, shape: type[M], package: str, group: str) -> None:
@@ -87,10 +87,10 @@ class Members(Mapping[str, M], Generic[M]):
         try:
             member = point.load()
         except Exception as error:
-            said = f"cannot be loaded: {shortened(str(error))}; mend or uninstall it"
+            said = f"cannot be loaded: {shortened(str(error))}; fix or uninstall it"
             raise MemberError(f"{self._where(point)} {said}") from error
         if not isinstance(member, self.shape):
-            said = f"is no {self.shape.__name__}: docs/how-to/extend.md says what one defines"
+            said = f"is not a {self.shape.__name__}: docs/how-to/extend.md says what to define"
             raise MemberError(f"{self._where(point)} {said}")
         return member
 
@@ -111,7 +111,7 @@ class Members(Mapping[str, M], Generic[M]):
 
 
 class MembersByName(Members[M]):
-    """Members of which each is imported when it is asked for, and no other: to list their names imports none.
+    """Members that are imported one by one on first use: listing their names imports none.
 
     The module hand_object_pose of the folder defines the member "hand.object_pose" as `MEMBER`. A member of another
     package has the name of its entry point. Names come in alphabetical order, those of other packages last.
@@ -119,13 +119,13 @@ class MembersByName(Members[M]):
     Raises
     ------
     MemberError
-        On use, if a name is taken. When a member of another package is asked for: if it cannot be imported, is no
-        `shape`, or has another name than its entry point.
+        On use, if a name is taken. On access to a member of another package, if it cannot be imported, is not a
+        `shape`, or has a different name from its entry point.
     """
 
     @cached_property
     def _places(self) -> dict[str, EntryPoint | None]:
-        """The entry points by the names of their members; None for those of the folder."""
+        """Entry points by member name; None for members of the folder."""
         folder = importlib.import_module(self.package)
         modules = sorted(info.name for info in pkgutil.iter_modules(folder.__path__))
         places: dict[str, EntryPoint | None] = {module.replace("_", ".", 1): None for module in modules}
@@ -141,7 +141,7 @@ class MembersByName(Members[M]):
             return member
         member = self._loaded(point)
         if member.name != name:
-            said = f"has another name, {shortened(member.name)!r}: give its entry point that name"
+            said = f"has a different name, {shortened(member.name)!r}: give its entry point that name"
             raise MemberError(f"{self._where(point)} {said}")
         return member
 

@@ -1,15 +1,15 @@
-"""Names from files and devices: which are good, and how they are shown so that no terminal obeys them.
+"""Names from files and devices: which are valid, and how to print them without terminal control sequences.
 
-It lives in `drivers` for the same reason as `errors`: everybody meets names, and this room imports nobody.
+It is in `drivers` for the same reason as `errors`: every package uses names, and this one imports none.
 """
 
 import unicodedata
 
 LONGEST_NAME = 200
-# The longest piece of a foreign file that a message repeats.
+# The longest excerpt of a foreign file in a message.
 LONGEST_SHOWN = 80
 
-# Control and format characters (a terminal obeys some, others reorder a line), halves of surrogate pairs, and the
+# Control and format characters (a terminal executes some, others reorder a line), halves of surrogate pairs, and the
 # separators of lines and paragraphs.
 _UNSOUND = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 # Private and unassigned ones have no glyph, but do nothing either.
@@ -19,9 +19,9 @@ _JOINERS = frozenset("\u200c\u200d")
 
 
 def fault(name: str, longest: int = LONGEST_NAME) -> str:
-    """Return why `name` would not survive every file format, or would deceive who reads it; or nothing.
+    """Return why `name` would not survive every file format or would mislead a reader, or "".
 
-    It is the one rule for names of switches, joints, grasp types, taxonomies, subjects, objects, sensors and gloves.
+    This is the only rule for names of switches, joints, grasp types, taxonomies, subjects, objects, sensors and gloves.
     `longest` is for texts that contain a name.
     """
     if not name:
@@ -37,12 +37,12 @@ def fault(name: str, longest: int = LONGEST_NAME) -> str:
 
 
 def sound_name(name: str, otherwise: str) -> str:
-    """Return `name`, or `otherwise` where it is none: the stem of a file may be anything."""
+    """Return `name`, or `otherwise` if it is not a valid name: the stem of a file may be anything."""
     return otherwise if fault(name) else name
 
 
 def printable(text: str) -> str:
-    """Return `text` with every character without a glyph escaped as in Python, so that no terminal obeys it."""
+    """Return `text` with every character without a glyph escaped as in Python, safe for terminals."""
     if text.isprintable():
         return text
     return "".join(
@@ -57,6 +57,6 @@ def shortened(text: str, longest: int = LONGEST_SHOWN) -> str:
 
 
 def _unsound(letter: str) -> bool:
-    # The last two of every plane are no characters: XML, HTML and SVG refuse them.
+    # The last two of every plane are noncharacters: XML, HTML and SVG reject them.
     none = ord(letter) & 0xFFFE == 0xFFFE or 0xFDD0 <= ord(letter) <= 0xFDEF
     return none or (unicodedata.category(letter) in _UNSOUND and letter not in _JOINERS)

@@ -1,6 +1,6 @@
-"""Ports: which texts name one, and which file may be opened as one. A port may come from somebody else's file.
+"""Ports: which texts name a port, and which file may be opened as one. A port may come from an untrusted file.
 
-pySerial takes more for a port than a line: `spy://` writes to any file, `alt://` loads any of its classes.
+pySerial accepts more than serial lines: `spy://` writes to any file, `alt://` loads any of its classes.
 """
 
 import re
@@ -12,7 +12,7 @@ from .errors import DeviceError
 
 _SCHEMES = ("socket", "rfc2217")
 _HOST = re.compile(r"[A-Za-z0-9._-]+|[0-9A-Fa-f:.]+(%[A-Za-z0-9._-]+)?")
-# What pySerial's connection to a redirector may be asked for: an option, and what it may be.
+# Options of pySerial's connection to a redirector, and their values.
 _OPTIONS = {
     "ign_set_control": re.compile(""),
     "poll_modem": re.compile(""),
@@ -22,54 +22,54 @@ _WAYS = "a port is a device such as /dev/ttyUSB0, socket://HOST:PORT or rfc2217:
 
 
 def port_fault(port: str) -> str:
-    """Return why `port` names no serial line, or nothing."""
+    """Return why `port` does not name a serial line, or ""."""
     scheme, found, _ = port.partition("://")
     if not found:
         return device_fault(port)
     if scheme.lower() not in _SCHEMES:
-        return f"is no port that is opened: {_WAYS}"
+        return f"is not a supported port: {_WAYS}"
     return _url_fault(port)
 
 
 def device_fault(path: str) -> str:
-    """Return why `path` cannot be that of a device node, or nothing."""
+    """Return why `path` cannot be a device node, or ""."""
     if not path:
         return f"is empty: {_WAYS}"
     if "://" in path or not path.isprintable():
-        return "is no path of a device, such as /dev/ttyUSB0 or /dev/i2c-1"
+        return "is not the path of a device, such as /dev/ttyUSB0 or /dev/i2c-1"
     return ""
 
 
 def check_node(path: str) -> None:
-    """Raise DeviceError unless a device is at `path`: a file would be locked, or taken for a device, by its opening.
+    """Raise DeviceError unless `path` is a device: opening a file would lock it or treat it as a device.
 
-    A path that is missing or unreadable is no error here: opening it reports that.
+    A path that is missing or unreadable is not an error here: opening it reports that.
     """
     try:
         mode = Path(path).stat().st_mode
     except OSError:
         return
     if not stat.S_ISCHR(mode):
-        kind = "a folder" if stat.S_ISDIR(mode) else "a file" if stat.S_ISREG(mode) else "no character device"
-        raise DeviceError(f"{path} is {kind}, no device: it was left as it is")
+        kind = "a folder" if stat.S_ISDIR(mode) else "a file" if stat.S_ISREG(mode) else "not a character device"
+        raise DeviceError(f"{path} is {kind}, not a device: it was left as it is")
 
 
 def _url_fault(url: str) -> str:
-    if not (url.isascii() and url.isprintable()):  # urlsplit leaves line breaks out
-        return f"is no address of a line: {_WAYS}"
+    if not (url.isascii() and url.isprintable()):  # urlsplit drops line breaks
+        return f"is not the address of a line: {_WAYS}"
     try:
         parts = urlsplit(url)
         host, port = parts.hostname, parts.port
         options = parse_qsl(parts.query, keep_blank_values=True, max_num_fields=8)
     except ValueError as reason:
-        return f"is no address of a line ({reason}): {_WAYS}"
+        return f"is not the address of a line ({reason}): {_WAYS}"
     if not host or not port or not _HOST.fullmatch(host) or parts.path not in ("", "/") or parts.fragment:
-        return f"is no address of a line: {_WAYS}"
+        return f"is not the address of a line: {_WAYS}"
     if parts.username is not None or parts.password is not None:
-        return f"names a user, which no line asks for: {_WAYS}"
+        return f"names a user, which no serial line needs: {_WAYS}"
     known = _OPTIONS if parts.scheme == "rfc2217" else {}
     for option, value in options:
         if option not in known or not known[option].fullmatch(value):
             allowed = f": there are {', '.join(known)}" if known else ": a socket has none"
-            return f"has the option {option!r}, which is not for it{allowed}"
+            return f"has the option {option!r}, which it does not support{allowed}"
     return ""

@@ -1,4 +1,4 @@
-"""The switch-scanner board, on a serial line or in a Wi-Fi: its closed keys, and codes, with their times."""
+"""The switch-scanner board, on a serial line or over Wi-Fi: its closed keys and codes, with their times."""
 
 import logging
 from collections import deque
@@ -44,12 +44,11 @@ _Setting = SetRate | SetDebounce | SetChannels | SetSegments
 
 
 class ScannerReading(NamedTuple):
-    """The keys at one time, in the host's monotonic microseconds; and where it is an ANALOG that came, the codes.
+    """The keys at one time, in the host's monotonic microseconds; after an ANALOG message also the codes.
 
-    known holds the keys of which anything can be said: none from a lost frame until the board has told all of its keys
-    again, none that the board says it cannot read, and of a matrix without diodes only those that cannot be ghosts.
-    `closed` holds no others. codes are of the channels that were asked for (`Scanner.analog`), the lowest first, None
-    for one that could not be read.
+    known holds the keys with a known state: none from a lost frame until the board has reported all keys again, none
+    that the board cannot read, and of a matrix without diodes only those that cannot be ghosts. `closed` is a subset.
+    codes are those of the requested channels (`Scanner.analog`), the lowest first, None for one that could not be read.
     """
 
     time_us: int
@@ -59,11 +58,11 @@ class ScannerReading(NamedTuple):
 
 
 class BoardGrasp(NamedTuple):
-    """What a board recognised by itself, in a frame that it read at time_us, in the host's monotonic microseconds.
+    """A prediction by the board from a frame that it read at time_us, in the host's monotonic microseconds.
 
-    number    of the grasp type in the order of the build that the board carries, the one after the last: nothing is
-              held; None: it is not known
-    margin    the best score less the second, in steps of the build's tables; 65535 stands for more, too
+    number    of the grasp type in the order of the build on the board; the number after the last: nothing is held;
+              None: unknown
+    margin    the best score minus the second, in steps of the build's tables, clipped to 65535
     degraded  whether an input was missing
     early     whether the scan ended as soon as the rest of the switches could not matter
     """
@@ -76,9 +75,9 @@ class BoardGrasp(NamedTuple):
 
 
 class BoardSegment(NamedTuple):
-    """The segment that a board was in when it read a frame at time_us, in the host's monotonic microseconds.
+    """The board's segment in a frame that it read at time_us, in the host's monotonic microseconds.
 
-    number  of grasps so far, modulo 65536; while one is forming, its own
+    number  of grasps so far, modulo 65536, including one that is forming
     grasp   the number of the segment's grasp type; None in the state "none"
     state   "none", "forming", "held" or "releasing", as in `runtime.published.LiveGrasp`
     """
@@ -91,11 +90,11 @@ class BoardSegment(NamedTuple):
 
 @dataclass(slots=True)
 class ScannerCounts(FrameCounts):
-    """What came in since the board was opened.
+    """Counts since the board was opened.
 
-    Besides frames: gaps in the numbers of the sound ones; misfits, which were sound but said what this board cannot
-    say; in a Wi-Fi, datagrams that were missing, late, repeated or foreign, as DatagramCounts has them. And how often
-    the state was asked for, something being amiss, and the time.
+    In addition to frames: gaps in the numbers of valid ones; misfits, which were valid but impossible for this board;
+    over Wi-Fi, datagrams that were missing, late, repeated or foreign, as in DatagramCounts; requests for the state
+    after a loss, and for the time.
     """
 
     gaps: int = 0
@@ -108,28 +107,28 @@ class ScannerCounts(FrameCounts):
     pings: int = 0
 
 
-# Opening the port of an Arduino resets it, and its boot loader answers nobody for up to two seconds.
+# Opening the port of an Arduino resets it, and its boot loader does not reply for up to two seconds.
 _BOOT_S = 3.0
 _GREETING_S = 0.3
-# What was asked for and does not come; and from one loss that was made good to the next.
+# Period of repeated requests; and the shortest time between two recovered losses.
 _ASK_AGAIN_S, _ASK_ANEW_S = 0.1, 0.02
 
 
 class Scanner(Closing):
-    """A scanner board at `url`: a device, socket://HOST:PORT, rfc2217://HOST:PORT; in a Wi-Fi udp://HOST:PORT.
+    """A scanner board at `url`: a device, socket://HOST:PORT, rfc2217://HOST:PORT; over Wi-Fi udp://HOST:PORT.
 
     Boards with USB or Wi-Fi ignore `baud`.
 
-    `open`, then `read` again and again; both raise DeviceError when the board is gone or is not what it was, after
-    which opening it again is the way back. For one thread.
+    Call `open`, then `read` repeatedly. Both raise DeviceError if the board is gone or was replaced; reopen it then.
+    Not thread-safe.
 
-    hello   what the board last said of itself
-    faults  what it last said of its own troubles; None: nothing yet
-    grasp   what it last recognised by itself; None: nothing yet
-    segment the segment that it was last in; None: it has not said so, or does not follow segments
-    analog  which channels it measures, how often, in how many bits; None before it answered `set_channels`
-    times   gives readings their times: by `clock.trip_us` the last may be older, and `late_us` late came the last
-            message with a time of its own
+    hello   the board's last description of itself
+    faults  its last fault counts; None: none yet
+    grasp   its last prediction; None: none yet
+    segment its last segment; None: not reported, or the board does not follow segments
+    analog  its measured channels, their period and bits; None before its reply to `set_channels`
+    times   gives readings their times: the last may be older by `clock.trip_us`, and the last message with a time
+            stamp arrived `late_us` late
     """
 
     def __init__(self, url: str, baud: int = 115200) -> None:
@@ -150,7 +149,7 @@ class Scanner(Closing):
         self._waiting: deque[tuple[int, Received]] = deque()  # when it came in, in the host's monotonic microseconds
         self._misfits = self._asked = 0
         self._asked_at = self._ask_at = self._channels_at = self._segments_at = 0.0
-        self._told: dict[int, _Setting] = {}
+        self._settings: dict[int, _Setting] = {}
         self._token = 0
 
     def __enter__(self) -> Self:
@@ -158,7 +157,7 @@ class Scanner(Closing):
         return self
 
     def open(self) -> Hello:
-        """Find the board. Raises DeviceError if none answers within three seconds, or one that speaks otherwise."""
+        """Find the board. Raises DeviceError if none replies within three seconds, or with another protocol."""
         self.close()
         self._forget()
         if is_datagram_port(self.url):
@@ -176,13 +175,13 @@ class Scanner(Closing):
 
     @property
     def counts(self) -> ScannerCounts:
-        """What came in since the board was last opened."""
+        """Counts since the board was last opened."""
         keys, times = self._keys, self.times
         seen = asdict(self._frames) | asdict(self._datagrams)
         return ScannerCounts(**seen, gaps=keys.gaps, misfits=self._misfits, asked=self._asked, pings=times.pings)
 
     def read(self, timeout_s: float) -> ScannerReading | None:
-        """Return the next reading, None if there was none in time. Raises DeviceError."""
+        """Return the next reading, None at the timeout. Raises DeviceError."""
         end = monotonic() + timeout_s
         if self.times.due:
             self._send(self.times.ping())
@@ -197,20 +196,20 @@ class Scanner(Closing):
         return reading
 
     def set_rate(self, scan_us: int, state_us: int, heartbeat_us: int) -> None:
-        """Ask for other periods, as in Hello; once the answer was read, `hello` says what came of it.
+        """Request other periods, as in Hello; once the reply was read, `hello` has the result.
 
-        A board that restarts is told again. Raises SettingError for a time that no frame can carry.
+        A board that restarts gets the setting again. Raises SettingError for a time that no frame can carry.
         """
         self._tell(SetRate(scan_us, state_us, heartbeat_us))
 
     def set_debounce(self, press_us: int, release_us: int) -> None:
-        """Ask for debouncing on the board, as in Hello; answered as `set_rate` is."""
+        """Request debouncing on the board, as in Hello, with a reply as for `set_rate`."""
         self._tell(SetDebounce(press_us, release_us))
 
     def set_channels(self, analog_us: int, wanted: Mask) -> None:
-        """Ask for the codes of these channels every `analog_us`, 0: never; once the answer was read, `analog` has it.
+        """Request the codes of these channels every `analog_us`, 0: never; once the reply was read, `analog` has it.
 
-        A board that restarts is told again. Raises SettingError for a board that has no analog channels.
+        A board that restarts gets the setting again. Raises SettingError for a board without analog channels.
         """
         if self.hello is not None and not self.hello.has_analog:
             raise SettingError(
@@ -222,7 +221,7 @@ class Scanner(Closing):
         self._tell(SetChannels(self._token, analog_us, wanted, wanted.bit_length()))
 
     def close(self) -> None:
-        """Close the line. Does no harm twice."""
+        """Close the line. Closing twice is harmless."""
         link, self._link = self._link, None
         if link is not None:
             link.close()
@@ -238,14 +237,14 @@ class Scanner(Closing):
         self._sequence += 1
 
     def _receive(self, timeout_s: float) -> None:
-        """Add what came in to what waits, after waiting for something until the timeout."""
+        """Wait for messages until the timeout, and queue them."""
         received = self._opened().receive(timeout_s)
         came_us = monotonic_ns() // 1000
         self._waiting.extend((came_us, each) for each in received)
 
     def _tell(self, setting: _Setting) -> None:
         self._send(setting)
-        self._told[setting.KIND] = setting
+        self._settings[setting.KIND] = setting
 
     def _greet(self) -> Hello:
         end, ping_at = monotonic() + _BOOT_S, 0.0
@@ -263,9 +262,9 @@ class Scanner(Closing):
         wireless = is_datagram_port(self.url)
         at, check = ("", "address, Wi-Fi") if wireless else (f" at {self.baud} baud", "port, baud rate")
         raise DeviceError(
-            f"{self.url}: no scanner board answered{at} in {_BOOT_S:g} s ({self._opened().received_bytes} bytes"
+            f"{self.url}: no scanner board replied{at} in {_BOOT_S:g} s ({self._opened().received_bytes} bytes"
             f" came, {self._frames.frames} sound frames): check {check}, power and the board's firmware"
-            + (", and whether another program has it open: it hears one at a time" if wireless else "")
+            + (", and whether another program has it open: the board serves one at a time" if wireless else "")
         )
 
     def _meet(self, received: Frame, came_us: int) -> Hello:
@@ -278,14 +277,14 @@ class Scanner(Closing):
         return hello
 
     def _next(self) -> ScannerReading | None:
-        """Return the first reading of what waits."""
+        """Return the first reading from the queue."""
         while self._waiting:
             if (reading := self._take(*self._waiting.popleft())) is not None:
                 return reading
         return None
 
     def _take(self, came_us: int, received: Received) -> ScannerReading | None:
-        """Return what came in as a reading, if it says something new: keys as they are, or that they are unknown."""
+        """Return a reading if the message says something new: the state of keys, or that it is unknown."""
         keys = self._keys
         was_trusted = keys.trusted
         message = self._message(received)
@@ -311,10 +310,10 @@ class Scanner(Closing):
         return ScannerReading(time_us, 0, 0) if was_trusted and not keys.trusted else None
 
     def _restarted(self) -> None:
-        """Tell a board that has booted what it was told before."""
+        """Repeat all settings to a board that has booted."""
         self._keys.restarted()
         self.analog = self.segment = None
-        for setting in self._told.values():
+        for setting in self._settings.values():
             self._send(setting)
 
     def _recognised(self, message: Grasp | Segment, time_us: int) -> None:
@@ -330,17 +329,17 @@ class Scanner(Closing):
             self.analog = message
 
     def _message(self, received: Received) -> FromBoard | None:
-        """Return what a frame says, None if it says nothing; then an event may have been lost."""
+        """Return the message of a frame; None if there is none: an event may have been lost."""
         if isinstance(received, Frame):
             self._keys.numbered(received.sequence)
             try:
                 return from_board(received, self._keys.keys)
             except MessageError as reason:
-                _LOG.warning("%s: a sound frame was refused: %s", self.url, reason)
+                _LOG.warning("%s: a valid frame was rejected: %s", self.url, reason)
                 self._misfits += 1
                 self._keys.misread()
         elif received is Break.DAMAGED:
-            _LOG.info("%s: bytes that are no frame were skipped", self.url)
+            _LOG.info("%s: bytes that are not a frame were skipped", self.url)
             self._keys.damaged()
         else:
             what = "the board has booted" if received is Break.RESTARTED else "datagrams are missing"
@@ -352,11 +351,11 @@ class Scanner(Closing):
 
     def _same(self, hello: Hello) -> None:
         if self.hello is not None and hello.identity != self.hello.identity:
-            raise DeviceError(f"{self.url}: another scanner board answers than was opened: open it again")
+            raise DeviceError(f"{self.url}: the scanner board is not the one that was opened: open it again")
         self.hello = hello
 
     def _codes(self, message: Analog) -> tuple[int | None, ...] | None:
-        """Return the codes of the channels that were asked for last; None where they are of others."""
+        """Return the codes of the channels that were requested last; None if they belong to an earlier request."""
         if self.analog is None or message.token != self.analog.token:
             return None
         if len(message.codes) != self.analog.wanted.bit_count():
@@ -365,20 +364,20 @@ class Scanner(Closing):
         return tuple(None if code == UNREAD else code for code in message.codes)
 
     def _ask_again(self) -> None:
-        """Ask for a full bitmap where keys cannot be trusted, for channels where nothing answered that; and again."""
+        """Request a full bitmap if keys cannot be trusted, and repeat settings that had no reply."""
         now = monotonic()
         if self._keys.trusted:
             self._ask_at = min(self._ask_at, self._asked_at + _ASK_ANEW_S)
         elif now >= self._ask_at:
-            _LOG.info("%s: what the board said of its keys cannot be trusted: all of them are asked for", self.url)
+            _LOG.info("%s: the last key states cannot be trusted: requesting all keys", self.url)
             self._asked_at, self._ask_at = now, now + _ASK_AGAIN_S
             self._asked += 1
             self._send(GetState())
-        asked = self._told.get(SetChannels.KIND)
+        asked = self._settings.get(SetChannels.KIND)
         if asked is not None and self.analog is None and now >= self._channels_at:
             self._channels_at = now + _ASK_AGAIN_S
             self._send(asked)
-        asked = self._told.get(SetSegments.KIND)
+        asked = self._settings.get(SetSegments.KIND)
         if asked is not None and self.segment is None and now >= self._segments_at:
             self._segments_at = now + _ASK_AGAIN_S
             self._send(asked)

@@ -1,11 +1,12 @@
-"""A scanner board on Wi-Fi: one frame per UDP datagram, at udp://HOST:PORT; see docs/reference/devices.md.
+"""A scanner board over Wi-Fi: one frame a UDP datagram, at udp://HOST:PORT. docs/reference/devices.md has the
+layout.
 
-A network drops datagrams, doubles them, and delivers some after later ones. So each carries a number of 32 bits, and
-one is taken only if it is newer than all before it (RFC 1982): what is late was overtaken by something newer, and says
-nothing of now. The frame's own number of 8 bits would take a frame that is 200 late for one that is 56 early.
+A network drops, duplicates and reorders datagrams. So each carries a number of 32 bits, and one is accepted only if it
+is newer than all before it (RFC 1982): a late one was overtaken by a newer one, and is out of date. The frame's own
+number of 8 bits would confuse a frame that is 200 late with one that is 56 early.
 
-A board draws a number whenever it boots, a host whenever it opens the board: what earlier ones have sent is told from
-what these send, and nobody who does not see the datagrams can forge one.
+A board draws a random number whenever it boots, a host whenever it opens the board. They distinguish datagrams from
+earlier ones, and nobody can forge a datagram without seeing others.
 """
 
 import logging
@@ -31,35 +32,35 @@ _MARK, _VERSION = 0x54, 1
 FROM_BOARD, TO_BOARD = Struct("<BBIIIII"), Struct("<BBII")
 _MODULUS, _HALF = 1 << 32, 1 << 31
 _HEARD = 32
-# So many of the newest numbers are remembered, to tell a datagram that comes twice from one that comes late.
+# How many of the newest numbers are remembered, to distinguish a repeated datagram from a late one.
 _WINDOW = 256
 _EARLIER = 8  # boots
 
 _NET = re.compile(r"udp://(\[[0-9A-Fa-f:.]+(?:%[A-Za-z0-9._-]+)?\]|[A-Za-z0-9._-]+):(\d{1,5})/?")
-_AGAIN_S = 0.1  # after so long a setting that was not acknowledged is sent again
-_SILENT_S = 4.0  # a board that answers nothing for so long may have another address by now
+_AGAIN_S = 0.1  # a setting that was not acknowledged is repeated after this time
+_SILENT_S = 4.0  # a board that sends nothing for this time may have another address by now
 _AT_ONCE = 64
 
 
 def is_datagram_port(port: str) -> bool:
-    """Return whether `port` is meant as udp://HOST:PORT."""
+    """Return whether `port` is intended as udp://HOST:PORT."""
     return port.lower().startswith("udp:")
 
 
 def scanner_port_fault(port: str) -> str:
-    """Return why no scanner board can be at `port`, or nothing."""
+    """Return why no scanner board can be at `port`, or ""."""
     if not is_datagram_port(port):
         return port_fault(port)
     found = _NET.fullmatch(port)
-    return "" if found and 0 < int(found[2]) < 65_536 else "is no address: a board in a Wi-Fi is at udp://HOST:PORT"
+    return "" if found and 0 < int(found[2]) < 65_536 else "is not an address: a board on Wi-Fi is at udp://HOST:PORT"
 
 
 @dataclass(slots=True)
 class DatagramCounts:
-    """What came in besides sound frames in their order.
+    """Counts of datagrams that are not valid frames in order.
 
-    missing   datagrams that were not there when a later one came    late  those of them that came after all
-    repeated  that came a second time                                foreign  that are none of this board's
+    missing   datagrams overtaken by a later one      late     missing ones that arrived afterwards
+    repeated  that arrived a second time              foreign  not from this board
     """
 
     missing: int = 0
@@ -69,7 +70,7 @@ class DatagramCounts:
 
 
 class Datagrams:
-    """Frames into datagrams of one session and out of them; no network. Nothing that comes in raises."""
+    """Wraps and unwraps frames in datagrams of one session, without a network. No input raises."""
 
     def __init__(self, session: int, frames: FrameCounts | None = None, counts: DatagramCounts | None = None) -> None:
         self.frames = FrameCounts() if frames is None else frames
@@ -83,19 +84,19 @@ class Datagrams:
         self._heard_before = 0
 
     def wrap(self, frame: bytes = b"") -> tuple[int, bytes]:
-        """Return the number of the next datagram, and the datagram of `frame`; of none: a farewell."""
+        """Return the number of the next datagram, and the datagram of `frame`; an empty frame is a farewell."""
         self._sent = (self._sent + 1) % _MODULUS
         return self._sent, TO_BOARD.pack(_MARK, _VERSION, self._session, self._sent) + frame
 
     def acknowledged(self, number: int) -> bool:
-        """Return whether the board has taken datagram `number`, as it last said."""
+        """Return whether the board has acknowledged datagram `number`."""
         if self._heard is None:
             return False
         back = (self._heard - number) % _MODULUS
         return back == 0 or (back <= _HEARD and bool(self._heard_before >> (back - 1) & 1))
 
     def take(self, datagram: bytes) -> list[Received]:
-        """Return what `datagram` says: a frame, perhaps after a break; nothing if it is late, or not the board's."""
+        """Return the frame of `datagram`, after a break if there was one; nothing if it is late or foreign."""
         frame = self._frame(datagram)
         if frame is None:
             self.counts.foreign += 1
@@ -134,7 +135,7 @@ class Datagrams:
             self._seen |= 1 << back if back < _WINDOW else 0
 
     def _frame(self, datagram: bytes) -> Frame | None:
-        """Return the frame of a datagram of this session, None if it is none, or holds not exactly one sound frame."""
+        """Return the frame of a datagram of this session, None if it is foreign or not exactly one valid frame."""
         head = FROM_BOARD.size
         if not head + OVERHEAD <= len(datagram) <= head + MAX_PAYLOAD + OVERHEAD:
             return None
@@ -149,32 +150,32 @@ class Datagrams:
 
 
 class DatagramLink(ScannerLink):
-    """The way to a board at udp://HOST:PORT. Only what comes from there is heard: the socket is connected.
+    """The link to a board at udp://HOST:PORT. The socket is connected, so it receives only from there.
 
-    A setting is sent again every 0.1 s until the board says that it has it.
+    A setting is repeated every 0.1 s until the board acknowledges it.
     """
 
     def __init__(self, url: str, frames: FrameCounts, counts: DatagramCounts) -> None:
-        """Find the host. Raises DeviceError if there is none of that name, SettingError for what is no address."""
+        """Find the host. Raises DeviceError if there is none of that name, SettingError for a malformed address."""
         if fault := scanner_port_fault(url):
             raise SettingError(f"{shortened(repr(url))} {fault}")
         found = _NET.fullmatch(url)
         assert found is not None
         self.url, self.received_bytes = url, 0
         self._datagrams = Datagrams(secrets.randbits(32), frames, counts)
-        self._unanswered: dict[int, tuple[bytes, int, float]] = {}
+        self._unacknowledged: dict[int, tuple[bytes, int, float]] = {}
         self._waited_s = 0.0
         self._socket = _connected(url, found[1].strip("[]"), int(found[2]))
 
     def send(self, data: bytes, setting: int | None = None) -> None:
-        """Send a frame; one of `setting`, the kind of a setting, until the board says that it came, or another does."""
+        """Send a frame. Repeat one with a `setting` (its kind) until it is acknowledged or replaced by another."""
         number, datagram = self._datagrams.wrap(data)
         if setting is not None:
-            self._unanswered[setting] = data, number, monotonic() + _AGAIN_S
+            self._unacknowledged[setting] = data, number, monotonic() + _AGAIN_S
         self._write(datagram)
 
     def receive(self, timeout_s: float) -> list[Received]:
-        """Return what came in, after waiting for something until the timeout."""
+        """Wait for frames until the timeout, and return them."""
         self._send_again()
         began = monotonic()
         received = self._read_all() if self._ready(timeout_s) else []
@@ -184,12 +185,12 @@ class DatagramLink(ScannerLink):
             self._waited_s += monotonic() - began
         if self._waited_s > _SILENT_S:
             raise DeviceError(
-                f"{self.url}: the board has said nothing for {_SILENT_S:g} s: check its power, and its Wi-Fi"
+                f"{self.url}: the board has sent nothing for {_SILENT_S:g} s: check its power and its Wi-Fi"
             )
         return received
 
     def close(self) -> None:
-        """Say farewell, so that the board hears another host at once. Does no harm twice."""
+        """Send a farewell, so that the board accepts another host at once. Closing twice is harmless."""
         if self._socket.fileno() >= 0:
             try:
                 self._socket.send(self._datagrams.wrap()[1])
@@ -199,14 +200,14 @@ class DatagramLink(ScannerLink):
 
     def _send_again(self) -> None:
         now = monotonic()
-        for setting, (data, number, due) in list(self._unanswered.items()):
+        for setting, (data, number, due) in list(self._unacknowledged.items()):
             if self._datagrams.acknowledged(number):
-                del self._unanswered[setting]
+                del self._unacknowledged[setting]
             elif now >= due:
                 self.send(data, setting)
 
     def _ready(self, timeout_s: float) -> bool:
-        due = min((due for _, _, due in self._unanswered.values()), default=float("inf"))
+        due = min((due for _, _, due in self._unacknowledged.values()), default=float("inf"))
         try:
             return bool(select.select([self._socket], [], [], max(0.0, min(timeout_s, due - monotonic())))[0])
         except (OSError, ValueError) as reason:  # closed meanwhile by another thread
@@ -219,7 +220,7 @@ class DatagramLink(ScannerLink):
                 datagram = self._socket.recv(FROM_BOARD.size + MAX_PAYLOAD + OVERHEAD + 1)
             except BlockingIOError:
                 break
-            except ConnectionRefusedError:  # nobody listens there: the board is starting
+            except ConnectionRefusedError:  # no listener: the board is starting
                 continue
             except OSError as reason:
                 raise self._gone(reason) from reason
@@ -231,7 +232,7 @@ class DatagramLink(ScannerLink):
         try:
             self._socket.send(datagram)
         except (BlockingIOError, ConnectionRefusedError):
-            pass  # lost, as others are: the latter tells of an earlier one
+            pass  # lost like any other; ConnectionRefusedError reports an earlier one
         except OSError as reason:
             raise self._gone(reason) from reason
 

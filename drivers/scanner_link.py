@@ -1,4 +1,4 @@
-"""The way to a scanner board and back: frames in their order, and where something is missing between them."""
+"""The link to a scanner board: frames in order, and breaks where something is missing between them."""
 
 from abc import ABC, abstractmethod
 from enum import Enum, auto
@@ -11,8 +11,8 @@ from .serial_line import SerialLine
 class Break(Enum):
     """Why a frame does not follow the one before it."""
 
-    DAMAGED = auto()  # something came in that was no frame
-    MISSING = auto()  # there was at least one between them that did not come
+    DAMAGED = auto()  # bytes arrived that were not a frame
+    MISSING = auto()  # at least one frame between them is missing
     RESTARTED = auto()  # the board has booted
 
 
@@ -20,9 +20,9 @@ Received = Frame | Break
 
 
 class ScannerLink(Closing, ABC):
-    """An open way to a board. Closing it twice does no harm.
+    """An open link to a board. Closing it twice is harmless.
 
-    url             names it               received_bytes  came in
+    url  its name in messages      received_bytes  number of bytes received
     """
 
     url: str
@@ -30,15 +30,15 @@ class ScannerLink(Closing, ABC):
 
     @abstractmethod
     def send(self, data: bytes, setting: int | None = None) -> None:
-        """Send a frame, of which `setting` says that it is a setting, and of which kind. Raises DeviceError."""
+        """Send a frame; `setting` is its kind if it is a setting. Raises DeviceError."""
 
     @abstractmethod
     def receive(self, timeout_s: float) -> list[Received]:
-        """Return what came in, after waiting for something until the timeout. Raises DeviceError when it is gone."""
+        """Wait for frames until the timeout, and return them. Raises DeviceError if the link is gone."""
 
 
 class SerialLink(ScannerLink):
-    """A serial line, which drops nothing: what is sent is sent once."""
+    """A serial line, which drops nothing: each frame is sent once."""
 
     def __init__(self, url: str, baud: int, frames: FrameCounts) -> None:
         """Open it. Raises DeviceError or SettingError as `SerialLine` does."""
@@ -46,7 +46,7 @@ class SerialLink(ScannerLink):
         self._decoder = FrameDecoder(frames)
         self._line = SerialLine(url, baud)
         try:
-            self._line.write(b"\0")  # ends whatever stands half-sent in the board's receiver
+            self._line.write(b"\0")  # ends a half-sent frame in the board's receiver
         except BaseException:
             self._line.close()
             raise
@@ -56,7 +56,7 @@ class SerialLink(ScannerLink):
         self._line.write(data)
 
     def receive(self, timeout_s: float) -> list[Received]:
-        """Return what came in."""
+        """Return the received frames and breaks."""
         data = self._line.read(timeout_s)
         self.received_bytes += len(data)
         return [Break.DAMAGED if each is None else each for each in self._decoder.received(data)]

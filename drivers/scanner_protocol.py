@@ -1,17 +1,17 @@
-"""The protocol of the switch-scanner board: frames, and what they carry; docs/reference/devices.md draws every byte.
+"""The protocol of the switch-scanner board: frames and messages. docs/reference/devices.md has the byte layout.
 
 A frame is type | sequence | payload | CRC-16, stuffed by COBS, ended by 00. COBS (Cheshire and Baker 1999) costs one
 byte a frame and leaves no zero inside it, so every 00 is an end, after any loss. The CRC is CRC-16/CCITT-FALSE
-(polynomial 1021, start FFFF), high byte first: over a whole frame it comes out as 0. It catches every damage that stays
-within 16 bits of the frame. A damaged byte of the stuffing moves zeros about, which may be more than that: of such
-damages one in 65536 passes.
+(polynomial 1021, start FFFF), high byte first, so the CRC of a whole frame is 0. It detects all damage within 16
+consecutive bits of the frame. A damaged stuffing byte may move zeros over a longer range: of such frames one in 65536
+passes.
 
-Integers are little-endian. A frame whose payload is not exactly what its kind asks for raises `MessageError`, and
-nothing else does. Times are the board's microseconds, modulo 2**32; sets of switches are one integer, bit k for key k.
+Integers are little-endian. Only a frame whose payload does not match its kind raises `MessageError`. Times are the
+board's microseconds, modulo 2**32; a set of switches is one integer, bit k for key k.
 
-Version 2 is version 1 with analog channels: CHANNELS, ANALOG and SET_CHANNELS. A board of version 2 says so by a flag
-of its HELLO, and sends none of the new frames before it is asked to: a host of version 1 reads its keys as ever. So
-it is with SEGMENT and SET_SEGMENTS, of a board that follows segments.
+Version 2 is version 1 with analog channels: CHANNELS, ANALOG and SET_CHANNELS. A board of version 2 sets a flag in its
+HELLO, and sends none of the new frames before it is requested to, so a host of version 1 still reads its keys. The same
+applies to SEGMENT and SET_SEGMENTS of a board that follows segments.
 """
 
 from binascii import crc_hqx
@@ -34,31 +34,31 @@ Bytes = NDArray[np.uint8]
 # The full bitmap of the switches: switch k is bit k % 8 of payload byte k // 8.
 STATE = 0x02
 
-# What one COBS block holds, less type, sequence and CRC. A frame on the wire is its payload and OVERHEAD bytes more.
+# The capacity of one COBS block minus type, sequence and CRC. A frame on the wire is its payload plus OVERHEAD bytes.
 MAX_PAYLOAD = 250
 OVERHEAD = 6
 _SHORTEST = 4
 PROTOCOL = 1
-# What a HEARTBEAT carries besides its bitmap, and so how many keys a board can have.
+# A HEARTBEAT carries a time and a bitmap, which limits the number of keys of a board.
 _TIME = Struct("<I")
 MOST_KEYS = 8 * (MAX_PAYLOAD - _TIME.size)
-# Flags of HELLO: keys stand in a matrix without diodes, where three closed corners of a rectangle close the fourth; and
-# the board speaks version 2, since it has analog channels; it follows segments.
+# Flags of HELLO: keys in a matrix without diodes, where three closed corners of a rectangle close the fourth; analog
+# channels (version 2); segments.
 WITHOUT_DIODES, ANALOG, SEGMENTS = 0x01, 0x02, 0x04
 ANALOG_VERSION = 2
-# Codes of channels in one ANALOG; the code of a channel that could not be read, and so the most bits of a code.
+# Limits on the channels of an ANALOG and of a board; the code of an unreadable channel, which limits the bits.
 MOST_ASKED, MOST_CHANNELS = 122, 255
 UNREAD, MOST_BITS = 0xFFFF, 15
-# What GRASP says where nothing can be known, and SEGMENT where nothing is held; the states of a SEGMENT.
+# The grasp number in GRASP if it is unknown, and in SEGMENT if nothing is held; the states of a SEGMENT.
 NO_GRASP = 255
 STATES = ("none", "forming", "held", "releasing")
-# Flags of GRASP: an input was missing; the scan ended as soon as the rest of the switches could not matter.
+# Flags of GRASP: an input was missing; the scan ended early because the remaining switches could not matter.
 DEGRADED, EARLY = 0x01, 0x02
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One frame: its kind, its number modulo 256, and what it carries."""
+    """One frame: its kind, its number modulo 256, and its payload."""
 
     kind: int
     sequence: int
@@ -67,7 +67,7 @@ class Frame:
 
 @dataclass(slots=True)
 class FrameCounts:
-    """What came in: good frames; damaged ones (stuffing or CRC wrong), too short ones, too long ones."""
+    """Counts of received frames: valid, damaged (stuffing or CRC wrong), too short, too long."""
 
     frames: int = 0
     damaged: int = 0
@@ -76,7 +76,7 @@ class FrameCounts:
 
 
 def encode(frame: Frame) -> bytes:
-    """Return the frame as it goes on the wire, its end included. Raises ValueError above MAX_PAYLOAD."""
+    """Return the frame's bytes on the wire, with its end. Raises ValueError above MAX_PAYLOAD."""
     if len(frame.payload) > MAX_PAYLOAD:
         raise ValueError(f"a scanner frame carries at most {MAX_PAYLOAD} bytes, not {len(frame.payload)}")
     body = bytes((frame.kind, frame.sequence)) + frame.payload
@@ -85,7 +85,7 @@ def encode(frame: Frame) -> bytes:
 
 @dataclass(slots=True)
 class FrameDecoder:
-    """Bytes in, frames out; what is none is counted, and skipped to the next 00. Nothing that comes in raises."""
+    """Decodes bytes to frames; other bytes are counted and skipped to the next 00. No input raises."""
 
     counts: FrameCounts = field(default_factory=FrameCounts)
     _pieces: Pieces = field(default_factory=lambda: Pieces(MAX_PAYLOAD + OVERHEAD - 1))
@@ -95,7 +95,7 @@ class FrameDecoder:
         return list(filter(None, self.received(chunk)))
 
     def received(self, chunk: bytes) -> list[Frame | None]:
-        """Return what `chunk` completes, oldest first: a frame, or None for something that was none."""
+        """Return the pieces that `chunk` completes, oldest first: a frame, or None for an invalid piece."""
         return [self._frame(piece) for piece in self._pieces.feed(chunk) if piece]
 
     def _frame(self, piece: bytes) -> Frame | None:
@@ -128,7 +128,7 @@ def unpack_bits(payloads: Bytes, switches: int) -> Bits:
 
 
 class MessageError(DeviceError):
-    """A sound frame that does not carry what its kind asks for: another firmware, or one damage in 65536."""
+    """A valid frame with a payload that does not match its kind: other firmware, or one damaged frame in 65536."""
 
 
 def _packed(layout: Struct, values: Sequence[int]) -> bytes:
@@ -139,26 +139,26 @@ def _packed(layout: Struct, values: Sequence[int]) -> bytes:
 
 
 class Fixed:
-    """A message, a dataclass whose fields in their order are the values of `LAYOUT`."""
+    """A message: a dataclass whose fields, in order, are the values of `LAYOUT`."""
 
     __slots__ = ()
     KIND: ClassVar[int]
     LAYOUT: ClassVar[Struct]
 
     def payload(self) -> bytes:
-        """Return what the frame carries. Raises SettingError for a value that its field cannot hold."""
+        """Return the payload. Raises SettingError for a value that its field cannot hold."""
         return _packed(self.LAYOUT, astuple(self))  # type: ignore[call-overload]
 
     @classmethod
     def read(cls, payload: bytes, keys: int = 0) -> Self:
-        """Return the message of a board of so many keys. Raises MessageError where the payload has another length."""
+        """Return the message of a board with `keys` keys. Raises MessageError if the payload has another length."""
         if len(payload) != cls.LAYOUT.size:
             raise MessageError(f"a {cls.__name__} carries {cls.LAYOUT.size} bytes, not {len(payload)}")
         return cls(*cls.LAYOUT.unpack(payload))
 
 
 def from_bitmap(payload: bytes, keys: int) -> int:
-    """Return which of so many keys are set. Raises MessageError at another length, or where others are set."""
+    """Return the set bits of a bitmap of `keys` keys. Raises MessageError for a wrong length or other set bits."""
     if len(payload) != (keys + 7) // 8:
         raise MessageError(f"a bitmap of {len(payload)} bytes from a board of {keys} keys")
     bits = int.from_bytes(payload, "little")
@@ -169,17 +169,17 @@ def from_bitmap(payload: bytes, keys: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Hello(Fixed):
-    """What the board is, and how it works now: sent at boot, and in answer to PING, SET_RATE and SET_DEBOUNCE.
+    """The board's identity and settings: sent at boot, and in reply to PING, SET_RATE and SET_DEBOUNCE.
 
-    token         that of the PING it answers, 0 where it answers none
+    token         that of the PING to which it replies, or 0
     flags         WITHOUT_DIODES, ANALOG, SEGMENTS
-    board         a number of this very board's own
+    board         a unique number of the board
     major, minor, patch  version of its firmware
-    rows, columns key k stands at row k // columns, column k % columns; directly wired keys are one row
-    scan_us       from scan to scan
-    state_us      from STATE to STATE; 0: it sends an EVENT for every change instead
-    heartbeat_us  from HEARTBEAT to HEARTBEAT; 0: none
-    press_us, release_us  its own debouncing: presses at once and then locked, releases deferred; 0: none
+    rows, columns key k is at row k // columns, column k % columns; directly wired keys are one row
+    scan_us       period of scans
+    state_us      period of STATE; 0: it sends an EVENT for every change instead
+    heartbeat_us  period of HEARTBEAT; 0: none
+    press_us, release_us  debouncing on the board: presses at once and then locked, releases deferred; 0: none
     time_us       when it was sent
     """
 
@@ -204,32 +204,32 @@ class Hello(Fixed):
 
     @property
     def keys(self) -> int:
-        """How many keys the board scans."""
+        """Number of keys that the board scans."""
         return self.rows * self.columns
 
     @property
     def has_analog(self) -> bool:
-        """Whether the board has analog channels: it speaks version 2."""
+        """Whether the board has analog channels, and thus version 2 of the protocol."""
         return bool(self.flags & ANALOG)
 
     @property
     def has_segments(self) -> bool:
-        """Whether the board follows segments, and sends them once it is asked to."""
+        """Whether the board follows segments, and sends them on request."""
         return bool(self.flags & SEGMENTS)
 
     @property
     def identity(self) -> tuple[int, int, int, int]:
-        """What stays as it is while a board runs: its number, its flags, its rows and columns."""
+        """The constants of a board: its number, its flags, its rows and columns."""
         return self.board, self.flags, self.rows, self.columns
 
     @property
     def period_us(self) -> int:
-        """How long the board is silent at most while all is well; 0: without limit."""
+        """The longest silence of a working board; 0: no limit."""
         return min((period for period in (self.state_us, self.heartbeat_us) if period), default=0)
 
     @classmethod
     def read(cls, payload: bytes, keys: int = 0) -> Self:
-        """Return the message. Raises MessageError where length, protocol or number of keys are none of ours."""
+        """Return the message. Raises MessageError for an unsupported length, protocol or number of keys."""
         if payload and payload[0] != PROTOCOL:
             raise MessageError(
                 f"the board speaks protocol {payload[0]}, this is {PROTOCOL}: update the older of the two"
@@ -241,16 +241,16 @@ class Hello(Fixed):
 
 
 class _Bitmap:
-    """A message, a dataclass of the values of `LAYOUT`, of a set of keys, and of how many keys there are."""
+    """A message: a dataclass of the values of `LAYOUT`, a set of keys, and the number of keys."""
 
     __slots__ = ()
     KIND: ClassVar[int]
     LAYOUT: ClassVar[Struct] = Struct("<")
 
     def payload(self) -> bytes:
-        """Return what the frame carries: key k is bit k % 8 of byte k // 8.
+        """Return the payload: key k is bit k % 8 of byte k // 8.
 
-        Raises OverflowError where the set holds a key that there is not, SettingError where a value does not fit.
+        Raises OverflowError if the set holds a key that does not exist, SettingError if a value does not fit.
         """
         *values, held, keys = astuple(self)  # type: ignore[call-overload]
         bitmap: bytes = held.to_bytes((keys + 7) // 8, "little")
@@ -258,7 +258,7 @@ class _Bitmap:
 
     @classmethod
     def read(cls, payload: bytes, keys: int) -> Self:
-        """Return the message of a board of so many keys. Raises MessageError."""
+        """Return the message of a board with `keys` keys. Raises MessageError."""
         size = cls.LAYOUT.size
         if len(payload) < size:
             raise MessageError(f"a {cls.__name__} of {len(payload)} bytes has no room for its time")
@@ -267,7 +267,7 @@ class _Bitmap:
 
 @dataclass(frozen=True, slots=True)
 class State(_Bitmap):
-    """All keys as they were scanned just before it was sent."""
+    """All keys as scanned just before sending."""
 
     KIND: ClassVar[int] = STATE
 
@@ -277,7 +277,7 @@ class State(_Bitmap):
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat(_Bitmap):
-    """All keys, and when they were scanned: sent even if nothing happens, so that a lost EVENT heals."""
+    """All keys and the time of their scan: sent even without changes, to recover from a lost EVENT."""
 
     KIND: ClassVar[int] = 0x04
     LAYOUT: ClassVar[Struct] = _TIME
@@ -289,7 +289,7 @@ class Heartbeat(_Bitmap):
 
 @dataclass(frozen=True, slots=True)
 class Event(Fixed):
-    """One key closed (edge 1) or opened (edge 0), and when it was scanned."""
+    """One key closed (edge 1) or opened (edge 0), and the time of the scan."""
 
     KIND: ClassVar[int] = 0x03
     LAYOUT: ClassVar[Struct] = Struct("<IHB")
@@ -300,7 +300,7 @@ class Event(Fixed):
 
     @classmethod
     def read(cls, payload: bytes, keys: int = 0) -> Self:
-        """Return the message of a board of so many keys. Raises MessageError."""
+        """Return the message of a board with `keys` keys. Raises MessageError."""
         event = super(Event, cls).read(payload)
         if event.key >= keys or event.edge > 1:
             raise MessageError(f"an EVENT of key {event.key}, edge {event.edge}, from a board of {keys} keys")
@@ -309,10 +309,10 @@ class Event(Fixed):
 
 @dataclass(frozen=True, slots=True)
 class Faults(Fixed):
-    """What went wrong on the board since boot: sent when a count has grown, at most once a second. The ERROR frame.
+    """Fault counts of the board since boot: sent when a count has grown, at most once a second. The ERROR frame.
 
     overruns  scans that began late       refused  frames from the host that were damaged or not understood
-    dropped   frames that were never sent   bus    transactions with port expanders that failed
+    dropped   frames that were never sent   bus    failed transactions with port expanders
     """
 
     KIND: ClassVar[int] = 0x05
@@ -327,11 +327,11 @@ class Faults(Fixed):
 
 @dataclass(frozen=True, slots=True)
 class Grasp(Fixed):
-    """What a board that carries a build recognised.
+    """The prediction of a board that carries a build.
 
     time_us  when the frame was read
-    grasp    number of the grasp type in the build's order, the one after the last: nothing is held; NO_GRASP: not known
-    margin   the best score less the second, in steps of the build's tables; 65535 stands for more, too
+    grasp    number of the grasp type in the build's order; the one after the last: nothing is held; NO_GRASP: unknown
+    margin   the best score minus the second, in steps of the build's tables, clipped to 65535
     flags    DEGRADED, EARLY
     """
 
@@ -346,7 +346,7 @@ class Grasp(Fixed):
 
 @dataclass(frozen=True, slots=True)
 class Segment(Fixed):
-    """The segment that a board which carries a build is in.
+    """The current segment of a board that carries a build.
 
     time_us  when its last frame was read     number  of grasps so far, modulo 65536
     grasp    number of the segment's grasp type; NO_GRASP in the state "none"
@@ -372,7 +372,7 @@ class Segment(Fixed):
 
 @dataclass(frozen=True, slots=True)
 class Lost(_Bitmap):
-    """The keys that cannot be read now: sent when they change, and right before every HEARTBEAT while there are any."""
+    """The keys that cannot be read: sent when they change, and right before every HEARTBEAT while there are any."""
 
     KIND: ClassVar[int] = 0x07
 
@@ -382,11 +382,11 @@ class Lost(_Bitmap):
 
 @dataclass(frozen=True, slots=True)
 class Channels(_Bitmap):
-    """What a board of version 2 measures: sent in answer to SET_CHANNELS.
+    """The measured channels of a board of version 2: sent in reply to SET_CHANNELS.
 
-    version    2                          token   that of the SET_CHANNELS it answers
-    bits       of a code, at most 15      analog_us  from ANALOG to ANALOG; 0: none is sent
-    wanted     the channels whose codes an ANALOG holds, of `channels` that there are
+    version    2                          token   that of the SET_CHANNELS to which it replies
+    bits       of a code, at most 15      analog_us  period of ANALOG; 0: none is sent
+    wanted     the channels whose codes an ANALOG holds, out of `channels`
     """
 
     KIND: ClassVar[int] = 0x08
@@ -400,7 +400,7 @@ class Channels(_Bitmap):
     channels: int
 
     def payload(self) -> bytes:
-        """Return what the frame carries. Raises OverflowError where the set holds a channel that there is not."""
+        """Return the payload. Raises OverflowError if the set holds a channel that does not exist."""
         head = (self.version, self.token, self.bits, self.analog_us, self.channels)
         return self.LAYOUT.pack(*head) + self.wanted.to_bytes((self.channels + 7) // 8, "little")
 
@@ -421,9 +421,9 @@ class Channels(_Bitmap):
 
 @dataclass(frozen=True, slots=True)
 class Analog:
-    """The codes of the channels that were asked for, the lowest channel first; UNREAD for one that could not be read.
+    """The codes of the requested channels, the lowest channel first; UNREAD for one that could not be read.
 
-    time_us  when the last of them was converted    token  that of the SET_CHANNELS that asked for them
+    time_us  when the last of them was converted    token  that of the SET_CHANNELS that requested them
     """
 
     KIND: ClassVar[int] = 0x09
@@ -434,12 +434,12 @@ class Analog:
     codes: tuple[int, ...]
 
     def payload(self) -> bytes:
-        """Return what the frame carries."""
+        """Return the payload."""
         return self.LAYOUT.pack(self.time_us, self.token) + Struct(f"<{len(self.codes)}H").pack(*self.codes)
 
     @classmethod
     def read(cls, payload: bytes, keys: int = 0) -> Self:
-        """Return the message. Raises MessageError where the payload is of no whole number of codes."""
+        """Return the message. Raises MessageError if the payload is not a whole number of codes."""
         size = cls.LAYOUT.size
         if len(payload) < size or (len(payload) - size) % 2:
             raise MessageError(f"an Analog of {len(payload)} bytes holds no whole number of codes")
@@ -449,7 +449,7 @@ class Analog:
 
 @dataclass(frozen=True, slots=True)
 class SetRate(Fixed):
-    """How often to scan and to send, as in Hello; the Hello that answers says what the board made of it."""
+    """Set the periods of scanning and sending, as in Hello; the Hello in reply has the accepted values."""
 
     KIND: ClassVar[int] = 0x11
     LAYOUT: ClassVar[Struct] = Struct("<III")
@@ -461,7 +461,7 @@ class SetRate(Fixed):
 
 @dataclass(frozen=True, slots=True)
 class SetDebounce(Fixed):
-    """How the board shall debounce, as in Hello."""
+    """Set the debouncing on the board, as in Hello."""
 
     KIND: ClassVar[int] = 0x12
     LAYOUT: ClassVar[Struct] = Struct("<HH")
@@ -490,8 +490,9 @@ class Ping(Fixed):
 
 @dataclass(frozen=True, slots=True)
 class SetChannels(_Bitmap):
-    """Send the codes of these channels, and no others, every `analog_us`; the CHANNELS that answers says what the board
-    made of it. Of more than MOST_ASKED channels it takes the lowest. `room` is how many the bitmap has room for.
+    """Send the codes of only these channels every `analog_us`; the CHANNELS in reply has the accepted values.
+
+    Of more than MOST_ASKED channels the board takes the lowest. `room` is the capacity of the bitmap.
     """
 
     KIND: ClassVar[int] = 0x15
@@ -510,7 +511,7 @@ class SetChannels(_Bitmap):
 
 @dataclass(frozen=True, slots=True)
 class SetSegments(Fixed):
-    """Send a SEGMENT now, and where `wanted` is not 0, one for every change from now on and after every HEARTBEAT."""
+    """Send a SEGMENT now and, if `wanted` is not 0, one for every change from now on and after every HEARTBEAT."""
 
     KIND: ClassVar[int] = 0x16
     LAYOUT: ClassVar[Struct] = Struct("<B")
@@ -534,7 +535,7 @@ def frame(message: FromBoard | ToBoard, sequence: int) -> Frame:
 
 
 def from_board(received: Frame, keys: int) -> FromBoard:
-    """Return what a board of so many keys says. Raises MessageError."""
+    """Return the message of a board with `keys` keys. Raises MessageError."""
     kind = _FROM_BOARD.get(received.kind)
     if kind is None:
         raise MessageError(f"no message of a scanner board has kind 0x{received.kind:02X}")
@@ -542,7 +543,7 @@ def from_board(received: Frame, keys: int) -> FromBoard:
 
 
 def to_board(received: Frame) -> ToBoard:
-    """Return what a host asks for. Raises MessageError."""
+    """Return the message of a host. Raises MessageError."""
     kind = _TO_BOARD.get(received.kind)
     if kind is None:
         raise MessageError(f"no message to a scanner board has kind 0x{received.kind:02X}")

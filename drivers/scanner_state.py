@@ -1,4 +1,4 @@
-"""What is known of a scanner board: which of its keys are closed, and when it sent what it said."""
+"""The known state of a scanner board: its closed keys, and the times of its messages."""
 
 from itertools import combinations
 from time import monotonic_ns
@@ -6,11 +6,11 @@ from time import monotonic_ns
 from .scanner_protocol import WITHOUT_DIODES, Channels, Event, FromBoard, Heartbeat, Hello, Lost, Mask, Ping, State
 
 _MODULUS = 1 << 32
-# A ceramic resonator is wrong by up to 0.5 %: so much the offset may grow between two frames, 1/128 of what has passed.
+# A ceramic resonator is wrong by up to 0.5 %, so the offset may grow between two frames by 1/128 of their interval.
 _DRIFT_SHIFT = 7
-# How often a PING bounds the delay that all messages share; between two of them clocks drift apart by 2 ms at most.
+# Period of the PINGs that bound the delay common to all messages; clocks drift by at most 2 ms in between.
 _PING_US = 250_000
-# At most this many PINGs are under way: an answer that takes longer than they do says nothing.
+# At most this many PINGs are pending: a reply that takes longer carries no information.
 _UNDER_WAY = 64
 _TOKENS = 0xFFFF
 
@@ -18,9 +18,8 @@ _TOKENS = 0xFFFF
 def ambiguous(closed: Mask, rows: int, columns: int) -> Mask:
     """Return the keys, bits row * columns + column, that read closed but may be ghosts of others.
 
-    Current finds a way through three closed corners of a rectangle and closes the fourth for the reader; which of the
-    four is the ghost cannot be seen. Where two rows have two columns or more in common, all of those are doubtful. What
-    reads open is open.
+    Current through three closed corners of a rectangle makes the fourth read closed; which of the four is the ghost is
+    not observable. If two rows share two or more columns, all keys there are doubtful. A key that reads open is open.
     """
     row = (1 << columns) - 1
     held = [(shift, closed >> shift & row) for shift in range(0, rows * columns, columns)]
@@ -34,10 +33,10 @@ def ambiguous(closed: Mask, rows: int, columns: int) -> Mask:
 
 
 class BoardKeys:
-    """The keys of a board, as its HELLO gives them, which was the frame numbered `sequence`.
+    """The keys of a board, initialised from its HELLO, which was the frame numbered `sequence`.
 
-    They are unknown until a HEARTBEAT comes, with the frame before it: that is a LOST if there are keys that the board
-    cannot read. `trusted` says whether nothing is missing of what the board told of them.
+    They are unknown until a HEARTBEAT and the frame before it arrive: that is a LOST if there are keys that the board
+    cannot read. `trusted` is True if no message about the keys is missing.
     """
 
     def __init__(self, rows: int = 0, columns: int = 0, flags: int = 0, sequence: int = 0) -> None:
@@ -48,13 +47,13 @@ class BoardKeys:
         self.lost: Mask = 0
         self.gaps = 0
         self._follows = True  # the frame before the last one was read, too
-        self._unread = False  # the last one was sound, but could not be read
+        self._unread = False  # the last one was valid, but could not be read
         self._is_lost = self._after_lost = False  # the last one, and the one before it, were LOSTs
         self.restarted()
 
     @property
     def known(self) -> Mask:
-        """The keys of which it can be said whether they are closed."""
+        """The keys with a known state."""
         if not self.trusted:
             return 0
         readable = self._all & ~self.lost
@@ -63,20 +62,20 @@ class BoardKeys:
         return readable & ~ambiguous(self.closed, self._rows, self._columns)
 
     def restarted(self) -> None:
-        """Note that the board begins anew: nothing of what it told before holds."""
+        """Record that the board restarted: its earlier messages no longer apply."""
         self._has_bitmap = self._has_lost = self.trusted = False
 
     def damaged(self) -> None:
-        """Note that something came in which was no frame: it may have been an EVENT. A LOST would leave a gap."""
+        """Record bytes that were not a frame: they may have been an EVENT. A lost LOST would leave a gap."""
         self._has_bitmap = self.trusted = False
 
     def misread(self) -> None:
-        """Note that the last frame could not be read: it may have been anything."""
+        """Record that the last frame could not be read: it may have been any message."""
         self._unread = True
         self.restarted()
 
     def numbered(self, sequence: int) -> None:
-        """Note the number of a frame; a gap before it means that frames were lost, or that the board restarted."""
+        """Record the number of a frame; a gap before it means lost frames or a restart of the board."""
         gap = sequence != (self._sequence + 1) & 0xFF
         self._follows, self._unread, self._sequence = not (gap or self._unread), False, sequence
         self._after_lost, self._is_lost = self._is_lost, False
@@ -85,7 +84,7 @@ class BoardKeys:
             self.restarted()
 
     def heard(self, message: FromBoard) -> None:
-        """Take what the frame numbered last says of keys. An EVENT changes nothing before there is a bitmap."""
+        """Update the keys from the last numbered frame. An EVENT is ignored before the first bitmap."""
         match message:
             case State():
                 self.closed, self._has_bitmap = message.closed, True
@@ -100,20 +99,20 @@ class BoardKeys:
         self.trusted = self._has_bitmap and self._has_lost
 
     def _not_lost(self) -> None:
-        """Take a HEARTBEAT that follows another frame than a LOST to say that all keys can be read."""
+        """Conclude from a HEARTBEAT that does not follow a LOST that all keys can be read."""
         if self._follows and not self._after_lost:
             self.lost, self._has_lost = 0, True
 
 
 class BoardClock:
-    """Finds the offset between the clocks as the smallest delay seen, forgotten no faster than clocks drift apart.
+    """Estimates the offset between the clocks as the smallest delay seen, forgotten no faster than clocks drift apart.
 
-    Delays only ever add to it, so the smallest is the nearest to the truth. A host that falls behind, and reads what
-    has long stood in a buffer, thus gets the times at which it was sent, not those at which it was read. The board's
-    clock wraps after 71.6 minutes; it may restart at any time.
+    Delays only add to the offset, so the smallest is the best estimate. A host that falls behind and reads an old
+    buffer thus gets the times at which frames were sent, not those at which they were read. The board's clock wraps
+    after 71.6 minutes; it may restart at any time.
 
-    A delay that all frames share does not show in that offset. Frames that the host asked for bound it from the other
-    side: they were not sent before they were asked for. `trip_us` is what lies between the two bounds.
+    A delay common to all frames does not show in that offset. Frames that the host requested bound it from the other
+    side: they were not sent before the request. `trip_us` is the distance between the two bounds.
     """
 
     def __init__(self) -> None:
@@ -124,13 +123,13 @@ class BoardClock:
 
     @property
     def trip_us(self) -> int:
-        """By how much a frame may have been sent before the time that `host_us` gave it; 0 before one was asked for."""
+        """The most by which a frame may be older than its time from `host_us`; 0 before the first requested frame."""
         return 0 if self._least is None else self._offset - self._least
 
     def host_us(self, board_us: int, came_us: int, asked_us: int | None = None) -> int:
-        """Return the host's time of `board_us` (0 to 2**32 - 1), sent in a frame that came in at `came_us`: not later.
+        """Return the host's time of `board_us` (0 to 2**32 - 1) in a frame that arrived at `came_us`, which bounds it.
 
-        asked_us  when the host asked for this very frame, if it did: the board cannot have sent it before
+        asked_us  when the host requested this frame, if it did: the board cannot have sent it before
         """
         if self._board is None:
             self._board, self._offset = board_us, came_us - board_us
@@ -140,7 +139,7 @@ class BoardClock:
         self._offset = min(came_us - self._board, self._offset + drift_us)
         if self._least is not None:
             self._least -= drift_us
-            # Where the bounds cross, the board has started again: on the same line, until it is asked anew.
+            # If the bounds cross, the board has restarted: keep the trip time until the next request.
             self._guessed |= self._least > self._offset
             if self._guessed:
                 self._least = min(self._least, self._offset - trip_us)
@@ -153,12 +152,12 @@ class BoardClock:
 
 
 class BoardTimes:
-    """Gives every message its time, in the host's monotonic microseconds: never one before the last one's.
+    """Gives every message its time, in the host's monotonic microseconds, never decreasing.
 
-    clock     knows by how much a message may have been sent before that: a delay that all share (`trip_us`)
-    late_us   how late the last message with a time came in, which those without one are taken to share
-    pings     how often the board's time was asked for
-    answered  whether an answer ever came
+    clock     bounds the delay common to all messages (`trip_us`)
+    late_us   delay of the last message with a time; messages without one are assumed to share it
+    pings     how often the board's time was requested
+    answered  whether a reply ever came
     """
 
     def __init__(self) -> None:
@@ -170,7 +169,7 @@ class BoardTimes:
         self.answered = False
 
     def ping(self) -> Ping:
-        """Return a message that asks for the time."""
+        """Return a message that requests the time."""
         token = self.pings % _TOKENS + 1
         self._asked_us = self._asked[token] = monotonic_ns() // 1000
         self.pings += 1
@@ -180,11 +179,11 @@ class BoardTimes:
 
     @property
     def due(self) -> bool:
-        """Whether the time should be asked for again."""
+        """Whether the next request for the time is due."""
         return monotonic_ns() // 1000 - self._asked_us >= _PING_US
 
     def stamp(self, message: FromBoard | None, came_us: int) -> int:
-        """Return the time of what came in. What carries none is taken to be as late as the last that did."""
+        """Return the time of a message. One without a time is assumed to be as late as the last that had one."""
         if message is not None and not isinstance(message, State | Lost | Channels):
             asked_us = self._asked.get(message.token) if isinstance(message, Hello) else None
             self.answered |= asked_us is not None

@@ -1,7 +1,7 @@
-"""A serial line, whatever carries it: a port, a pty, socket://HOST:PORT or rfc2217://HOST:PORT.
+"""A serial line on any transport: a port, a pty, socket://HOST:PORT or rfc2217://HOST:PORT.
 
-8 data bits, no parity, one stop bit, no handshake; DTR and RTS stay as opening leaves them. Nothing here waits without
-a limit, and whatever pySerial or the kernel says of a line that is gone becomes a `DeviceError`.
+8 data bits, no parity, one stop bit, no handshake; DTR and RTS stay as opening leaves them. Every wait has a limit, and
+every error of pySerial or the kernel about a lost line becomes a `DeviceError`.
 """
 
 import errno
@@ -23,15 +23,15 @@ _LOG = logging.getLogger(__name__)
 
 BITS_A_BYTE = 10  # a start bit, 8 data bits, a stop bit
 _CHUNK = 4096
-# A line takes a command of a few bytes at once; one that has not within this time takes none any more.
+# A line accepts a command of a few bytes at once; one that has not done so within this time is dead.
 _WRITE_TIMEOUT_S = 1.0
-# A port without a file descriptor is asked again this often: its reading may be that much late in giving up.
+# Poll period of a port without a file descriptor: a read may time out late by this much.
 _SLICE_S = 0.005
-# How often an open line looks whether its name still leads to the port that it has open.
+# How often an open line checks that its name still refers to the open port.
 _LOOK_S = 0.2
 
 _ADVICE = {
-    errno.ENOENT: "there is no such port: is the cable plugged in? `ls /dev/serial/by-id` shows what is",
+    errno.ENOENT: "there is no such port: is the cable plugged in? `ls /dev/serial/by-id` lists the ports",
     errno.EACCES: "no permission: add yourself to the port's group (`sudo usermod -aG dialout $USER`), log in again",
     errno.EAGAIN: "another program has it open: close that first",
     errno.EBUSY: "another program has it open: close that first",
@@ -39,10 +39,10 @@ _ADVICE = {
 
 
 class Pieces:
-    """Splits a stream at 00, which ends a frame and can stand nowhere else: the one sure place to fall back into step.
+    """Splits a stream at 00, which ends a frame and occurs nowhere else: a reliable point to resynchronise.
 
-    Of a piece longer than `longest` the first `longest` + 1 bytes are kept, so that its length tells; a stream without
-    zeros never fills the memory.
+    Of a piece longer than `longest`, `longest` + 1 bytes are kept, so its length shows that it is too long and a stream
+    without zeros cannot fill the memory.
     """
 
     def __init__(self, longest: int) -> None:
@@ -50,7 +50,7 @@ class Pieces:
         self._rest = b""
 
     def feed(self, chunk: bytes) -> list[bytes]:
-        """Return the pieces that `chunk` ends, in order, without their zeros; empty ones too."""
+        """Return the pieces that `chunk` completes, in order, without their zeros; empty ones too."""
         pieces = chunk.split(b"\0")
         pieces[0] = self._rest + pieces[0]
         self._rest = pieces.pop()[: self._keep]
@@ -58,15 +58,15 @@ class Pieces:
 
 
 class SerialLine(Closing):
-    """An open serial line. Closing it twice does no harm; a context manager closes it at its end.
+    """An open serial line. Closing it twice is harmless; a context manager closes it at its end.
 
     One thread may read while another writes.
     """
 
     def __init__(self, url: str, baud: int) -> None:
-        """Open `url`, for this program alone where the system can see to that.
+        """Open `url`, exclusively if the system supports it.
 
-        Raises DeviceError if that fails, SettingError for a baud rate below 1 and a text that names no port.
+        Raises DeviceError if that fails, SettingError for a baud rate below 1 or a text that does not name a port.
         """
         if fault := port_fault(url):
             raise SettingError(f"{shortened(repr(url))} {fault}")
@@ -83,53 +83,53 @@ class SerialLine(Closing):
         _lower_latency(self._port)
 
     def read(self, timeout_s: float) -> bytes:
-        """Return what has come in, after waiting for something until the timeout: b"" if nothing came.
+        """Wait for bytes until the timeout and return them; b"" if none came.
 
-        Raises DeviceError when the line is gone, as soon as that shows, or when its name has come to lead to another
-        port: the one that is open is then no longer the one that was meant.
+        Raises DeviceError as soon as the line is known to be gone, or when its name refers to another port: then the
+        open port is no longer the intended one.
         """
         if monotonic() >= self._look_at:
             self._look()
         try:
             return self._in_slices(timeout_s) if self._sliced else self._when_ready(timeout_s)
-        except (OSError, TypeError, ValueError) as reason:  # the latter two: closed meanwhile by another thread
+        except (OSError, TypeError, ValueError) as reason:  # TypeError, ValueError: closed meanwhile by another thread
             raise self._gone(reason) from reason
 
     def write(self, data: bytes) -> None:
-        """Send `data`. Raises DeviceError when the line is gone, or has taken nothing for a second."""
+        """Send `data`. Raises DeviceError if the line is gone or has accepted nothing for a second."""
         try:
             self._port.write(data)
         except (OSError, TypeError, ValueError) as reason:
             raise self._gone(reason) from reason
 
     def drain(self, seconds: float) -> bytes:
-        """Read for so long and return what came, to be thrown away. Raises DeviceError as `read` does."""
+        """Read for `seconds` and return the last bytes, to be discarded. Raises DeviceError as `read` does."""
         end, drained = monotonic() + seconds, b""
         while (left := end - monotonic()) > 0:
             drained = (drained + self.read(left))[-_CHUNK:]
         return drained
 
     def close(self) -> None:
-        """Close the line; what was written is given to the system already."""
-        self._descriptor = -1  # nobody reads what another file of the same number holds
+        """Close the line; written bytes have already been handed to the system."""
+        self._descriptor = -1  # never read another file that gets the same number
         self._port.close()
 
     def check_plugged(self) -> None:
-        """Raise DeviceError if the node that was opened has been removed, which reading may not show yet."""
+        """Raise DeviceError if the opened node has been removed, which reading may not show yet."""
         if self._node is not None and _node(self.url) is None:
             raise self._gone("its device node was removed")
 
     def _look(self) -> None:
         self._look_at = monotonic() + _LOOK_S
         if _node(self.url) not in (None, self._node):
-            raise DeviceError(f"{self.url}: it has come to be another port than the one that was opened")
+            raise DeviceError(f"{self.url}: it now refers to another port than the one that was opened")
 
     def _when_ready(self, timeout_s: float) -> bytes:
         ready, _, _ = select.select([self._descriptor], [], [], max(0.0, timeout_s))
         if not ready:
             return b""
         try:
-            data = os.read(self._descriptor, _CHUNK)  # pySerial would wait once more, in ten calls
+            data = os.read(self._descriptor, _CHUNK)  # pySerial would wait again, in ten calls
         except BlockingIOError:
             return b""
         if not data:
@@ -138,7 +138,7 @@ class SerialLine(Closing):
 
     def _in_slices(self, timeout_s: float) -> bytes:
         end = monotonic() + timeout_s
-        # pySerial waits for the one byte at most a slice; what came with it is there then.
+        # pySerial waits at most one slice for this byte; bytes that came with it are available then.
         while not (first := self._port.read(1)):
             if monotonic() >= end:
                 return b""
@@ -154,17 +154,17 @@ def _opened(url: str, baud: int) -> "Serial":
 
     if "://" not in url:
         check_node(url)
-    # pySerial knows no write timeout there; that connection's own is 5 s.
+    # pySerial supports no write timeout there; that connection has a timeout of 5 s.
     write_timeout = None if url.lower().startswith("rfc2217:") else _WRITE_TIMEOUT_S
     try:
         return serial_for_url(url, baud, timeout=0, write_timeout=write_timeout, exclusive=True)
-    except Exception as reason:  # termios.error is no OSError, and every kind of URL raises errors of its own
+    except Exception as reason:  # termios.error is not an OSError, and each kind of URL raises different errors
         advice = _ADVICE.get(getattr(reason, "errno", None) or 0, f"cannot be opened at {baud} baud ({reason})")
         raise DeviceError(f"{url}: {advice}") from reason
 
 
 def _node(port: str | int) -> int | None:
-    """Return the device number behind a path or a descriptor, None if it is no device."""
+    """Return the device number behind a path or a descriptor, None if it is not a device."""
     try:
         return os.stat(port).st_rdev or None  # noqa: PTH116 - of a descriptor, too
     except (OSError, ValueError):
@@ -180,9 +180,9 @@ def _has_descriptor(port: "Serial") -> bool:
 
 
 def _lower_latency(port: "Serial") -> None:
-    """Ask an FTDI adapter not to wait 16 ms for more bytes before it hands over what it has."""
+    """Set an FTDI adapter to deliver bytes at once, without its wait of 16 ms for more."""
     if hasattr(port, "set_low_latency_mode"):
         try:
             port.set_low_latency_mode(True)
-        except (OSError, ValueError) as reason:  # another kind of adapter: nothing lost
+        except (OSError, ValueError) as reason:  # another kind of adapter: no harm done
             _LOG.debug("%s: %s", port.port, reason)

@@ -1,4 +1,4 @@
-"""Choose preshapes of a Barrett hand, and say them whenever they change: in rad, one joint after the other.
+"""Choose preshapes of a Barrett hand, and print each change: joint by joint, in rad.
 
 thenar run build/ --glove glove.toml --sink jsonl:- | python barrett_preshape.py
 """
@@ -11,11 +11,11 @@ from thenar.runtime.preshape import PreshapeSelector, load_preshapes
 from thenar.runtime.sinks import HealthLine, Line
 
 selector = PreshapeSelector(load_preshapes("barrett_bh8"), min_probability=0.8, settle_ms=100)
-told = None
+shown = None
 for line in sys.stdin.buffer:
     grasp = json.decode(line, type=Line | HealthLine)
     preshape = selector.update(grasp) if isinstance(grasp, Line) else None
-    if preshape is not None and preshape is not told:
+    if preshape is not None and preshape is not shown:
         joints = zip(preshape.joint_names, preshape.positions, strict=True)
         print(preshape.name, *(f"{name}={position:.3f}" for name, position in joints), flush=True)
-        told = preshape
+        shown = preshape

@@ -54,7 +54,7 @@ class Glove:
         return [scale * (sum(self.random.random() for _ in range(12)) - 6.0) for scale in scales]
 
     def cells(self, state: list[float]) -> list[str]:
-        """Return what is read of a hand: pads in counts, then flex sensors in volts; some cells are empty."""
+        """Return the readings of a hand: pads in counts, then flex sensors in volts; some cells are empty."""
         bends, presses = state[: len(FLEX)], state[len(FLEX) :]
         counts = [str(min(max(round(2600 * press), 0) + self.random.randrange(12, 40), 4095)) for press in presses]
         volts = [f"{3.3 - 2.4 * min(max(bend, 0.0), 1.0):.2f}" for bend in bends]

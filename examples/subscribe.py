@@ -1,4 +1,4 @@
-"""Subscribe to grasps. Nothing of thenar is needed on this side, and any language will do.
+"""Subscribe to grasps. This side does not need thenar, and can be in any language.
 
 thenar run build/ --glove glove.toml --sink unix:/tmp/grasps &
 python subscribe.py /tmp/grasps
@@ -11,6 +11,6 @@ import sys
 with socket.socket(socket.AF_UNIX) as server:
     server.connect(sys.argv[1])
     for line in server.makefile(encoding="utf-8"):
-        told = json.loads(line)
-        if told["kind"] == "grasp":
-            print(told["number"], told["grasp"], f"{told['probability']:.0%}", told["health"], flush=True)
+        message = json.loads(line)
+        if message["kind"] == "grasp":
+            print(message["number"], message["grasp"], f"{message['probability']:.0%}", message["health"], flush=True)

@@ -1,6 +1,6 @@
-"""Scenes: grasps, hands and faults, simulated only as a scene calls for.
+"""Simulated scenes: grasps, hands and faults, only as far as a scene requires.
 
-The names below are loaded when first used: who draws a glove needs no simulation.
+The names below are loaded on first use: drawing a glove needs no simulation.
 """
 
 from importlib import import_module

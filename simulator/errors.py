@@ -1,4 +1,4 @@
-"""What can go wrong between a scene and its grasps."""
+"""Errors of scenes and their simulation."""
 
 from thenar.drivers.errors import ThenarError
 
@@ -6,11 +6,11 @@ __all__ = ["PlanError", "SceneError", "SimMissingError", "ThenarError"]
 
 
 class SceneError(ThenarError, ValueError):
-    """A scene cannot be simulated as it stands: the message names the file, the place in it, and what to do."""
+    """A scene cannot be simulated: the message names the file, the location in it, and the remedy."""
 
 
 class PlanError(ThenarError, ValueError):
-    """No posture of a hand holds an object as a grasp type wants it."""
+    """No posture of a hand can hold an object with a grasp type."""
 
 
 class SimMissingError(ThenarError, ImportError):

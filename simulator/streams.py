@@ -1,11 +1,10 @@
-"""Random numbers of a scene: streams of random words by draw site, and what numbers they become.
+"""Random numbers of a scene: streams of random words by draw site, and their conversion to numbers.
 
 key     = hash of (scene seed, effect name)
 counter = [0, repetition, hash of (grasp type, object), hash of subject]
 
-An effect that is added or removed, a subject that is put first, a repetition that is made alone: none changes a draw of
-any other site. Only Philox' raw 64-bit words come from numpy, which keeps them for good; deviates.py makes numbers of
-them.
+Adding or removing an effect, putting a subject first, or making a single repetition changes no draw of any other site.
+Only Philox' raw 64-bit words come from numpy, which guarantees them; deviates.py converts them to numbers.
 """
 
 from collections import Counter
@@ -24,7 +23,7 @@ Words = NDArray[np.uint64]
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """Raw 64-bit words of any shape, and what they become."""
+    """Raw 64-bit words of any shape, and their conversions."""
 
     words: Words
 
@@ -113,13 +112,13 @@ def _ratio(x: Floats, above: tuple[float, ...], below: tuple[float, ...]) -> Flo
     return polynomial(x, above) / polynomial(x, below)
 
 
-# What stands for "every repetition" (of a subject) and "every subject" (one glove) in a counter.
+# The counter values for "every repetition" (of a subject) and "every subject" (one glove).
 _ALL = 2**64 - 1
 
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """Whose draws: a subject, a grasp type with an object, and the repetitions (n,) of one batch."""
+    """The site of draws: a subject, a grasp type with an object, and the repetitions (n,) of one batch."""
 
     subject: str
     grasp: str
@@ -129,7 +128,7 @@ class Site:
 
 @dataclass(slots=True)
 class Draws:
-    """How many random numbers each effect has drawn."""
+    """The number of random numbers that each effect has drawn."""
 
     counts: Counter[str] = field(default_factory=Counter)
 
@@ -138,9 +137,9 @@ class Draws:
 class Draw:
     """The random numbers of one effect for one batch of n repetitions.
 
-    `per_repetition` draws differ with the repetition; `per_subject` ones are the subject's own in every repetition, and
-    `per_type` ones in every repetition of a grasp type; `per_glove` ones are the glove's, the same for everybody.
-    Asking twice returns the same numbers.
+    `per_repetition` draws differ by repetition; `per_subject` draws are constant over all repetitions of a subject,
+    `per_type` draws over those of a grasp type; `per_glove` draws are the same for all subjects.
+    The same call returns the same numbers again.
     """
 
     seed: int
@@ -149,7 +148,7 @@ class Draw:
     draws: Draws
 
     def at_rest(self, numbers: NDArray[np.int64]) -> "Draw":
-        """Return the draws for the same subject's rests of these numbers (n,): that before trial t has the number t."""
+        """Return the draws for the same subject's rests (n,): the rest before trial t has the number t."""
         return replace(self, site=Site(self.site.subject, NONE, "", numbers))
 
     def per_repetition(self, *shape: int) -> Numbers:
@@ -159,11 +158,11 @@ class Draw:
         return Numbers(rows.reshape(len(rows), *shape))
 
     def per_subject(self, *shape: int) -> Numbers:
-        """Return numbers of `shape`, the subject's own."""
+        """Return numbers of `shape`, specific to the subject."""
         return self._common(_hash(self.site.subject), shape)
 
     def per_type(self, *shape: int) -> Numbers:
-        """Return numbers of `shape`, the subject's own for this grasp type."""
+        """Return numbers of `shape`, specific to the subject and this grasp type."""
         return self._common(_hash(self.site.subject, self.site.grasp), shape)
 
     def per_glove(self, *shape: int) -> Numbers:
@@ -184,7 +183,7 @@ class Draw:
         counter = np.array([0, 0, condition, subject], dtype=np.uint64)
         source, at = np.random.Philox(key=_key(self.seed, self.effect), counter=counter), 0
         for row, repetition in zip(words, repetitions, strict=True):
-            # To move the counter on costs a third of a new source.
+            # Advancing the counter costs a third of a new source.
             source.advance(((repetition << 64) - at) % (1 << 256))
             row[:] = source.random_raw(size)
             at = (repetition << 64) + -(-size // 4)  # four words to a step of the counter

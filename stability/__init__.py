@@ -1,1 +1,1 @@
-"""The hard cases: what could go wrong with the numbers, the truth each is held against, and the error."""
+"""Hard cases: numerical dangers, a reference for each, and the measured error."""

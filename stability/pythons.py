@@ -1,4 +1,4 @@
-"""The other Pythons of this machine: those that there are, and those that `make pythons` has given a thenar."""
+"""The other Pythons of this machine: those installed, and those in which `make pythons` has installed thenar."""
 
 import os
 import shutil
@@ -8,14 +8,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 SUPPORTED = ("3.11", "3.12", "3.13", "3.14")
-VARIABLE = "THENAR_PYTHONS"  # interpreters that have thenar, as a list like PATH, in place of the folders
+VARIABLE = "THENAR_PYTHONS"  # interpreters with thenar, a list like PATH, used instead of the folders
 ROOT = Path(__file__).resolve().parents[1]
 
 _RUNS = "import ensurepip, platform; print(platform.python_version())"
 
 
 def made() -> list[Path]:
-    """Return the interpreters that thenar is installed for: of THENAR_PYTHONS, else of the repository's `.venv-3.x`."""
+    """Return the interpreters with thenar installed: from THENAR_PYTHONS, else the repository's `.venv-3.x`."""
     listed = os.environ.get(VARIABLE)
     if listed is not None:
         return [Path(entry) for entry in listed.split(os.pathsep) if entry]
@@ -24,7 +24,7 @@ def made() -> list[Path]:
 
 
 def found() -> Iterator[tuple[str, Path]]:
-    """Yield (version "3.x", interpreter) of every supported Python but this one that really runs here."""
+    """Yield (version "3.x", interpreter) of every other supported Python that runs here."""
     for version in SUPPORTED:
         if version == f"{sys.version_info.major}.{sys.version_info.minor}":
             continue
@@ -34,7 +34,7 @@ def found() -> Iterator[tuple[str, Path]]:
 
 
 def _candidates(version: str) -> Iterator[Path]:
-    """Yield what could be an interpreter of `version`: first along the PATH, then pyenv's, whose shims may refuse."""
+    """Yield candidates for an interpreter of `version`: first on the PATH, then pyenv's, whose shims may fail."""
     for folder in os.get_exec_path():
         if (file := shutil.which(f"python{version}", path=folder)) is not None:
             yield Path(file)
@@ -43,8 +43,8 @@ def _candidates(version: str) -> Iterator[Path]:
 
 
 def _runs(python: Path, version: str) -> bool:
-    answer = subprocess.run([python, "-I", "-c", _RUNS], capture_output=True, text=True, check=False)
-    return answer.returncode == 0 and answer.stdout.startswith(version + ".")
+    output = subprocess.run([python, "-I", "-c", _RUNS], capture_output=True, text=True, check=False)
+    return output.returncode == 0 and output.stdout.startswith(version + ".")
 
 
 if __name__ == "__main__":

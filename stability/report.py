@@ -1,4 +1,4 @@
-"""The catalogue of hard cases run on all cores, what came of it, and how terminal and page word it."""
+"""Run the catalogue of hard cases on all cores, and format the results for the terminal and the page."""
 
 import math
 import traceback
@@ -15,7 +15,7 @@ import msgspec
 from thenar.compiler.workers import in_workers
 
 from .finding import Case, Finding
-from .weka import Beside, Differences, NotRun
+from .weka import Comparison, Differences, NotRun
 
 NAMES = (
     "elementary",
@@ -46,7 +46,7 @@ class CaseModule(Protocol):
 
     @staticmethod
     def findings(full: bool) -> Iterator[Finding]:
-        """Run the case, quickly or in full, and yield what it finds, in an order that does not vary."""
+        """Run the case, quickly or in full, and yield its findings in a fixed order."""
 
 
 def load(name: str) -> CaseModule:
@@ -56,7 +56,7 @@ def load(name: str) -> CaseModule:
 
 Progress = Callable[[int, int], None]
 
-_KILLED = "not finished: a worker process ended before its work was done, perhaps for want of memory"
+_KILLED = "not finished: a worker process ended early, perhaps for lack of memory"
 
 
 class Listed(msgspec.Struct, frozen=True):
@@ -68,19 +68,19 @@ class Listed(msgspec.Struct, frozen=True):
 
 
 def listed(names: Sequence[str]) -> list[Listed]:
-    """Return what the cases `names` are, and what could go wrong in each."""
+    """Return the titles and the dangers of the cases `names`."""
     return [Listed(name, *msgspec.structs.astuple(load(name).CASE)) for name in names]
 
 
 class Check(msgspec.Struct, frozen=True):
-    """A finding and the verdict on it."""
+    """A finding and its verdict."""
 
     finding: Finding
     holds: bool
 
 
 class CaseReport(msgspec.Struct, frozen=True):
-    """What a case found. `failure` says what it raised, and where; what it had found until then is there too."""
+    """The findings of a case. `failure` describes an exception and its location; earlier findings are kept."""
 
     name: str
     about: Case
@@ -90,11 +90,11 @@ class CaseReport(msgspec.Struct, frozen=True):
 
 
 class Report(msgspec.Struct, frozen=True):
-    """What the catalogue found; `beside` is what Weka said on a separable set, None where nobody asked for it."""
+    """The results of the catalogue; `weka` is the comparison with Weka on a separable set, None if not requested."""
 
     full: bool
     cases: tuple[CaseReport, ...]
-    beside: Beside | NotRun | None
+    weka: Comparison | NotRun | None
     holds: bool
 
 
@@ -103,7 +103,7 @@ def run(
 ) -> tuple[CaseReport, ...]:
     """Run the cases `names`, each in a worker process (`jobs` as for in_workers), and return them in that order.
 
-    A case that raises, or warns, has failed and says so; so has each that was not finished when a worker was killed.
+    A case that raises or warns has failed, as has each case that was unfinished when a worker was killed.
     """
     progress = progress or (lambda done, total: None)
     found: dict[str, CaseReport] = {}
@@ -118,7 +118,7 @@ def run(
 
 
 def run_case(name: str, *, full: bool) -> CaseReport:
-    """Run one case, its warnings turned into errors."""
+    """Run one case with warnings as errors."""
     about, findings, failure = Case(name, ""), [], None
     try:
         module = load(name)
@@ -126,8 +126,8 @@ def run_case(name: str, *, full: bool) -> CaseReport:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             for finding in module.findings(full):
-                findings.append(finding)  # noqa: PERF402  one by one: those before a failure stay
-    except Exception as fault:  # whatever it is, it is this case's failure, and no other's
+                findings.append(finding)  # noqa: PERF402  one by one, to keep those before a failure
+    except Exception as fault:  # any exception fails this case only
         # "ZeroDivisionError in separable.py, line 40: division by zero"
         place = traceback.extract_tb(fault.__traceback__)[-1]
         failure = f"{type(fault).__name__} in {Path(place.filename).name}, line {place.lineno}: {fault}"
@@ -139,19 +139,19 @@ def _reported(name: str, about: Case, findings: Sequence[Finding], failure: str 
     return CaseReport(name, about, checks, failure, failure is None and bool(checks) and all(c.holds for c in checks))
 
 
-# What units mean, in the order of the legend. All others count what is wrong, or speak for themselves.
+# The meanings of units, in the order of the legend. Other units count violations, or are self-explanatory.
 _MEANINGS = (
     ("ulp", "the distance from the true number to the next double"),
-    ("x 2^-53", "times 2^-53 of the number, or of what is named: by so much one rounding can be off"),
-    ("x rounding", "times the most that rounding can do to that very number, added up for each input"),
-    ("x growth", "the same, with what later rounds make of the roundings of earlier ones"),
-    ("of the bound", "as a share of a bound that is worked out for each input"),
-    ("steps", "whole numbers: those of the integer tables, or a joint's codes"),
+    ("x 2^-53", "times 2^-53 of the number, or of the named quantity: the largest error of one rounding"),
+    ("x rounding", "times the largest possible effect of rounding on this number, summed for each input"),
+    ("x growth", "the same, including the growth of earlier rounding errors in later rounds"),
+    ("of the bound", "as a share of a bound that is computed for each input"),
+    ("steps", "integers: entries of the integer tables, or a joint's codes"),
 )
 
 
 def figure(number: float) -> str:
-    """Return a number for people: whole ones below a million whole, others to three digits."""
+    """Format a number: integers below a million exactly, others to three digits."""
     whole = math.isfinite(number) and number == round(number) and abs(number) < 1e6
     return f"{round(number):,}" if whole else f"{number:.3g}"
 
@@ -162,19 +162,19 @@ def error_of(finding: Finding) -> str:
 
 
 def bound_of(finding: Finding) -> str:
-    """Return the most that the error may be."""
+    """Return the bound with its unit."""
     return f"{figure(finding.bound)} {finding.unit}"
 
 
 def verdict(check: Check) -> str:
-    """Return the verdict as a word or two."""
+    """Return the verdict in one or two words."""
     if check.holds:
         return "holds"
     return "FAILS" if check.finding.tried else "NOT TRIED"
 
 
 def summary(report: Report) -> str:
-    """Return the sum of it all in a line."""
+    """Return a one-line summary."""
     checks = [check for case in report.cases for check in case.checks]
     tried = sum(check.finding.tried for check in checks)
     looked = f"{_count(len(report.cases), 'case')} {'in full' if report.full else 'quickly'}, "
@@ -186,7 +186,7 @@ def summary(report: Report) -> str:
 
 
 def failures(report: Report) -> tuple[str, ...]:
-    """Return a sentence for all that fails: the case, what was looked at, by how much it fails, and where worst."""
+    """Return a sentence per failure: the case, the check, the size of the error, and the worst input."""
     return tuple(f"{case.name}: {said}" for case in report.cases for said in _failures(case))
 
 
@@ -197,7 +197,7 @@ def _failures(case: CaseReport) -> Iterator[str]:
     if case.failure is not None:
         yield case.failure
     elif not case.checks:
-        yield "it finds nothing"
+        yield "it has no findings"
 
 
 def _fault(finding: Finding) -> str:
@@ -209,7 +209,7 @@ def _fault(finding: Finding) -> str:
 
 
 def legend(report: Report) -> tuple[tuple[str, str], ...]:
-    """Return the units that occur and do not speak for themselves, each with what it means."""
+    """Return the units in use that need an explanation, each with its meaning."""
     units = {check.finding.unit for case in report.cases for check in case.checks}
     occurring = (
         (unit, meaning)
@@ -219,19 +219,19 @@ def legend(report: Report) -> tuple[tuple[str, str], ...]:
     return tuple(occurring)
 
 
-def besides(beside: Beside | NotRun) -> tuple[str, ...]:
-    """Return what came of running Weka beside thenar, a sentence a line."""
-    if isinstance(beside, NotRun):
-        return (f"not run: {beside.why}",)
-    changed = f"in the end {_count(beside.weka_changed, 'row')} of {beside.held_out} change class"
+def weka_lines(weka: Comparison | NotRun) -> tuple[str, ...]:
+    """Return the results of the comparison with Weka, one sentence per line."""
+    if isinstance(weka, NotRun):
+        return (f"not run: {weka.why}",)
+    changed = f"after the last round {_count(weka.weka_changed, 'row')} of {weka.held_out} change class"
     return (
-        f"Weka {beside.weka} and thenar, {beside.rounds} rounds on {beside.rows} rows of {beside.classes} classes that "
-        f"stumps learn by heart; how far apart the probabilities are that they give to {beside.held_out} other rows:",
-        f"{_apart(beside.weka_itself, 'Weka and itself, under the two exp() settings of the JVM')}; {changed}",
-        _apart(beside.ours_processor, "thenar and Weka under the exp() of the processor, the default"),
-        _apart(beside.ours_java, "thenar and Weka under the exp() written in Java"),
-        f"thenar and itself, trained on the rows in {beside.shuffles} other orders: "
-        + (f"at most {figure(beside.our_shuffled)}" if beside.our_shuffled else "the same bits"),
+        f"Weka {weka.weka} and thenar, {weka.rounds} rounds on {weka.rows} rows of {weka.classes} classes that "
+        f"stumps overfit; largest differences between their probabilities for {weka.held_out} other rows:",
+        f"{_apart(weka.weka_itself, 'Weka with the two exp() settings of the JVM')}; {changed}",
+        _apart(weka.ours_processor, "thenar and Weka with the processor's exp(), the default"),
+        _apart(weka.ours_java, "thenar and Weka with Java's portable exp()"),
+        f"thenar trained on the rows in {weka.shuffles} other orders: "
+        + (f"at most {figure(weka.our_shuffled)}" if weka.our_shuffled else "the same bits"),
     )
 
 
@@ -240,7 +240,7 @@ def _apart(differences: Differences, who: str) -> str:
     if parts is None:
         return f"{who}: at most {figure(max(differences.largest, default=0.0))}, in all rounds"
     most = figure(max(differences.largest[: parts - 1], default=0.0))
-    return f"{who}: at most {most} until they part in round {parts}, then by up to {figure(max(differences.largest))}"
+    return f"{who}: at most {most} until they diverge in round {parts}, then up to {figure(max(differences.largest))}"
 
 
 def _count(number: int, noun: str) -> str:

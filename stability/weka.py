@@ -1,6 +1,6 @@
-"""Weka 3.6, run as a program beside thenar on the same separable set, under the JVM's two exp().
+"""Weka 3.6, run as a program on the same separable set as thenar, with both exp() of the JVM.
 
-Weka is not part of thenar and nothing of it is: where java or its jar are missing, this part is not run and says so.
+Weka is not part of thenar: if java or Weka's jar is missing, the comparison is not run, and the report says so.
 """
 
 import re
@@ -20,7 +20,7 @@ from thenar.drivers.errors import ThenarError
 
 JAR = Path("/usr/share/java/weka.jar")  # where Debian's package puts it
 
-# The JVM has two exp(): the processor's own, which is its choice, and the portable one, which this makes it take.
+# The JVM has two exp(): the processor's, its default, and a portable one, which this option selects.
 EXP_OF_THE_PROCESSOR: tuple[str, ...] = ()
 EXP_IN_JAVA = ("-XX:+UnlockDiagnosticVMOptions", "-XX:-UseLibmIntrinsic")
 
@@ -29,11 +29,11 @@ _BRANCHES = tuple(re.compile(rf"^x(\d+) {branch} : (\S+)$", re.M) for branch in 
 
 
 class WekaError(ThenarError, RuntimeError):
-    """Weka could not be run, or what it printed is not a model of what it was given."""
+    """Weka could not be run, or its output is not the expected model."""
 
 
 def run_weka(*arguments: str, options: tuple[str, ...] = ()) -> str:
-    """Return what a class of Weka prints under JVM `options`. Raises WekaError if none is installed, or it fails."""
+    """Return the output of a Weka class under JVM `options`. Raises WekaError if Weka is missing or fails."""
     java = shutil.which("java")
     if java is None or not JAR.is_file():
         raise WekaError("java or Weka is not installed")
@@ -44,15 +44,15 @@ def run_weka(*arguments: str, options: tuple[str, ...] = ()) -> str:
         said = (reason.stderr or reason.stdout).strip().partition("\n")[0]
         raise WekaError(f"java ended with code {reason.returncode}: {said}") from reason
     except subprocess.TimeoutExpired as reason:
-        raise WekaError(f"Weka was not done after {_LONGEST_S:g} s") from reason
+        raise WekaError(f"Weka was not finished after {_LONGEST_S:g} s") from reason
 
 
 def weka_stumps(
     X: NDArray[np.int64], labels: NDArray[np.intp], n_classes: int, rounds: int, options: tuple[str, ...]
 ) -> Stumps:
-    """Train Weka's LogitBoost on X (n, d) whole numbers and labels (n,) under JVM `options`; return its stumps.
+    """Train Weka's LogitBoost on X (n, d) of integers and labels (n,) under JVM `options`; return its stumps.
 
-    They are at full precision: Java prints a double so that it reads back as itself. Raises WekaError.
+    They have full precision: Java prints a double so that it reads back unchanged. Raises WekaError.
     """
     with TemporaryDirectory(prefix="thenar-weka-") as folder:
         table = Path(folder) / "set.arff"
@@ -63,7 +63,7 @@ def weka_stumps(
 
 
 def read_stumps(printed: str, rounds: int, n_classes: int, n_inputs: int) -> Stumps:
-    """Return the stumps of a model that Weka printed, columns named x0, x1, ... Raises WekaError if it is another."""
+    """Parse the stumps of a model in Weka's output, with columns x0, x1, ... Raises WekaError if they do not match."""
     left, right, missing = (pattern.findall(printed) for pattern in _BRANCHES)
     if not len(left) == len(right) == len(missing) == rounds * n_classes:
         raise WekaError(f"Weka printed {len(left)} stumps, not {rounds} rounds of {n_classes}")
@@ -84,8 +84,8 @@ def _arff(X: NDArray[np.int64], labels: NDArray[np.intp], n_classes: int) -> str
     return "\n".join([*lines, ""])
 
 
-# Distributions further apart than this have parted: what docs/project/weka-parity.md calls agreement.
-PARTED = 1e-9
+# Distributions further apart than this have diverged, as in docs/project/weka-parity.md.
+DIVERGED = 1e-9
 
 ROUNDS = 100
 CLASSES, ROWS_A_CLASS, SWITCHES, JOINTS = 10, 8, 16, 3
@@ -95,14 +95,14 @@ _SHUFFLES = 10
 
 
 class Differences(msgspec.Struct, frozen=True):
-    """The largest difference between two answers' held-out distributions, after each round; None: they never part."""
+    """The largest difference between two models' held-out distributions, after each round; None: they never diverge."""
 
     largest: tuple[float, ...]
     parts: int | None
 
 
-class Beside(msgspec.Struct, frozen=True, tag="run"):
-    """What came of running Weka and thenar side by side."""
+class Comparison(msgspec.Struct, frozen=True, tag="run"):
+    """The comparison of Weka and thenar."""
 
     weka: str  # its version
     rounds: int
@@ -110,25 +110,25 @@ class Beside(msgspec.Struct, frozen=True, tag="run"):
     inputs: int
     rows: int
     held_out: int
-    learned: int | None  # the round from which on thenar has all training rows right
-    weka_itself: Differences  # Weka under the JVM's one exp() and the other
-    ours_processor: Differences  # thenar and Weka under the processor's exp()
+    learned: int | None  # the round from which thenar predicts all training rows correctly
+    weka_itself: Differences  # Weka with the JVM's two exp()
+    ours_processor: Differences  # thenar and Weka with the processor's exp()
     ours_java: Differences
-    weka_changed: int  # held-out rows whose class in Weka hangs on the choice of exp()
+    weka_changed: int  # held-out rows whose class in Weka depends on the choice of exp()
     weka_value: float  # the largest branch value of Weka's stumps under either
     our_value: float
-    shuffles: int  # orders of the rows in which thenar was trained again
-    our_shuffled: float  # the largest difference between its held-out distributions then
+    shuffles: int  # number of other row orders in which thenar was trained
+    our_shuffled: float  # the largest difference between its held-out distributions in these orders
 
 
 class NotRun(msgspec.Struct, frozen=True, tag="not run"):
-    """Why there is nothing to compare."""
+    """The reason why there is no comparison."""
 
     why: str
 
 
-def beside_weka() -> Beside | NotRun:
-    """Return what came of it, or why nothing did."""
+def compare_with_weka() -> Comparison | NotRun:
+    """Run the comparison, or return the reason why it cannot run."""
     try:
         return _compare()
     except WekaError as reason:
@@ -138,9 +138,9 @@ def beside_weka() -> Beside | NotRun:
 def separable_set() -> tuple[NDArray[np.int64], NDArray[np.intp]]:
     """Return X (n, d) of 0/1 switches and joint codes, and labels (n,): twice ROWS_A_CLASS of each class in turn.
 
-    Each class has its own pattern of switches, of which a few flip in each row, and its own posture of the joints,
-    which sways a little. The first half of the rows is trained on; stumps learn it by heart. The seed is one that shows
-    in full what other draws show in part.
+    Each class has its own pattern of switches, of which a few flip in each row, and its own posture of the joints with
+    small deviations. The first half of the rows is for training; stumps overfit it. The seed shows in full an effect
+    that other draws show in part.
     """
     random = np.random.default_rng(_SEED)
     patterns = random.integers(0, 2, (CLASSES, SWITCHES))
@@ -151,7 +151,7 @@ def separable_set() -> tuple[NDArray[np.int64], NDArray[np.intp]]:
     return np.hstack([switches, joints]), labels
 
 
-def _compare() -> Beside:
+def _compare() -> Comparison:
     X, labels = separable_set()
     half = len(labels) // 2
     training, held_out = (X[:half], labels[:half]), X[half:]
@@ -159,8 +159,8 @@ def _compare() -> Beside:
         weka_stumps(*training, CLASSES, ROUNDS, options) for options in (EXP_OF_THE_PROCESSOR, EXP_IN_JAVA)
     )
     ours, _ = boost(*training, CLASSES, rounds=ROUNDS)
-    answers = {name: _staged(stumps, held_out) for name, stumps in (("p", processor), ("j", java), ("o", ours))}
-    return Beside(
+    outputs = {name: _staged(stumps, held_out) for name, stumps in (("p", processor), ("j", java), ("o", ours))}
+    return Comparison(
         weka=run_weka("weka.core.Version").partition("\n")[0].strip(),
         rounds=ROUNDS,
         classes=CLASSES,
@@ -168,14 +168,14 @@ def _compare() -> Beside:
         rows=half,
         held_out=len(held_out),
         learned=_learned(ours, *training),
-        weka_itself=_differences(answers["p"], answers["j"]),
-        ours_processor=_differences(answers["o"], answers["p"]),
-        ours_java=_differences(answers["o"], answers["j"]),
+        weka_itself=_differences(outputs["p"], outputs["j"]),
+        ours_processor=_differences(outputs["o"], outputs["p"]),
+        ours_java=_differences(outputs["o"], outputs["j"]),
         weka_changed=int(np.count_nonzero(winners(processor.scores(held_out)) != winners(java.scores(held_out)))),
         weka_value=float(max(np.abs(processor.values).max(), np.abs(java.values).max())),
         our_value=float(np.abs(ours.values).max()),
         shuffles=_SHUFFLES,
-        our_shuffled=_shuffled(answers["o"], *training, held_out),
+        our_shuffled=_shuffled(outputs["o"], *training, held_out),
     )
 
 
@@ -186,7 +186,7 @@ def _staged(stumps: Stumps, X: NDArray[np.int64]) -> Floats:
 
 def _differences(one: Floats, other: Floats) -> Differences:
     largest = np.abs(one - other).max(axis=(1, 2))
-    apart = np.flatnonzero(largest > PARTED)
+    apart = np.flatnonzero(largest > DIVERGED)
     return Differences(tuple(largest.tolist()), int(apart[0]) + 1 if apart.size else None)
 
 
@@ -196,8 +196,8 @@ def _learned(stumps: Stumps, X: NDArray[np.int64], labels: NDArray[np.intp]) -> 
     return last + 1 if last < len(wrong) else None
 
 
-def _shuffled(answer: Floats, X: NDArray[np.int64], labels: NDArray[np.intp], held_out: NDArray[np.int64]) -> float:
+def _shuffled(output: Floats, X: NDArray[np.int64], labels: NDArray[np.intp], held_out: NDArray[np.int64]) -> float:
     random = np.random.default_rng(_SEED)
     orders = (random.permutation(len(labels)) for _ in range(_SHUFFLES))
     again = (_staged(boost(X[order], labels[order], CLASSES, rounds=ROUNDS)[0], held_out) for order in orders)
-    return max(float(np.abs(answer - other).max()) for other in again)
+    return max(float(np.abs(output - other).max()) for other in again)

@@ -100,7 +100,7 @@ def ensemble_from_bytes(data: bytes, what: str = "ensemble.bin") -> Model:
 
 
 def model_fault(model: Model, n_switches: int, n_joints: int, n_classes: int) -> str:
-    """Return what is wrong with a model of this many inputs and classes, to follow "a model that"; "" if valid."""
+    """Return the fault of a model of this many inputs and classes, to follow "a model that"; "" if valid."""
     if isinstance(model, Stumps):
         sizes, wanted = (model.n_inputs, model.n_classes), (n_switches + n_joints, n_classes)
         return (

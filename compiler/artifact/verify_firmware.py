@@ -145,7 +145,6 @@ class TargetCheck(Struct, frozen=True, kw_only=True):
     """The result for one part.
 
     layout     which layout was compiled, and why
-    answer     "classify": every frame from scratch; "update": from the changes since the previous frame
     missing    whether inputs are missing in every frame; in every second frame it is a single one
     frames     how many were classified; `differing` of them differ from Python in a score, grasp type, margin or
                probability
@@ -157,6 +156,7 @@ class TargetCheck(Struct, frozen=True, kw_only=True):
 
     part: str
     layout: str
+    # "classify": every frame from scratch; "update": from the changes since the previous frame.
     answer: Function  # codespell:ignore answer
     missing: bool
     shares: bool

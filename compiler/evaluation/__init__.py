@@ -1,1 +1,1 @@
-"""Recognition rates: folds, protocols, intervals, and the paper's tables for the user's data."""
+"""Accuracy: folds, protocols, intervals, and the paper's tables for the user's data."""

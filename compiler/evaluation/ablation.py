@@ -1,4 +1,4 @@
-"""Ablation: what removing each effect of a simulated scene does to the recognition rate."""
+"""Ablation: the change in accuracy when an effect of a simulated scene is removed."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ Labels = NDArray[np.intp]
 
 FOLDS, ROUNDS, SEED = 4, 100, 1
 
-# All switches, all joints, and both: no placement has a say in what an effect does.
+# All switches, all joints, and both: no placement, so that only the effects matter.
 _KINDS = {"switches": COMPOSITIONS[4], "joints": COMPOSITIONS[3], "both": COMPOSITIONS[0]}
 _Z = 1.959963984540054  # of the normal distribution, for 95 %
 
 
 class Change(msgspec.Struct, frozen=True):
-    """A difference of two recognition rates of the same grasps, and its 95 % interval."""
+    """A difference of two accuracies on the same grasps, and its 95 % interval."""
 
     mean: float
     low: float
@@ -33,8 +33,8 @@ class Change(msgspec.Struct, frozen=True):
 
 
 class Recognised(msgspec.Struct, frozen=True):
-    """The accuracy from some inputs, of trials and of frames (None where each row is a trial), and what removing the
-    effect changed for trials; None for the whole scene.
+    """The accuracy with some inputs, by trials and by frames (None if each row is a trial), and the change in accuracy
+    by trials when the effect is removed; None for the whole scene.
     """
 
     inputs: str
@@ -66,7 +66,7 @@ class Ablation(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Made:
-    """Grasps of a scene without an effect, or of the whole scene (`without` is None): what did not settle is no row."""
+    """Grasps of a scene without an effect, or of the whole scene (`without` is None), if they settled."""
 
     without: str | None
     grasp_set: GraspSet
@@ -77,10 +77,10 @@ class Made:
 def ablated(
     made: Iterable[Made], n_variants: int, n_subjects: int, jobs: int = -1, progress: Progress | None = None
 ) -> tuple[Variant, ...]:
-    """Return what each effect does to the recognition rate of each subject's own grasps.
+    """Return the effect of each effect of a scene on the accuracy for each subject's own grasps.
 
-    LogitBoost, cross-validated within each subject. The whole scene is `made` first; `progress` counts the fits of
-    n_variants, each of n_subjects. Raises EvaluationError for too few repetitions to cross-validate.
+    LogitBoost is cross-validated within each subject. The whole scene is the first of `made`; `progress` counts the
+    fits, n_subjects for each of n_variants. Raises EvaluationError for too few repetitions to cross-validate.
     """
     count = len(_KINDS) * FOLDS * n_subjects
     found: list[Variant] = []
@@ -100,7 +100,7 @@ def _further(progress: Progress, before: int, total: int) -> Progress:
 
 
 def _predicted(grasp_set: GraspSet, jobs: int, progress: Progress | None) -> dict[str, Labels]:
-    """Return for each kind of inputs the label (n,) that each row was given when it was left out of training."""
+    """Return, for each kind of inputs, the label (n,) predicted for each row when it was left out of training."""
     parts = populations(grasp_set, "trial", FOLDS, repeats=1, seed=SEED)
     planner = Planner(parts, Samples.of(grasp_set), 0, (), SEED)
     fits = {
@@ -124,7 +124,7 @@ def _recognised(
     if whole is None:
         return Recognised(name, *rates, None)
     now, before = _hits(grasp_set, predicted[name]), _hits(whole[0], whole[1][name])
-    # One has what did not settle in the other.
+    # A grasp may have settled in only one of the two.
     same = [key for key in now if key in before]
     change = change_of(np.array([now[key] for key in same]), np.array([before[key] for key in same]))
     return Recognised(name, *rates, change)
@@ -140,10 +140,10 @@ def _hits(grasp_set: GraspSet, predicted: Labels) -> dict[tuple[str, int], bool]
 
 
 def change_of(now: Bits, before: Bits) -> Change:
-    """Return the change of the rate of the same m > 0 grasps, recognised `now` and `before`, with its 95 % interval.
+    """Return the change in accuracy on the same m > 0 grasps, recognised `now` and `before`, with its 95 % interval.
 
-    A difference of paired proportions with half a grasp added to each cell of the 2 x 2 table (Agresti and Min 2005,
-    Statistics in Medicine 24:729-740). It says how much the choice of grasps matters, not the cut into folds.
+    The interval is for a difference of paired proportions, with half a grasp added to each cell of the 2 x 2 table
+    (Agresti and Min 2005, Statistics in Medicine 24:729-740). It covers the choice of grasps, not the cut into folds.
     """
     gained = float(np.count_nonzero(now & ~before))
     lost = float(np.count_nonzero(before & ~now))

@@ -1,4 +1,4 @@
-"""Classifiers of scikit-learn that trainers are compared with: what anybody would try first."""
+"""Baseline classifiers from scikit-learn, to compare with the trainers."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,17 +16,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Classifier:
-    """A classifier of the standardised inputs: what it is, and what makes one."""
+    """A classifier on standardised inputs: its description, and a function that creates it."""
 
     what: str
     make: "Callable[[], ClassifierMixin]"
 
-    def answers(self, learning: Samples, X: NDArray[np.generic]) -> NDArray[np.intp]:
-        """Return the class numbers that rows X (n, s + j) get after it has learnt from `learning`."""
+    def predict(self, learning: Samples, X: NDArray[np.generic]) -> NDArray[np.intp]:
+        """Return the class numbers predicted for rows X (n, s + j) after training on `learning`."""
         from sklearn.pipeline import make_pipeline
         from sklearn.preprocessing import StandardScaler
 
-        # scikit-learn's refuse to learn from a single class.
+        # scikit-learn's classifiers cannot be fitted to a single class.
         if (learning.labels == learning.labels[0]).all():
             return np.full(len(X), learning.labels[0])
         made = make_pipeline(StandardScaler(), self.make()).fit(learning.inputs.astype(np.float64), learning.labels)

@@ -1,10 +1,10 @@
-"""The fit is chosen inside the training rows: which trainer, with which settings, by inner folds.
+"""Model selection inside the training rows: the trainer and its settings are chosen on inner folds.
 
-Inner folds part no movement; and where the fit is to recognise a new subject (object, session), they leave subjects
-out as well. Each way to train is scored by the trials that it recognises there, ties by the log-loss. Of those that are
-behind the best one by no more than the standard error of that difference, those with small tables are cheap to
-recognise with; of these, the one with the lowest log-loss is taken. Rows of nothing held are no trials to recognise;
-they count in the log-loss. Of trials of many frames some are enough to compare by.
+Inner folds split no movement; if the fit is to generalise to new subjects (objects, sessions), they also leave subjects
+out. Each candidate is scored by its accuracy on trials, ties by log-loss. Candidates within one standard error of the
+difference to the best are considered equal; of these, those with small tables are cheap to deploy, and the one with the
+lowest log-loss among them is taken. Rows in which nothing is held count only in the log-loss. For trials of many
+frames, a subset of the frames suffices for the comparison.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -26,21 +26,23 @@ from .folds import Fold, leave_groups_out, trial_folds
 
 Rows = NDArray[np.intp]
 
-# A training set of fewer trials than these is cut into so many inner folds, a larger one into two.
+# Training sets with fewer trials than this are cut into this many inner folds, larger ones into two.
 _FOLDS = ((1500, 4), (20_000, 3))
 _LEAST_GROUPS = 3
-# Tables of eight kilobytes, at a byte an entry, fit the smallest microcontrollers; of larger ones, those up to a
-# quarter above the smallest are small.
+# Tables of eight kilobytes, at a byte per entry, fit the smallest microcontrollers; larger ones are small up to a
+# quarter above the smallest.
 _SMALL, _LARGER = 8192, 1.25
-# Frames of a trial resemble their neighbours: of more rows than these, evenly spaced ones are enough to compare fits
-# by, of each trial at least so many.
+# Frames of a trial resemble their neighbours: of more rows than this, evenly spaced ones suffice to compare fits, at
+# least this many per trial.
 _COMPARED, _FRAMES = 2048, 8
 
 
 def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None = None) -> list[Fold]:
-    """Return folds of training rows that part no movement, and no group if there are three or more; none of one.
+    """Return folds of training rows that split no movement, and no group if there are three or more.
 
-    groups  (n,) the subject, object or session of each row, where those are left out
+    For a single group there are no folds.
+
+    groups  (n,) the subject, object or session of each row, if those are left out
     """
     n_trials = len(np.unique(samples.movements))
     number = next((folds for most, folds in _FOLDS if n_trials < most), 2)
@@ -61,29 +63,29 @@ def choose_training(
     jobs: int = 1,
     report: Callable[[int, int], None] | None = None,
 ) -> Fitting:
-    """Return which of several ways to train suits these rows, and why. Of one way, no fold is made.
+    """Choose the best of several ways to train for these rows, with the reason. A single candidate needs no folds.
 
     Parameters
     ----------
     samples : Samples
         The rows to learn from, of the kept switches and the joints.
     candidates : sequence of Training
-        The ways, as `Training.candidates` returns them: those of one trainer together, the most regular first.
+        The candidates, as returned by `Training.candidates`: those of one trainer together, the most regular first.
     seed : int
-        Of inner folds that are cut at random.
+        Seed for random inner folds.
     groups : ndarray, shape (n,), optional
-        The subject, object or session of each row, if the fit is to recognise new ones.
+        The subject, object or session of each row, if the fit is to generalise to new ones.
     of : str
-        What is new about rows that are to be recognised, if there are `groups`.
+        What is new about test rows, if there are `groups`.
     jobs : int
-        Worker processes. The answer is the same for any number of them.
+        Worker processes. The result does not depend on their number.
     report : callable, optional
-        Called with (done, total) as work is done.
+        Called with (done, total) as the work proceeds.
 
     Returns
     -------
     Fitting
-        `Training.chosen(fitting)` trains so.
+        Train with `Training.chosen(fitting)`.
     """
     some = _spread(samples)
     samples, groups = samples.rows(some), None if groups is None else groups[some]
@@ -118,7 +120,7 @@ def _values(training: Training) -> dict[str, float | str | None]:
 
 
 def _alike(training: Training) -> tuple[object, ...]:
-    """Return what trainings share of which one gives the others: all but the rounds, if the trainer has stages."""
+    """Return the settings shared by trainings of which one gives the others: all but the rounds for staged trainers."""
     staged = TRAINERS.named(training.trainer).staged
     return training.trainer, *(
         (name, value) for name, value in training.settings.items() if name != "rounds" or not staged
@@ -127,8 +129,8 @@ def _alike(training: Training) -> tuple[object, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Test:
-    """What became of a fold's trials: first rows (T,) of those of grasps, whether each was recognised; how many there
-    were with those of nothing held, and the sum of their losses.
+    """The result for the trials of a fold: the first rows (T,) of trials with a grasp, and whether each was recognised;
+    the number of trials including those without a grasp, and the sum of their losses.
     """
 
     first: Rows
@@ -149,12 +151,12 @@ def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
     found = []
     for model in _models(trainings, learning):
         scores = model_scores(model, test.switches, test.codes)
-        answers = decided(scores.argmax(axis=1)[np.newaxis], trial)[0]
+        predicted = decided(scores.argmax(axis=1)[np.newaxis], trial)[0]
         loss = softmax_and_loss(np.ascontiguousarray(scores.T), test.labels, weights)[1] * len(first)
         found.append(
             _Test(
                 fold.test[first[held]],
-                (answers == test.labels[first])[held],
+                (predicted == test.labels[first])[held],
                 len(first),
                 loss,
                 _table_rows(collapse(model, samples.n_switches)),
@@ -172,7 +174,7 @@ def _models(trainings: list[Training], samples: Samples) -> Iterator[Model]:
 
 
 def _table_rows(tables: ScoreTables) -> int:
-    """Return how many rows of scores tables hold for inputs in use: one a switch, a bin of a joint or pair, a line."""
+    """Return the number of rows of scores for the inputs in use: one per switch, bin of a joint or pair, and line."""
     in_use = [len(rows) for rows in tables.joint_rows if rows.any()]
     in_use += [pair.rows.size // tables.n_classes for pair in tables.pairs]
     return int(tables.switch_rows.any(axis=1).sum()) + sum(in_use) + sum(bool(line.row.any()) for line in tables.lines)
@@ -180,7 +182,7 @@ def _table_rows(tables: ScoreTables) -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Score:
-    """A candidate over all inner folds: trials recognised (T,), and the cluster of each; mean loss; rows of tables."""
+    """A candidate over all inner folds: trials recognised (T,), the cluster of each, mean loss, and rows of tables."""
 
     hits: NDArray[np.bool_]
     clusters: Rows
@@ -199,7 +201,7 @@ class _Score:
 
 
 def _error(gains: NDArray[np.intp], clusters: Rows) -> float:
-    """Return the standard error of the mean of whole numbers (T,) in clusters: robust to what those share."""
+    """Return the standard error of the mean of integers (T,) in clusters, robust to correlation within them."""
     sizes, own, total = np.bincount(clusters), np.zeros(clusters.max() + 1, np.int64), int(gains.sum())
     np.add.at(own, clusters, gains)
     squares = int(((len(gains) * own - sizes * total) ** 2).sum())
@@ -249,8 +251,8 @@ def _why(found: list[Compared], best: int, chosen: int) -> str:
     one, top = found[chosen], found[best]
     rate = f"{100 * one.rate:.1f} % of {one.total} trials in inner folds"
     if chosen == best:
-        return f"it recognises the most, {rate}"
+        return f"it has the highest accuracy, {rate}"
     return (
-        f"it recognises {rate}, within one standard error of the best, {top.name}, with {100 * top.rate:.1f} %; of "
+        f"its accuracy is {rate}, within one standard error of the best, {top.name}, with {100 * top.rate:.1f} %; of "
         "those with small tables it has the lowest log-loss"
     )

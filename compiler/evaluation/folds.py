@@ -1,4 +1,4 @@
-"""Folds: stratified exactly as Weka 3.6 cuts them, and those that keep what belongs together on one side of the cut."""
+"""Folds: stratified exactly as in Weka 3.6, and folds that keep related rows on the same side of the split."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from thenar.drivers.errors import ThenarError
 
 
 class EvaluationError(ThenarError, ValueError):
-    """The set cannot be cut or compared as asked: too few rows, subjects, objects or blocks, or an unknown name."""
+    """The set cannot be split or compared as requested: too few rows, subjects or blocks, or an unknown name."""
 
 
 _MULTIPLIER = 0x5DEECE66D
@@ -25,7 +25,7 @@ class JavaRandom:
         self._state = (seed ^ _MULTIPLIER) & _MASK
 
     def next_bits(self, bits: int) -> int:
-        """Return the next `bits` (1 to 32) random bits, as a number that is not negative."""
+        """Return the next `bits` (1 to 32) random bits, as a non-negative number."""
         self._state = (self._state * _MULTIPLIER + _INCREMENT) & _MASK
         return self._state >> (48 - bits)
 
@@ -61,16 +61,16 @@ class Fold:
     name: str
 
     def of(self, rows: Rows) -> "Fold":
-        """Return this fold of a part, `rows` (n_part,), as a fold of the whole."""
+        """Return this fold of a part with rows `rows` (n_part,) as a fold of the whole."""
         return Fold(rows[self.train], rows[self.test], self.name)
 
 
 def weka_folds(labels: ArrayLike, n_folds: int, seed: int) -> list[Fold]:
     """Return the folds of `weka -x n_folds -s seed` for labels (n,) in the order of the file.
 
-    One generator shuffles all rows and then, fold by fold, each training part; classes are dealt out as Weka's
-    `stratify` does. A class of fewer rows than folds is missing from some test parts, as in Weka.
-    Raises EvaluationError for fewer than two folds, or fewer rows than folds.
+    One generator shuffles all rows and then each fold's training part; classes are distributed as in Weka's `stratify`.
+    A class with fewer rows than folds is missing from some test parts, as in Weka. Raises EvaluationError for fewer
+    than two folds, or fewer rows than folds.
     """
     values = np.asarray(labels).tolist()
     check_cut(len(values), n_folds, "rows")
@@ -82,11 +82,11 @@ def weka_folds(labels: ArrayLike, n_folds: int, seed: int) -> list[Fold]:
 
 
 def trial_folds(labels: ArrayLike, trials: NDArray[np.intp], n_folds: int, seed: int) -> list[Fold]:
-    """Return stratified folds of rows (n,) that part no trial: rows of one number in `trials` (n,) stay together.
+    """Return stratified folds of rows (n,) that split no trial: rows with equal numbers in `trials` (n,) stay together.
 
-    The trials, in the order of their first rows, are cut as `weka_folds` cuts rows; where each row is a trial of its
-    own, these are Weka's folds. The label of a trial is the least of its rows': of a movement, whose rows of nothing
-    held have the highest label, that of the grasp. Raises EvaluationError as `weka_folds` does.
+    The trials, in the order of their first rows, are split as `weka_folds` splits rows; if each row is a separate
+    trial, these are Weka's folds. The label of a trial is the smallest of its rows' labels. For a movement this is the
+    grasp, since rows without one have the highest label. Raises EvaluationError as `weka_folds` does.
     """
     _, first, number = np.unique(trials, return_index=True, return_inverse=True)
     least = np.asarray(labels)[first]
@@ -104,7 +104,7 @@ def trial_folds(labels: ArrayLike, trials: NDArray[np.intp], n_folds: int, seed:
 
 
 def check_cut(n_parts: int, n_folds: int, what: str) -> None:
-    """Raise EvaluationError unless `n_parts` `what` can be cut into `n_folds` folds that all have some."""
+    """Raise EvaluationError unless `n_parts` `what` can be split into `n_folds` non-empty folds."""
     if n_folds < 2:
         raise EvaluationError(f"{n_folds} fold(s) leave nothing to train on; ask for 2 or more")
     if n_parts < n_folds:
@@ -153,24 +153,22 @@ def leave_one_out(groups: NDArray[np.str_], what: str) -> list[Fold]:
     return [_fold(groups == name, name) for name in names]
 
 
-# With more of them, several subjects, objects or sessions are left out together.
+# With more groups than this, several are left out together.
 _MOST_GROUPS = 10
 
 
 def leave_groups_out(names: NDArray[np.generic], what: str, most: int = _MOST_GROUPS) -> list[Fold]:
-    """Return the folds of `leave_one_out`, or where there are more than `most` names in names (n,), that many folds,
-    each of several names.
-    """
+    """Return the folds of `leave_one_out`; for more than `most` names in names (n,), `most` folds of several names."""
     found, number = np.unique(names, return_inverse=True)
     parts = names if len(found) <= most else number % most
     return leave_one_out(parts.astype(np.str_), what)
 
 
 def block_folds(trials: NDArray[np.int64], n_folds: int) -> list[Fold]:
-    """Return folds by recording block: the trial numbers (n,), in order, cut into `n_folds` contiguous ranges.
+    """Return folds by recording block: the trial numbers (n,), in order, split into `n_folds` contiguous ranges.
 
-    Neighbouring trials resemble each other (the glove has not moved on the hand); this cut never trains on one and
-    tests on the other, but at the borders. Raises EvaluationError if there are fewer trial numbers than folds.
+    Neighbouring trials resemble each other (the glove has not moved on the hand); this split never trains on one and
+    tests on the other, except at the borders. Raises EvaluationError if there are fewer trial numbers than folds.
     """
     numbers = np.unique(trials)
     if len(numbers) < 2:

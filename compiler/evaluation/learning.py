@@ -1,9 +1,9 @@
-"""Learning curves: the accuracy after 2, 4, 8, ... repetitions of each grasp type by each person, and what to expect
-of more.
+"""Learning curves: the accuracy after 2, 4, 8, ... repetitions of each grasp type by each person, and its
+extrapolation.
 
-The error after n repetitions is taken to be a + b n^-c with a, b >= 0: it falls as a power of n to what more recordings
-cannot mend. The least weighted squares are taken over all exponents of a grid. Nobody knows whether the law goes on:
-it is followed to at most FURTHER times the repetitions that were trained on, and only where LEAST points hold it.
+The error after n repetitions is modelled as a + b n^-c with a, b >= 0: a power law with a floor that more recordings
+cannot lower. It is fitted by weighted least squares over a grid of exponents. Since the law may not hold further on, it
+is extrapolated to at most FURTHER times the largest number of repetitions, and only with at least LEAST points.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,7 +30,7 @@ _EXPONENTS = np.arange(1, 61) / 30  # of n, from 1/30 to 2
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """The rate to expect after so many repetitions, of a law that was fitted, and its 95 % interval."""
+    """The accuracy expected after `repetitions` repetitions, from a fitted law, with its 95 % interval."""
 
     repetitions: int
     mean: float
@@ -40,7 +40,7 @@ class Expected:
 
 @dataclass(frozen=True, slots=True)
 class LearningCurve:
-    """A trainer's, or a baseline's, rates after each number of repetitions, and those to expect of more of them."""
+    """The accuracies of a trainer or baseline after each number of repetitions, and those expected for more."""
 
     learner: str
     rates: tuple[Rate, ...]
@@ -51,9 +51,9 @@ class LearningCurve:
 class Learning:
     """Learning curves of the same trials.
 
-    inputs       what the classifiers read            of     what the rates are of
-    repetitions  trials of each grasp type and person that were trained on; the last, all there are: the mean
-    curves       one a trainer or baseline               note   why nothing is expected of more; "" where something is
+    inputs       inputs of the classifiers            of     what the accuracies are of
+    repetitions  trials of each grasp type and person in training; the last uses all there are: their mean
+    curves       one per trainer or baseline          note   why there is no extrapolation; "" if there is one
     """
 
     inputs: str
@@ -64,12 +64,12 @@ class Learning:
 
     @property
     def title(self) -> str:
-        """What the curves show."""
+        """The title of the curves."""
         return f"Learning curves, {self.inputs}, nested: {self.of}, trials, by repetitions a grasp type and person"
 
     @property
     def further(self) -> tuple[int, ...]:
-        """The numbers of repetitions for which rates are expected."""
+        """The numbers of repetitions for which the accuracy is extrapolated."""
         return tuple(each.repetitions for each in self.curves[0].expected)
 
 
@@ -88,7 +88,7 @@ class LearningPlan:
         return (cell for cells in self.cells.values() for cell in cells)
 
     def read(self, reader: Reader, groups: NDArray[np.str_] | None, seed: int) -> Learning:
-        """Return the curves; groups (n,) are the subjects, where those are left out."""
+        """Return the curves; groups (n,) are the subjects, if those are left out."""
         enough, curves = len(self.repetitions) >= LEAST, []
         for learner, cells in self.cells.items():
             rates = tuple(reader.rates((cell,))[0] for cell in cells)
@@ -98,22 +98,21 @@ class LearningPlan:
                 units = np.unique(groups[np.unique(reader.trials, return_index=True)[1]], return_inverse=True)[1]
             found = expected(self.repetitions, rates, hits, units, seed) if enough else ()
             curves.append(LearningCurve(learner, rates, found))
-        note = f"What more repetitions would bring is not extrapolated from fewer than {LEAST} points: record more."
+        note = f"The effect of more repetitions is not extrapolated from fewer than {LEAST} points: record more."
         return Learning(self.inputs, self.of, self.repetitions, tuple(curves), "" if enough else note)
 
 
 def plan_learning(
     data: Data, subjects: NDArray[np.str_], planner: Planner, scheme: Scheme, n_folds: int, repeats: int
 ) -> LearningPlan:
-    """Return what to fit: everybody's trials in folds, or a subject left out; of what is trained on, so many of each
-    type.
+    """Plan the fits: folds of everybody's trials, or a subject left out, with a limited number of training trials.
 
-    Trials of a fold that are trained on are put in random order, and the first of them taken: a curve's larger training
-    sets hold its smaller ones. Raises EvaluationError where trials are cut in other ways, or are too few.
+    The training trials of each type in a fold are put in random order and the first ones taken, so larger training sets
+    of a curve contain the smaller ones. Raises EvaluationError for other schemes, or too few trials.
     """
     if scheme not in ("trial", "subject"):
         raise EvaluationError(
-            f"a learning curve tests trials, or subjects left out, and no {scheme} left out: choose another cut"
+            f"a learning curve tests trials, or subjects left out, not {scheme}s left out: choose another scheme"
         )
     everyone = np.arange(len(data.labels))
     several = len(np.unique(subjects)) > 1
@@ -148,8 +147,8 @@ def plan_learning(
 
 
 def _ranks(data: Data, subjects: Rows, rows: Rows, place: Rows) -> tuple[Rows, float]:
-    """Return for each of these rows (n,) the number of its trial among those of its type and subject, by their `place`;
-    and how many trials a type and subject have, on average.
+    """Return the rank (n,) of each row's trial among those of its type and subject, ordered by `place`, and the mean
+    number of trials per type and subject.
     """
     trials, first, back = np.unique(data.trials[rows], return_index=True, return_inverse=True)
     kind = np.unique(np.stack([data.labels[rows], subjects[rows]])[:, first], axis=1, return_inverse=True)[1].ravel()
@@ -163,10 +162,10 @@ def _ranks(data: Data, subjects: Rows, rows: Rows, place: Rows) -> tuple[Rows, f
 def expected(
     repetitions: Sequence[int], rates: Sequence[Rate], hits: NDArray[np.bool_], units: Rows, seed: int
 ) -> tuple[Expected, ...]:
-    """Return the rates to expect after FURTHER times the last number of repetitions.
+    """Return the expected accuracies up to FURTHER times the last number of repetitions.
 
-    The interval holds 95 % of the laws that are fitted to bootstrap draws of units (m,), trials or subjects, and of
-    repeats, by hits (sizes, repeats, m). It is at least as wide as that of the last rate, and holds that rate.
+    The interval covers 95 % of the laws fitted to bootstrap draws of units (m,), trials or subjects, and of repeats, by
+    hits (sizes, repeats, m). It is at least as wide as that of the last accuracy, and contains that accuracy.
     """
     sizes, repeats, _ = hits.shape
     wanted = np.array([times * repetitions[-1] for times in FURTHER], np.float64)
@@ -188,8 +187,9 @@ def expected(
 
 
 def power_law(n: Floats, errors: Floats, weights: Floats, wanted: Floats) -> Floats:
-    """Return a + b w^-c for each of `wanted` (w,), with the least sum of weights (s,) times squares over errors (r, s)
-    at n (s,): (r, w).
+    """Return a + b w^-c for each of `wanted` (w,), as (r, w).
+
+    The law minimises the sum of weights (s,) times squared residuals over errors (r, s) at n (s,).
     """
     best, found = np.full(len(errors), np.inf), np.zeros((len(errors), len(wanted)))
     total = weights.sum()

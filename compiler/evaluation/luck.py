@@ -1,8 +1,8 @@
-"""How lucky the best of many is: bootstrap bias correction of cross-validation, without another training.
+"""The optimism of picking the best of many: bootstrap bias correction of cross-validation, without retraining.
 
-Units (trials, or subjects) are drawn with replacement. Of all that was tried, the best by the units that were drawn is
-judged by those that were not (BBC-CV: Tsamardinos, Greasidou and Borboudakis 2018, Machine Learning 107: 1895). How
-much worse it does there than the one that is best by all units, in the mean over the draws, is the luck of that one.
+Units (trials, or subjects) are drawn with replacement. The contender that is best on the drawn units is evaluated on
+the others (BBC-CV: Tsamardinos, Greasidou and Borboudakis 2018, Machine Learning 107: 1895). Its mean loss of accuracy
+over the draws, compared with the accuracy of the overall best on all units, is the luck of that one.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 DRAWS = 1000
-# Of up to so many units every draw is taken once, in place of random ones.
+# For up to this many units, every possible draw is used once instead of random draws.
 _FEW = 4
 # Units whose hits are summed at a time.
 _BLOCK = 2048
@@ -22,7 +22,7 @@ _BLOCK = 2048
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draws:
-    """The rates of c contenders over the units of b draws, (b, c), over those left, (b, c), and over all, (c,)."""
+    """The accuracies of c contenders on the drawn units of b draws, (b, c), on the others, (b, c), and on all, (c,)."""
 
     drawn: Floats
     left: Floats
@@ -30,7 +30,7 @@ class Draws:
 
     @classmethod
     def of(cls, hits: NDArray[np.intp], units: NDArray[np.intp], seed: int) -> "Draws":
-        """Return those of `hits` (c, m): how often each of m trials was recognised; `units` (m,) are what is drawn."""
+        """Return the draws for `hits` (c, m), the correct predictions for each of m trials; `units` (m,) are drawn."""
         units = np.unique(units, return_inverse=True)[1]
         sizes = np.bincount(units)
         counts = _counts(len(sizes), seed)
@@ -38,7 +38,7 @@ class Draws:
         own = np.array([np.bincount(units, each) for each in hits]).T
         for start in range(0, len(sizes), _BLOCK):
             block = slice(start, start + _BLOCK)
-            # Whole numbers below 2^53: the sums are exact in any order.
+            # Integers below 2^53: the sums are exact in any order.
             sums[0] += counts[:, block].astype(np.float64) @ own[block]
             sums[1] += (counts[:, block] == 0).astype(np.float64) @ own[block]
         drawn, left = counts @ sizes, (counts == 0) @ sizes
@@ -46,7 +46,7 @@ class Draws:
         return cls(sums[0, judged] / drawn[judged, None], sums[1, judged] / left[judged, None], own.sum(axis=0))
 
     def luck(self, costs: Floats, limits: Sequence[float]) -> list[float]:
-        """Return, for each limit, the luck of the best contender (c,) that costs less; of equals the cheapest."""
+        """Return, for each limit, the luck of the best contender (c,) with a lower cost; ties go to the cheapest."""
         order = np.argsort(costs, kind="stable")
         drawn, left, every = self.drawn[:, order], self.left[:, order], self.every[order]
         found = []

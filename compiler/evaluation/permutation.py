@@ -1,4 +1,4 @@
-"""Permutation test: what the same evaluation reaches where labels say nothing, and how seldom it does as well."""
+"""Permutation test: the accuracy of the same evaluation with shuffled labels, and how rarely it is as high."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -18,15 +18,15 @@ from .tables import Reader
 
 @dataclass(frozen=True, slots=True)
 class Permuted:
-    """The rate of one composition under the nested protocol, one repeat, against that of shuffled labels.
+    """The accuracy of one composition under the nested protocol, one repeat, compared with shuffled labels.
 
-    Labels are shuffled among the trials of each subject, frames of a trial together; then folds are cut, placements
-    chosen and classifiers trained as they were with the true ones.
+    Labels are shuffled among the trials of each subject, keeping frames of a trial together; then folds are cut,
+    placements chosen and classifiers trained as with the true labels.
 
-    composition   its name and inputs             of, unit  what its rate is of
-    rate          with the true labels            chance    mean rate of the permutations
-    permutations  how many, m                     highest   their highest rate
-    p             (b + 1) / (m + 1), where b permutations reach the rate or more: how probable such a rate is by chance
+    composition   its name and inputs             of, unit  what the accuracy is of
+    rate          with the true labels            chance    mean accuracy of the permutations
+    permutations  their number, m                 highest   their highest accuracy
+    p             (b + 1) / (m + 1), where b permutations reach the accuracy: the probability of it by chance
     """
 
     composition: str
@@ -39,7 +39,7 @@ class Permuted:
     p: float
 
     def __str__(self) -> str:
-        """Return rate, chance level and p-value in a sentence."""
+        """Return accuracy, chance level and p-value in a sentence."""
         return (
             f"Permutation test of {self.composition}, {self.of}, {self.unit}, nested: {100 * self.rate:.1f} %; chance "
             f"{100 * self.chance:.1f} % (mean of {self.permutations} shuffles of labels within subjects, highest "
@@ -49,7 +49,7 @@ class Permuted:
 
 @dataclass(frozen=True, slots=True)
 class Permutations:
-    """How to evaluate, m times over: what Options of a study say; parts are the populations of the true labels."""
+    """The evaluation to repeat m times, from a study's Options; parts are the populations of the true labels."""
 
     parts: tuple[Population, ...]
     scheme: Scheme
@@ -59,7 +59,7 @@ class Permutations:
     training: Training
 
     def test(self, grasp_set: GraspSet, m: int, jobs: int, progress: Progress | None) -> Permuted:
-        """Return the test of selected switches and joints, or of what of them there is; m > 0."""
+        """Return the test with selected switches and joints, as far as the set has them; m > 0."""
         kind = ANGLE_SELECTED if grasp_set.joints else SELECTED
         kind = kind if grasp_set.element_names else ANGLE
         tasks = [(self, grasp_set, kind, number) for number in range(m + 1)]
@@ -82,7 +82,7 @@ class Permutations:
 
 
 def _counted(task: tuple[Permutations, GraspSet, Composition, int]) -> tuple[int, int]:
-    """Return how many trials a permutation (0: the true labels) recognises, of how many."""
+    """Return the number of trials that a permutation (0: the true labels) predicts correctly, and the total."""
     how, grasp_set, kind, number = task
     made = shuffled_labels(grasp_set, (how.seed, number)) if number else grasp_set
     parts = populations(made, "trial", how.folds, 1, how.seed) if how.scheme == "trial" else how.parts
@@ -108,5 +108,5 @@ def shuffled_labels(grasp_set: GraspSet, seed: tuple[int, ...]) -> GraspSet:
     for subject in np.unique(subjects):
         mine = np.flatnonzero(subjects == subject)
         grasps[mine] = grasps[random.permutation(mine)]
-    # The number of a trial keeps two apart that come to have one label.
+    # The trial number keeps two trials apart that get the same label.
     return replace(grasp_set, grasps=grasps[trial], trials=trial)

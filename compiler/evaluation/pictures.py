@@ -19,18 +19,17 @@ if TYPE_CHECKING:
     from .tables import Confusion
 
 
-# Curves are no inputs: colours that no inputs have.
+# Curves are not inputs, so they get other colours.
 _CURVES = ("ink", "picked", "link", "baseline-1", "baseline-2", "baseline-3")
 LEARNING_NAME = "learning-curve.svg"
 
 
 def draw(study: Study, folder: Path) -> list[Path]:
-    """Write a picture for each composition and protocol, subjects side by side, and one of learning curves, as far as
-    the study has them; return the files.
+    """Write a picture for each composition and protocol, subjects side by side, and one of learning curves, if present.
 
-    They are `confusion-PROTOCOL-COMPOSITION.png` and LEARNING_NAME in `folder`, which is made if need be. Colour is the
-    share of the true grasp type's rows; numbers are percent of them, left out below 1 %. Raises OSError as the system
-    gives it.
+    Return the files: `confusion-PROTOCOL-COMPOSITION.png` and LEARNING_NAME in `folder`, which is created if necessary.
+    Colour is the share of the true grasp type's rows; numbers are percent of them, omitted below 1 %. Raises OSError
+    from the system.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with painting(font_size=10):
@@ -67,9 +66,9 @@ def _draw_learning(learning: Learning, path: Path) -> Path:
     axes.set_xscale("log")
     for number, curve in enumerate(learning.curves):
         colour, last = on_paper(_CURVES[number % len(_CURVES)]), learning.repetitions[-1]
-        # Side by side: whiskers do not hide each other.
-        beside = 1 + 0.025 * (number - (len(learning.curves) - 1) / 2)
-        xs, means = [beside * n for n in learning.repetitions], [100 * rate.mean for rate in curve.rates]
+        # Shift curves sideways so that whiskers do not hide each other.
+        shift = 1 + 0.025 * (number - (len(learning.curves) - 1) / 2)
+        xs, means = [shift * n for n in learning.repetitions], [100 * rate.mean for rate in curve.rates]
         reach = [[100 * (r.mean - r.low) for r in curve.rates], [100 * (r.high - r.mean) for r in curve.rates]]
         axes.errorbar(xs, means, reach, color=colour, marker="os^Dv"[number % 5], ms=4, lw=1.5, elinewidth=0.8)
         axes.plot([], [], color=colour, marker="os^Dv"[number % 5], ms=4, label=curve.learner)

@@ -1,4 +1,4 @@
-"""What to fit for each of the tables (which inputs, which placement, which folds); and the fits, each done once."""
+"""Plan the fits for each table (inputs, placement, folds), and run each distinct fit once."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -28,14 +28,15 @@ from .populations import Population, Protocol, Scheme, groups_of
 
 Labels = NDArray[np.intp]
 Progress = Callable[[int, int], None]
-# For each trainer, those ways to train among which each fit chooses.
+# For each trainer, the candidates among which each fit chooses.
 Ways = Mapping[str, tuple[Training, ...]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Data:
-    """All rows that fits take elements and joints of; their labels (n,) in the taxonomy; groups (n,) are what each row
-    is left out with, None: its trial.
+    """All rows from which fits take elements and joints, with their labels (n,) in the taxonomy.
+
+    groups (n,) are what each row is left out with, None: its trial.
     """
 
     samples: Samples
@@ -55,10 +56,10 @@ class Data:
 
 @dataclass(frozen=True, slots=True)
 class FoldFit:
-    """Train on a fold's training rows, these elements and joints, classes `grasps` (ascending labels); then test it.
+    """Train on a fold's training rows with these elements, joints, and classes `grasps` (ascending labels); then test.
 
-    `learner` is a trainer, at settings that it chooses from the training rows, or one of CLASSIFIERS; "": the trainer
-    and settings of the evaluation. Two fits are one if they are of the same `Fold` object, inputs and learner.
+    `learner` is a trainer, whose settings are chosen on the training rows, or one of CLASSIFIERS; "": the trainer and
+    settings of the evaluation. Two fits are equal if they have the same `Fold` object, inputs and learner.
     """
 
     fold: Fold
@@ -68,15 +69,15 @@ class FoldFit:
     learner: str = ""
 
     def read(self, data: Data) -> Samples:
-        """Return all rows, of its inputs alone."""
+        """Return all rows with only these inputs."""
         return bits_of(data.samples.with_joints(self.joints), self.elements)
 
 
 def predictions(data: Data, fit: FoldFit, training: Training, ways: Ways | None = None) -> Labels:
-    """Return the labels given to the fold's test rows, where its learner is `training` or one of `ways`.
+    """Return the labels predicted for the fold's test rows, by `training` or the fit's learner among `ways`.
 
-    Where the fit is blind, every row gets the most frequent label of the training rows (the lowest of several), which
-    is the rate to beat.
+    A blind fit predicts the most frequent label of the training rows (the lowest of several), which is the accuracy to
+    beat.
     """
     grasps, rows = np.array(fit.grasps, dtype=np.intp), fit.fold.train
     trained = np.searchsorted(grasps, data.labels[rows])
@@ -86,7 +87,7 @@ def predictions(data: Data, fit: FoldFit, training: Training, ways: Ways | None 
     learning = replace(read.rows(rows), labels=trained, grasps=tuple(map(str, fit.grasps)))
     test = read.rows(fit.fold.test)
     if fit.learner in CLASSIFIERS:
-        return grasps[CLASSIFIERS[fit.learner].answers(learning, test.inputs)]
+        return grasps[CLASSIFIERS[fit.learner].predict(learning, test.inputs)]
     if fit.learner:
         groups = None if data.groups is None else data.groups[rows]
         training = Training.chosen(choose_training(learning, (ways or {})[fit.learner], groups=groups))
@@ -94,7 +95,7 @@ def predictions(data: Data, fit: FoldFit, training: Training, ways: Ways | None 
 
 
 def is_blind(data: Data, fit: FoldFit) -> bool:
-    """Return whether a fit has no input that varies among its training rows: nothing to tell apart by."""
+    """Return whether none of a fit's inputs varies among its training rows."""
     inputs = fit.read(data).inputs[fit.fold.train]
     return not (inputs != inputs[0]).any()
 
@@ -107,10 +108,10 @@ def run_fits(
     progress: Progress | None = None,
     ways: Ways | None = None,
 ) -> dict[FoldFit, Labels]:
-    """Return the predictions of every fit. Equal fits are done once; `progress(done, total)` after each.
+    """Return the predictions of every fit. Equal fits are run once; `progress(done, total)` is called after each.
 
-    jobs  worker processes, as joblib counts them: -1 for all cores, 1 for none beside this one. A worker runs one
-          thread. Sums in boosting are exact, so the result does not depend on the number of workers.
+    jobs  worker processes, as in joblib: -1 for all cores, 1 for this process only. A worker runs one thread. Sums in
+          boosting are exact, so the result does not depend on the number of workers.
     """
     todo = list(dict.fromkeys(fits))
     results: dict[FoldFit, Labels] = {}
@@ -129,7 +130,7 @@ def _numbered(task: tuple[int, Data, FoldFit, Training, Ways | None]) -> tuple[i
 
 @dataclass(frozen=True, slots=True)
 class Composition:
-    """Which inputs a classifier gets: the joints (Angle), the placement's switches (Sel-Co), the others (NoSel-Co)."""
+    """The inputs of a classifier: the joints (Angle), the placement's switches (Sel-Co), the others (NoSel-Co)."""
 
     name: str
     what: str
@@ -139,16 +140,16 @@ class Composition:
 
     @property
     def needs_placement(self) -> bool:
-        """Whether its columns depend on which switches were selected."""
+        """Whether its columns depend on the selected switches."""
         return self.selected != self.others
 
     @property
     def has_switches(self) -> bool:
-        """Whether it takes any switches."""
+        """Whether it uses any switches."""
         return self.selected or self.others
 
     def elements(self, placement: Elements, every: Elements) -> Elements:
-        """Return which elements it takes, ascending, given those selected and those there are."""
+        """Return the elements that it uses, ascending, given the selected and the available ones."""
         kept = set(placement)
         return tuple(sorted([*kept] * self.selected + [one for one in every if one not in kept] * self.others))
 
@@ -166,7 +167,7 @@ ANGLE_SELECTED, ANGLE, ALL_SWITCHES, SELECTED = COMPOSITIONS[1], COMPOSITIONS[3]
 
 
 def available(n_switches: int, n_joints: int) -> tuple[Composition, ...]:
-    """Return the compositions that a set has the inputs for: without switches only IV, without joints V, VI and VII."""
+    """Return the compositions that a set has inputs for: without switches only IV, without joints V, VI and VII."""
     return tuple(c for c in COMPOSITIONS if (n_joints or not c.angle) and (n_switches or not c.has_switches))
 
 
@@ -174,20 +175,20 @@ TableName = Literal["compositions", "generality", "pruning", "baselines", "train
 Select = Callable[[Population, Fold], Elements]
 
 BASELINES = ("cmim", "mutual-information")
-REFERENCE = "logitboost"  # of the trainers: the others are compared with it
-JOINTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 18)  # how many are kept, of the joints alone
-DRAWS = 5  # random placements that a placement is compared with
+REFERENCE = "logitboost"  # the trainer with which the others are compared
+JOINTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 18)  # numbers of kept joints, without switches
+DRAWS = 5  # random placements to compare with
 
 
 def learners() -> tuple[str, ...]:
-    """Return who is compared in the table of trainers: REFERENCE, the other trainers that take part where one is
-    chosen, and CLASSIFIERS.
+    """Return the methods in the table of trainers: REFERENCE, the other trainers that can be chosen automatically, and
+    CLASSIFIERS.
     """
     return tuple(dict.fromkeys([REFERENCE, *(name for name in TRAINERS if TRAINERS[name].tried), *CLASSIFIERS]))
 
 
 def ways_of(asked: Options) -> Ways:
-    """Return for each trainer the ways to train that are tried; settings that are asked for are those of its own."""
+    """Return the candidates of each trainer; requested settings apply to the trainers that have them."""
     trainers = [name for name in learners() if name not in CLASSIFIERS]
     own = {name: asked if name == asked.trainer else replace_option(Options(), trainer=name) for name in trainers}
     return {name: Training.candidates(each) for name, each in own.items()}
@@ -195,7 +196,7 @@ def ways_of(asked: Options) -> Ways:
 
 @dataclass(frozen=True, slots=True)
 class CellPlan:
-    """The fits of one cell: `runs` of folds, one run a repeat; a cell of random draws has all repeats of each draw."""
+    """The fits of one cell: `runs` of folds, one per repeat; a cell of random draws has all repeats of each draw."""
 
     part: Population
     runs: tuple[tuple[FoldFit, ...], ...]
@@ -208,7 +209,7 @@ class CellPlan:
 
 @dataclass(frozen=True, slots=True)
 class RowPlan:
-    """A row of a table: its short name, what it is, and its cells, one a population."""
+    """A row of a table: its short name, its description, and its cells, one per population."""
 
     name: str
     what: str
@@ -255,7 +256,7 @@ class Planner:
 
     def _generality(self, protocol: Protocol) -> list[RowPlan]:
         def chosen_by(giver: Population, part: Population, fold: Fold) -> Elements:
-            # Another subject's placement has never seen this subject's rows: both protocols agree on it.
+            # Another subject's placement has never seen this subject's rows: both protocols allow it.
             own = part is giver
             return self.own(protocol, part, fold) if own else self.chosen(PAPERS, giver.rows, self.prune)
 
@@ -293,7 +294,7 @@ class Planner:
 
     def _trainers(self, protocol: Protocol) -> list[RowPlan]:
         chosen = partial(self.own, protocol)
-        # Where settings are chosen, a fit takes as long as many: one repeat has to do.
+        # Choosing settings takes as long as many fits: a single repeat is run.
         once = replace(self, parts=tuple(replace(part, repeats=part.repeats[:1]) for part in self.parts))
         return [once._row(name, kind.what, kind, chosen, name) for kind in self.kinds for name in learners()]
 
@@ -303,13 +304,13 @@ class Planner:
 
     @property
     def kinds(self) -> tuple[Composition, ...]:
-        """What trainers are compared on: selected switches and joints, or what of them there is; and each alone."""
+        """The inputs for comparing trainers: selected switches and joints, as far as available, and each alone."""
         there = available(self._n_switches, self.n_joints)
         return tuple(kind for kind in (ANGLE_SELECTED, ANGLE, SELECTED) if kind in there)
 
     @property
     def n_joints(self) -> int:
-        """How many joints there are."""
+        """The number of joints."""
         return int(self.samples.codes.shape[1])
 
     @property
@@ -317,18 +318,18 @@ class Planner:
         return self.samples.n_switches + int(self.samples.taxels.shape[1])
 
     def own(self, protocol: Protocol, part: Population, fold: Fold) -> Elements:
-        """Return the placement that ID3 chooses for a fold from the population's own rows, as the protocol allows."""
+        """Return ID3's placement for a fold, chosen from the population's own rows as the protocol allows."""
         return self.chosen(PAPERS, protocol.may_choose(part, fold), self.prune)
 
     def elements(self, rows: Rows) -> Elements:
-        """Return the elements that there are to choose from in these rows."""
+        """Return the elements available in these rows."""
         key = rows.tobytes()
         if key not in self._elements:
             self._elements[key] = elements_of(self.samples.rows(rows), self.levels)
         return self._elements[key]
 
     def chosen(self, method: str, rows: Rows, parameter: int) -> Elements:
-        """Return the elements that a method keeps from these rows, in whatever order they are given."""
+        """Return the elements that a method keeps from these rows, in any order of rows."""
         if not self._n_switches:
             return ()
         rows = np.sort(rows)
@@ -339,7 +340,7 @@ class Planner:
         return tuple(elements[place] for place in self._choosers[key](parameter))
 
     def joints(self, rows: Rows, elements: Elements, most: int | None) -> Columns:
-        """Return at most so many joints, ascending: the best, given these elements, by these rows; None: all."""
+        """Return the best joints, ascending, at most `most`, given these elements and rows; None: all."""
         if most is None or most >= self.n_joints:
             return tuple(range(self.n_joints))
         key = elements, rows.tobytes()
@@ -355,8 +356,9 @@ class Planner:
     def cell(
         self, part: Population, kind: Composition, select: Select, learner: str = "", most: int | None = None
     ) -> CellPlan:
-        """Return the fits of composition `kind` on every fold of `part`; `select` gives the placement for a fold, and
-        `most` is how many joints are kept, None: `keep_joints`.
+        """Return the fits of composition `kind` on every fold of `part`.
+
+        `select` returns the placement for a fold, and `most` is the number of joints kept, None: `keep_joints`.
         """
 
         def fit(fold: Fold) -> FoldFit:

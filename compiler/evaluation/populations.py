@@ -1,4 +1,4 @@
-"""Populations: whose rows a column of the tables is about, how they are cut, and which may choose a placement."""
+"""Populations: the rows behind a column of the tables, their folds, and the rows from which a placement is chosen."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from .folds import EvaluationError, Fold, Rows, block_folds, leave_one_out, tria
 
 Scheme = Literal["trial", "subject", "object", "session", "block"]
 
-# What the rates of each scheme are of.
+# What the accuracies of each scheme are of.
 OF: dict[Scheme, Of] = {
     "trial": "within subject",
     "subject": "new subject",
@@ -29,8 +29,8 @@ OF: dict[Scheme, Of] = {
 class Population:
     """One column of the tables.
 
-    name     the subject: whose rows are tested
-    rows     every row that takes part, tested or trained on
+    name     the subject whose rows are tested
+    rows     all rows in training or test
     grasps   labels present in `rows`, ascending: the classes
     repeats  folds of each repeat
     """
@@ -52,12 +52,11 @@ class Population:
 
 
 def populations(grasp_set: GraspSet, scheme: Scheme, n_folds: int, repeats: int, seed: int) -> tuple[Population, ...]:
-    """Return a population a subject.
+    """Return one population per subject.
 
-    trial, block, object, session: only the subject's own rows are trained on, and all of them are tested once a repeat.
+    trial, block, object, session: only the subject's own rows are trained on, and all are tested once per repeat.
     subject: the rows of all others are trained on. Only `trial` has a seed, and so repeats (seed, seed + 1, ...). No
-    scheme has rows of one trial on both sides of a fold.
-    Raises EvaluationError naming the subject that cannot be cut so.
+    scheme has rows of one trial on both sides of a fold. Raises EvaluationError naming a subject that cannot be split.
     """
     if scheme == "subject":
         everyone = np.arange(len(grasp_set))
@@ -72,7 +71,7 @@ _Cut = Callable[[Rows], list[list[Fold]]]
 
 
 def _cutter(grasp_set: GraspSet, scheme: Scheme, n_folds: int, repeats: int, seed: int) -> _Cut:
-    """Return what cuts rows into repeats of folds, numbered within the rows."""
+    """Return a function that splits rows into repeats of folds, numbered within the rows."""
     if scheme in ("object", "session"):
         groups = grasp_set.objects if scheme == "object" else grasp_set.sessions
         return lambda rows: [leave_one_out(groups[rows], scheme)]
@@ -83,7 +82,7 @@ def _cutter(grasp_set: GraspSet, scheme: Scheme, n_folds: int, repeats: int, see
 
 
 def groups_of(grasp_set: GraspSet, scheme: Scheme) -> NDArray[np.str_] | None:
-    """Return a name (n,) for what each row is left out with, None if that is its trial; a session is a subject's."""
+    """Return the group (n,) that each row is left out with, None if that is its trial; sessions are per subject."""
     if scheme == "session":
         return np.char.add(np.char.add(grasp_set.subjects, "\n"), grasp_set.sessions)
     return {"subject": grasp_set.subjects, "object": grasp_set.objects}.get(scheme)
@@ -107,7 +106,7 @@ ProtocolName = Literal["paper", "nested"]
 
 @dataclass(frozen=True, slots=True)
 class Protocol:
-    """A protocol's name, and one sentence on what it means."""
+    """A protocol's name, and one sentence on its meaning."""
 
     name: ProtocolName
     meaning: str
@@ -127,19 +126,19 @@ PAPER = Protocol(
 )
 NESTED = Protocol(
     "nested",
-    "The placement is chosen anew inside each training fold; no test row has a say: what to expect of new grasps.",
+    "The placement is chosen anew inside each training fold, without the test rows: the accuracy on new grasps.",
 )
 PROTOCOLS = (PAPER, NESTED)
 
 
 def concerns(grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme, n_folds: int) -> tuple[str, ...]:
-    """Return sentences: that grasps are simulated, that rows are stated to be independent, and for each grasp type that
-    is alone, too rare for the folds, or tested but never trained.
+    """Return warnings: that grasps are simulated, that rows are stated to be independent, and about grasp types that
+    are the only one, too rare for the folds, or tested but never trained.
     """
     made = grasp_set.simulated
     simulated = [f"these grasps are simulated ({made}): the rates are not those of recorded ones"] if made else []
     alone = [
-        f"subject {part.name}: every row is of {grasp_set.taxonomy.types[part.grasps[0]]}, nothing is to be told apart"
+        f"subject {part.name}: every row is of {grasp_set.taxonomy.types[part.grasps[0]]}, the only type"
         for part in parts
         if len(part.grasps) == 1
     ]
@@ -162,7 +161,7 @@ def _rare(grasp_set: GraspSet, part: Population, n_folds: int) -> list[str]:
 
 
 def _untrained(grasp_set: GraspSet, part: Population) -> list[str]:
-    """Name the grasp types that some fold tests without having trained them, with the number of rows lost so."""
+    """Name the grasp types that some fold tests without training on them, with the number of rows lost."""
     lost: dict[int, int] = {}
     for fold in part.repeats[0]:
         tested = grasp_set.labels[fold.test]

@@ -18,8 +18,8 @@ UNITS: tuple[Unit, ...] = ("trials", "frames")
 LEVEL = 0.95
 _Z = 1.959963984540054  # the normal distribution's quantile of (1 + LEVEL) / 2
 
-# Prior of how alike two units of one cluster are (intracluster correlation), frames of a trial or trials of a subject,
-# and how many misses it weighs.
+# Prior for the similarity of two units of one cluster (intracluster correlation), frames of a trial or trials of a
+# subject, and its weight in misses.
 ALIKE: dict[Unit, float] = {"frames": 0.6, "trials": 0.3}
 WEIGHT = 0.5
 
@@ -28,27 +28,27 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """The share of units that were recognised, and its 95 % interval.
+    """The share of correct units, and its 95 % interval.
 
-    of       which units: of all subjects pooled, of a subject that was also trained on, of a subject, an object or a
+    of       which units: of all subjects pooled, of a subject that was also trained on, or of a subject, an object or a
              session that was left out
-    unit     what is counted: trials, each recognised as most of its frames are, or single frames
-    correct  units recognised in each repeat        mean       in 0..1
+    unit     what is counted: trials, each decided by the majority of its frames, or single frames
+    correct  correct units in each repeat           mean       in 0..1
     total    units of one repeat                    low, high  the 95 % interval of the mean
-    over     how many clusters the interval is over: trials; of `new ...`, subjects, objects or sessions if several
+    over     the number of clusters: trials; for `new ...`, subjects, objects or sessions if there are several
 
-    Where each unit is a cluster of its own, the interval is Wilson's (E. B. Wilson 1927):
+    If each unit is a separate cluster, the interval is Wilson's (E. B. Wilson 1927):
 
         (p + z^2/2n +- z sqrt(p (1 - p)/n + z^2/4n^2)) / (1 + z^2/n)        with n = total, z = 1.96
 
-    Units of one cluster (frames of a trial, trials of a left out subject) are alike. There n is total / d, and z is
-    Student's t of over - 1 degrees of freedom (as Korn and Graubard 1998, Survey Methodology 24). The design effect d
-    is the cluster-robust variance of p over p (1 - p) / total, at least 1. Few misses tell little about d: so it is
-    averaged with that of a correlation of ALIKE within clusters, which weighs WEIGHT misses. `benchmarks/intervals.py`
-    shows how often the interval covers the truth.
+    Units of one cluster (frames of a trial, trials of a left out subject) are correlated. Then n is total / d, and z is
+    Student's t with over - 1 degrees of freedom (as Korn and Graubard 1998, Survey Methodology 24). The design effect d
+    is the cluster-robust variance of p over p (1 - p) / total, at least 1. Few misses carry little information on d: so
+    it is averaged with that of a correlation of ALIKE within clusters, weighted as WEIGHT misses.
+    `benchmarks/intervals.py` shows how often the interval covers the truth.
 
-    Repeats share their units: the interval is over the units' means. It also holds Student's interval over the
-    repeats, or over random draws where there are several, which says how much the cut into folds and the draw matter.
+    Repeats share their units: the interval is over the units' means. It also contains Student's interval over the
+    repeats, or over random draws if there are several, which reflects the influence of folds and draws.
     """
 
     of: Of
@@ -77,28 +77,29 @@ class Rate:
         Parameters
         ----------
         predicted : array of int, shape (n,) or (r, n)
-            The label that each row was given, in each of r repeats.
+            The label predicted for each row in each of r repeats.
         labels, trials : array of int, shape (n,)
-            Each row's true label, and its trial. Rows of a trial have one label.
+            Each row's true label, and its trial. Rows of a trial have the same label.
         of : str
-            What the rate is of.
+            What the accuracy is of.
         unit : str
-            What to count. A trial is recognised as the label that most of its frames are given, the lowest of several.
+            What to count. The label of a trial is that of most of its frames, the lowest of several.
         groups : array, shape (n,), optional
             The subject, object or session of each row, if `of` is of new ones: the interval is over those, if there
             are several.
         repeats_a_draw : int
-            So many repeats in a row are of one random draw.
+            The number of consecutive repeats that belong to one random draw.
 
         Raises
         ------
         ValueError
-            If there are no rows, or the shapes do not fit.
+            If there are no rows, or the shapes do not match.
         """
         given, truth = np.atleast_2d(np.asarray(predicted)), np.asarray(labels)
         _, first, trial = np.unique(np.asarray(trials), return_index=True, return_inverse=True)
         if not truth.size or given.shape[1:] != truth.shape or trial.shape != truth.shape:
-            raise ValueError(f"predictions {given.shape} of {truth.size} rows with {trial.size} trials are no rate")
+            shapes = f"predictions {given.shape} of {truth.size} rows with {trial.size} trials"
+            raise ValueError(f"{shapes} do not give a rate")
         clusters: Rows = trial
         alike: Unit = "frames"
         if groups is not None and len(found := np.unique(np.asarray(groups), return_inverse=True)[1]) and found.max():
@@ -113,12 +114,12 @@ class Rate:
 
     @classmethod
     def counted(cls, correct: tuple[int, ...], total: int, *, of: Of, repeats_a_draw: int = 1) -> Self:
-        """Return the rate of `correct` trials of `total` in each repeat, each a cluster of its own.
+        """Return the rate of `correct` trials of `total` in each repeat, with each trial as a separate cluster.
 
         Raises ValueError unless 0 <= correct <= total > 0.
         """
         if not correct or total < 1 or not all(0 <= count <= total for count in correct):
-            raise ValueError(f"{correct} recognised of {total} trials is no rate")
+            raise ValueError(f"{correct} correct of {total} trials do not give a rate")
         wilson = _wilson(sum(correct) / (len(correct) * total), total, _Z)
         return cls._held(of, "trials", correct, total, total, wilson, repeats_a_draw)
 
@@ -133,7 +134,7 @@ class Rate:
         bounds: tuple[float, float],
         repeats_a_draw: int,
     ) -> Self:
-        """Return the rate whose interval holds `bounds`, Student's over the draws, and the mean."""
+        """Return the rate whose interval contains `bounds`, Student's interval over the draws, and the mean."""
         mean = sum(correct) / (len(correct) * total)
         ends = [mean, *bounds]
         starts = range(0, len(correct), repeats_a_draw)
@@ -143,7 +144,7 @@ class Rate:
 
     @property
     def what(self) -> str:
-        """What the rate is of, and its unit: "new subject, trials"."""
+        """What the accuracy is of, and its unit: "new subject, trials"."""
         return f"{self.of}, {self.unit}"
 
     def __str__(self) -> str:
@@ -160,7 +161,7 @@ def rated(
     groups: ArrayLike | None = None,
     repeats_a_draw: int = 1,
 ) -> tuple[Rate, Rate | None]:
-    """Return the rate of trials, and that of frames where a trial has several; arguments as Rate.predicted's."""
+    """Return the accuracy by trials, and by frames if a trial has several; arguments as in Rate.predicted."""
     by_trial, by_frame = (
         Rate.predicted(predicted, labels, trials, of=of, unit=unit, groups=groups, repeats_a_draw=repeats_a_draw)
         for unit in UNITS
@@ -170,13 +171,13 @@ def rated(
 
 @dataclass(frozen=True, slots=True)
 class Paired:
-    """The same m trials by two recognisers.
+    """Two recognisers compared on the same m trials.
 
-    than        the other one
-    difference  of the rates, -1..1
-    better      trials that are recognised in more repeats than by the other; worse: in fewer
-    p           how probable a split of these as uneven is where both are equal: McNemar's exact test, two-sided. It is
-                of these people: trials of a person are alike, so of new people it tells less.
+    than        the other recogniser
+    difference  of the accuracies, -1..1
+    better      trials that are correct in more repeats than with the other; worse: in fewer
+    p           probability of a split at least as uneven if both are equal: McNemar's exact test, two-sided. It is for
+                these people: trials of a person are correlated, so it says less about new people.
     """
 
     than: str
@@ -187,7 +188,7 @@ class Paired:
 
     @classmethod
     def of(cls, hits: NDArray[np.bool_], others: NDArray[np.bool_], than: str) -> Self:
-        """Return the comparison of `hits` (r, m), which trials are recognised in each of r repeats, with `others`."""
+        """Return the comparison of `hits` (r, m), the correct trials in each of r repeats, with `others`."""
         from scipy.special import bdtr
 
         gained = hits.sum(axis=0, dtype=np.intp) - others.sum(axis=0, dtype=np.intp)
@@ -201,8 +202,10 @@ class Paired:
 
 
 def clustered(recognised: list[int], sizes: list[int], unit: Unit, repeats: int = 1) -> tuple[float, float]:
-    """Return the 95 % interval of a rate of units in clusters: of each, how many were recognised in all repeats
-    together, and how many there are in one; units are the frames of trials, or the trials of subjects or the like.
+    """Return the 95 % interval of a rate of units in clusters.
+
+    `recognised` counts each cluster's correct units in all repeats together, `sizes` its units in one; units are the
+    frames of trials, or the trials of subjects, objects or sessions.
     """
     n_clusters, total, hits = len(sizes), sum(sizes), sum(recognised)
     mean = hits / (repeats * total)
@@ -215,13 +218,13 @@ def clustered(recognised: list[int], sizes: list[int], unit: Unit, repeats: int 
 
 
 def design_effect(recognised: list[int], sizes: list[int], unit: Unit, repeats: int = 1) -> float:
-    """Return how many units of two or more clusters tell as much as one independent unit; 1 or more."""
+    """Return how many units of two or more clusters are worth one independent unit; 1 or more."""
     n_clusters, total, hits = len(sizes), sum(sizes), sum(recognised)
     misses = repeats * total - hits
     prior = 1 + (total / n_clusters - 1) * ALIKE[unit]
     if not hits or not misses:
         return prior
-    # In whole numbers up to the quotient: exact on every machine.
+    # Integers up to the final quotient: exact on every machine.
     squares = sum((own * total - size * hits) ** 2 for own, size in zip(recognised, sizes, strict=True))
     found = max(1.0, n_clusters * squares / ((n_clusters - 1) * total * hits * misses))
     weight = min(hits, misses) / (repeats * found)
@@ -236,7 +239,7 @@ def _wilson(p: float, n: float, z: float) -> tuple[float, float]:
 
 
 def student(rates: list[float]) -> tuple[float, float]:
-    """Return Student's 95 % interval of the mean of two numbers or more."""
+    """Return Student's 95 % interval of the mean of two or more numbers."""
     reach = _quantile(len(rates) - 1) * stdev(rates) / sqrt(len(rates))
     return fmean(rates) - reach, fmean(rates) + reach
 

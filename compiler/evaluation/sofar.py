@@ -1,13 +1,13 @@
-"""Accuracy of a collection that is under way: each trial recognised by a quick model of all the others.
+"""The accuracy during a collection: each trial is predicted by a quick model of all the others.
 
-The model is least squares on the inputs with a penalty, a column of +1 and -1 for each class (R. Rifkin and A. Klautau
-2004, In defense of one-vs-all classification, JMLR 5). Leaving a trial out needs no training of its own: with
-A = inverse of (X X' + penalty) over all rows, the scores of the rows B of a trial from all other rows are
+The model is penalised least squares on the inputs, with a column of +1 and -1 for each class (R. Rifkin and A. Klautau
+2004, In defense of one-vs-all classification, JMLR 5). Leaving a trial out needs no retraining: with A = inverse of
+(X X' + penalty) over all rows, the scores of the rows B of a trial from all other rows are
 
     Y_B - inverse(A_BB) (A Y)_B
 
-exactly (the PRESS of D. Allen 1974, for blocks). So a thousand trials take a second. Inputs are scaled by how far they
-spread over all rows, which uses no label. The penalty is fixed: nothing is chosen by the rates.
+exactly (the PRESS of D. Allen 1974, for blocks), so a thousand trials take a second. Inputs are scaled by their
+standard deviation over all rows, which uses no label. The penalty is fixed: no choice depends on the accuracies.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from .rates import Rate
 
 # As a share of the mean eigenvalue of X X'.
 _PENALTY = 0.1
-# So free is the constant that is added to the scores, as a multiple of that mean.
+# The inverse penalty on the constant added to the scores, as a multiple of that mean.
 _CONSTANT = 1e4
 
 Floats = NDArray[np.float64]
@@ -32,8 +32,8 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class TypeSoFar:
-    """A grasp type, or none: how many trials of it there are, how many are recognised, the 95 % interval of that rate
-    in 0..1, and for which type the others are taken most often ("" where none is).
+    """A grasp type, or none: the number of its trials, how many are correct, the 95 % interval of that accuracy in
+    0..1, and the type most often predicted for the others ("" if there are none).
     """
 
     grasp: str
@@ -46,7 +46,7 @@ class TypeSoFar:
 
 @dataclass(frozen=True, slots=True)
 class SoFar:
-    """The accuracy of a collection so far, and that of each type: those for which more trials help most come first."""
+    """The accuracy of a collection so far, and of each type, starting with those for which more trials help most."""
 
     total: int
     correct: int
@@ -56,16 +56,16 @@ class SoFar:
 
 
 def recognition_so_far(grasp_set: GraspSet) -> SoFar:
-    """Return how many trials of a set are recognised from all of its other trials.
+    """Return the accuracy for a set's trials, each predicted from all others.
 
-    Types are in the order of the lower ends of their intervals: that is low where a type is mistaken for others, and
-    where there are few trials of it. Raises EvaluationError for a set of one type.
+    Types are ordered by the lower end of their interval, which is low for types that are mistaken for others and for
+    types with few trials. Raises EvaluationError for a set with one type.
     """
     names = grasp_set.taxonomy.names
     labels, trials = np.asarray(grasp_set.labels, np.intp), grasp_set.trial_ids
     classes, label = np.unique(labels, return_inverse=True)
     if len(classes) < 2:
-        raise EvaluationError("all trials are of one grasp type: there is nothing to take them for")
+        raise EvaluationError("all trials are of one grasp type: there is nothing to distinguish")
     _, first, trial = np.unique(trials, return_index=True, return_inverse=True)
     scores = left_out_scores(_inputs(grasp_set), label, trial)
     given, truth = decided(scores.argmax(axis=1)[np.newaxis], trial)[0], label[first]
@@ -83,8 +83,8 @@ def recognition_so_far(grasp_set: GraspSet) -> SoFar:
 def left_out_scores(inputs: Floats, label: NDArray[np.intp], trial: NDArray[np.intp]) -> Floats:
     """Return the scores (n, K) of each row from a model of all rows but those of its trial.
 
-    inputs (n, p); label (n,) in 0..K-1; trial (n,) in 0..T-1. The rows of a trial weigh as much as the one row of
-    another. The model is the minimum over weights W (p, K) and constants c (K,) of
+    inputs (n, p); label (n,) in 0..K-1; trial (n,) in 0..T-1. All rows of a trial together weigh as much as the only
+    row of another. The model is the minimum over weights W (p, K) and constants c (K,) of
 
         sum over rows of |x W + c - y|^2 / rows of its trial + penalty (|W|^2 + |c|^2 / _CONSTANT)
     """
@@ -104,15 +104,13 @@ def left_out_scores(inputs: Floats, label: NDArray[np.intp], trial: NDArray[np.i
 
 
 def recording_so_far(recording: Path) -> SoFar | None:
-    """Return the accuracy of the trials that a recording holds so far; None while they are of fewer than two types."""
+    """Return the accuracy for the trials of a recording so far; None while they have fewer than two types."""
     grasp_set, _ = import_recordings([recording])
     return recognition_so_far(grasp_set) if len(np.unique(grasp_set.labels)) > 1 else None
 
 
 def _inputs(grasp_set: GraspSet) -> Floats:
-    """Return switches, joints and taxels (n, p), centred, each scaled by its standard deviation; one that never changed
-    is 0.
-    """
+    """Return switches, joints and taxels (n, p), centred and scaled by the standard deviation; constant ones are 0."""
     columns = np.hstack([grasp_set.switches, grasp_set.codes, grasp_set.taxels.reshape(len(grasp_set), -1)]).astype(
         np.float64
     )

@@ -1,4 +1,4 @@
-"""An evaluation: the paper's tables for the user's own recordings, from fits that are each done once."""
+"""An evaluation: the paper's tables for the user's own recordings, with each distinct fit run once."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -26,28 +26,29 @@ TABLES: tuple[TableName, ...] = ("compositions", "generality", "pruning", "basel
 _NESTED: tuple[TableName, ...] = ("trainers", "joints")
 
 _ROUNDS = 100  # the paper's
-# Those with a row that is trained on all switches at once.
+# Tables with a row that trains on all switches at once.
 _OF_ALL_SWITCHES: tuple[TableName, ...] = ("compositions", "pruning")
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What to evaluate, and how.
+    """Settings of an evaluation.
 
-    subjects    whose rows to use; none given: everybody's
-    scheme      what is kept whole in a fold: trials (stratified as in Weka), blocks of trial numbers, or, each left out
-                in turn, subjects, objects or sessions
-    folds       of `trial` and `block`
-    repeats     of `trial`, with seeds seed, seed + 1, ...
+    subjects    whose rows to use; empty: everybody's
+    scheme      what is kept together in a fold: trials (stratified as in Weka), blocks of trial numbers, or subjects,
+                objects or sessions, each left out in turn
+    folds       for `trial` and `block`
+    repeats     for `trial`, with seeds seed, seed + 1, ...
     prune       S of the placements of the compositions, the generality and the baselines
     prune_list  each S of the table of pooled and pruned placements
-    baselines   methods that ID3 is compared with in the baselines, besides random placements
-    trainer     what makes every classifier, with its `settings`; rounds are LogitBoost's, None: the paper's hundred. In
-                the table of trainers and the learning curve, what is not given is chosen from the training rows
-    levels      most levels of a taxel that there are to choose from, None: as many as are usual
-    keep_joints how many joints classifiers get, chosen from the training rows, None: all
-    learning    whether to find learning curves
-    permute     how often to evaluate with shuffled labels, for the chance level; 0: not at all
+    baselines   methods to compare with ID3, in addition to random placements
+    trainer     the trainer of every classifier, with its `settings`; rounds are LogitBoost's, None: the paper's
+    hundred.
+                In the table of trainers and the learning curve, what is not given is chosen from the training rows
+    levels      the most levels of a taxel to choose from, None: the usual number
+    keep_joints the number of joints for classifiers, chosen from the training rows, None: all
+    learning    whether to compute learning curves
+    permute     number of evaluations with shuffled labels, for the chance level; 0: none
     """
 
     subjects: tuple[str, ...] = ()
@@ -79,10 +80,10 @@ class LeftOut:
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """The result: what was asked of which set, the grasp types that occur, what to beware of, and the tables.
+    """The result: the options and the set, the grasp types that occur, warnings, and the tables.
 
-    left_out names the tables that were asked for but have no meaning here, with the reason; permuted is the permutation
-    test, learning the learning curves; each None if it was not asked for.
+    left_out names requested tables that have no meaning here, with the reason; permuted is the permutation test,
+    learning the learning curves; each is None if not requested.
     """
 
     fingerprint: str
@@ -97,7 +98,7 @@ class Study:
     learning: Learning | None = None
 
     def __str__(self) -> str:
-        """Return how many trials and frames there are, and how they were cut."""
+        """Return the numbers of trials and frames, and the scheme of the folds."""
         options, repeats = self.options, counted(self.options.repeats, "repeat")
         cut = {
             "trial": f"{options.folds} stratified folds of whole trials, {repeats} from seed {options.seed}",
@@ -119,7 +120,7 @@ def evaluate(
     progress: Progress | None = None,
     **changes: Any,
 ) -> Study:
-    """Cross-validate: return the paper's tables that `options` ask for and the set has the inputs for.
+    """Cross-validate: return the paper's tables that `options` request and the set has inputs for.
 
     Parameters
     ----------
@@ -128,23 +129,23 @@ def evaluate(
     options : Options, optional
         What to evaluate, and how.
     jobs : int
-        Worker processes; -1: all cores. The result is the same for any number of them.
+        Worker processes; -1: all cores. The result does not depend on their number.
     progress : callable, optional
         Called with (done, total) after each classifier.
     **changes
-        Single options, such as `folds=5`, instead of those in `options`.
+        Single options, such as `folds=5`, which override those in `options`.
 
     Returns
     -------
     Study
-        The tables, of rates in 0..1 with 95 % intervals, and what to beware of.
+        The tables, with rates in 0..1 and their 95 % intervals, and warnings.
 
     Raises
     ------
     EvaluationError
-        If the set cannot be cut as asked, or its rows look like frames of fewer trials than it has.
+        If the set cannot be split as requested, or its rows look like frames of fewer trials than it has.
     MemberError, TrainerError
-        For a baseline that is no method, or a trainer that is not there or takes no such setting.
+        For an unknown baseline, or an unknown trainer or setting.
 
     Examples
     --------
@@ -157,7 +158,7 @@ def evaluate(
     options = replace(options or Options(), **changes)
     for name in options.baselines:
         if not METHODS.named(name).by_number:
-            raise EvaluationError(f"{name} takes S: a baseline is a method that takes a number of switches")
+            raise EvaluationError(f"{name} takes S: baselines must be methods that take a number of switches")
     wanted = changed(Manifested(rounds=options.rounds, trainer=options.trainer), options.settings)
     training, ways = Training.of(wanted), ways_of(wanted)
     chosen = _of_subjects(grasp_set.without_none(), options.subjects)
@@ -243,7 +244,7 @@ def _of_subjects(grasp_set: GraspSet, subjects: tuple[str, ...]) -> GraspSet:
 
 
 def _check_all_switches(grasp_set: GraspSet, parts: tuple[Population, ...]) -> None:
-    """Raise EvaluationError where a training on all switches has no room in memory: before placements are chosen."""
+    """Raise EvaluationError if training on all switches does not fit in memory, before placements are chosen."""
     switches = grasp_set.switches
     varying = int(np.count_nonzero(switches.any(axis=0) & ~switches.all(axis=0))) + len(grasp_set.taxel_columns)
     for part in parts:
@@ -252,15 +253,15 @@ def _check_all_switches(grasp_set: GraspSet, parts: tuple[Population, ...]) -> N
 
 
 def _why_not(name: TableName, grasp_set: GraspSet, parts: tuple[Population, ...], options: Options) -> str | None:
-    """Return why a table has no meaning for the set and what is asked, or None."""
+    """Return why a table has no meaning for the set and the options, or None."""
     if name == "joints" and not grasp_set.joints:
         return "the set has no joints"
     if name in _NESTED:
-        return None if "nested" in options.protocols else f"{name} are compared under the nested protocol alone"
+        return None if "nested" in options.protocols else f"{name} are compared under the nested protocol only"
     if name != "compositions" and not grasp_set.element_names:
         return "a placement needs switches, and the set has none"
     if name == "generality" and len(parts) < 2:
         return "another's placement needs a second subject"
     if name == "generality" and options.scheme == "subject":
-        return "when a subject is left out, the placement always is others'"
+        return "when a subject is left out, the placement is always that of others"
     return None

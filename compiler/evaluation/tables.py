@@ -1,4 +1,4 @@
-"""The paper's tables: cells of rates, read off predictions."""
+"""The paper's tables: cells of accuracies, computed from predictions."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ _TITLES: dict[TableName, str] = {
     "compositions": "Compositions of inputs (the paper's Tables II and V)",
     "generality": "One subject's placement (row) on another's data (column), selected switches (Tables III and VI)",
     "pruning": "Placement of all subjects pooled, pruned by S, selected switches (Tables IV and VII)",
-    "baselines": "ID3 beside other placements of as many switches, selected switches",
+    "baselines": "ID3 compared with other placements of as many switches, selected switches",
     "trainers": f"Trainers, their settings chosen from the training rows, and baselines; paired with {REFERENCE}",
     "joints": "The best joints alone, chosen from the training rows by backward elimination",
 }
@@ -32,7 +32,7 @@ _TITLES: dict[TableName, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Least, mean and most of something that may differ from fold to fold."""
+    """Minimum, mean and maximum of a quantity that may differ between folds."""
 
     least: float
     mean: float
@@ -51,13 +51,13 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """The rate of one row of a table on one population.
+    """The accuracy of one row of a table on one population.
 
-    rate       of trials; frames: of frames, None where each row is a trial
-    switches   how many switches the classifiers had         draws  spread of the rates of random draws; else None
-    no_inputs  fits without any input that varies: they answer the most frequent grasp type of their training rows
-    confusion  (K, K) counts of trials over all repeats, row: true, column: recognised, K as in Study.grasps; None but
-               for compositions
+    rate       by trials; frames: by frames, None if each row is a trial
+    switches   the number of switches                        draws  spread over random draws, else None
+    no_inputs  fits without any varying input: they predict the most frequent grasp type of their training rows
+    confusion  (K, K) counts of trials over all repeats, row: true, column: predicted, K as in Study.grasps; only for
+               compositions
     """
 
     rate: Rate
@@ -68,21 +68,22 @@ class Cell:
     confusion: Confusion | None
 
     def __str__(self) -> str:
-        """Return the rates in percent, starred where fits had no inputs; the draws' spread on a line of its own."""
+        """Return the rates in percent, starred if fits had no inputs; the draws' spread on a separate line."""
         draws = "" if self.draws is None else f"\nfrom {100 * self.draws.least:.1f} to {100 * self.draws.most:.1f}"
         return f"{both(self.rate, self.frames, '*' if self.no_inputs else '')}{draws}"
 
 
 def both(rate: Rate, frames: Rate | None, mark: str = "") -> str:
-    """Return a rate of trials in percent, with a mark; and on a second line that of frames, where there is one."""
+    """Return a rate by trials in percent, with a mark; and on a second line the rate by frames, if there is one."""
     return f"{interval(rate)}{mark}" + ("" if frames is None else f"\n{interval(frames)} frames")
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A row of a table: its short name, what it is, its switches, its cells, and the rate of all their trials (frames:
-    of all their frames, None where each row is a trial); paired: their trials compared with those of the REFERENCE
-    trainer on the same inputs, in the table of trainers.
+    """A row of a table: its short name, its description, its switches, its cells, and the rate over all trials.
+
+    frames is the rate over all frames, None if each row is a trial; paired compares the trials with those of the
+    REFERENCE trainer on the same inputs, in the table of trainers.
     """
 
     name: str
@@ -96,7 +97,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class RateTable:
-    """A table in the paper's layout: a column a subject."""
+    """A table in the paper's layout: a column per subject."""
 
     name: TableName
     protocol: ProtocolName
@@ -105,22 +106,22 @@ class RateTable:
 
     @property
     def title(self) -> str:
-        """What the table shows, and what its rates are of."""
+        """The title: what the table shows, and what its rates are of."""
         return f"{_TITLES[self.name]}: {self.protocol} protocol, {self.rows[0].rate.what}"
 
     @property
     def note(self) -> str:
-        """What a star means, in a sentence; "" where there is none."""
+        """A sentence on the meaning of a star; "" if there is none."""
         starred = any(cell.no_inputs for row in self.rows for cell in row.cells)
-        return "* In some folds no input varied: there, the most frequent grasp type is answered." if starred else ""
+        return "* In some folds no input varied: there, the most frequent grasp type is predicted." if starred else ""
 
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """Reads rates off predictions.
+    """Computes rates from predictions.
 
     labels, trials  (n,) of each row       grasps  labels that occur
-    predictions     of each fit; blind: the fits that were
+    predictions     of each fit; blind: the fits without varying inputs
     of              what the rates are of, with the group (n,) that each row is left out with, None: its trial
     """
 
@@ -133,7 +134,7 @@ class Reader:
     groups: NDArray[np.str_] | None
 
     def table(self, name: TableName, protocol: ProtocolName, plans: Sequence[RowPlan]) -> RateTable:
-        """Return the table of these rows."""
+        """Return the table for these rows."""
         columns = tuple(cell.part.name for cell in plans[0].cells)
         rows = [self._row(plan, confusing=name == "compositions") for plan in plans]
         if name == "trainers":
@@ -161,7 +162,7 @@ class Reader:
         return Row(plan.name, plan.what, switches, cells, rate, frames)
 
     def rates(self, plans: Sequence[CellPlan]) -> tuple[Rate, Rate | None]:
-        """Return the rates of trials and of frames of some cells together; their runs correspond."""
+        """Return the rates by trials and by frames of some cells together; their runs correspond."""
         rows, predicted = self._predicted(plans)
         groups = None if self.groups is None else self.groups[rows]
         repeats = len(plans[0].part.repeats)
@@ -169,13 +170,13 @@ class Reader:
         return rated(predicted, self.labels[rows], self.trials[rows], of=self.of, groups=groups, repeats_a_draw=a_draw)
 
     def hits(self, plans: Sequence[CellPlan]) -> NDArray[np.bool_]:
-        """Return which trials (runs, m) of some cells each run recognises, in the order of the trials' numbers."""
+        """Return the correct trials (runs, m) of some cells in each run, in the order of the trials' numbers."""
         rows, predicted = self._predicted(plans)
         _, first, trial = np.unique(self.trials[rows], return_index=True, return_inverse=True)
         return np.asarray(decided(predicted, trial) == self.labels[rows[first]])
 
     def _predicted(self, plans: Sequence[CellPlan]) -> tuple[Rows, Labels]:
-        """Return the rows (n,) that some cells test, and the label (runs, n) that each run gives them."""
+        """Return the rows (n,) that some cells test, and the label (runs, n) that each run predicts for them."""
         rows = np.concatenate([fit.fold.test for plan in plans for fit in plan.runs[0]])
         predicted = np.zeros((len(plans[0].runs), len(self.labels)), dtype=np.intp)
         for plan in plans:
@@ -195,7 +196,7 @@ class Reader:
 
 
 def _draws(rate: Rate, repeats: int) -> Spread | None:
-    """Return the spread of the draws' own rates, each over its `repeats`; None if there is one draw only."""
+    """Return the spread of the draws' own rates, each over its `repeats`; None for a single draw."""
     if len(rate.correct) == repeats:
         return None
     draws = np.reshape(rate.correct, (-1, repeats)).mean(axis=1) / rate.total

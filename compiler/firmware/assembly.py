@@ -1,4 +1,4 @@
-"""The classifier in AVR assembly: which registers hold the sums, and where each look-up finds its row."""
+"""The classifier in AVR assembly: which registers hold the sums, and how each lookup finds its row."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -6,22 +6,19 @@ from itertools import pairwise, product
 from typing import cast
 
 from . import FirmwareError
-from .layout import Field, JointLayout, Layout, Lookup
+from .layout import Field, JointLayout, Layout, Lookup, looked_up
 from .words import Names, comment, switches_in_words
 
-# Free to use for a C function, and to be kept for its caller; of pairs the lower.
+# Call-clobbered and call-saved register pairs, each named by its lower register.
 _FREE, _KEPT = (22, 24, 26, 18, 20), (16, 14, 12, 10, 8, 6, 4, 2, 28)
-# What finding a row needs besides r0, r1 and Z: Y, which points at the glove; where codes are wide, two zeros and a
-# register for comparisons; where some of the input is far, X.
-_POINTER, _WIDE, _FAR = 28, (18, 20), (26,)
+# Finding a row needs r0, r1, Z, and Y, which points at the glove. With 16-bit codes it also needs r19:r18 as zero, or
+# r20 for comparisons.
+_POINTER, _ZERO, _COMPARED = 28, 18, 20
 _IMMEDIATE = 16  # registers from here on can be loaded with a constant
 _LPM_REACH = 65536
-# rcall reaches 4 KiB either way; all that update() does about a look-up must stay within that.
-_NEAR_BYTES = 3600
-_LOOKUP_BYTES, _JOINT_BYTES, _SOURCE_BYTES = 100, 54, 26  # without comparisons
-_SLOPE_BYTES = 110  # but for its products, which no near call reaches across
-FLAGS = 2  # bytes of a glove from where Y points to its input
-_REACH = 63  # of ldd
+FLAGS = 2  # bytes between the address in Y and the glove's input
+MOST_DISTANCE = 255  # the largest distance that fits in a byte
+_REACH = 63  # of ldd, and of adiw
 
 
 Row = dict[str, object]  # of the template's lists
@@ -37,7 +34,7 @@ def check_size(layout: Layout) -> None:
 
 
 def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> dict[str, object]:
-    """Return what the template of the assembly asks for; `near` is what `calls_are_near` says of the whole layout."""
+    """Return the values for the assembly template; if `near`, calls are relative."""
     parts = layout.parts
     stride = parts.width * layout.entry_bits // 8
     passes = [_pass(names, layout, number) for number in range(len(parts.firsts))]
@@ -45,8 +42,10 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
     return {
         "byte_sums": layout.sum_bits == 8,
         "wide": layout.code_bits == 16,
+        "zeros": _ZERO in _spare(layout),
         "unrolled": layout.adding == "unrolled",
         "finds_first": finds_first(layout),
+        "compares": compares_input(layout),
         "call": "rcall" if near else "call",
         "jump": "rjmp" if near else "jmp",
         "passes": passes,
@@ -54,11 +53,11 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
         "stride": stride,
         "frame_size": layout.frame_size,
         "kept": kept_registers(layout),
-        "borrowed": borrowed_registers(layout),
+        "last": last_size(layout),
         "seen": seen_size(layout),
         "sources": FLAGS + layout.frame_size + _n_found(layout),
         "halves": layout.entry_shift == 8,
-        "clean": layout.biased and not layout.entry_shift,  # r1 is zero between look-ups
+        "clean": layout.biased and not layout.entry_shift,  # r1 is zero between lookups
         "tables": [
             *([(f"thenar_{name}_rows", layout.n_rows * len(parts.firsts) * stride)] if layout.n_rows else []),
             *([(f"thenar_{name}_bins", bins)] if bins else []),
@@ -67,33 +66,47 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
 
 
 def finds_first(layout: Layout) -> bool:
-    """Return whether classify() finds all rows before it adds any: where classes are added up in parts, or where their
-    sums leave no registers to find rows with.
+    """Return whether classify() finds all rows before it adds any: the classes need several passes, or their sums leave
+    no registers for finding rows.
     """
-    return len(layout.parts.firsts) > 1 or bool(_pairs(layout) & spare_registers(layout))
+    return len(layout.parts.firsts) > 1 or bool(_pairs(layout) & _spare(layout))
+
+
+def compares_input(layout: Layout) -> bool:
+    """Return whether update() compares the input before it finds rows. Otherwise it finds all rows and compares those,
+    which needs less flash but more time if few codes change.
+
+    Sensor noise changes most 16-bit codes in every frame, so they are only compared if rows are added in line.
+    """
+    return layout.adding == "unrolled" or layout.code_bits == 8
 
 
 def compared_bytes(layout: Layout, lookup: Lookup) -> list[int]:
-    """Return the places in the frame of the bytes of input that update() compares, to know whether a look-up's row may
-    be another: none of a group of switches alone, whose row is made of few bits.
+    """Return the offsets in the frame of the input bytes that update() compares to decide whether a lookup's row may
+    have changed. A lookup of switches alone has none: its row number is cheap to compute.
     """
-    if not lookup.joints:
+    if not lookup.joints or not compares_input(layout):
         return []
     ports = [] if lookup.group is None else [field.port for field in layout.fields[lookup.group]]
     return [*dict.fromkeys(ports), *(place for joint in lookup.joints for place in _code_bytes(layout, joint.number))]
 
 
+def _compared_of_slope(layout: Layout, joint: int) -> list[int]:
+    return _code_bytes(layout, joint) if compares_input(layout) else []
+
+
 def found_size(layout: Layout) -> int:
-    """Return the bytes that hold what classify() has found, where it finds first."""
+    """Return the size of the row numbers that classify() stores if it finds all rows first."""
     return max(_n_found(layout), 1) if finds_first(layout) else 0
 
 
 def seen_size(layout: Layout) -> int:
-    """Return the bytes that say what is in the sums of update(): the distances of slopes, the rows of look-ups, and the
-    input that these were found from.
+    """Return the size of the state of update(): the distances of slopes, the row numbers of lookups, and the compared
+    input bytes.
     """
     codes = sum(len(compared_bytes(layout, lookup)) for lookup in layout.lookups)
-    return max(_n_found(layout) + codes + len(layout.tables.slopes) * layout.code_bits // 8, 1)
+    codes += sum(len(_compared_of_slope(layout, slope.joint)) for slope in layout.tables.slopes)
+    return max(_n_found(layout) + codes, 1)
 
 
 def _n_found(layout: Layout) -> int:
@@ -101,20 +114,9 @@ def _n_found(layout: Layout) -> int:
 
 
 def glove_size(layout: Layout) -> int:
-    """Return the bytes of a glove on an AVR: scores, what they begin with, FLAGS, the input, and what is private."""
+    """Return the size of a glove on an AVR: scores, initial scores, FLAGS, input and private state."""
     lost = len(layout.ports) + -(-layout.tables.n_joints // 8) + 2
     return 4 * layout.tables.n_classes + FLAGS + layout.frame_size + seen_size(layout) + lost
-
-
-def calls_are_near(layout: Layout) -> bool:
-    """Return whether all calls are `rcall`; else they are `call`, a word and a cycle more."""
-    joints = sum(_JOINT_BYTES + 4 * len(joint.thresholds) * joint.compared for joint in layout.joints)
-    wide = sum(4 * len(joint.thresholds) * joint.compared for joint in layout.joints) * (layout.code_bits == 16)
-    groups = [layout.fields[lookup.group] for lookup in layout.lookups if lookup.group is not None]
-    put_together = 2 * sum(len(group_lines(fields)) for fields in groups)
-    each = put_together + _LOOKUP_BYTES * len(layout.lookups) + _SLOPE_BYTES * len(layout.tables.slopes)
-    each += _SOURCE_BYTES * (seen_size(layout) - _n_found(layout)) + joints + wide
-    return each * len(layout.parts.firsts) < _NEAR_BYTES
 
 
 _MOST_MOVES, _BYTE = 4, range(8)
@@ -122,8 +124,8 @@ _MOST_MOVES, _BYTE = 4, range(8)
 
 @lru_cache(maxsize=512)
 def _moved(bit: int, width: int, to: int) -> tuple[str, ...]:
-    """Return the fewest instructions that bring `width` bits of a register from `bit` to `to` and clear all others;
-    `{}` is the register.
+    """Return the shortest instruction sequence that moves `width` bits of a register from `bit` to `to` and clears the
+    others; `{}` is the register.
     """
 
     def after(moves: tuple[str, ...], place: int) -> int | None:
@@ -145,53 +147,46 @@ def _moved(bit: int, width: int, to: int) -> tuple[str, ...]:
     return min(found, key=len)
 
 
-def far(place: int, *, wide: bool = False) -> bool:
-    """Return whether an input at that place in the frame is beyond the reach of Y."""
-    return FLAGS + place + wide > _REACH
+def far(place: int, *, wide: bool = False) -> int:
+    """Return how Y reaches an offset from the glove's input: directly (0), after one `adiw` (1), or after a 16-bit
+    addition (2).
+    """
+    at = FLAGS + place + wide
+    return (at > _REACH) + (at > 2 * _REACH)
+
+
+def _at(place: int, transfer: str, registers: Sequence[int]) -> list[str]:
+    """Return the instructions that load or store (`transfer`) registers at an offset from the input. Y points FLAGS
+    bytes before the input; it is moved and restored if the offset is out of reach.
+    """
+    at = FLAGS + place
+    base = (0, _REACH, at)[far(place, wide=len(registers) > 1)]
+    before, after = [f"adiw  r28, {base}"], [f"sbiw  r28, {base}"]
+    if base > _REACH:
+        before, after = ([f"subi  r28, lo8({each})", f"sbci  r29, hi8({each})"] for each in (-base, base))
+    moved = [transfer.format(register=each, place=at - base + more) for more, each in enumerate(registers)]
+    return [*before, *moved, *after] if base else moved
 
 
 def taken(place: int, register: int, *, wide: bool = False) -> list[str]:
-    """Return the instructions that load an input from that place in the frame, a wide one into two registers. Y points
-    FLAGS bytes before the frame; what is beyond its reach goes by X.
-    """
-    at = FLAGS + place
-    registers = range(register, register + 1 + wide)
-    if not far(place, wide=wide):
-        return [f"ldd   r{each}, Y+{at + more}" for more, each in enumerate(registers)]
-    moved = ["movw  r26, r28", f"subi  r26, lo8(-{at})", f"sbci  r27, hi8(-{at})"]
-    return moved + [f"ld    r{each}, X+" for each in registers]
+    """Return the instructions that load the input at an offset in the frame, two bytes if `wide`."""
+    return _at(place, "ldd   r{register}, Y+{place}", range(register, register + 1 + wide))
 
 
-def _loaded(layout: Layout, places: Sequence[int]) -> list[list[str]]:
-    """Return for each byte of input the instructions that load it into r0 while sums are in their registers."""
-    return [_lending(layout, taken(place, 0)) for place in places]
-
-
-def _lending(layout: Layout, lines: list[str]) -> list[str]:
-    """Return the instructions, and around them what saves X where they need it and it is a sum."""
-    if _FAR[0] not in _borrowed(layout) or not any("r26" in line for line in lines):
-        return lines
-    return ["push  r26", "push  r27", *lines, "pop   r27", "pop   r26"]
-
-
-def found_is_far(layout: Layout, number: int) -> bool:
-    """Return whether the byte that says what update() has found for a slope, or then for a look-up, is beyond Y."""
-    return far(layout.frame_size + number)
+def found_place(layout: Layout, number: int) -> int:
+    """Return the offset of the distance of a slope, or of the row number of a lookup (numbered after the slopes)."""
+    return layout.frame_size + number
 
 
 def _exchange(layout: Layout, number: int) -> Row:
-    """Return the instructions that load what was found before into r31, and those that store r30 in its place."""
-    if not found_is_far(layout, number):
-        at = FLAGS + layout.frame_size + number
-        return {"before_in_r31": [f"ldd   r31, Y+{at}"], "store_r30": [f"std   Y+{at}, r30"]}
-    *moved, _ = taken(layout.frame_size + number, 31)
-    lines = (_lending(layout, [*moved, each]) for each in ("ld    r31, X", "st    X, r30"))
-    return dict(zip(("before_in_r31", "store_r30"), lines, strict=True))
+    """Return the instructions that load the previous row number or distance into r31, and that store r30 over it."""
+    place = found_place(layout, number)
+    return {"before_in_r31": taken(place, 31), "store_r30": _at(place, "std   Y+{place}, r{register}", [30])}
 
 
 def group_lines(fields: Sequence[Field]) -> list[str]:
-    """Return the instructions that make the byte of a group of its fields' ports in r30; r31 is theirs to use, r0 and
-    r1 are not.
+    """Return the instructions that assemble a group's byte in r30 from its fields. They may change r31, but not r0 or
+    r1.
     """
     lines: list[str] = []
     for field in fields:
@@ -207,48 +202,51 @@ def group_lines(fields: Sequence[Field]) -> list[str]:
     return lines
 
 
-def spare_registers(layout: Layout) -> set[int]:
-    """Return the registers that are needed to find rows; of pairs the lower."""
-    beyond = max(layout.frame_size - 1, layout.frame_size + _n_found(layout) - 1)
-    return {_POINTER, *(_WIDE if layout.code_bits == 16 else ()), *(_FAR if far(beyond) else ())}
+def _spare(layout: Layout) -> set[int]:
+    """Return the register pairs that are needed to find rows, each by its lower register."""
+    if layout.code_bits == 8 or not looked_up(layout.tables):
+        return {_POINTER}
+    return {_POINTER, _COMPARED if layout.bins == "search" else _ZERO}
 
 
 def _registers(layout: Layout) -> list[int]:
-    """Return the registers of the sums of a pass; of pairs the lower. Those that finding rows needs are the last to be
-    taken.
+    """Return the registers of the sums of a pass; of a pair the lower. Registers that finding rows needs are taken
+    last.
     """
-    spare = spare_registers(layout)
+    spare = _spare(layout)
     pairs = sorted((*_FREE, *_KEPT), key=lambda low: (low == _POINTER, low in spare))
     found = pairs if layout.sum_bits == 16 else [low + half for low in pairs for half in (0, 1)]
     return sorted(found[: layout.parts.width])
 
 
 def _pairs(layout: Layout) -> set[int]:
-    """Return the pairs of registers that hold sums; the lower of each."""
+    """Return the register pairs that hold sums, each by its lower register."""
     return {register // 2 * 2 for register in _registers(layout)}
 
 
-def _borrowed(layout: Layout) -> list[int]:
-    """Return the pairs besides Y that update() must save whenever it finds a row."""
-    return sorted(_pairs(layout) & spare_registers(layout) - {_POINTER})
+def borrows(layout: Layout, lookup: Lookup) -> bool:
+    """Return whether update() must save r20, a sum, while it compares 16-bit codes with thresholds."""
+    compares = layout.code_bits == 16 and any(joint.compared for joint in lookup.joints)
+    return compares and _COMPARED in _registers(layout)
 
 
-def borrowed_registers(layout: Layout) -> list[int]:
-    """Return the registers with sums that are saved while update() finds a row."""
-    return [register for low in _borrowed(layout) for register in (low, low + 1)]
+def last_size(layout: Layout) -> int:
+    """Return the size of the sums that update() keeps in memory while Y points at the glove."""
+    return sum(each // 2 * 2 == _POINTER for each in _registers(layout)) * layout.sum_bits // 8
 
 
 def kept_registers(layout: Layout) -> list[int]:
-    """Return the registers that are saved: because they hold sums, and because Y points at the glove."""
+    """Return the call-saved registers that are used: those with sums, and Y."""
     halves = (0, 1) if layout.sum_bits == 16 else (0,)
     sums = {low + half for low in _registers(layout) for half in halves if low // 2 * 2 in _KEPT}
     return sorted(sums | {_POINTER, _POINTER + 1})
 
 
 def _pass(names: Names, layout: Layout, number: int) -> Row:
-    """Return a pass over all look-ups for some classes: their sums, each in a register or in a pair from `low` on,
-    their place among the scores in bytes, and how many of them, the first ones, are in the pass before as well. While
-    Y points at the glove, the sums in `spilled`, which are the last, stay in memory.
+    """Return a pass over all lookups for some classes.
+
+    Each sum is in a register, or in a pair from `low` on; those in `spilled`, the last, stay in memory while Y points
+    at the glove. `scores` is the byte offset of the first score; the first `again` classes are also in the pass before.
     """
     parts = layout.parts
     first = parts.firsts[number]
@@ -259,7 +257,7 @@ def _pass(names: Names, layout: Layout, number: int) -> Row:
     slopes = [_slope(names, layout, at, first) for at in range(len(layout.tables.slopes))]
     before = 0
     for each in (*steps, *slopes):
-        each["before"] = before  # where the bytes of input that it was found from begin
+        each["before"] = before  # offset of its compared input bytes
         before += len(cast("list[Row]", each["compared_bytes"]))
     sums = [
         {"low": low, "high": low + high, "start": start, "grasp": grasp, "immediate": low >= _IMMEDIATE}
@@ -280,30 +278,36 @@ def _pass(names: Names, layout: Layout, number: int) -> Row:
 
 
 def _code_bytes(layout: Layout, joint: int) -> list[int]:
-    """Return the places in the frame of the bytes of a joint's code."""
+    """Return the offsets in the frame of the bytes of a joint's code."""
     each = layout.code_bits // 8
     first = len(layout.ports) + layout.padding + joint * each
     return [*range(first, first + each)]
 
 
+def _loaded(places: Sequence[int]) -> list[list[str]]:
+    """Return the instructions that load each input byte into r0."""
+    return [taken(place, 0) for place in places]
+
+
 def _code(layout: Layout, joint: int) -> list[str]:
-    """Return the instructions that load a joint's code, into r30 or r31:r30."""
+    """Return the instructions that load a joint's code into r30 or r31:r30."""
     return taken(_code_bytes(layout, joint)[0], 30, wide=layout.code_bits == 16)
 
 
 def _slope(names: Names, layout: Layout, at: int, first: int) -> Row:
-    """Return a slope: how its code is loaded, held within its range and scaled, and what it multiplies: entries, each
-    with the sums that it is added to, or subtracted from.
+    """Return a slope: how its code is loaded, clamped and scaled, and the entries that it multiplies, each with the
+    sums that the product is added to or subtracted from.
     """
     slope, registers = layout.tables.slopes[at], _registers(layout)
     return {
         "at": at,
         "what": comment(names.joints[slope.joint].name),
         "taken": _code(layout, slope.joint),
-        "compared_bytes": _loaded(layout, _code_bytes(layout, slope.joint)),
+        "compared_bytes": _loaded(_compared_of_slope(layout, slope.joint)),
         **_exchange(layout, at),
         "low": slope.low,
         "span": slope.high - slope.low,
+        "long": slope.high - slope.low > MOST_DISTANCE,
         "upper": slope.high < (1 << layout.code_bits) - 1,
         "doubled": max(slope.gain, 0),
         "halved": max(-slope.gain, 0),
@@ -316,8 +320,8 @@ def _slope(names: Names, layout: Layout, at: int, first: int) -> Row:
 
 
 def products(row: Sequence[int]) -> list[tuple[int, list[tuple[int, bool]]]]:
-    """Return what a slope's row multiplies: each entry that is not zero, but for those that are equal to another or its
-    negative, and the classes that it is of, with whether it is theirs or its negative is.
+    """Return the distinct absolute values among the nonzero entries of a slope's row. With each come its classes, and
+    whether the entry of a class equals the one returned or its negative.
     """
     found: dict[int, list[int]] = {}
     for k, entry in enumerate(row):
@@ -327,8 +331,8 @@ def products(row: Sequence[int]) -> list[tuple[int, list[tuple[int, bool]]]]:
 
 
 def _step(names: Names, layout: Layout, lookup: Lookup, part: int) -> Row:
-    """Return a look-up in the pass for the classes of a part: what it is of, how the number of its row is made of the
-    input, which register has it then, how each byte of that input is loaded into r0, and where its rows begin.
+    """Return a lookup in the pass of a part: its inputs, how its row number is computed and in which register, how each
+    input byte is loaded into r0, and the offset of its rows.
     """
     compared = [joint for joint in reversed(lookup.joints) if joint.compared]
     trimmed = [joint for joint in lookup.joints if not joint.compared]
@@ -341,7 +345,7 @@ def _step(names: Names, layout: Layout, lookup: Lookup, part: int) -> Row:
         "index": lookup.index,
         "what": ", ".join([*groups, *(comment(names.joints[joint.number].name) for joint in lookup.joints)]),
         "rows": (part * layout.n_rows + lookup.first_row) * layout.parts.width * layout.entry_bits // 8,
-        "compared_bytes": _loaded(layout, compared_bytes(layout, lookup)),
+        "compared_bytes": _loaded(compared_bytes(layout, lookup)),
         **_exchange(layout, len(layout.tables.slopes) + lookup.index),
         "one_group": not lookup.joints,
         "compared": [
@@ -358,7 +362,7 @@ def _step(names: Names, layout: Layout, lookup: Lookup, part: int) -> Row:
             for joint, how in zip(trimmed, _adding(len(trimmed), bool(compared), grouped), strict=True)
         ],
         "group": group,
-        "group_lent": _lending(layout, group),
+        "borrows": borrows(layout, lookup),
         "register": 30 if trimmed or grouped else 0,
     }
 
@@ -376,8 +380,8 @@ def _bins(layout: Layout, joint: JointLayout) -> Row:
 
 
 def _adding(count: int, before: bool, after: bool) -> list[str]:
-    """Return what is done with each of `count` numbers in r30, that are added up in r0 and in the end in r30; whether
-    there is one in r0 before, and whether one comes after.
+    """Return the instruction that adds each of `count` numbers in r30 to a sum in r0; the last leaves the sum in r30.
+    `before`: r0 already holds a number; `after`: another number follows.
     """
     last = [] if after else ["add   r30, r0" if count > 1 or before else ""]
     rest = ["add   r0, r30"] * (count - len(last) if count else 0)

@@ -1,8 +1,8 @@
-"""Cycles, flash and RAM of the classifier on an AVR, counted instruction by instruction in its rendered assembly, along
-the longest path.
+"""Cycles, flash and RAM of the classifier on an AVR, counted in its assembly as it is rendered, instruction by
+instruction along the longest path.
 
-All frames take the same time with two exceptions: each class whose score exceeds all earlier ones costs a cycle, and so
-does each 16-bit code outside the range of a slope.
+All frames take the same time with two exceptions: each class whose score exceeds all earlier ones costs a cycle, and
+so does each 16-bit code below a slope, or beyond a slope that is longer than a byte.
 """
 
 import re
@@ -18,28 +18,27 @@ from numpy.typing import NDArray
 from thenar.firmware_templates.rendering import render
 
 from .assembly import (
+    MOST_DISTANCE,
     assembly_values,
-    borrowed_registers,
-    calls_are_near,
     compared_bytes,
     far,
     finds_first,
-    found_is_far,
+    found_place,
     found_size,
     glove_size,
     kept_registers,
-    spare_registers,
+    last_size,
 )
 from .costs import NAME_BYTES, Cost
 from .layout import Field, JointLayout, Layout, Lookup
 from .words import numbered
 
-# AVR Instruction Set Manual, DS40002198, table 5-1: cores AVRe (ATmega328P) and AVRe+ (ATmega2560). The latter's
-# three-byte program counter makes calls and returns a cycle longer. A branch or a skip that is taken costs more.
+# AVR Instruction Set Manual, DS40002198, table 5-1: cores AVRe (ATmega328P) and AVRe+ (ATmega2560), whose program
+# counter of three bytes makes calls and returns a cycle longer. A branch or a skip that is taken costs more.
 _ONE = (
     "adc add and andi bst clr cp cpc clt cpi eor inc ldi lsl lsr mov movw neg or ori ror sbc sbci set sub subi swap tst"
 )
-_TWO = "icall ld ldd lds mul muls pop push sbiw st std sts"
+_TWO = "adiw icall ld ldd lds mul muls pop push sbiw st std sts"
 _CYCLES = dict.fromkeys(_ONE.split(), 1) | dict.fromkeys(_TWO.split(), 2) | {"lpm": 3}
 _JUMPS = {"rjmp": 2, "jmp": 3}
 _CALLS = {"rcall": 3, "call": 4, "ret": 4}
@@ -49,12 +48,12 @@ _COMMENT, _LOOP = re.compile(r"/\*.*?\*/", re.DOTALL), re.compile(r"/\* (\d+) ti
 
 
 Ways = tuple[int, int]
-"""The fewest and the most cycles of all paths through some code."""
+"""The fewest and the most cycles of all ways through some code."""
 
 
 class Instruction(NamedTuple):
-    """An instruction: its target if it jumps or calls, how often it runs if it ends a loop (0: it always jumps), its
-    bytes, and its cycles; 0 where the cycles depend on what follows.
+    """An instruction, where it may jump to or call, how often it is met if it ends a loop (0: it always jumps), its
+    bytes, and its cycles; 0 where these depend on what follows.
     """
 
     name: str
@@ -65,7 +64,7 @@ class Instruction(NamedTuple):
 
 
 class Line(NamedTuple):
-    """A line of assembly: its first word, its label or "", and its instruction if it has one."""
+    """A line of assembly: its first word, its label, "" if it has none, and its instruction if it has one."""
 
     first: str
     label: str
@@ -73,7 +72,7 @@ class Line(NamedTuple):
 
 
 class Assembly:
-    """The instructions of rendered assembly, its macros expanded, preprocessed for a part with or without ELPM."""
+    """The instructions of rendered assembly, macros expanded, preprocessed for a part with or without ELPM."""
 
     def __init__(self, text: str, *, elpm: bool) -> None:
         self._counter = 3 if elpm else 2
@@ -106,7 +105,7 @@ class Assembly:
                 self._add(_expanded(line, macros), section)
 
     def _add(self, lines: list["Line"], section: str) -> None:
-        """Add the labels and the instructions of the lines."""
+        """Note the labels and the instructions of lines."""
         for _, label, found in lines:
             if label:
                 self._labels.setdefault(label, []).append(len(self._code))
@@ -115,12 +114,17 @@ class Assembly:
                 self._sections.append(section)
 
     def size(self, section: str = "") -> int:
-        """Return the bytes of code, of one section or of all sections."""
+        """Return the bytes of code, of one section or of all."""
         pairs = zip(self._code, self._sections, strict=True)
         return sum(each.size for each, its in pairs if section in ("", its))
 
+    def span(self, first: str, last: str) -> int:
+        """Return the bytes of code from a label to another, or to the end where that is not there."""
+        end = self._labels.get(last, [len(self._code)])[0]
+        return sum(each.size for each in self._code[self._labels[first][0] : end])
+
     def cycles(self, label: str) -> Ways:
-        """Return the cycles from a label to its return, the return included."""
+        """Return the cycles from a label to the return from there, which is counted."""
         return self._from(self._labels[label][0])
 
     def _from(self, start: int) -> Ways:
@@ -130,7 +134,7 @@ class Assembly:
         return self._found[start]
 
     def _end(self, start: int) -> int:
-        """Return the first instruction after `start` that ends its block: no branch leads across it."""
+        """Return the first instruction that ends what begins at `start`: no branch leads across it."""
         reached = start
         for at in range(start, len(self._code)):
             name = self._code[at].name
@@ -141,19 +145,19 @@ class Assembly:
         raise AssertionError("assembly that does not return")
 
     def _at(self, target: str, at: int) -> int:
-        """Return the instruction that a jump or call at `at` leads to, or -1 for one outside."""
+        """Return the instruction that a jump or call at `at` leads to, -1 for one outside."""
         if target[:-1].isdigit():
             places = self._labels[target[:-1]]
             return places[bisect_right(places, at) - (target[-1] == "b")]
         return self._labels[target][0] if target in self._labels else -1
 
     def _stops(self, at: int) -> bool:
-        """Return whether an instruction leaves this assembly for good: no classification takes that path."""
+        """Return whether an instruction leaves this assembly for good, on a path that no prediction takes."""
         return self._code[at].name in _JUMPS and self._to[at] < 0
 
     def _path(self, start: int, end: int) -> Ways:
-        """Return the cycles from `start` until the code reaches `end` or returns."""
-        left = {end: (0, 0), end + 1: (0, 0)}  # remaining cycles from an instruction
+        """Return the cycles of code from `start` on until it comes to `end` or returns."""
+        left = {end: (0, 0), end + 1: (0, 0)}  # cycles from an instruction on
         for at in range(end - 1, start - 1, -1):
             cycles = self._code[at].cycles
             least, most = left[at + 1]
@@ -161,7 +165,7 @@ class Assembly:
         return left[start]
 
     def _ways(self, at: int, left: dict[int, Ways]) -> Ways:
-        """Return the cycles from an instruction that may be followed by one other than the next."""
+        """Return the cycles from an instruction on that may be followed by another than the next one."""
         each, to, after = self._code[at], self._to[at], left[at + 1]
         if each.name in _CALLS:
             called = _CALLS[each.name] + self._counter - 2
@@ -171,7 +175,7 @@ class Assembly:
         if each.name in _SKIPS:
             skipped = _more(1 + self._code[at + 1].size // 2, left[at + 2])
             return skipped if self._stops(at + 1) else _either(_more(1, after), skipped)
-        if not each.times:  # an input is missing: that path is not counted
+        if not each.times:  # something is missing: what that takes is not counted
             return _more(2, left[to])
         if to > at:
             return _either(_more(1, after), _more(2, left[to]))
@@ -192,7 +196,7 @@ def _either(one: Ways, other: Ways) -> Ways:
 
 
 def _expanded(line: Line, macros: Mapping[str, list[Line]]) -> list[Line]:
-    """Return the line, or the lines of the macro that it invokes."""
+    """Return the line, or those of the macro that it calls."""
     return (
         [each for inner in macros[line.first] for each in _expanded(inner, macros)] if line.first in macros else [line]
     )
@@ -208,7 +212,7 @@ def _read_line(line: str) -> Line:
         return Line(first, label, None)
     size = 4 if name in _TWO_WORDS else 2
     depends = name in _JUMPS or name in _CALLS or name in _SKIPS or name.startswith("br")
-    cycles = 0 if depends else _CYCLES.get(name, -1)  # -1: not an instruction, perhaps a macro
+    cycles = 0 if depends else _CYCLES.get(name, -1)  # -1: no instruction, a macro perhaps
     target = operands[0].strip() if operands else ""
     return Line(first, label, Instruction(name, target, int(times or 1), size, cycles))
 
@@ -218,14 +222,16 @@ def _times(comment: str) -> str:
     return f"\0{said[1]}" if said else ""
 
 
-_LARGE = 5  # numbers from here on are multiplied with `mul`
-# Bytes of C code, rounded up; a table of whole pages of bins starts at a page boundary.
+_LARGE = 5  # numbers from here on are multiplied by `mul`
+# Bytes of C code, rounded up; a table of whole pages of bins begins at one.
 _SET_SWITCH, _GRASP, _INIT, _PAGE = 80, 40, 70, 256
 _LOSING, _LOSING_JOINTS = 400, 300
-_POINTER = 2  # bytes of variables: state while an input is missing, and the glove's pointer, where rows are found first
-# Return addresses of update() and of the function it calls for a change; then either the registers that finding a row
-# saves, or a row's number and the return address of the routine that adds the row.
-_CALLS_DEEP = 2
+_POINTER = 2  # bytes of variables: what is done while an input is missing, and the glove, where rows are found first
+# Return addresses of update(), of what it calls about a change, and of what adds a row; a row's number is on top.
+# One more where a group's change takes the last sum from memory to add, and puts it back.
+_CALLS_DEEP = 3
+_RCALL_REACH = 4094  # bytes, forwards and backwards
+_ELPM_BYTES = 16  # where a part has ELPM, classify() looks where its tables end
 
 
 Frame = tuple[NDArray[np.bool_], NDArray[np.uint16]]
@@ -234,8 +240,8 @@ _DRAWN, _CLIMBED, _ROUNDS, _BETWEEN = 4096, 8, 20, 33
 
 
 class Counts(NamedTuple):
-    """The fewest cycles of classify, the most of it and of update, bytes of all code and of the code that classify does
-    not need.
+    """The fewest cycles of classify, the most of it and of update; bytes of all code, of what is not needed to
+    classify, and of what calls in update() must reach across.
     """
 
     least: int
@@ -243,15 +249,16 @@ class Counts(NamedTuple):
     update: int
     size: int
     uncalled: int
+    across: int
 
     def plus(self, more: "Counts", times: int = 1) -> "Counts":
-        """Return the sum of these counts and `times` more."""
+        """Return the sum of these and of `times` more."""
         return Counts(*(one + times * other for one, other in zip(self, more, strict=True)))
 
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """Lookups of a layout, equal for all lookups that need the same code."""
+    """Lookups of a layout; two are equal if they need the same code."""
 
     key: tuple[object, ...]
     layout: Layout = field(compare=False)
@@ -259,7 +266,7 @@ class _Part:
 
 
 def _of_joint(layout: Layout, joint: JointLayout) -> tuple[int, ...]:
-    """Return the joint's part in the code that finds a row: its steps, and its multiplier, or its clamps."""
+    """Return a joint's part in the code that finds a row: its steps, and its factor or clamps."""
     place, wide = len(layout.ports) + layout.padding + joint.number * layout.code_bits // 8, layout.code_bits == 16
     beyond = far(place, wide=wide)
     if joint.compared:
@@ -270,7 +277,7 @@ def _of_joint(layout: Layout, joint: JointLayout) -> tuple[int, ...]:
 
 
 def _of_group(layout: Layout, lookup: Lookup) -> tuple[Field, ...]:
-    """Return the group's part in the code that assembles its byte, independent of the ports' addresses."""
+    """Return a group's part in the code that assembles its index, independent of its ports."""
     return () if lookup.group is None else _anywhere(layout.fields[lookup.group])
 
 
@@ -281,7 +288,7 @@ def _anywhere(fields: tuple[Field, ...]) -> tuple[Field, ...]:
 
 @lru_cache(maxsize=4096)
 def _counted(part: _Part, near: bool, elpm: bool) -> Counts:
-    """Return the counts of the assembly of a layout that consists of these lookups alone."""
+    """Return the counts of the assembly of a layout with only these lookups."""
     layout = replace(part.layout, lookups=part.lookups)
     values = assembly_values("x", numbered(layout.tables), layout, near=near)
     common = {"name": "x", "opening": "", "biased": layout.biased, "width": layout.parts.width}
@@ -290,50 +297,63 @@ def _counted(part: _Part, near: bool, elpm: bool) -> Counts:
     found = Assembly(render("classifier/thenar_NAME_avr.S.j2", **common, assembly=values), elpm=elpm)
     _, update = found.cycles("thenar_x_update")
     uncalled = found.size(".text.thenar_x_update") + found.size(".text.thenar_x_start_without")
-    return Counts(*found.cycles("thenar_x_classify"), update, found.size(), uncalled)
+    across = found.span("thenar_x_update", "thenar_x_update_near")
+    return Counts(*found.cycles("thenar_x_classify"), update, found.size(), uncalled, across)
 
 
-class AvrCosts:
-    """The costs of a layout on an AVR with `flash` bytes of flash, which determine the width of its program counter.
+def _total(layout: Layout, near: bool, elpm: bool) -> Counts:
+    """Return the counts of the assembly of a layout.
 
-    Lookups follow one another, so the contribution of each is counted once for all layouts: twice the count of its
-    assembly alone, less the count of the assembly with two of it.
+    Lookups follow one another, so the contribution of each is counted once for all layouts: its assembly alone, less
+    what is left of that without it, which is what it takes alone less than twice.
     """
+    compares = layout.code_bits == 16 and layout.bins == "search"
+    kind = layout.entry_bits, layout.sum_bits, layout.entry_shift, layout.code_bits, compares, layout.adding
+    of_all = (layout.tables.n_classes, layout.tables.relative, layout.tables.slopes, *kind)
 
-    def __init__(self, layout: Layout, flash: int) -> None:
-        self._layout, self._counter = layout, 3 if flash > 128 << 10 else 2
-        self._near = calls_are_near(layout)
-        kind = layout.entry_bits, layout.sum_bits, layout.entry_shift, layout.code_bits, layout.adding
-        self._of_all = (layout.tables.n_classes, layout.tables.relative, layout.tables.slopes, *kind)
-        if spare_registers(layout) != spare_registers(replace(layout, lookups=layout.lookups[:1])):
-            # With enough lookups to need X as well, each lookup takes more than it takes alone.
-            self._counts = self._count(*layout.lookups)
-            return
-        ordered = sorted(layout.lookups, key=lambda lookup: not lookup.joints)
-        self._counts, rest = self._count(*ordered[:1]), ordered[1:]
-        kinds = {bool(lookup.joints): lookup for lookup in layout.lookups}
-        around = {kind: self._around(lookup) for kind, lookup in kinds.items()}
-        for lookup in rest:
-            self._counts = self._counts.plus(self._count(lookup)).plus(around[bool(lookup.joints)], -1)
-
-    def _around(self, lookup: Lookup) -> Counts:
-        return self._count(lookup).plus(self._count(lookup)).plus(self._count(lookup, lookup), -1)
-
-    def _count(self, *lookups: Lookup) -> Counts:
+    def count(*lookups: Lookup) -> Counts:
         shapes = tuple(
             (
-                _of_group(self._layout, lookup),
-                len(compared_bytes(self._layout, lookup)),
-                found_is_far(self._layout, len(self._layout.tables.slopes) + lookup.index),
-                tuple([_of_joint(self._layout, joint) for joint in lookup.joints]),
+                _of_group(layout, lookup),
+                len(compared_bytes(layout, lookup)),
+                far(found_place(layout, len(layout.tables.slopes) + lookup.index)),
+                tuple([_of_joint(layout, joint) for joint in lookup.joints]),
             )
             for lookup in lookups
         )
-        return _counted(_Part((shapes, self._of_all), self._layout, lookups), self._near, self._counter == 3)
+        return _counted(_Part((shapes, of_all), layout, lookups), near, elpm)
+
+    def around(lookup: Lookup) -> Counts:
+        return count(lookup).plus(count(lookup)).plus(count(lookup, lookup), -1)
+
+    if layout.tables.slopes:
+        return count(*layout.lookups)  # which take longer to render than many lookups
+    ordered = sorted(layout.lookups, key=lambda lookup: not lookup.joints)
+    kinds = {bool(lookup.joints): lookup for lookup in layout.lookups}
+    between = {kind: around(lookup) for kind, lookup in kinds.items()}
+    counts = count(*ordered[:1])
+    for lookup in ordered[1:]:
+        counts = counts.plus(count(lookup)).plus(between[bool(lookup.joints)], -1)
+    return counts
+
+
+def calls_are_near(layout: Layout) -> bool:
+    """Return whether all calls are `rcall`; else they are `call`, a word and a cycle more."""
+    counts = _total(layout, near=True, elpm=False)
+    classify = 0 if layout.adding == "unrolled" else counts.size - counts.uncalled + _ELPM_BYTES
+    return max(counts.across, classify) <= _RCALL_REACH
+
+
+class AvrCosts:
+    """The costs of a layout on an AVR; its flash, in bytes, determines the width of its program counter."""
+
+    def __init__(self, layout: Layout, flash: int) -> None:
+        self._layout, self._counter = layout, 3 if flash > 128 << 10 else 2
+        self._counts = _total(layout, calls_are_near(layout), self._counter == 3)
 
     @property
     def cost(self) -> Cost:
-        """The most that the classifier takes; flash and RAM include a few spare bytes."""
+        """What the classifier takes at most, a few bytes more of flash and RAM."""
         names = NAME_BYTES * (self._layout.tables.n_classes + 1)
         flash, counts = self.flash + names, self._counts
         return Cost(counts.classify, counts.update, flash, flash - counts.uncalled - self.losing, self.ram)
@@ -345,11 +365,11 @@ class AvrCosts:
 
     @property
     def flash(self) -> int:
-        """Bytes of tables and code, at most; the names of the grasp types are added to this."""
+        """Bytes of tables and code, at most; the names of the grasp types come on top."""
         layout, parts = self._layout, self._layout.parts
         tables = layout.n_rows * len(parts.firsts) * parts.width * layout.entry_bits // 8
         tables += 2 * layout.tables.n_switches * (2 if len(layout.ports) > 255 else 1)
-        tables += 2 * layout.tables.n_classes  # the initial scores
+        tables += 2 * layout.tables.n_classes  # what scores begin with
         bins = sum(len(joint.bins) for joint in layout.joints)
         tables += bins + (_PAGE - 1 if layout.bins == "direct" and bins else 0)
         return tables + self.losing + self._counts.size + _INIT + _GRASP + (_SET_SWITCH if layout.groups else 0)
@@ -357,21 +377,23 @@ class AvrCosts:
     @property
     def ram(self) -> int:
         """Bytes of a glove, of variables and of the deepest stack, return address included."""
-        deepest = max(len(borrowed_registers(self._layout)), 1 + self._counter)
-        stack = len(kept_registers(self._layout)) + _CALLS_DEEP * self._counter + deepest
-        variables = _POINTER * (1 + finds_first(self._layout)) + found_size(self._layout)
-        return glove_size(self._layout) + variables + stack
+        layout = self._layout
+        taking = last_size(layout) > 0 and not layout.biased and any(not lookup.joints for lookup in layout.lookups)
+        stack = len(kept_registers(layout)) + (_CALLS_DEEP + taking) * self._counter + 1
+        variables = _POINTER * (1 + finds_first(layout)) + found_size(layout) + last_size(layout)
+        return glove_size(layout) + variables + stack
 
     @property
     def losing(self) -> int:
-        """Bytes of flash, at most and without the assembly, of the code that replaces missing inputs by their means."""
+        """Bytes of flash, at most and without the assembly, of what replaces missing inputs by their means."""
         means = self._layout.means.size * (1 if self._layout.narrow_means else 2)
         return means + (_LOSING if self._layout.groups else _LOSING_JOINTS)
 
 
 def rises(layout: Layout, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.int64]:
-    """Return the cycles (n,) that classify takes beyond the fixed ones for bits (n, s) and codes (n, j): one for each
-    class whose score exceeds all earlier ones, and one for each 16-bit code outside the range of its slope.
+    """Return how many classes of each frame, bits (n, s) and codes (n, j), are better than all before them, (n,), and
+    how many codes of 16 bits are cut off at an end of their slope where that takes longer: the cycles that classify
+    takes beyond the fixed ones.
     """
     scores = layout.scores(bits, codes)
     if len(layout.parts.firsts) == 1:
@@ -379,16 +401,17 @@ def rises(layout: Layout, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) ->
     best = np.maximum.accumulate(scores, axis=1)
     cycles: NDArray[np.int64] = np.count_nonzero(scores[:, 1:] > best[:, :-1], axis=1)
     for slope in layout.tables.slopes if layout.code_bits == 16 else ():
-        beyond = (codes[:, slope.joint] < slope.low) | (codes[:, slope.joint] >= slope.high)
-        cycles = cycles + beyond
+        code = codes[:, slope.joint]
+        cycles = cycles + ((code < slope.low) | ((code >= slope.high) & (slope.high - slope.low > MOST_DISTANCE)))
     return cycles
 
 
 def worst_frame(layout: Layout) -> Frame:
-    """Return the bits (s,) and codes (j,) of the slowest frame found on an AVR; the result is deterministic.
+    """Return bits (s,) and codes (j,) of a frame than which none was found to take longer on an AVR; the same one every
+    time.
 
-    The slowest frame has the most classes whose score exceeds all earlier ones, the same on all parts. The search
-    climbs from random frames, one input at a time; the result is proved optimal where it reaches the bound.
+    The worst frame is the one with the most classes that are better than all before them, alike on all parts. It is
+    sought by a climb from random frames, one input at a time, and proved the worst where it reaches the bound.
     """
     random = np.random.default_rng(0)
     choices = [_codes(layout, number) for number in range(layout.tables.n_joints)]
@@ -402,7 +425,7 @@ def worst_frame(layout: Layout) -> Frame:
 
 
 def _codes(layout: Layout, number: int) -> NDArray[np.uint16]:
-    """Return codes of a joint that differ in row or time: the lowest of each bin and, below all bins, zero."""
+    """Return codes of a joint that differ in row or time: the least of each bin and, below all bins, zero."""
     steps, slope = layout.tables.steps_of(number) + 1, layout.tables.slope_of(number)
     if slope is not None:
         between = np.linspace(slope.low, slope.high, _BETWEEN).astype(np.int64)
@@ -411,7 +434,7 @@ def _codes(layout: Layout, number: int) -> NDArray[np.uint16]:
 
 
 def _climb(layout: Layout, frame: Frame, choices: list[NDArray[np.uint16]]) -> Frame:
-    """Improve the frame greedily, one input at a time, until no change helps, and return it."""
+    """Climb from a frame: repeatedly take the best of the frames that differ in one input."""
     for _ in range(_ROUNDS):
         bits, codes = _neighbours(frame, choices)
         cycles = rises(layout, bits, codes)
@@ -423,7 +446,7 @@ def _climb(layout: Layout, frame: Frame, choices: list[NDArray[np.uint16]]) -> F
 
 
 def _neighbours(frame: Frame, choices: list[NDArray[np.uint16]]) -> tuple[NDArray[np.bool_], NDArray[np.uint16]]:
-    """Return the frame itself, then all frames that differ from it in one input: bits (n, s) and codes (n, j)."""
+    """Return the frame itself, then all that differ from it in one input: bits (n, s) and codes (n, j)."""
     bits, codes = frame
     n = 1 + len(bits) + sum(map(len, choices))
     all_bits, all_codes = np.tile(bits, (n, 1)), np.tile(codes, (n, 1))

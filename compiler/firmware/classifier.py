@@ -14,7 +14,8 @@ from thenar.runtime.manifest import Rejection
 from thenar.runtime.published import NONE
 from thenar.runtime.softmax import POWERS, Softmax
 
-from .assembly import assembly_values, calls_are_near, check_size
+from .assembly import assembly_values, check_size
+from .avr_costs import calls_are_near
 from .layout import MOST_INLINE, Field, JointLayout, Layout, Lookup, Parts
 from .segments import segment_files
 from .sensors import Sensors, codes_files, sensors_of

@@ -1,4 +1,4 @@
-"""The same frames through the ensemble, the float tables and the integer tables: differences held against bounds."""
+"""The same frames through the ensemble, the float tables and the integer tables: differences compared with bounds."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,11 +24,11 @@ Labels = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """What became of n rows on the way from the ensemble to integers.
+    """The results for n rows on the way from the ensemble to integers.
 
-    collapse_difference and its bound are in units of score, integer_difference, its bound and what doubles may lose
-    besides, the slack, in steps. trained and deployed (n,) are the classes by the ensemble and by the integers, covered
-    (n,) the rows whose float margin is beyond doubt.
+    collapse_difference and its bound are in units of score; integer_difference, its bound and the additional error of
+    doubles, the slack, are in steps. trained and deployed (n,) are the classes by the ensemble and by the integers,
+    covered (n,) the rows whose float margin exceeds the safe margin.
     """
 
     collapse_difference: float
@@ -44,7 +44,7 @@ class Comparison:
 
     @property
     def changed(self) -> Labels:
-        """Numbers of the rows that the integers give another class."""
+        """The indices of the rows whose class the integers change."""
         return np.flatnonzero(self.trained != self.deployed)
 
     @property
@@ -85,14 +85,14 @@ class WorstCase(Struct, frozen=True, kw_only=True):
 def worst_case(
     model: Model, integers: IntegerTables, comparison: Comparison, grasps: Sequence[str], switches: Sequence[str]
 ) -> WorstCase:
-    """Return what is proved of `integers` over all frames, and which of the rows of `comparison` that covers.
+    """Return the proof about `integers` over all frames, and which rows of `comparison` that covers.
 
-    They were made of `model`; `grasps` and `switches` are the names of its classes and kept switches.
+    They were made from `model`; `grasps` and `switches` are the names of its classes and kept switches.
     """
     rounding = Rounding(as_deployed(collapse(model, integers.n_switches), integers.grid), integers)
     frame, furthest_sum = rounding.worst_of_all(), furthest(integers)
     safe = float(rounding.safe_margin())
-    # Scores that the ensemble takes for tied are decided by the number of the class.
+    # Scores that the ensemble treats as tied are decided by the number of the class.
     covered = comparison.margins > max(safe, TIE * integers.scale) + 2 * comparison.slack
     return WorstCase(
         leader=grasps[frame.leader],
@@ -110,13 +110,13 @@ def worst_case(
 
 
 def float_slack(tables: ScoreTables, scale: float) -> float:
-    """Return the most steps that doubles can move a score besides, on the way to integers and while it is compared.
+    """Return the largest additional error of a score, in steps, from arithmetic with doubles.
 
-    With n inputs, j of them joints, u = 2^-53 and S the sum of the largest magnitudes of all rows, scale * u * S times
-    j for the bias that `balance` sums up, 2 for its rows, each at most twice as large as before, 3 for scaling these
-    and the bias, n for adding up the scores compared with and 1 for scaling them; and 2 for products of u. A line is
-    two rows more, each as large as it gets, and adds 4: a product, a sum, and two by which its middle moves. A pair is
-    a row more, and adds 1.
+    It arises on the way to integers and in the comparison. With n inputs, j of them joints, u = 2^-53 and S the sum of
+    the largest magnitudes of all rows, it is scale * u * S times j for the bias that `balance` sums up, 2 for its rows,
+    each at most twice as large as before, 3 for scaling these and the bias, n for adding up the scores compared with
+    and 1 for scaling them; and 2 for products of u. A line is two more rows, each at its maximum, and adds 4: a
+    product, a sum, and two by which its middle moves. A pair is one more row, and adds 1.
     """
     rows = [tables.bias, *tables.switch_rows, *tables.joint_rows]
     rows += 2 * [line.row * (line.high - line.low) for line in tables.lines]
@@ -137,7 +137,7 @@ def compare(
     codes: NDArray[np.uint16],
     report: Callable[[int, int], None] | None = None,
 ) -> Comparison:
-    """Send the kept switches (n, s) and codes (n, j) through all three; the integers frame by frame, as they run."""
+    """Run kept switches (n, s) and codes (n, j) through all three; the integers frame by frame, as deployed."""
     tables = collapse(model, bits.shape[1])
     by_model = model_scores(model, bits, codes)
     by_tables = tables.scores(bits, codes)
@@ -162,7 +162,7 @@ def compare(
 
 
 def _magnitudes(model: Model) -> float:
-    """Return the sum of the magnitudes that an ensemble adds up; from tables to themselves nothing is lost."""
+    """Return the sum of the magnitudes that an ensemble adds up; 0 for tables, where nothing is lost."""
     if not isinstance(model, Stumps):
         return 0.0
     return float(2 * model.shrinkage * np.abs(model.values[:, :, :2]).max(axis=(1, 2)).sum())

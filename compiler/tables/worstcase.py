@@ -1,12 +1,12 @@
-"""The worst that rounding to integers can do, over every frame there is and not over a sample of them.
+"""The worst case of rounding to integers, over all possible frames rather than a sample of them.
 
-What rounding takes from the lead of class k over class l is a sum over bias and inputs,
+Rounding takes from the lead of class k over class l a sum over bias and inputs,
 
     scale * (F_k - F_l) - (I_k - I_l) = sum over inputs a of (e_a[k] - e_a[l])    with e_a = scale * row_a - steps_a,
 
-and no input knows of the others, but for the joints of a pair, which are one input here. So the most it can take is the
-sum of the most that it takes in each input, and the bits and codes at which it does so make up the frame. All of it is
-done in whole numbers: nothing is rounded here.
+and inputs are independent, except for the joints of a pair, which count as one input here. So the maximum is the sum of
+the maxima of all inputs, and the bits and codes that reach them form the worst frame. All arithmetic is in integers:
+nothing is rounded here.
 """
 
 from collections.abc import Iterator
@@ -20,9 +20,9 @@ from thenar.runtime.tables import HIGHEST_CODE, IntegerTables, Slope
 
 from .collapse import Floats, ScoreTables, first_codes
 
-Exact = NDArray[np.object_]  # of Python's integers
+Exact = NDArray[np.object_]  # of Python integers
 
-# Differences that are held at a time: what a processor's own memory holds.
+# Differences kept in memory at a time: they fit a processor's cache.
 _WORDS = 1 << 16
 
 
@@ -41,12 +41,12 @@ class WorstFrame:
 
 
 class Rounding:
-    """What rounding took from the rows of score tables when it made integer tables of them."""
+    """The rounding errors of integer tables made from score tables."""
 
     __slots__ = ("_n_switches", "_pairs", "_step", "_units", "_values")
 
     def __init__(self, tables: ScoreTables, integers: IntegerTables) -> None:
-        """Compare the two, bin by bin of either. They must have the same classes and inputs."""
+        """Compare the two, bin by bin of both. They must have the same classes and inputs."""
         self._n_switches, self._units = integers.n_switches, integers.units
         if (len(tables.switch_rows), len(tables.joint_rows)) != (integers.n_switches, integers.n_joints):
             raise ValueError("the tables and the integers are of other inputs")
@@ -58,7 +58,7 @@ class Rounding:
     def worst(self, leader: int, competitor: int) -> WorstFrame:
         """Return the frame that takes most from the lead of class `leader` over class `competitor`."""
         taken = self._pairs.taken(leader, competitor)
-        # Of equal ones the first: an open switch, the lowest code.
+        # Ties go to the first: an open switch, the lowest code.
         picked = [choice.index(max(choice)) for choice in taken]
         values = [values[pick] for values, pick in zip(self._values, picked[1:], strict=True)]
         bits, codes = values[: self._n_switches], np.zeros(sum(map(len, self._units)), np.uint16)
@@ -68,7 +68,7 @@ class Rounding:
         return WorstFrame(leader, competitor, loss, np.array(bits, bool), codes)
 
     def worst_of_all(self) -> WorstFrame:
-        """Return the worst frame of the pair of classes that has the worst; of equal pairs of the first."""
+        """Return the worst frame over all pairs of classes; ties go to the first pair."""
         _, leader, competitor = self._pairs.greatest(0)
         return self.worst(leader, competitor)
 
@@ -82,11 +82,11 @@ class Rounding:
 
 
 class _Pairs:
-    """The most that every ordered pair of classes can lose: the sum over inputs of the greatest difference of errors.
+    """The maximal loss of every ordered pair of classes: the sum over inputs of the largest difference of errors.
 
-    Errors have a hundred bits and more, pairs are a million where there are a thousand classes. So errors are cut into
-    parts of so many bits that sums of differences fit machine words. The first parts alone bound every loss to within a
-    unit an input on either side; the few pairs that may then have the greatest are worked out with all parts.
+    Errors have a hundred bits and more, and a thousand classes have a million pairs. So errors are cut into parts small
+    enough for sums of differences to fit machine words. The first parts alone bound every loss to within one unit per
+    input on either side; the few pairs that may have the maximum are then computed with all parts.
     """
 
     def __init__(self, errors: list[Exact]) -> None:
@@ -208,7 +208,7 @@ def _own(
 
 
 def _of_pair(tables: ScoreTables, integers: IntegerTables, unit: tuple[int, ...]) -> _Choice:
-    """Return what the joints of a pair can say: every bin of the one with every one of the other."""
+    """Return the choices of a pair of joints: every bin of one combined with every bin of the other."""
     pair, whole = (next(pair for pair in each.pairs if pair.joints == unit) for each in (tables, integers))
     each = [
         first_codes(tables.thresholds[joint], integers.thresholds[joint], steps)

@@ -1,9 +1,9 @@
-"""An emulated CyberGlove at the end of a serial line: it answers, is polled and streams as fast as a real one may.
+"""An emulated CyberGlove at the end of a serial line: it replies, is polled and streams as fast as a real one.
 
     with PtyLine(Path("glove")) as line, EmulatedCyberGlove(line) as glove:
         glove.set(bytes(range(60, 78)))
 
-What a bad cable does is the line's business (`PtyLine.damage`, `.unplug`, `.send` for what nobody asked for).
+The line emulates a bad cable (`PtyLine.damage`, `.unplug`, `.send` for unsolicited bytes).
 """
 
 from collections import deque
@@ -19,14 +19,14 @@ _RESTART_S = 1.75  # from the vendor's manual, as ViSTA quotes it
 
 
 class EmulatedCyberGlove(Closing):
-    """A glove of 18 or 22 sensors on `line`, in a thread of its own.
+    """A glove of 18 or 22 sensors on `line`, in a separate thread.
 
-    text       what ?i shall say
-    not_ready  how many times ?G shall say 1 before it says 3
-    doubts     how it shall behave where the sources disagree
+    text       the reply to ?i
+    not_ready  number of replies 1 to ?G before the reply 3
+    doubts     its behaviour where the sources disagree
 
-    `state` is the glove and what its box was told, `box` whether it streams. What is done to them takes effect with the
-    next record. Raises SettingError for another number of sensors.
+    `state` holds the glove and the settings of its box, `box` whether it streams. Changes take effect with the next
+    record. Raises SettingError for another number of sensors.
     """
 
     def __init__(
@@ -52,11 +52,11 @@ class EmulatedCyberGlove(Closing):
         line.receive = self._receive
 
     def set(self, sensors: bytes) -> None:
-        """Let the sensors have these values, one byte of 1 to 255 a sensor. Raises SettingError if they cannot."""
+        """Set the sensor values, one byte of 1 to 255 per sensor. Raises SettingError for others."""
         self.state.set(sensors)
 
     def close(self) -> None:
-        """Fall silent and hear no more. The line stays."""
+        """Stop sending and receiving. The line stays."""
         self._line.receive = None
         with self._changed:
             self._closing = True
@@ -76,7 +76,7 @@ class EmulatedCyberGlove(Closing):
                 self._hear(data)
 
     def _heard_until(self, end: float | None) -> list[bytes]:
-        """Return what has come in, as soon as something has; nothing at the end, or when closing."""
+        """Return the received chunks as soon as there are any; none at the end, or when closing."""
         with self._changed:
             left = None if end is None else max(0.0, end - monotonic())
             self._changed.wait_for(lambda: self._heard or self._closing, left)
@@ -104,18 +104,18 @@ class EmulatedCyberGlove(Closing):
         self._send(self.box.polled_as_text() if as_text else self.state.record(streamed=False, ticks=self._ticks()))
 
     def _stream(self) -> None:
-        """Send a record when it is due, and say when the next is: by the told period or the shortest there can be."""
+        """Send a record when it is due, and schedule the next by the set period or the shortest possible one."""
         if monotonic() < self._next:
             return
         settings = self.state.settings
         words = int.from_bytes(settings["T"][:2], "big"), int.from_bytes(settings["T"][2:], "big")
-        told = told_us(words)
+        period = told_us(words)
         shortest = shortest_us(
             self._count(), self._line.baud, status=self.state.is_on("U"), filtered=self.state.is_on("F")
         )
-        self._send(self.state.record(streamed=True, too_fast=0 < told < shortest, ticks=self._ticks()))
-        # A host too busy to wake this thread in time is not repaid with a burst.
-        self._next = max(self._next + max(told, shortest) / 1e6, monotonic())
+        self._send(self.state.record(streamed=True, too_fast=0 < period < shortest, ticks=self._ticks()))
+        # If the host wakes this thread late, there is no burst to catch up.
+        self._next = max(self._next + max(period, shortest) / 1e6, monotonic())
 
     def _send(self, record: bytes) -> None:
         self.records += 1

@@ -1,4 +1,4 @@
-"""The box of an emulated CyberGlove: bytes of commands in, answers and records out. It knows no time and no line."""
+"""The box of an emulated CyberGlove: commands in, replies and records out, without a clock or a line."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -23,7 +23,7 @@ from ..cyberglove_protocol import (
 from ..errors import SettingError
 
 MASKS = {18: MASK_18, 22: MASK_22}
-VERSIONS = bytes([2, 4, 0, 1])  # firmware and information format: any will do
+VERSIONS = bytes([2, 4, 0, 1])  # firmware and information format: arbitrary
 _SWITCHES = "DFJLQUWY"  # settings that are 0 or 1
 _NOT_READY = 1
 _REINITIALISE = b"\x09"  # Ctrl-I
@@ -35,9 +35,9 @@ _ALL_ACTUATORS = 255
 class GloveState:
     """A glove of 18 or 22 sensors and its box.
 
-    not_ready  how many times ?G shall say 1 before it says 3
+    not_ready  number of replies 1 to ?G before the reply 3
 
-    plugged is whether the glove hangs on its box. What the box is told stands in `settings`, by letter.
+    plugged is whether the glove is connected to its box. `settings` holds the settings of the box, by letter.
     """
 
     def __init__(self, sensors: int, not_ready: int) -> None:
@@ -53,14 +53,14 @@ class GloveState:
         self.reset()
 
     def reset(self) -> None:
-        """Be as after power-up. (What a real box's settings are then, no source says.)"""
+        """Reset to the state after power-up. (No source gives a real box's settings then.)"""
         self.settings = dict.fromkeys(_SWITCHES, b"\0") | {"J": b"\1", "B": b"\0", "T": bytes(4)}
         self.settings |= {"M": MASKS[self.sensors], "N": bytes([self.sensors])}
 
     def set(self, values: bytes) -> None:
-        """Let the sensors have these values, one byte a sensor. Raises SettingError if they cannot."""
+        """Set the sensor values, one byte of 1 to 255 per sensor. Raises SettingError for others."""
         if len(values) != self.sensors or 0 in values:
-            raise SettingError(f"a CyberGlove's {self.sensors} sensors are that many bytes of 1 to 255, not {values!r}")
+            raise SettingError(f"a CyberGlove's {self.sensors} sensors need as many bytes of 1 to 255, not {values!r}")
         self.values = values
 
     def is_on(self, letter: str) -> bool:
@@ -68,13 +68,13 @@ class GloveState:
         return self.settings[letter] != b"\0"
 
     def turn_switch(self, on: bool) -> None:
-        """Turn the switch at the wrist, which turns the light as long as J says so."""
+        """Turn the switch at the wrist, which also turns the light while setting J is on."""
         self.settings["W"] = bytes([on])
         if self.is_on("J"):
             self.settings["L"] = bytes([on])
 
     def apply(self, letter: str, values: bytes) -> bool:
-        """Set what the letter stands for, and return whether that can be."""
+        """Apply the setting of this letter, and return whether it is valid."""
         if letter in _SWITCHES and values[0] > 1:
             return False
         if letter == "N" and not 1 <= values[0] <= len(masked_sensors(self.settings["M"])):
@@ -87,7 +87,7 @@ class GloveState:
         return True
 
     def answer(self, letter: str) -> bytes | None:
-        """Return the values that the query of this letter has, None if there is no such query."""
+        """Return the values in the reply to the query of this letter, None if there is no such query."""
         if letter not in ANSWERED and letter != "C":
             return None
         computed = {"G": self._readiness, "P": self._flags, "C": self._calibration}
@@ -95,14 +95,14 @@ class GloveState:
         return computed[letter]() if letter in computed else constant.get(letter) or self.settings[letter]
 
     def record(self, *, streamed: bool, too_fast: bool = False, ticks: int = 0) -> bytes:
-        """Return a record as it goes on the wire; ticks is the box's clock, in 1/115200 s."""
+        """Return a record's bytes on the wire; ticks is the box's clock, in 1/115200 s."""
         stamp = _stamp(ticks) if self.is_on("D") else b""
         status = bytes([self._status()]) if self.is_on("U") else b""
         fault = b"eg" if not self.plugged else b"es" if too_fast else b""
         return (STREAM if streamed else POLL) + self.sent() + stamp + status + fault + b"\0"
 
     def sent(self) -> bytes:
-        """Return the values of the sensors that mask and number let through, where it does as it says."""
+        """Return the values of the sensors that mask and number let through, or all if the box ignores its mask."""
         if self.sends_all:
             return self.values
         names = self._masked(self.settings["M"])[: self.settings["N"][0]]
@@ -126,15 +126,15 @@ class GloveState:
         return bytes([self._status() & ~ALWAYS, second | right_and_valid, int(self.is_on("Q"))])
 
     def _calibration(self) -> bytes:
-        """Offsets, then gains, all the same. (asr reads them so; another driver reads triples.)"""
+        """Return offsets, then gains, all the same. (asr reads them so; another driver reads triples.)"""
         count = self.settings["N"][0]
         return bytes([64] * count + [128] * count)
 
 
 def _stamp(ticks: int) -> bytes:
-    """Return a time stamp: which of the four bytes are really 0, then these, lowest first, 1 in place of 0.
+    """Return a time stamp: flags of the four bytes that are 0, then the bytes, lowest first, with 1 in place of 0.
 
-    The first byte's highest bit is left 0, as ViSTA's authors saw it (the manual says 1): it may be a NUL.
+    The first byte's highest bit is 0, as ViSTA's authors observed (the manual says 1), so the byte may be a NUL.
     """
     counter = (ticks & 0xFFFFFFFF).to_bytes(4, "little")
     zeros = sum((byte == 0) << place for place, byte in enumerate(counter))
@@ -142,22 +142,22 @@ def _stamp(ticks: int) -> bytes:
 
 
 class Action(Enum):
-    """What only somebody with a clock can do."""
+    """Actions that need a clock."""
 
-    POLLED = "a record is asked for"
-    POLLED_AS_TEXT = "a record is asked for in the text dialect"
+    POLLED = "a record is requested"
+    POLLED_AS_TEXT = "a record is requested in the text dialect"
     RESTARTED = "the box is silent until it has restarted"
 
 
 @dataclass(frozen=True, slots=True)
 class Doubts:
-    """What the sources disagree on, or do not say, as this glove has it.
+    """Behaviour on which the sources disagree or are silent.
 
-    error_echo   whether an error answer begins with the command's echo
-    stop_echo    whether a Ctrl-C is answered by itself and a NUL
-    stray_nul    whether a NUL follows a text answer
-    mask         what becomes of a sensor mask: it is taken, the command is unknown, it is answered and ignored, or the
-                 box says that it has it and sends all sensors
+    error_echo   whether an error reply begins with the command's echo
+    stop_echo    whether the reply to a Ctrl-C is itself and a NUL
+    stray_nul    whether a NUL follows a text reply
+    mask         the effect of a sensor mask: accepted, an unknown command, acknowledged and ignored, or reported back
+                 but without effect
     """
 
     error_echo: bool = True
@@ -167,7 +167,7 @@ class Doubts:
 
 
 class CyberGloveBox:
-    """Reply to the commands of `docs/reference/devices.md`, in both dialects; while streaming, only to Ctrl-C."""
+    """Understands the commands of `docs/reference/devices.md`, in both dialects. While it streams, only Ctrl-C."""
 
     def __init__(self, state: GloveState, text: str, doubts: Doubts) -> None:
         self.state, self.text, self.doubts = state, text, doubts
@@ -176,7 +176,7 @@ class CyberGloveBox:
         self._pending = b""
 
     def feed(self, data: bytes) -> list[bytes | Action]:
-        """Return what `data` brings about, in order: bytes to send at once, and what takes time."""
+        """Return the effects of `data`, in order: bytes to send at once, and actions that take time."""
         self._pending += data
         out: list[bytes | Action] = []
         while self._pending:
@@ -189,10 +189,10 @@ class CyberGloveBox:
     def _streaming(self, out: list[bytes | Action]) -> int:
         if self._pending.startswith(STOP):
             return self._stop(out)
-        return 1  # commands are lost on a box that streams
+        return 1  # a streaming box ignores commands
 
     def _command(self, out: list[bytes | Action]) -> int:
-        """Carry out the first command that is pending; return its length, 0 while it is not complete."""
+        """Execute the first pending command; return its length, 0 while it is incomplete."""
         first = self._pending[:1]
         if first in (STOP, RESTART, _REINITIALISE):
             return self._control(first, out)
@@ -295,7 +295,7 @@ def _decimals(letter: str, values: bytes) -> bytes:
 
 
 def _numbers(letter: str, text: bytes) -> bytes | None:
-    """Return the values that decimal numbers stand for, None if they are not the right ones."""
+    """Return the values of decimal numbers, None if they are invalid."""
     size = 2 if letter == "T" else 1
     words = text.split()
     if len(words) * size != SET.get(letter) or not all(word.isdigit() and len(word) <= 5 for word in words):

@@ -1,7 +1,7 @@
-"""Emulated expanders on real device nodes: an unchanged driver opens /dev/i2c-N and meets them there.
+"""Emulated expanders on real device nodes: an unchanged driver opens /dev/i2c-N and finds them there.
 
 umockdev (Debian packages umockdev, gir1.2-umockdev-1.0, python3-gi) intercepts a client's system calls, so the client
-must be a process of its own, started with `EmulatedI2c.environment`; kernel modules and privileges are not needed.
+must be a separate process, started with `EmulatedI2c.environment`. It needs no kernel modules or privileges.
 """
 
 import json
@@ -22,7 +22,7 @@ from ..i2c.chips import CHIPS, Converter
 from ..spi.chips import SPI_CHIPS
 
 _PYTHON = "/usr/bin/python3"
-# Isolated, it has neither the current folder nor the user's on its path, whose modules are none of ours.
+# Isolated: neither the current folder nor the user's, with foreign modules, is on its path.
 _SERVE = "import runpy, sys; sys.path.append(sys.argv[1]); runpy.run_module(sys.argv[2], run_name='__main__')"
 _INSTALL = "install the packages umockdev, gir1.2-umockdev-1.0 and python3-gi (Debian, Ubuntu)"
 
@@ -31,7 +31,7 @@ AdapterKind = Literal["any", "bcm2835", "designware", "i2c-gpio", "smbus-only"]
 
 @dataclass(frozen=True, slots=True)
 class EmulatedChip:
-    """A chip in its place: straight on the bus, or on a channel of the TCA9548A at address `mux`."""
+    """A chip and its location: directly on the bus or on a channel of the TCA9548A at address `mux`."""
 
     kind: str
     address: int
@@ -52,7 +52,7 @@ class EmulatedBus:
 
 @dataclass(frozen=True, slots=True)
 class EmulatedSpi:
-    """A converter of a kind at `device` (/dev/spidevB.C); None: nothing is wired to it, and its line is high."""
+    """A converter of a kind at `device` (/dev/spidevB.C); None: no chip, and the line is high."""
 
     device: str
     kind: str | None
@@ -60,7 +60,7 @@ class EmulatedSpi:
 
 @dataclass(frozen=True, slots=True)
 class Traffic:
-    """Bytes that went to and from one place, addresses included; `register` where the chip has registers."""
+    """Bytes to and from one place, including addresses; `register` if the chip has registers."""
 
     address: int
     mux: int | None
@@ -71,7 +71,7 @@ class Traffic:
 
 @dataclass(frozen=True, slots=True)
 class WireCounters:
-    """What a bus has seen: ioctl calls, transfers (each ended by a STOP), SCL periods, and bytes by place."""
+    """Counts of a bus: ioctl calls, transfers (each ended by a STOP), SCL periods, and bytes by place."""
 
     calls: int
     transfers: int
@@ -80,16 +80,16 @@ class WireCounters:
 
     @property
     def total_bytes(self) -> int:
-        """Bytes on the wire, addresses included."""
+        """Bytes on the wire, including addresses."""
         return sum(place.count for place in self.traffic)
 
 
 class EmulatedI2c(Closing):
-    """The buses of a glove, served by a process of its own. Chips are numbered as they stand in their bus; SPI devices
-    are counted after the buses, each with one chip.
+    """The buses of a glove, served by a separate process.
 
-    A client sees them if it runs with `environment`. Pins start high, and channels at 0 V; the levels of a converter
-    are its channels' codes, 16 bits each. Raises DeviceError, naming what to install, where umockdev is missing, and
+    Chips are numbered in the order of their bus; SPI devices are numbered after the buses, with one chip each. A client
+    sees them if it runs with `environment`. Pins start high, and channels at 0 V; the levels of a converter are its
+    channels' codes, 16 bits each. Raises DeviceError with the packages to install if umockdev is missing, and
     SettingError for a chip that cannot be emulated.
     """
 
@@ -97,7 +97,7 @@ class EmulatedI2c(Closing):
         unknown = sorted({chip.kind for bus in buses for chip in bus.chips} - set(CHIPS))
         unknown += sorted({chip.kind for chip in spi if chip.kind} - set(SPI_CHIPS))
         if unknown:
-            raise SettingError(f"cannot emulate {', '.join(unknown)}; what can be emulated: {', '.join(CHIPS)}")
+            raise SettingError(f"cannot emulate {', '.join(unknown)}; supported: {', '.join(CHIPS)}")
         wrapper = shutil.which("umockdev-wrapper")
         if wrapper is None:
             raise DeviceError(f"the program umockdev-wrapper is missing: {_INSTALL}")
@@ -134,7 +134,7 @@ class EmulatedI2c(Closing):
         self._tell(["levels", self._levels])
 
     def counters(self, bus: int) -> WireCounters:
-        """Return what the bus has seen since the start."""
+        """Return the counts of the bus since the start."""
         seen = self._tell(["counters", bus])
         traffic = tuple(Traffic(*place) for place in seen.pop("traffic"))
         return WireCounters(**seen, traffic=traffic)
@@ -142,11 +142,11 @@ class EmulatedI2c(Closing):
     def fail(
         self, bus: int, code: int, *, address: int | None = None, times: int | None = None, batches: bool = False
     ) -> None:
-        """Let transfers end with errno `code`: to one address or all, so many times or until healed, batches alone."""
+        """Make transfers fail with errno `code`: to one address or all, `times` times or until healed, batches only."""
         self._fault(bus, "error", code, address, times, batches)
 
     def remove(self, bus: int, chip: int) -> None:
-        """Let a chip acknowledge nothing any more; `heal` brings it back as it was left."""
+        """Make a chip stop acknowledging; `heal` restores it with its state."""
         self._fault(bus, "absent", chip, True)
 
     def bring_back(self, bus: int, chip: int) -> None:
@@ -154,15 +154,15 @@ class EmulatedI2c(Closing):
         self._fault(bus, "absent", chip, False)
 
     def remove_mux(self, bus: int, mux: int) -> None:
-        """Let a mux acknowledge nothing any more, and nothing behind it."""
+        """Make a mux and the chips behind it stop acknowledging."""
         self._fault(bus, "absent_mux", mux)
 
     def replace(self, bus: int, chip: int, kind: str) -> None:
-        """Put a new chip of another kind in the place of a chip."""
+        """Replace a chip by a new one of another kind."""
         self._fault(bus, "become", chip, _model(kind))
 
     def reset(self, bus: int, chip: int) -> None:
-        """Let a power glitch bring a chip back to its defaults."""
+        """Reset a chip to its defaults, as a power glitch does."""
         self._fault(bus, "reset", chip)
 
     def poke(self, bus: int, chip: int, register: int, value: int) -> None:
@@ -170,35 +170,35 @@ class EmulatedI2c(Closing):
         self._fault(bus, "poke", chip, register, value)
 
     def poke_mux(self, bus: int, mux: int, control: int) -> None:
-        """Change a mux's control register: 0 is what a reset of it does."""
+        """Change a mux's control register; 0 is the effect of a reset."""
         self._fault(bus, "poke_mux", mux, control)
 
     def claim(self, bus: int, address: int) -> None:
-        """Let a driver of the kernel hold an address: I2C_SLAVE answers EBUSY."""
+        """Make a kernel driver hold an address: I2C_SLAVE fails with EBUSY."""
         self._fault(bus, "claim", address)
 
     def hold_sda(self, bus: int, transfers: int | None = None) -> None:
-        """Hold SDA low until healed, or until so many transfers have clocked it free."""
+        """Hold SDA low until healed, or until this number of transfers has clocked it free."""
         self._fault(bus, "stick", transfers)
 
     def heal(self, bus: int) -> None:
-        """End all of the above that lasts."""
+        """End all persistent faults."""
         self._fault(bus, "heal")
 
     def unplug(self, bus: int) -> None:
-        """Take the adapter away: its node is gone, and who has it open is told ENODEV."""
+        """Remove the adapter: its node is gone, and clients that have it open get ENODEV."""
         self._tell(["unplug", bus])
 
     def replug(self, bus: int) -> None:
-        """Bring it back."""
+        """Bring the adapter back."""
         self._tell(["plug", bus])
 
     def close(self) -> None:
-        """End the server and its device nodes. Does no harm twice."""
+        """End the server and its device nodes. Closing twice is harmless."""
         if not self._errors.closed:
             self._end()
             self._errors.close()
-            if self._root is not None:  # a server that was killed has left it
+            if self._root is not None:  # a killed server leaves it behind
                 shutil.rmtree(self._root, ignore_errors=True)
 
     def _fault(self, bus: int, name: str, *arguments: Any) -> None:
@@ -209,17 +209,17 @@ class EmulatedI2c(Closing):
         assert self._server.stdout is not None
         with self._lock:
             if self._server.stdout.closed:
-                raise DeviceError("the emulated I2C buses have ended: make new ones")
+                raise DeviceError("the emulated I2C buses have ended: create new ones")
             with suppress(BrokenPipeError):
                 self._server.stdin.write(json.dumps(line) + "\n")
                 self._server.stdin.flush()
-            answer = self._server.stdout.readline()
-            if not answer:
+            reply = self._server.stdout.readline()
+            if not reply:
                 raise DeviceError(f"the emulated I2C buses have ended ({self._last_words()}): {_INSTALL}")
-        return json.loads(answer)
+        return json.loads(reply)
 
     def _end(self) -> None:
-        """End the server by the end of its stdin; by force, should it hang."""
+        """End the server by closing its stdin; kill it if it hangs."""
         if self._server.stdout is None or self._server.stdout.closed:
             return
         with suppress(BrokenPipeError):
@@ -236,7 +236,7 @@ class EmulatedI2c(Closing):
 
 
 def _described(bus: EmulatedBus) -> dict[str, Any]:
-    """Return a bus as the server's first line has it: each chip's model in place of its kind."""
+    """Return a bus in the form of the server's first line, with each chip's model in place of its kind."""
     chips = [{"model": _model(chip.kind), **asdict(chip)} for chip in bus.chips]
     for chip in chips:
         del chip["kind"]
@@ -253,10 +253,10 @@ def _model(kind: str) -> tuple[str, str, str]:
 
 
 def _place_of(model: type) -> tuple[str, str, str]:
-    """Return where another Python finds the class that emulates a chip: a folder of modules, module and name."""
+    """Return the location, for another Python, of the class that emulates a chip: folder, module and name."""
     return _folder(model.__module__), model.__module__, model.__qualname__
 
 
 def _folder(module: str) -> str:
-    """Return the folder in which the import of `module` begins."""
+    """Return the folder from which `module` is imported."""
     return str(Path(sys.modules[module].__file__ or "").absolute().parents[module.count(".")])

@@ -1,7 +1,7 @@
-"""Serves emulated I2C buses as device nodes through umockdev; spoken to in JSON lines on stdin and stdout.
+"""Serves emulated I2C buses as device nodes through umockdev, controlled by JSON lines on stdin and stdout.
 
 It is started by `umockdev-wrapper /usr/bin/python3 -I`: it needs the system's Python, which has PyGObject, and no other
-package. Each line in is [verb, arguments...] of `Server`; each line out is the answer.
+package. Each line in is [verb, arguments...] of `Server`; each line out is the reply.
 """
 
 import errno
@@ -29,17 +29,17 @@ _READS = 0x0001
 _MESSAGE = struct.Struct("=HHHxxQ")
 SPI_MODE, SPI_SPEED, SPI_MESSAGE = 0x40016B01, 0x40046B04, 0x40006B00
 _SPI_TRANSFER = struct.Struct("=QQIIHBBBBBB")
-# A sleep this much shorter than the wait, then a spin: sleeping alone ends late by as much.
+# Sleep this much less than the wait, then spin: a plain sleep ends late by about this time.
 _SPIN_S = 100e-6
 
 
 class EmulatedNode(ABC):
-    """A device node. The handler runs in umockdev's thread; `lock` keeps it apart from the commands."""
+    """A device node. The handler runs in umockdev's thread; `lock` separates it from the commands."""
 
     def __init__(self, testbed: Any, device: str, number: str, subsystem: str) -> None:
         self.lock = threading.Lock()
-        self._clients: set[int] = set()  # who has opened the node since it is there
-        self._strangers: set[int] = set()  # who had it open when it went away
+        self._clients: set[int] = set()  # clients that opened the node after its last plugging
+        self._strangers: set[int] = set()  # clients that had it open when it was unplugged
         self._handler = UMockdev.IoctlBase()
         self._handler.connect("handle-ioctl", self._on_ioctl)
         self._handler.connect("client-vanished", self._forget)
@@ -56,46 +56,46 @@ class EmulatedNode(ABC):
 
     @abstractmethod
     def counters(self) -> dict[str, Any]:
-        """Tell what went over the wire."""
+        """Return the traffic counts."""
 
     @abstractmethod
     def _do(self, client: Any) -> int:
-        """Do what a client asks for; raises OSError."""
+        """Execute a client's request; raises OSError."""
 
     @abstractmethod
     def _spent_s(self) -> float:
-        """Return for how long the wire has been busy since the start; no longer than it takes, where it is unpaced."""
+        """Return the busy time of the wire since the start; 0 for an unpaced one."""
 
     def unplug(self) -> None:
-        """Remove the node; who has it open is told ENODEV from now on."""
+        """Remove the node; clients that have it open get ENODEV from now on."""
         if not self._away.is_symlink():
             self._path.rename(self._away)
         self._strangers |= self._clients
         self._clients.clear()
 
     def plug(self) -> None:
-        """Bring the node back, for who opens it now."""
+        """Bring the node back for clients that open it from now on."""
         if self._away.is_symlink():
             self._away.rename(self._path)
 
     def _on_ioctl(self, _: Any, client: Any) -> bool:
         start = time.monotonic()
-        answer = (-1, errno.EIO)  # whatever happens here: who is not answered waits for ever
+        reply = (-1, errno.EIO)  # on any error: a client without a reply would wait forever
         try:
             with self.lock:
                 before = self._spent_s()
-                answer = self._answer(client)
+                reply = self._reply(client)
                 took_s = self._spent_s() - before
             _wait_until(start + took_s)
         except (GLib.Error, AttributeError):
-            return True  # the client was killed amid its call: to answer it would end this process
+            return True  # the client was killed during its call: a reply would end this process
         except BaseException:
-            client.complete(*answer)
+            client.complete(*reply)
             raise
-        client.complete(*answer)
+        client.complete(*reply)
         return True
 
-    def _answer(self, client: Any) -> tuple[int, int]:
+    def _reply(self, client: Any) -> tuple[int, int]:
         try:
             self._admit(hash(client))
             return self._do(client), 0
@@ -128,7 +128,7 @@ class I2cNode(EmulatedNode):
             station.device.levels = value
 
     def counters(self) -> dict[str, Any]:
-        """Tell what went over the wire."""
+        """Return the traffic counts."""
         wire = self.adapter.wire
         return {
             "calls": self.adapter.calls,
@@ -172,9 +172,9 @@ class I2cNode(EmulatedNode):
                 buffers.append((number, buffer))
             else:
                 messages.append(Message(address, bytes(buffer.retrieve())))
-        answers = self.adapter.rdwr(messages)
+        replies = self.adapter.rdwr(messages)
         for number, buffer in buffers:
-            buffer.update(0, answers[number])
+            buffer.update(0, replies[number])
         return int(count)
 
     def _smbus(self, data: Any, address: int) -> int:
@@ -182,14 +182,14 @@ class I2cNode(EmulatedNode):
         pointer = data.resolve(8, 34) if size else None
         content = bytes(pointer.retrieve()) if pointer is not None else b""
         block = content[1 : 1 + content[0]] if size == I2C_BLOCK else content[: max(0, size - 1)]
-        answer = self.adapter.smbus(address, bool(reads), command, size, block)
+        reply = self.adapter.smbus(address, bool(reads), command, size, block)
         if reads and pointer is not None:
-            pointer.update(1 if size == I2C_BLOCK else 0, answer)
+            pointer.update(1 if size == I2C_BLOCK else 0, reply)
         return 0
 
 
 class SpiNode(EmulatedNode):
-    """One /dev/spidevB.C with a chip behind it, at the clock that its client asks for; None: nothing is there."""
+    """One /dev/spidevB.C with a chip behind it, at the clock that its client requests; None: no chip."""
 
     def __init__(self, testbed: Any, device: str, chip: SpiModel | None) -> None:
         super().__init__(testbed, device, "E: MAJOR=153\nE: MINOR=0\n", "spidev")
@@ -201,7 +201,7 @@ class SpiNode(EmulatedNode):
             (self._chip.levels,) = levels
 
     def counters(self) -> dict[str, Any]:
-        """Tell what went over the wire."""
+        """Return the traffic counts."""
         return {"calls": self._calls, "transfers": self._transfers, "scl_periods": 8 * self._bytes, "traffic": []}
 
     def _spent_s(self) -> float:
@@ -228,7 +228,7 @@ class SpiNode(EmulatedNode):
 
 
 class Server:
-    """What the lines on stdin may ask for; a chip is its number on its bus. SPI devices follow the buses."""
+    """The verbs of lines on stdin; a chip is its number on its bus. SPI devices follow the buses."""
 
     def __init__(self, testbed: Any, buses: list[dict[str, Any]]) -> None:
         self._nodes = [_node(testbed, **bus) for bus in buses]
@@ -240,24 +240,24 @@ class Server:
                 node.show(values)
 
     def unplug(self, bus: int) -> None:
-        """Take the adapter away."""
+        """Remove the adapter."""
         with self._nodes[bus].lock:
             self._nodes[bus].unplug()
 
     def plug(self, bus: int) -> None:
-        """Bring it back."""
+        """Bring the adapter back."""
         with self._nodes[bus].lock:
             self._nodes[bus].plug()
 
     def fault(self, bus: int, name: str, arguments: list[Any]) -> None:
-        """Let something go wrong: see `i2c.EmulatedI2c`, which has a method for each of them."""
+        """Inject a fault: see `i2c.EmulatedI2c`, which has a method for each."""
         node = self._nodes[bus]
         assert isinstance(node, I2cNode)
         with node.lock:
             _FAULTS[name](node.adapter, *arguments)
 
     def counters(self, bus: int) -> dict[str, Any]:
-        """Tell what went over the wire."""
+        """Return the traffic counts."""
         node = self._nodes[bus]
         with node.lock:
             return node.counters()
@@ -266,7 +266,7 @@ class Server:
 def _node(
     testbed: Any, device: str, chips: list[dict[str, Any]], clock_hz: int = 0, adapter: str = "", paced: bool = True
 ) -> EmulatedNode:
-    """Return a bus; without an adapter an SPI device, whose one chip has no model where nothing is there."""
+    """Return a bus, or, without an adapter, an SPI device; no chip there is a chip without a model."""
     if not adapter:
         (chip,) = chips
         return SpiNode(testbed, device, None if chip["model"] is None else _model(*chip["model"])())
@@ -289,7 +289,7 @@ _FAULTS: dict[str, Callable[..., None]] = {
 
 
 def _model(folder: str, module: str, name: str) -> Any:
-    """Return the class `name` of a chip's module, which the imports of `folder` find."""
+    """Return the class `name` of a chip's module, imported from `folder`."""
     if folder not in sys.path:
         sys.path.append(folder)
     return getattr(importlib.import_module(module), name)
@@ -302,7 +302,7 @@ def _wait_until(moment: float) -> None:
 
 
 def main() -> None:
-    """Read the buses from the first line, say where the testbed is, and do as every further line says."""
+    """Read the buses from the first line, print the location of the testbed, and execute every further line."""
     testbed = UMockdev.Testbed.new()
     server = Server(testbed, json.loads(sys.stdin.readline()))
     print(json.dumps(testbed.get_root_dir()), flush=True)

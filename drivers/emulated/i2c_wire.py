@@ -1,10 +1,10 @@
-"""SDA and SCL: who answers at an address, what it costs in bytes and SCL periods, and what goes wrong on the way; and
-what the kernel's adapter drivers let through to the wire, and which errno they answer with.
+"""SDA and SCL: replies at an address, their cost in bytes and SCL periods, faults; and the limits and errnos of the
+kernel's adapter drivers.
 
 Read from the kernel's sources: i2c-bcm2835 (Raspberry Pi 0 to 4), i2c-designware-master (Raspberry Pi 5, many PCs),
-i2c-algo-bit (i2c-gpio); "any" has no limits of its own, "smbus-only" offers no I2C_RDWR at all, as many PC chipsets.
+i2c-algo-bit (i2c-gpio); "any" has no limits, "smbus-only" offers no I2C_RDWR, like many PC chipsets.
 
-It needs the standard library alone: the system's own Python serves it to /dev/i2c-N.
+It needs only the standard library: the system's Python serves it to /dev/i2c-N.
 """
 
 import errno
@@ -14,17 +14,17 @@ from dataclasses import dataclass, field
 from ..i2c.chips.base import Device
 from ..i2c.tca9548a import MuxModel
 
-# Nine SCL periods a byte, one a START and one the STOP; then the bus is free for so long, by the clock's class.
+# Nine SCL periods a byte, one a START and one the STOP; then the bus free time, by speed class.
 BUS_FREE_US = ((100_000, 4.7), (400_000, 1.3), (1_000_000, 0.5))
 
 
 class NakError(Exception):
-    """Nobody acknowledged an address."""
+    """No device acknowledged an address."""
 
 
 @dataclass(frozen=True)
 class Message:
-    """What stands between two STARTs: `data` written, or `length` bytes read where data is None."""
+    """The message between two STARTs: `data` written, or `length` bytes read if data is None."""
 
     address: int
     data: bytes | None
@@ -33,7 +33,7 @@ class Message:
 
 @dataclass(eq=False)
 class Station:
-    """A chip in its place: straight on the bus, or on a channel of the mux at address `mux`."""
+    """A chip and its location: directly on the bus or on a channel of the mux at address `mux`."""
 
     model: type[Device]
     address: int
@@ -46,16 +46,16 @@ class Station:
         self.device = self.model()
 
     def become(self, model: type[Device]) -> None:
-        """Put a new chip of another kind in the place; the pins stay wired."""
+        """Replace the chip by a new one of another kind; the pins stay wired."""
         levels, self.device = self.device.levels, model()
         self.device.levels = levels & (1 << self.device.pins) - 1
 
 
-Place = tuple[int, int | None, int | None, int | None]  # address, mux, channel, register (where there are registers)
+Place = tuple[int, int | None, int | None, int | None]  # address, mux, channel, register (if there are registers)
 
 
 class Wire:
-    """A bus with stations and muxes. `traffic` counts bytes by place and register, addresses included."""
+    """A bus with stations and muxes. `traffic` counts bytes by place and register, including addresses."""
 
     def __init__(self, stations: list[Station], clock_hz: int) -> None:
         self.stations = stations
@@ -67,7 +67,7 @@ class Wire:
         self.scl_periods = self.transfers = 0
 
     def transfer(self, messages: list[Message]) -> list[bytes]:
-        """Send messages, with a START before each and one STOP; return what was read, in order.
+        """Send messages, with a START before each and one STOP; return the bytes read, in order.
 
         Raises NakError. With SDA held low every address looks acknowledged and every byte reads 0.
         """
@@ -81,7 +81,7 @@ class Wire:
                 mux.stop()
 
     def duration_s(self, scl_periods: int, transfers: int) -> float:
-        """Return how long so many SCL periods in so many transfers take."""
+        """Return the duration of `scl_periods` in `transfers`."""
         free_us = next((free for limit, free in BUS_FREE_US if self.clock_hz <= limit), BUS_FREE_US[-1][1])
         return scl_periods / self.clock_hz + transfers * free_us * 1e-6
 
@@ -90,32 +90,32 @@ class Wire:
         if self.sda_low:
             self._count((message.address, None, None, None), 0 if message.data is None else len(message.data))
             return bytes(message.length)
-        answering = self._answering(message.address)
-        if not answering:
+        responding = self._responding(message.address)
+        if not responding:
             self.traffic[(message.address, None, None, None)] += 1
             raise NakError(message.address)
-        (device, mux, channel) = answering[0]
+        (device, mux, channel) = responding[0]
         if message.data and device.has_registers:
             commands[device] = message.data[0]
         size = message.length if message.data is None else len(message.data)
         self._count((message.address, mux, channel, commands.get(device)), size)
-        return self._exchange(message, [device for device, _, _ in answering])
+        return self._exchange(message, [device for device, _, _ in responding])
 
     def _exchange(self, message: Message, devices: list[Device]) -> bytes:
         if message.data is not None:
             for device in devices:
                 device.write(message.data)
             return b""
-        answer = bytes(b"\xff" * message.length)
+        reply = bytes(b"\xff" * message.length)
         for device in devices:
-            answer = bytes(a & b for a, b in zip(answer, device.read(message.length), strict=True))
-        return answer
+            reply = bytes(a & b for a, b in zip(reply, device.read(message.length), strict=True))
+        return reply
 
     def _count(self, place: Place, size: int) -> None:
         self.traffic[place] += 1 + size
         self.scl_periods += 9 * size
 
-    def _answering(self, address: int) -> list[tuple[Device, int | None, int | None]]:
+    def _responding(self, address: int) -> list[tuple[Device, int | None, int | None]]:
         found: list[tuple[Device, int | None, int | None]] = []
         if address in self.muxes and address not in self.absent_muxes:
             found.append((self.muxes[address], None, None))
@@ -139,7 +139,7 @@ _READ_SIZES = {BYTE: 1, BYTE_DATA: 1, WORD_DATA: 2}
 
 @dataclass(frozen=True)
 class Temper:
-    """How an adapter is: errno of a NAK; errno with SDA held low (None: it notices nothing)."""
+    """The error codes of an adapter: errno of a NAK; errno with SDA held low (None: not detected)."""
 
     nak: int
     stuck: int | None
@@ -157,9 +157,9 @@ ADAPTERS = {
 
 @dataclass
 class TransferFault:
-    """Transfers that go wrong with errno `code`: those to `address` (None: all), so many `times` (None: until healed).
+    """A fault that makes transfers to `address` (None: all) fail with errno `code`, `times` times (None: until healed).
 
-    `batches` alone: only transfers of more than one write and read.
+    `batches`: only transfers of more than one write and read.
     """
 
     code: int
@@ -168,7 +168,7 @@ class TransferFault:
     batches: bool = False
 
     def hits(self, messages: list[Message]) -> bool:
-        """Tell whether these messages go wrong, and count it."""
+        """Return whether these messages fail, and count it."""
         met = self.address is None or any(message.address == self.address for message in messages)
         if not met or self.times == 0 or (self.batches and len(messages) <= 2):
             return False
@@ -178,7 +178,7 @@ class TransferFault:
 
 
 class Adapter:
-    """One bus as the kernel shows it: every refusal is an OSError with the errno of this adapter."""
+    """One bus as the kernel presents it: every error is an OSError with the errno of this adapter."""
 
     def __init__(self, wire: Wire, kind: str) -> None:
         self.wire = wire
@@ -191,16 +191,16 @@ class Adapter:
 
     @property
     def funcs(self) -> int:
-        """The answer to I2C_FUNCS."""
+        """The reply to I2C_FUNCS."""
         return FUNC_SMBUS | (FUNC_I2C if self.temper.plain_i2c else 0)
 
     def slave(self, address: int) -> None:
-        """I2C_SLAVE: EBUSY where a driver of the kernel holds the address."""
+        """I2C_SLAVE: EBUSY if a kernel driver holds the address."""
         if address in self.claimed:
             raise OSError(errno.EBUSY, "claimed")
 
     def stick(self, transfers: int | None) -> None:
-        """Hold SDA low: until healed, or until so many transfers have clocked it free."""
+        """Hold SDA low until healed, or until this number of transfers has clocked it free."""
         self.stuck_for, self.wire.sda_low = transfers, True
 
     def heal(self) -> None:
@@ -225,7 +225,7 @@ class Adapter:
         return self._transfer(messages)
 
     def smbus(self, address: int, reads: bool, command: int, size: int, block: bytes) -> bytes:
-        """I2C_SMBUS as the kernel makes it of messages: `block` is what to write, or as long as what to read."""
+        """I2C_SMBUS, built from messages as in the kernel: `block` is the data to write, or has the length to read."""
         if size == QUICK:
             return self._transfer([Message(address, None if reads else b"")])[0]
         if size not in (*_READ_SIZES, I2C_BLOCK):

@@ -1,4 +1,4 @@
-"""A board, or a program, that sends rows of numbers as lines: over a pty, TCP, UDP, a Unix socket or a WebSocket."""
+"""Emulated boards or programs that send rows of numbers as lines: over a pty, TCP, UDP, Unix socket or WebSocket."""
 
 import contextlib
 import socket
@@ -15,13 +15,14 @@ if TYPE_CHECKING:
     from websockets.sync.server import ServerConnection
 
 _UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
-# Who does not take a line within it is let go of.
+# A client that does not accept a line within this time is dropped.
 _SEND_S = 0.2
 
 
 class LineSender(Closing):
-    """Sends the values that are shown, `rate_hz` times a second, to `send`: numbers in the order of the columns, with
-    the sender's clock in the column `time`, which counts from the start in `unit`.
+    """Sends the current values to `send`, `rate_hz` times a second: numbers in the order of the columns.
+
+    The column `time` holds the sender's clock, which counts from the start in `unit`.
     """
 
     def __init__(
@@ -39,14 +40,14 @@ class LineSender(Closing):
         self._values = self._values | values
 
     def line(self, now_s: float) -> bytes:
-        """Return the line that is sent so many seconds after the start."""
+        """Return the line for a time `now_s` after the start."""
         values = self._values
         clock = {} if self._time is None else {self._time: now_s * self._scale}
         numbers = (clock.get(name, values.get(name, 0.0)) for name in self._columns)
         return ",".join(f"{round(number, 6):.10g}" for number in numbers).encode() + b"\n"
 
     def close(self) -> None:
-        """Send no more."""
+        """Stop sending."""
         self._stop.set()
         self._thread.join()
 
@@ -58,9 +59,9 @@ class LineSender(Closing):
 
 
 class SocketLines(Closing):
-    """A server of lines on loopback (`tcp://127.0.0.1:PORT`) or at a path (`unix:PATH`) for all who connect to it.
+    """A server of lines on loopback (`tcp://127.0.0.1:PORT`) or at a path (`unix:PATH`) for all clients.
 
-    port  where it is: what a `[[stream]]` calls its port
+    port  its address, in the form of a `[[stream]]`
     """
 
     def __init__(self, path: Path | None = None) -> None:
@@ -72,7 +73,7 @@ class SocketLines(Closing):
             self._listener.bind(("127.0.0.1", 0) if path is None else str(path))
         except OSError as reason:
             self._listener.close()
-            raise DeviceError(f"no socket can be made at {path}: {reason.strerror or reason}") from reason
+            raise DeviceError(f"no socket can be created at {path}: {reason.strerror or reason}") from reason
         self._listener.listen()
         self.port = f"tcp://127.0.0.1:{self._listener.getsockname()[1]}" if path is None else f"unix:{path}"
         self._clients: list[socket.socket] = []
@@ -81,7 +82,7 @@ class SocketLines(Closing):
         self._thread.start()
 
     def send(self, data: bytes) -> None:
-        """Send to all who are connected."""
+        """Send to all connected clients."""
         with self._lock:
             for client in tuple(self._clients):
                 try:
@@ -123,17 +124,17 @@ class DatagramLines(Closing):
         self.port = f"udp://127.0.0.1:{self.to[1]}"
 
     def send(self, data: bytes) -> None:
-        """Send a datagram; nobody may be there."""
+        """Send a datagram; there may be no receiver."""
         with contextlib.suppress(OSError):
             self._line.sendto(data, self.to)
 
     def close(self) -> None:
-        """Send no more."""
+        """Stop sending."""
         self._line.close()
 
 
 class WebLines(Closing):
-    """A WebSocket on loopback for all who connect to it."""
+    """A WebSocket on loopback for all clients."""
 
     def __init__(self) -> None:
         try:
@@ -148,11 +149,11 @@ class WebLines(Closing):
         self._thread.start()
 
     def send(self, data: bytes) -> None:
-        """Send a message to all who are connected."""
+        """Send a message to all connected clients."""
         with self._lock:
             clients = tuple(self._clients)
         for client in clients:
-            with contextlib.suppress(Exception):  # it is gone, which its own thread finds out
+            with contextlib.suppress(Exception):  # it is gone, which its thread detects
                 client.send(data.decode())
 
     def close(self) -> None:
@@ -169,7 +170,7 @@ class WebLines(Closing):
         with self._lock:
             self._clients.add(client)
         try:
-            for _ in client:  # what it says means nothing; the iteration ends when it is gone
+            for _ in client:  # its messages are ignored; the iteration ends when it is gone
                 pass
         finally:
             with self._lock:
@@ -177,8 +178,8 @@ class WebLines(Closing):
 
 
 def lines_like(port: str, path: Path) -> SocketLines | DatagramLines | WebLines:
-    """Return what sends lines by the way that `port` names, on loopback; where that is none of a network, at the Unix
-    socket `path`.
+    """Return a sender of lines on loopback with the transport of `port`, or at the Unix socket `path` if `port` is not
+    a network address.
     """
     if port.startswith("tcp:"):
         return SocketLines()

@@ -1,4 +1,4 @@
-"""An emulated scanner board: what it sends when, and what it answers; and that board on a serial line."""
+"""An emulated scanner board: its messages, their times and its replies; and the board on a serial line."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -50,9 +50,9 @@ _FAULTS_EVERY_US = 1_000_000
 
 
 def read_without_diodes(closed: Mask, rows: int, columns: int) -> Mask:
-    """Return which keys, bits row * columns + column, read closed when those in `closed` are.
+    """Return the keys, bits row * columns + column, that read closed when those in `closed` are closed.
 
-    Current finds any way from a row to a column through closed keys: rows that share a closed column are one wire.
+    Current flows from a row to a column on any path through closed keys: rows that share a closed column are one wire.
     """
     width = (1 << columns) - 1
     wires: list[tuple[set[int], Mask]] = []
@@ -68,17 +68,17 @@ def read_without_diodes(closed: Mask, rows: int, columns: int) -> Mask:
 
 
 class ScannerBoard:
-    """The board's firmware as a model, in its own microseconds since boot, which never go back.
+    """A model of the board's firmware, in microseconds since boot, which never go back.
 
     rows, columns  of its keys; one row: wired directly       diodes  whether the keys of a matrix have any
-    scan_us        from scan to scan                          state_us, heartbeat_us  of what it sends, 0: none
-    clock_us       what its 32 bit clock shows at boot        board   its number
-    channels, bits of its converter: it speaks version 2 where there are any
-    channel_us     how long a channel takes, its multiplexer's settling included
-    codes          what the channels have now, in order, None for one that cannot be read; others have 0
+    scan_us        period of scans                            state_us, heartbeat_us  periods of STATE and HEARTBEAT
+    clock_us       its 32 bit clock at boot                   board   its number
+    channels, bits of its converter: version 2 of the protocol if there are any
+    channel_us     time of one channel, including the settling of its multiplexer
+    codes          current codes of the channels, in order, None for one that cannot be read; others have 0
     segments       whether it follows segments
 
-    Without STATEs it sends an EVENT for every change. It does not debounce: what it is told of that it only says again.
+    Without STATEs it sends an EVENT for every change. It does not debounce: it only reports the settings back.
     """
 
     def __init__(
@@ -113,75 +113,75 @@ class ScannerBoard:
         self._decoder = FrameDecoder()
         self._state_at = self._heartbeat_at = self._faults_at = self._analog_at = 0
         self._scan_at: int | None = None
-        self._told = (0, 0, 0)
+        self._reported = (0, 0, 0)
 
     def boot(self, now: int) -> list[bytes]:
-        """Return what it sends first: an end, so that nothing before it can matter, and its HELLO.
+        """Return its first bytes: an end, so that nothing before it can matter, and its HELLO.
 
-        Of its keys it says nothing before it has scanned them all, at once.
+        It reports no keys before it has scanned all of them once.
         """
         self._scan_at = now
         return [b"\0" + self._sent(self._hello(0, now))]
 
     def touch(self, now: int) -> None:
-        """Note that keys changed: the next scan sees it."""
+        """Record that keys changed: the next scan detects it."""
         if self._scan_at is None:
             self._scan_at = _after(0, self.rate.scan_us, now)
 
     def next_us(self) -> int | None:
-        """Return when it will send again, or look at changed keys. None: not by itself."""
+        """Return the time of its next message or scan of changed keys. None: only on request."""
         due = []
         if self._scanned:
             due += [self._state_at] * (self.rate.state_us > 0) + [self._heartbeat_at] * (self.rate.heartbeat_us > 0)
         due += [] if self._scan_at is None else [self._scan_at]
-        due += [self._faults_at] * (self._told != self._faults())
+        due += [self._faults_at] * (self._reported != self._faults())
         due += [self._analog_at] * (self.analog.analog_us > 0)
         return min(due, default=None)
 
     def scan(self, closed: Mask, now: int, *, unread: Mask = 0, whole: bool = True) -> list[bytes]:
-        """Read the keys and the converter, and return the frames that are due.
+        """Read the keys and the converter, and return the due frames.
 
-        unread  keys that keep their state, since they were not read      whole  whether all were tried: those are lost
+        unread  keys that were not read and keep their state      whole  whether all were tried, so unread ones are lost
         """
         self._scan_at = None
         sent = self._keys(closed, unread, whole, now) if self._scanned or whole else []
-        if self._told != self._faults() and now >= self._faults_at:
-            self._told, self._faults_at = self._faults(), now + _FAULTS_EVERY_US
-            sent.append(self._sent(Faults(self._clock(now), *self._told, 0)))
+        if self._reported != self._faults() and now >= self._faults_at:
+            self._reported, self._faults_at = self._faults(), now + _FAULTS_EVERY_US
+            sent.append(self._sent(Faults(self._clock(now), *self._reported, 0)))
         if self.analog.analog_us and now >= self._analog_at:
             self._analog_at = _after(self._analog_at, self.analog.analog_us, now)
             sent.append(self._sent(Analog(self._clock(now), self.analog.token, self._converted())))
         return sent
 
     def _converted(self) -> tuple[int, ...]:
-        """Return the codes of the channels that were asked for."""
+        """Return the codes of the requested channels."""
         whole, analog = [*self.codes, *[0] * self.analog.channels], self.analog
         asked = [code for channel, code in enumerate(whole) if analog.wanted >> channel & 1]
         return tuple(UNREAD if code is None else min(max(code, 0), (1 << analog.bits) - 1) for code in asked)
 
     def recognised(self, grasp: int, margin: int, flags: int, now: int) -> list[bytes]:
-        """Return what it sends of a grasp; a margin beyond what the frame can say is the largest that it can."""
+        """Return the frames for a predicted grasp; the margin is clipped to the frame's range."""
         return [self._sent(Grasp(self._clock(now), grasp, min(margin, _MOST_MARGIN), flags))]
 
     def segmented(self, number: int, grasp: int, state: int, now: int) -> list[bytes]:
-        """Return what it sends of a segment: nothing before it is asked to."""
+        """Return the frames for a segment: none before they are requested."""
         self.segment = Segment(self._clock(now), number & 0xFFFF, grasp, state)
         return [self._sent(self.segment)] if self._asked else []
 
     def receive(self, data: bytes, now: int) -> list[bytes]:
-        """Return the answers to the frames that `data` completes."""
-        answers = []
+        """Return the replies to the frames that `data` completes."""
+        replies = []
         for received in self._decoder.feed(data):
             try:
-                answers += self._answer(to_board(received), now)
+                replies += self._reply(to_board(received), now)
             except MessageError:
                 self.refused += 1
-        return answers
+        return replies
 
-    def _answer(self, message: ToBoard, now: int) -> list[bytes]:
+    def _reply(self, message: ToBoard, now: int) -> list[bytes]:
         match message:
             case GetState():
-                return self._all_keys(now) if self._scanned else []  # the first scan answers
+                return self._all_keys(now) if self._scanned else []  # the first scan will send them
             case SetRate():
                 scan_us = max(message.scan_us, _FASTEST_US)
                 state_us, heartbeat_us = (
@@ -198,7 +198,7 @@ class ScannerBoard:
         return [self._sent(self._hello(message.token if isinstance(message, Ping) else 0, now))]
 
     def _measure(self, asked: SetChannels, now: int) -> list[bytes]:
-        """Take other channels, the lowest of too many; a board without any does not understand."""
+        """Select other channels, the lowest of too many; a board without channels rejects this."""
         analog = self.analog
         if not analog.channels:
             self.refused += 1
@@ -213,7 +213,7 @@ class ScannerBoard:
         return [self._sent(self.analog)]
 
     def _tell_segments(self, wanted: bool, now: int) -> list[bytes]:
-        """Send segments from now on, or none; a board without any does not understand."""
+        """Start or stop sending segments; a board that does not follow segments rejects this."""
         if self.segment is None:
             self.refused += 1
             return []
@@ -221,7 +221,7 @@ class ScannerBoard:
         return [self._sent(self.segment)]
 
     def _keys(self, closed: Mask, unread: Mask, whole: bool, now: int) -> list[bytes]:
-        """Take a scan and return what it sends of keys. The first one tells all of them, and has no changes."""
+        """Process a scan and return the frames about keys. The first scan reports all of them, and has no changes."""
         before, lost, first = self._closed, self._lost, not self._scanned
         self._closed = before & unread | self._read(closed) & ~unread
         self._lost = unread if whole else lost & unread
@@ -236,7 +236,7 @@ class ScannerBoard:
         return sent + self._all_keys(now, lost=self._lost != lost, beats=beats)
 
     def _all_keys(self, now: int, *, lost: bool = False, beats: bool = True) -> list[bytes]:
-        """Return a LOST, if it is news or there are any before a HEARTBEAT; and the HEARTBEAT."""
+        """Return a LOST, if it changed or precedes a HEARTBEAT with lost keys; and the HEARTBEAT."""
         tells = lost or (beats and self._lost != 0)
         sent = [self._sent(Lost(self._lost, self.rows * self.columns))] if tells else []
         return [*sent, self._heartbeat(now)] if beats else sent
@@ -282,10 +282,10 @@ def _after(last: int, period: int, now: int) -> int:
 
 
 class EmulatedScanner(Closing):
-    """A board of so many directly wired keys at the far end of `line`; or any other, as `board`.
+    """A board with directly wired keys at the far end of `line`; or any other, as `board`.
 
-    It runs from here to close(), as if the line gave it no power. Keys are read at the board's scans: a change that is
-    undone before the next one is not seen.
+    It runs until close(), also while the line is unplugged. Keys are read at the board's scans: a change that is undone
+    before the next scan is not detected.
     """
 
     def __init__(self, line: PtyLine, switches: int, *, board: ScannerBoard | None = None) -> None:
@@ -310,29 +310,29 @@ class EmulatedScanner(Closing):
             self._condition.notify()
 
     def lose(self, lost: Mask) -> None:
-        """Read all keys but these from now on: they keep their state, and the board says so."""
+        """Read all keys except these from now on: they keep their state, and the board reports them as lost."""
         with self._condition:
             self._lost = lost
             self.board.touch(self._now())
             self._condition.notify()
 
     def press(self, codes: Sequence[int | None]) -> None:
-        """Let the channels, in order, have these codes from now on; None: it cannot be read. Others have 0."""
+        """Set the codes of the channels, in order; None: the channel cannot be read. Others have 0."""
         with self._condition:
             self.board.codes = tuple(codes)
 
     def recognise(self, grasp: int, margin: int, flags: int = 0) -> None:
-        """Say that the board recognised grasp type number `grasp`, with the values of GRASP's fields."""
+        """Send that the board predicted grasp type number `grasp`, with the values of GRASP's fields."""
         with self._condition:
             self._send(self.board.recognised(grasp, margin, flags, self._now()))
 
     def segment(self, number: int, grasp: int, state: int) -> None:
-        """Say that the board is in this segment, with the values of SEGMENT's fields, if the host has asked for it."""
+        """Send that the board is in this segment, with the values of SEGMENT's fields, if the host has requested it."""
         with self._condition:
             self._send(self.board.segmented(number, grasp, state, self._now()))
 
     def reboot(self, board: ScannerBoard | None = None) -> None:
-        """Start again as after a power cut, as `board` if given: numbers and clock from their beginnings."""
+        """Restart as after a power cut, as `board` if given: numbers and clock start again."""
         with self._condition:
             old = self.board
             self.board = board or ScannerBoard(

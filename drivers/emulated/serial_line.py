@@ -1,4 +1,4 @@
-"""The far end of a serial line: a pty that any serial client opens by a name of its own, paced like a wire."""
+"""The far end of a serial line: a pty that any serial client opens by name, paced like a wire."""
 
 import contextlib
 import os
@@ -22,11 +22,11 @@ _MOST_WAITING = 4096
 
 
 class Outgoing:
-    """Messages on their way out, each from the moment it was queued or the line became free, whichever is later.
+    """Outgoing messages, each sent when it was queued or the line became free, whichever is later.
 
-    byte_s is how long a byte takes, in seconds (0: no time at all). Times are seconds of any one clock. More than
-    `most` bytes never wait: the oldest waiting messages are dropped whole, and counted. `put` may be called by any
-    thread, the rest by one.
+    byte_s is the time of a byte in seconds (0: none). All times are seconds of one arbitrary clock. At most `most`
+    bytes wait: older waiting messages are dropped whole, and counted. `put` may be called by any thread, the other
+    methods by one.
     """
 
     def __init__(self, byte_s: float, most: int) -> None:
@@ -50,7 +50,7 @@ class Outgoing:
                 self.dropped += 1
 
     def clear(self) -> None:
-        """Forget what waits and what is under way. Only while no thread sends."""
+        """Drop waiting and partly sent messages. Only while no thread sends."""
         with self._lock:
             self._waiting.clear()
             self._waiting_bytes = 0
@@ -63,34 +63,34 @@ class Outgoing:
             pass
         if not self.byte_s:
             return self._rest
-        # A hundredth of a byte of grace, so that a wake-up that rounding puts before the byte's end still finds it.
+        # A hundredth of a byte of grace, so that a wake-up that rounding puts before the byte's end still succeeds.
         return self._rest[: max(0, int((now - self._from) / self.byte_s + 0.01))]
 
     def take(self, count: int) -> None:
-        """Note that `count` bytes of what has arrived were handed over."""
+        """Record that `count` arrived bytes were delivered."""
         self._rest = self._rest[count:]
         self._from += count * self.byte_s
 
     def hold(self, now: float) -> None:
-        """Note that nobody takes what has arrived: what follows is paced from `now`, not sent in a burst."""
+        """Record that arrived bytes were not accepted: later ones are paced from `now`, not sent in a burst."""
         arrived = len(self.arrived(now))
         self._from = max(self._from, now - arrived * self.byte_s)
         self._free_at = self._from + len(self._rest) * self.byte_s
 
     def next_at(self, at_most_bytes: int) -> float | None:
-        """Return when so many more bytes, or the rest of the message, have arrived; None if nothing is under way."""
+        """Return the arrival time of the next `at_most_bytes`, or of the rest of the message; None if it is idle."""
         while not self._rest and self._begin():
             pass
         return self._from + min(len(self._rest), at_most_bytes) * self.byte_s if self._rest else None
 
     def _begin(self) -> bool:
-        """Take the next waiting message onto the wire, as it is after damage. False if none waits."""
+        """Put the next waiting message, after damage, onto the wire. False if none waits."""
         with self._lock:
             if not self._waiting:
                 return False
             queued_at, message = self._waiting.popleft()
             self._waiting_bytes -= len(message)
-        damage = self.damage  # another thread may take it away meanwhile
+        damage = self.damage  # another thread may remove it meanwhile
         self._rest = message if damage is None else damage(message)
         self._from = max(queued_at, self._free_at)
         self._free_at = self._from + len(self._rest) * self.byte_s
@@ -100,9 +100,9 @@ class Outgoing:
 class PtyWire:
     """Opens a pty in raw mode and carries bytes until it is closed. The slave stays open here.
 
-    A client that closes its side hangs nothing up, and its successor finds the same port. Bytes from the client are
-    heard as late as they would be on a wire of the same pace, one chunk at a time, so that a fast writer is slowed down
-    as by a real port.
+    A client that closes its side does not end the connection, and the next client finds the same port. Bytes from the
+    client arrive as late as on a wire of the same pace, one chunk at a time, so that a fast writer is slowed down as by
+    a real port.
     """
 
     def __init__(self, outgoing: Outgoing, heard: Callable[[bytes], None], sent: Callable[[int], None]) -> None:
@@ -121,12 +121,12 @@ class PtyWire:
         self._thread.start()
 
     def wake(self) -> None:
-        """Have the thread look at what is queued."""
-        with contextlib.suppress(OSError):  # full: it will wake all the same; closed: nothing to wake
+        """Wake the thread to process the queue."""
+        with contextlib.suppress(OSError):  # full: it will wake anyway; closed: nothing to wake
             self._wake_write.send(b"\0")
 
     def close(self) -> None:
-        """Close the pty: the client sees its port die. From the line's own thread, as soon as it comes back to it."""
+        """Close the pty: the client gets a hang-up. From the line's own thread, at its next iteration."""
         self._closing = True
         self.wake()
         if current_thread() is not self._thread:
@@ -166,7 +166,7 @@ class PtyWire:
             self._heard(data)
 
     def _wait(self) -> None:
-        """Sleep until a byte is due, the client sends, it reads again after it had not, or somebody wakes us."""
+        """Sleep until a byte is due, the client sends or resumes reading, or `wake` is called."""
         if self._closing:
             return
         reading = [self._wake_read.fileno()] + [self._master] * (self._incoming is None)
@@ -188,16 +188,16 @@ class PtyWire:
 class PtyLine(Closing):
     """A serial line whose near end is the port `link`.
 
-    link   where the port shall stand: a symbolic link to the pty, made whole at once, removed on close
+    link   path of the port: a symbolic link to the pty, created atomically, removed on close
     baud   bits a second, ten of them a byte, both ways; a client may set any other rate on its side
     paced  False: bytes take no time
 
-    `receive` is called from the line's own thread with what the client sent; `damage` makes of every message that goes
-    out what a bad cable would, nothing at all included; `delay_s` is how much later than it was sent a message goes
-    out. All may be set at any time. Of messages that wait for the line, or for a client that does not read, 4096 bytes
-    are kept, the newest; older ones are dropped whole.
+    `receive` is called from the line's own thread with the client's bytes; `damage` maps every outgoing message to the
+    one after a bad cable, which may be empty; `delay_s` delays outgoing messages. All may be set at any time. Of the
+    messages that wait for the line, or for a client that does not read, the newest 4096 bytes are kept; older messages
+    are dropped whole.
 
-    Raises DeviceError where no link can be made or the system has no pty left.
+    Raises DeviceError if the link cannot be created or the system has no pty left.
     """
 
     def __init__(self, link: Path, baud: int = 115200, *, paced: bool = True) -> None:
@@ -213,7 +213,7 @@ class PtyLine(Closing):
 
     @property
     def damage(self) -> Callable[[bytes], bytes] | None:
-        """What happens to every message on its way out."""
+        """The function applied to every outgoing message."""
         return self._outgoing.damage
 
     @damage.setter
@@ -222,7 +222,7 @@ class PtyLine(Closing):
 
     @property
     def dropped_messages(self) -> int:
-        """How many messages never went out: too many waited, or the line was unplugged."""
+        """Number of messages never sent: too many waited, or the line was unplugged."""
         return self._outgoing.dropped + self._unplugged
 
     @property
@@ -240,7 +240,7 @@ class PtyLine(Closing):
         wire.wake()
 
     def unplug(self) -> None:
-        """Take the port away, as a pulled USB plug does: an open client sees it die, and the link is gone."""
+        """Remove the port, like a pulled USB plug: an open client gets a hang-up, and the link is gone."""
         with self._lock:
             wire, self._wire = self._wire, None
         if wire is not None:
@@ -248,7 +248,7 @@ class PtyLine(Closing):
             wire.close()
 
     def replug(self) -> None:
-        """Put a new port under the same link. What still waited for the old one is forgotten."""
+        """Create a new port under the same link. Messages that waited for the old one are dropped."""
         with self._lock:
             if self._wire is None:
                 self._outgoing.clear()
@@ -271,7 +271,7 @@ class PtyLine(Closing):
         return wire
 
     def _heard(self, data: bytes) -> None:
-        receive = self.receive  # another thread may take it away meanwhile
+        receive = self.receive  # another thread may remove it meanwhile
         if receive is not None:
             receive(data)
 
@@ -280,16 +280,16 @@ class PtyLine(Closing):
 
 
 def _link(link: Path, target: str) -> None:
-    """Let `link` point to `target`, in place of a link that an earlier run left to a pty, but of nothing else."""
+    """Make `link` point to `target`. Replace only a link to a pty from an earlier run."""
     if (link.exists() or link.is_symlink()) and not _leads_to_a_pty(link):
-        raise DeviceError(f"{link} exists and is no emulated port: remove it, or name another place")
+        raise DeviceError(f"{link} exists and is not an emulated port: remove it, or use another path")
     fresh = link.with_name(f".{link.name}.{os.getpid()}")
     try:
         fresh.symlink_to(target)
         fresh.replace(link)
     except OSError as error:
         fresh.unlink(missing_ok=True)
-        raise DeviceError(f"{link}: no port can be linked there: {error.strerror}") from error
+        raise DeviceError(f"{link}: cannot link a port there: {error.strerror}") from error
 
 
 def _leads_to_a_pty(link: Path) -> bool:
@@ -297,7 +297,7 @@ def _leads_to_a_pty(link: Path) -> bool:
 
 
 def _unlink(link: Path, target: str) -> None:
-    """Remove `link` unless it has come to mean another port in the meantime."""
+    """Remove `link` unless it refers to another port by now."""
     with contextlib.suppress(OSError):
         if str(link.readlink()) == target:
             link.unlink()

@@ -1,4 +1,4 @@
-"""An I2C bus with port expanders and converters: which chips are there, how they do, and scans of their ports."""
+"""An I2C bus with port expanders and converters: its chips, their health, and scans of their ports."""
 
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -15,9 +15,9 @@ from .tca9548a import ADDRESSES, CHANNELS
 
 @dataclass(eq=False, slots=True)
 class Port:
-    """A port to read: whose, and how.
+    """A port to read, and its chip.
 
-    believed: an answer that looked wrong and was found to be right, and how often its chip had been checked by then.
+    believed: a suspicious reply that was found to be right, and the number of checks of its chip by then.
     """
 
     member: PlacedChip
@@ -25,17 +25,17 @@ class Port:
     reading: Reading
     believed: tuple[bytes, int] | None = None
 
-    def value(self, answer: bytes) -> int:
-        """Return an answer as a number: of a converter its code, else bit i for pin reading.pins[i]."""
+    def value(self, reply: bytes) -> int:
+        """Return a reply as a number: the code of a converter, else bit i for pin reading.pins[i]."""
         chip = self.member.chip
-        return chip.code(answer) if isinstance(chip, Converter) else int.from_bytes(answer, "little")
+        return chip.code(reply) if isinstance(chip, Converter) else int.from_bytes(reply, "little")
 
-    def doubtful(self, answer: bytes) -> bool:
-        """Return whether an answer looks as if SDA were held low, or the chip had been reset."""
+    def doubtful(self, reply: bytes) -> bool:
+        """Return whether a reply looks as if SDA were held low or the chip had been reset."""
         if isinstance(self.reading, Conversion):
-            return not any(answer)
+            return not any(reply)
         high = self.reading.high
-        return 0 in answer or int.from_bytes(answer, "little") & high != high
+        return 0 in reply or int.from_bytes(reply, "little") & high != high
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Group:
 
 
 def cut(ports: Sequence[Port], way: Way) -> Iterator[Group]:
-    """Return the groups that read the ports of the chips that are there, in their order."""
+    """Return the groups that read the ports of all present chips, in order."""
     gathered: list[tuple[int, Port]] = []
     for number, port in enumerate(ports):
         if not port.member.present:
@@ -81,17 +81,17 @@ class Scan:
         self._groups: list[tuple[Group, Run]] = []
 
     def read(self) -> list[int | None]:
-        """Return each port's answer: bit i is pin reading.pins[i], or the code of a conversion; None where the chip is
+        """Return each port's value: bit i is pin reading.pins[i], or the code of a conversion; None if the chip is
         absent or has failed.
 
-        Every answer was read in this call. Raises DeviceError if the device node is gone; after `open` it works again.
+        Every value was read in this call. Raises DeviceError if the device node is gone; after `open` it works again.
         """
         keeper = self._keeper
         if monotonic() >= keeper.due:
             self._attend()
         if self._revision != keeper.revision or self._way is not self._node.way:
             self._plan()
-        answers: list[int | None] = [None] * len(self._ports)
+        replies: list[int | None] = [None] * len(self._ports)
         for group, run in self._groups:
             try:
                 if group.route is not None:
@@ -99,11 +99,11 @@ class Scan:
                 found: Sequence[bytes | None] = run()
             except OSError as error:
                 found = self._one_by_one(group, error)
-            for (number, port), answer in zip(group.ports, found, strict=True):
-                if answer is None or not port.member.present:  # lost, maybe while its neighbours were read
+            for (number, port), reply in zip(group.ports, found, strict=True):
+                if reply is None or not port.member.present:  # lost, maybe while its neighbours were read
                     continue
-                answers[number] = self._doubt(port, answer) if port.doubtful(answer) else port.value(answer)
-        return answers
+                replies[number] = self._doubt(port, reply) if port.doubtful(reply) else port.value(reply)
+        return replies
 
     def _attend(self) -> None:
         self._need_open()
@@ -120,7 +120,7 @@ class Scan:
         self._groups = [(group, self._node.prepare([port.query for _, port in group.ports])) for group in groups]
 
     def _one_by_one(self, group: Group, error: OSError) -> list[bytes | None]:
-        """Read the ports of a transfer that failed each by itself; where batches are refused, ask less from now on."""
+        """Read the ports of a failed transfer one by one; if the adapter rejects batches, reduce them from then on."""
         if error.errno in REFUSED and self._way is self._node.way:  # else it was lowered since `_plan`
             self._node.way = self._way.lower() if len(group.ports) > 1 else Way.SMBUS
         self._keeper.routes.forget()
@@ -131,17 +131,17 @@ class Scan:
             return None
         return self._keeper.attempt(port.member, lambda: self._node.query(port.query))
 
-    def _doubt(self, port: Port, answer: bytes) -> int | None:
-        """Return an answer that looks wrong only when it is right; else what is read once the reason is gone.
+    def _doubt(self, port: Port, reply: bytes) -> int | None:
+        """Return a suspicious reply if it proves right, else the value read after recovery.
 
-        A byte of zeros is what SDA held low reads as, on adapters that do not notice; it is also eight closed switches.
-        A 0 where the chip pulls up tells that it was reset.
+        On adapters that do not notice SDA held low, it reads as zeros, but so do eight closed switches. A 0 on a pin
+        that the chip pulls up means that the chip was reset.
         """
         member = port.member
         if isinstance(port.reading, Conversion):
             believed = member.zeros == member.checked  # a chip has many channels, and most rest at 0 V
         else:
-            believed = port.believed == (answer, member.checked)
+            believed = port.believed == (reply, member.checked)
         if not believed:
             self._keeper.feel()
             if member.present:
@@ -150,37 +150,37 @@ class Scan:
             if again is None:
                 return None
             port.believed, member.zeros = (again, member.checked), member.checked
-            answer = again
-        return port.value(answer)
+            reply = again
+        return port.value(reply)
 
 
 class _Converting:
-    """A converter of a scan: which of its steps are left, which one converts, and until when it is busy."""
+    """A converter in a scan: its remaining steps, the one that converts, and the time until which it is busy."""
 
     def __init__(self, node: Node, keeper: Keeper, member: PlacedChip) -> None:
         self._node, self._keeper, self._member = node, keeper, member
         self._conversions: dict[int, Conversion] = {}
         self._left: deque[int] = deque()
         self.converts: int | None = None
-        # What a scan that ended early has begun is not stopped: the chip takes no other before it is over.
+        # A conversion from a scan that ended early is not stopped: the chip accepts no other before it is over.
         self.until = 0.0
 
     def add(self, step: int, conversion: Conversion) -> None:
-        """Take a step of the scan."""
+        """Add a step of the scan."""
         self._conversions[step] = conversion
 
     def restart(self) -> None:
-        """Begin a scan."""
+        """Start a scan."""
         self._left = deque(self._conversions)
         self.converts = None
 
     @property
     def pending(self) -> bool:
-        """Whether something is left of it in this scan."""
+        """Whether steps remain in this scan."""
         return self.converts is not None or bool(self._left)
 
     def begin(self) -> None:
-        """Begin the next conversion, if one is left and none goes on. A chip that is absent has nothing to wait for."""
+        """Start the next conversion, if one is left and none is running. An absent chip has nothing to wait for."""
         if self.converts is not None or not self._left or monotonic() < self.until:
             return
         self.converts = step = self._left.popleft()
@@ -197,16 +197,16 @@ class _Converting:
         return self.converts == step and monotonic() >= self.until
 
     def was_read(self) -> None:
-        """Go on with the next."""
+        """Advance to the next step."""
         self.converts = None
         self.begin()
 
 
 class Interleaved:
-    """Groups of ports, read in their order; conversions that take time are groups of one port.
+    """Groups of ports, read in order; conversions that take time are groups of one port.
 
-    Each converter begins its next conversion as soon as its last was read. While the next port of the scan converts,
-    the first of the later ones that can be read is read ahead: so counts `thenar.runtime.scanning.timing`.
+    Each converter starts its next conversion as soon as its last was read. While the next port of the scan converts,
+    the first later one that is ready is read ahead. `thenar.runtime.scanning.timing` models the same order.
     """
 
     def __init__(self, node: Node, keeper: Keeper, groups: Sequence[Sequence[Port]]) -> None:
@@ -222,11 +222,11 @@ class Interleaved:
         self._chips = tuple(slow.values())
 
     def read(self) -> list[int | None]:
-        """Return the answers of all ports, as `Scan.read` does."""
-        return [answer for answers in self for answer in answers]
+        """Return the values of all ports, as `Scan.read` does."""
+        return [reply for replies in self for reply in replies]
 
     def __iter__(self) -> Iterator[list[int | None]]:
-        """Yield the answers of each group, as soon as it and all before it were read."""
+        """Yield the values of each group, as soon as it and all before it were read."""
         if not self._slow:
             for scan in self._scans:
                 yield scan.read()
@@ -244,7 +244,7 @@ class Interleaved:
             yield found.pop(step)
 
     def _able(self, left: Sequence[int]) -> int:
-        """Return the first step that can be read, waiting where none can."""
+        """Return the first step that can be read, after a wait if there is none."""
         while True:
             for chip in self._chips:
                 chip.begin()
@@ -256,7 +256,7 @@ class Interleaved:
 
 @dataclass(frozen=True, slots=True)
 class ChipAt:
-    """A chip in its place: straight on the bus, or on a channel of the TCA9548A at address `mux`; and the pins used."""
+    """A chip, its location (on the bus, or on a channel of the TCA9548A at address `mux`) and its used pins."""
 
     chip: Chip
     address: int
@@ -274,17 +274,18 @@ class PortRead:
 
 
 class I2cBus(Closing):
-    """The chips on one device node: `chips`, and how each is doing. To be used by one thread at a time.
+    """The chips on one device node, and the health of each. Use it from one thread at a time.
 
-    Raises SettingError for two chips that would answer at one address, or a mux that cannot be.
+    Raises SettingError for two chips at one address, or an impossible mux.
     """
 
     def __init__(
         self, device: str, chips: Sequence[ChipAt], *, clock_hz: int = 100_000, check_every_s: float = 1.0
     ) -> None:
-        """clock_hz is what the bus runs at, which the adapter's driver alone can set; it is kept for those who ask.
+        """clock_hz is the bus clock, which only the adapter's driver can set; it is stored for information.
 
-        Every check_every_s each chip's registers and its mux are read back, to notice resets: one transfer or two.
+        Every check_every_s the registers of each chip and its mux are read back in one or two transfers, to detect
+        resets.
         """
         self.device, self.clock_hz = device, clock_hz
         _refuse_clashes(device, chips)
@@ -293,25 +294,25 @@ class I2cBus(Closing):
         self._keeper = Keeper(self._node, self.chips, check_every_s)
 
     def open(self) -> None:
-        """Set up every chip and find out what the adapter can batch. A chip that is missing is absent, and no error.
+        """Set up every chip and detect which batches the adapter supports. A missing chip is absent, not an error.
 
-        Raises DeviceError if the device node cannot be used. May be called again after one, and at any time.
+        Raises DeviceError if the device node cannot be used. May be called again afterwards, and at any time.
         """
         self._keeper.begin()
-        # Registers, not ports, each twice: what batches of two chips and of two reads of one chip come to.
+        # Registers, not ports, each twice: this tests batches of two chips and of two reads of one chip.
         control = [_control(member) for member in self.chips]
         trial = Scan(self._node, self._keeper, [port for port in control for _ in range(2)])
         for _ in Way:
             trial.read()
 
     def prepare(self, ports: Sequence[PortRead]) -> Scan:
-        """Return what reads these ports, in this order, as often as it is asked."""
+        """Return a reusable scan of these ports, in this order."""
         return Scan(self._node, self._keeper, self._made(ports))
 
     def interleaved(self, groups: Sequence[Sequence[PortRead]]) -> Interleaved:
-        """Return what reads groups of ports, in this order, conversions overlapped with what else the bus does.
+        """Return a scan of groups of ports, in this order, with conversions overlapped with other transfers.
 
-        A conversion that takes time is a group of its own.
+        A conversion that takes time is a separate group.
         """
         return Interleaved(self._node, self._keeper, [self._made(group) for group in groups])
 
@@ -321,17 +322,17 @@ class I2cBus(Closing):
 
     @property
     def way(self) -> str:
-        """How reads are batched, in words."""
+        """A description of how reads are batched."""
         return self._node.way.value
 
     @property
     def trouble(self) -> str:
-        """What is wrong with the bus as a whole and what to do about it; "" if nothing is."""
+        """A fault of the whole bus and its remedy; "" if there is none."""
         return self._keeper.trouble
 
     @property
     def transfers(self) -> int:
-        """How many transfers were asked of the kernel."""
+        """Number of transfers requested from the kernel."""
         return self._node.transfers
 
     def close(self) -> None:
@@ -364,7 +365,7 @@ def _refuse_clashes(device: str, chips: Sequence[ChipAt]) -> None:
         if (at.mux is None) != (at.channel is None) or (
             route and not (route.mux in ADDRESSES and route.channel in CHANNELS)
         ):
-            raise SettingError(f"{device}: a tca9548a is at 0x70 to 0x77 and has channels 0 to 7; this is none: {at}")
+            raise SettingError(f"{device}: a tca9548a is at 0x70 to 0x77 and has channels 0 to 7, which excludes {at}")
         if (address, route) in seen or (route and address in direct):
-            raise SettingError(f"{device}: two chips would answer at 0x{address:02X}: give one of them another address")
+            raise SettingError(f"{device}: two chips would respond at 0x{address:02X}: give one another address")
         seen.add((address, route))

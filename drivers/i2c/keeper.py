@@ -1,4 +1,4 @@
-"""Keeps the chips of a bus at work: sets them up, tries again, gives up for a while, notices resets and stuck lines."""
+"""Supervises the chips of a bus: set-up, retries and pauses, detection of resets and stuck lines."""
 
 import errno
 import logging
@@ -15,12 +15,12 @@ _LOG = logging.getLogger(__name__)
 T = TypeVar("T")
 
 TRIES = 3
-# An absent chip is tried again so often: it shall be back, and set up, within a second of its cable's return. What is
-# found again and again not to be the chip it should be is tried less often, for trying writes to it.
+# Retry period of an absent chip: it must be back, and set up, within a second of its cable's return. A device that
+# proves repeatedly to be the wrong chip is retried less often, since each attempt writes to it.
 RETRY_S = 0.9
 RETRY_IMPOSTOR_S = 10.0
 
-# So often a mux must leave its address unacknowledged before it counts as gone: a glitch may swallow one.
+# This many missing acknowledgements in a row make a mux count as gone: a glitch may cause one.
 _NAKS = 3
 
 
@@ -33,28 +33,28 @@ class Route:
 
 
 def place(device: str, what: str, address: int, route: Route | None) -> str:
-    """Name a chip by where it is."""
+    """Return a name of the chip by its location."""
     behind = f" (channel {route.channel} of the tca9548a at 0x{route.mux:02X})" if route else ""
     return f"{device}: the {what} at 0x{address:02X}{behind}"
 
 
 class Routes:
-    """The muxes of a bus. Only one channel of them all is connected at a time; chips off the muxes are always reached.
+    """The muxes of a bus. At most one channel of all muxes is connected; chips off the muxes are always reachable.
 
-    What was selected is remembered, and forgotten at any failure behind a mux: a mux that was reset acknowledges
-    nothing for the chips behind it, and the next try selects again.
+    The selection is remembered, and forgotten at any failure behind a mux: after a reset of the mux the chips behind it
+    do not acknowledge, and the next attempt selects again.
 
-    mux  the address of the mux that was spoken to last
+    mux  the address of the last used mux
     """
 
     def __init__(self, node: Node, muxes: Iterable[int]) -> None:
         self._node = node
-        self._connected = set(muxes)  # those that may have a channel on: all, until they were seen to
+        self._connected = set(muxes)  # those that may have a channel on: initially all
         self.selected: Route | None = None
         self.mux: int | None = None
 
     def select(self, route: Route | None) -> None:
-        """Connect `route`, and nothing else, unless it is connected. Raises OSError, with nothing selected, if not."""
+        """Connect `route` alone, unless it already is. On failure nothing is selected, and OSError is raised."""
         if route is None or route == self.selected:
             return
         self.selected = None
@@ -65,20 +65,20 @@ class Routes:
         self.selected = route
 
     def holds(self) -> bool:
-        """Read the mux's register back: is what was selected still connected? Raises OSError."""
+        """Read the mux's register back; return whether the selection is still connected. Raises OSError."""
         selected = self.selected
         if selected is None:
             return True
         return self._node.query(Query(selected.mux, b"", 1)) == control(selected.channel)
 
     def forget(self) -> None:
-        """Select again next time."""
+        """Forget the selection, so that the next access selects again."""
         self.selected = None
 
     def _release(self, mux: int) -> None:
-        """Disconnect all channels of a mux. One that is gone takes with it what is behind it.
+        """Disconnect all channels of a mux. If it is gone, so are the chips behind it.
 
-        Raises OSError where it may still be connected: its chips would answer together with those of the other mux.
+        Raises OSError if it may still be connected: its chips would respond together with those of the other mux.
         """
         for left in reversed(range(_NAKS)):
             try:
@@ -98,11 +98,11 @@ class Routes:
 
 
 class ImpostorError(Exception):
-    """What answers at an address is not the chip that should be there."""
+    """The device at an address is not the expected chip."""
 
 
 def set_up(node: Node, chip: Chip, address: int, used: frozenset[int]) -> None:
-    """Write the chip's registers and read them back. Raises OSError of a transfer, ImpostorError of a wrong answer."""
+    """Write the chip's registers and read them back. Raises OSError, or ImpostorError for a wrong reply."""
     for write in chip.setup(used):
         node.write(address, write.data)
         if write.expect and not write.holds(read_back(node, chip, address, write)):
@@ -110,14 +110,14 @@ def set_up(node: Node, chip: Chip, address: int, used: frozenset[int]) -> None:
 
 
 def read_back(node: Node, chip: Chip, address: int, write: Write) -> bytes:
-    """Return the bytes that stand where `write` put its own."""
+    """Return the bytes at the location that `write` wrote."""
     return node.query(Query(address, write.data[:1] if chip.registers else b"", len(write.expect)))
 
 
 def whats_there(node: Node, address: int) -> str:
-    """Return, in words, what answers at an address: the first kind whose set-up holds, which leaves its pins inputs.
+    """Describe the device at an address: the first kind whose set-up succeeds, which leaves its pins inputs.
 
-    Kinds without registers come last, for what is written to look for registers drives their pins.
+    Kinds without registers come last, since probing for registers drives their pins.
     """
     for chip in sorted(CHIPS.values(), key=lambda chip: chip.registers, reverse=True):
         if address in chip.addresses and _behaves_like(node, chip, address):
@@ -135,10 +135,10 @@ def _behaves_like(node: Node, chip: Chip, address: int) -> bool:
 
 @dataclass(eq=False, slots=True)
 class PlacedChip:
-    """A chip in its place on the bus at `device`, and how it is doing, which its keeper alone changes.
+    """A chip at its location on the bus at `device`, and its health, which only its keeper changes.
 
-    `errors` counts what failed, retries that helped included; `last_error` stays. `due` is when it is seen to next;
-    `checked` counts its checks; `zeros` is how many there were when zeros of it were last found right.
+    `errors` counts failures, including those that a retry fixed; `last_error` stays. `due` is the time of its next
+    check; `checked` counts its checks; `zeros` is their number when zeros from it were last confirmed.
     """
 
     device: str
@@ -155,12 +155,12 @@ class PlacedChip:
 
     @property
     def watched(self) -> Write | None:
-        """What a reset would lose."""
+        """The write that a reset would lose."""
         return self.chip.watched(self.used)
 
     @property
     def named(self) -> str:
-        """The chip and where it is, for messages."""
+        """The chip and its location, for messages."""
         return place(self.device, self.chip.name, self.address, self.route)
 
     def blame(self, error: str) -> None:
@@ -172,9 +172,9 @@ class PlacedChip:
 class Keeper:
     """The chips of one bus.
 
-    `revision` changes whenever a chip comes or goes; `due` is when `attend` wants to be called next; `trouble` says
-    what is wrong with the bus as a whole, "" for nothing. Every method that touches the wire raises DeviceError if the
-    device node is gone, and nothing else.
+    `revision` changes whenever a chip comes or goes; `due` is the time of the next call of `attend`; `trouble`
+    describes a fault of the whole bus, or is "". Every method that uses the wire raises DeviceError if the device node
+    is gone, and no other error.
     """
 
     def __init__(self, node: Node, members: Sequence[PlacedChip], check_every_s: float) -> None:
@@ -197,12 +197,12 @@ class Keeper:
         for number, member in enumerate(self._members):
             if not self.trouble:
                 self._bring_up(member, TRIES)
-            if member.present:  # checks are spread, so that no scan waits for more than one
+            if member.present:  # spread checks, so that no scan waits for more than one
                 member.due = monotonic() + self._check_every_s * (number + 1) / len(self._members)
         self._schedule()
 
     def attend(self) -> None:
-        """See to the one chip that has waited longest: check it, or try whether it is back. A stuck bus comes first."""
+        """Check the chip that has waited longest, or test whether it is back. A stuck bus comes first."""
         if self.trouble:
             self._unstick()
         elif self._members:
@@ -212,12 +212,12 @@ class Keeper:
                 self.check(member)
             else:
                 if not any(other.present for other in self._members):
-                    self._renew()  # not every adapter says ENODEV once it is unplugged: its node tells
+                    self._renew()  # not every adapter returns ENODEV once unplugged: test its node
                 self._bring_up(member, 1)
         self._schedule()
 
     def attempt(self, member: PlacedChip, action: Callable[[], T], tries: int = TRIES) -> T | None:
-        """Do something with a chip behind its route, up to three times; then it is absent, and None is returned."""
+        """Run `action` on a chip behind its route, up to `tries` times; then mark it absent and return None."""
         for left in reversed(range(tries)):
             try:
                 self.routes.select(member.route)
@@ -225,7 +225,7 @@ class Keeper:
             except OSError as error:
                 self._note(member, error)
                 self.routes.forget()
-                if error.errno in (errno.ETIMEDOUT, errno.EBUSY):  # each may last a second: no more of them than needed
+                if error.errno in (errno.ETIMEDOUT, errno.EBUSY):  # each may last a second: retry no more
                     self.feel()
                 if self.trouble or not left:
                     self._lose(member, error)
@@ -233,20 +233,20 @@ class Keeper:
         return None
 
     def check(self, member: PlacedChip) -> None:
-        """Read back what a reset of the chip or of its mux would have lost, and restore it."""
+        """Read back the registers that a reset of the chip or of its mux would have lost, and restore them."""
         member.checked += 1
         fine = self.attempt(member, lambda: self._in_order(member))
         if fine is False:
             self._bring_up(member, TRIES)
 
     def feel(self) -> None:
-        """Find out whether the bus is stuck: an address that nobody has must be acknowledged by nobody."""
+        """Detect a stuck bus: an unused address must not be acknowledged."""
         code: int | None = None
         try:
             self._node.query(Query(NOBODY, b"", 1))
         except OSError as error:
             code = error.errno
-            if code not in STUCK:  # no acknowledge, by whatever errno this adapter tells it
+            if code not in STUCK:  # no acknowledge, whichever errno this adapter uses for it
                 if self.trouble:
                     _LOG.warning("%s: the bus is free again", self._node.device)
                 self.trouble = ""
@@ -261,7 +261,7 @@ class Keeper:
         self._changed()
 
     def _in_order(self, member: PlacedChip) -> bool:
-        """Return whether the chip holds its registers. A mux that connects something else is set again."""
+        """Return whether the chip still has its register values. A mux with another selection is set again."""
         if member.route and not self.routes.holds():
             named = place(self._node.device, "tca9548a", member.route.mux, None)
             member.blame(f"{named} had lost its channel (a reset, or another program): it was selected again")
@@ -274,7 +274,7 @@ class Keeper:
         return False
 
     def _bring_up(self, member: PlacedChip, tries: int) -> None:
-        """Set a chip up; it is present then. If something else is there, say what."""
+        """Set up a chip, which is present then. If another device is there, record which."""
         was = member.present
         member.present = False
         for left in reversed(range(tries)):
@@ -298,17 +298,17 @@ class Keeper:
         return True
 
     def _refuse(self, member: PlacedChip) -> None:
-        self.feel()  # a line held low answers for every chip
+        self.feel()  # a line held low looks like a reply of every chip
         if self.trouble:
             return
         there = whats_there(self._node, member.address)
         found = f"{member.named} is not there, but {there}: check the harness and the chip's address pins"
-        # The first time it may also have been a supply or a contact that came and went during the set-up.
+        # The first failure may also come from an intermittent supply or contact during the set-up.
         member.due = monotonic() + (RETRY_IMPOSTOR_S if found == member.last_error else RETRY_S)
         member.blame(found)
 
     def _note(self, member: PlacedChip, error: OSError) -> None:
-        """Blame the mux where it failed, else the chip."""
+        """Count the failure for the mux if it failed, else for the chip."""
         named = member.named
         if member.route and self.routes.selected != member.route and self.routes.mux is not None:
             named = place(self._node.device, "tca9548a", self.routes.mux, None)
@@ -322,13 +322,13 @@ class Keeper:
         self._changed()
         if self.trouble:
             return
-        if error.errno == errno.ENODEV:  # nobody there, on some adapters; on most, the adapter itself is gone
+        if error.errno == errno.ENODEV:  # no device there, on some adapters; on most, the adapter itself is gone
             self._renew()
         elif error.errno not in NOBODY_THERE:
             self.feel()
 
     def _unstick(self) -> None:
-        """Open the node anew; then the reads of `feel` clock SCL, which frees a chip that waits amid a byte."""
+        """Reopen the node; then the reads of `feel` clock SCL, which frees a chip that waits within a byte."""
         self._renew()
         self.feel()
         for member in self._members:

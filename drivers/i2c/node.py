@@ -1,4 +1,4 @@
-"""A device node /dev/i2c-N: transfers as the kernel takes them, and what the errno of one that failed means."""
+"""A device node /dev/i2c-N: transfers in the form of the kernel, and the meaning of their errno."""
 
 import errno
 import os
@@ -19,32 +19,32 @@ if TYPE_CHECKING:
 NOBODY_THERE = frozenset({errno.EREMOTEIO, errno.ENXIO, errno.ENODEV})
 # A line may be held low.
 STUCK = frozenset({errno.ETIMEDOUT, errno.EBUSY, errno.EAGAIN})
-# The adapter's driver refuses the batch, not the chip.
+# The adapter's driver rejects the batch, not the chip.
 REFUSED = frozenset({errno.EOPNOTSUPP, errno.EINVAL})
 
 _MEANINGS = {
     errno.ETIMEDOUT: "the transfer did not end: SCL or SDA is held low, or the chip stretches the clock",
-    errno.EAGAIN: "the adapter lost SDA to somebody else: is the line held low, or is there another master?",
+    errno.EAGAIN: "the adapter lost arbitration: is SDA held low, or is there another master?",
     errno.EIO: "the transfer broke off: check cable length, pull-ups and supply",
-    errno.EBUSY: "busy: a driver of the kernel has the address (unbind it), or SDA is held low",
+    errno.EBUSY: "busy: a kernel driver has the address (unbind it), or SDA is held low",
     errno.EOPNOTSUPP: "this adapter cannot do such a transfer: use another adapter",
 }
 
 
 def failure(named: str, code: int | None) -> str:
-    """Return what to say of a transfer with what is `named`."""
+    """Return a message about a failed transfer with the chip `named`."""
     words = f"does not work: {_MEANINGS.get(code or errno.EIO, 'the transfer failed: check cable and adapter')}"
     if code in NOBODY_THERE:
-        words = "does not answer: check its supply, its wires and its address pins"
+        words = "does not reply: check its supply, its wires and its address pins"
     return f"{named} {words} (errno {code})"
 
 
 def stuck(device: str, code: int | None) -> str:
-    """Return what to say of a bus on which nothing goes any more."""
+    """Return a message about a stuck bus."""
     found = "SDA reads low all the time" if code is None else f"every transfer fails (errno {code})"
     return (
-        f"{device} is stuck: {found}. Tries go on once a second; if they do not help, look for a wire to ground, take "
-        "the chips' supply away for a moment, or clock SCL nine times by hand (unbind the adapter's driver first)"
+        f"{device} is stuck: {found}. It is retried once a second; if that does not help, look for a wire to ground, "
+        "power-cycle the chips, or clock SCL nine times by hand (unbind the adapter's driver first)"
     )
 
 
@@ -52,33 +52,33 @@ MOST_MESSAGES = 42
 _FUNC_I2C = 0x00000001
 _I2C_SLAVE = 0x0703
 
-# The specification keeps 1111 1XX for other uses: no chip acknowledges this address.
+# The specification reserves 1111 1XX: no chip acknowledges this address.
 NOBODY = 0x7F
 
 Run = Callable[[], list[bytes]]
 
 
 class Way(Enum):
-    """From the best to what always works.
+    """Batching of reads, from the fastest to the one that always works.
 
-    i2c-gpio takes any batch; designware (Raspberry Pi 5, many PCs) one address a transfer, else EINVAL; bcm2835
-    (Raspberry Pi 0 to 4) one read a transfer, else EOPNOTSUPP; adapters without I2C_RDWR do SMBus only.
+    i2c-gpio accepts any batch; designware (Raspberry Pi 5, many PCs) one address a transfer, else EINVAL; bcm2835
+    (Raspberry Pi 0 to 4) one read a transfer, else EOPNOTSUPP; adapters without I2C_RDWR support only SMBus.
     """
 
-    CHANNEL = "all ports that no mux is switched between, in one transfer"
+    CHANNEL = "all ports between two mux switches in one transfer"
     CHIP = "all ports of a chip in one transfer"
-    PORT = "a transfer for every port"
-    SMBUS = "an SMBus transfer for every port"
+    PORT = "one transfer per port"
+    SMBUS = "one SMBus transfer per port"
 
     def lower(self) -> "Way":
-        """Return the next that asks less of the adapter; of the last, itself."""
+        """Return the next less demanding way; for the last, itself."""
         ways = list(Way)
         return ways[min(ways.index(self) + 1, len(ways) - 1)]
 
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """A command to write, where there is one, and how many bytes to read then, without a STOP in between."""
+    """An optional command to write, and the number of bytes to read then, without a STOP in between."""
 
     address: int
     command: bytes
@@ -86,19 +86,19 @@ class Query:
 
     @property
     def messages(self) -> int:
-        """How many I2C messages this takes."""
+        """Number of I2C messages."""
         return 2 if self.command else 1
 
 
 class Node:
-    """The open node. Errors of transfers are OSErrors as the adapter gives them; `transfers` counts the ioctl calls.
+    """The open node. Errors of transfers are OSErrors of the adapter; `transfers` counts the ioctl calls.
 
-    way is how its adapter takes them, as far as that is known.
-    One thread at a time: the buffers of prepared transfers are used again and again.
+    way is the batching that its adapter supports, as far as it is known.
+    Use it from one thread at a time: the buffers of prepared transfers are reused.
     """
 
     def __init__(self, device: str) -> None:
-        """Raise SettingError if `device` is no path of a device."""
+        """Raise SettingError if `device` is not the path of a device."""
         if fault := device_fault(device):
             raise SettingError(f"{shortened(repr(device))} {fault}")
         self.device = device
@@ -112,7 +112,7 @@ class Node:
         return self._bus is not None and self._bus.fd is not None
 
     def open(self) -> None:
-        """Open the node, anew if it was open: what was prepared stays good. Raises DeviceError with what to check."""
+        """Open or reopen the node; prepared transfers stay valid. Raises DeviceError with a remedy."""
         from smbus2 import SMBus
 
         self.close()
@@ -125,20 +125,20 @@ class Node:
             raise DeviceError(f"{self.device} cannot be opened: {_cause(error)}") from None
 
     def find_way(self) -> None:
-        """Begin with the best way that the open adapter may have."""
+        """Start with the fastest way that the open adapter may support."""
         self.way = Way.CHANNEL if self._bus is not None and self._bus.funcs & _FUNC_I2C else Way.SMBUS
 
     def close(self) -> None:
-        """Close the node; there are no transfers until it is opened again."""
+        """Close the node; no transfers are possible until it is reopened."""
         if self._bus is not None:
             self._bus.close()
 
     def claim(self, address: int) -> None:
-        """Ask for an address. Raises OSError EBUSY where a driver of the kernel has it."""
+        """Select an address. Raises OSError EBUSY if a kernel driver has it."""
         bus = self._ready()
         assert bus.fd is not None
         ioctl(bus.fd, _I2C_SLAVE, address)
-        bus.address = None  # smbus2 remembers whom it asked for last
+        bus.address = None  # smbus2 caches the last address
 
     def write(self, address: int, data: bytes) -> None:
         """Write bytes in one transfer."""
@@ -158,7 +158,7 @@ class Node:
         return self.prepare((query,))()[0]
 
     def prepare(self, queries: Sequence[Query]) -> Run:
-        """Return what does all queries in one transfer and returns their answers; SMBus takes one query alone."""
+        """Return a function that makes all queries in one transfer and returns the replies; SMBus allows one query."""
         bus = self._ready()
         if self.way is Way.SMBUS:
             (query,) = queries
@@ -166,18 +166,18 @@ class Node:
         from smbus2 import i2c_msg
         from smbus2.smbus2 import I2C_RDWR, i2c_rdwr_ioctl_data
 
-        answers = [i2c_msg.read(query.address, query.length) for query in queries]
+        replies = [i2c_msg.read(query.address, query.length) for query in queries]
         messages: list[i2c_msg] = []
-        for query, answer in zip(queries, answers, strict=True):
-            messages += [i2c_msg.write(query.address, query.command), answer] if query.command else [answer]
-        # What i2c_rdwr of smbus2 makes anew at every call.
-        transfer = i2c_rdwr_ioctl_data.create(*messages)  # type: ignore[arg-type]  # smbus2 says a list, and takes them apart
+        for query, reply in zip(queries, replies, strict=True):
+            messages += [i2c_msg.write(query.address, query.command), reply] if query.command else [reply]
+        # i2c_rdwr of smbus2 would create this at every call.
+        transfer = i2c_rdwr_ioctl_data.create(*messages)  # type: ignore[arg-type]  # smbus2 is typed for a list, but takes arguments
 
         def run() -> list[bytes]:
             self.transfers += 1
             assert bus.fd is not None
             ioctl(bus.fd, I2C_RDWR, transfer)
-            return [bytes(answer) for answer in answers]
+            return [bytes(reply) for reply in replies]
 
         return run
 
@@ -204,5 +204,5 @@ def _cause(error: OSError) -> str:
     if error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
         return "there is no such bus; is the adapter plugged in, is I2C switched on, is the module i2c-dev loaded?"
     if error.errno in (errno.EACCES, errno.EPERM):
-        return "you may not; is your user in the group i2c?"
+        return "permission denied; is your user in the group i2c?"
     return f"{os.strerror(error.errno or errno.EIO)}; is it an I2C device?"

@@ -6,7 +6,7 @@ ADDRESSES = range(0x70, 0x78)
 CHANNELS = range(8)
 CLOCK_HZ = 400_000
 
-# Address and control byte: what one selection costs, and what reading the register back costs.
+# Address and control byte: the cost of one selection, and of reading the register back.
 SCL_PERIODS = 20
 
 PACKAGE = Package(
@@ -36,22 +36,22 @@ class MuxModel(Device):
     has_registers = False
 
     def reset(self) -> None:
-        """Do as after power-on."""
+        """Reset to the state after power-on."""
         self.control = self.connected = 0
 
     def write(self, data: bytes) -> None:
-        """Take the bytes of one message that writes."""
+        """Process the bytes of one write message."""
         if data:
             self.control = data[-1]
 
     def read(self, length: int) -> bytes:
-        """Return the bytes of one message that reads."""
+        """Return the bytes of one read message."""
         return bytes((self.control,)) * length
 
     def stop(self) -> None:
-        """See a STOP go by."""
+        """Process a STOP."""
         self.connected = self.control
 
     def poke(self, register: int, value: int) -> None:
-        """Put `value` where nobody wrote it."""
+        """Set a register to `value` without a bus write."""
         self.control = self.connected = value

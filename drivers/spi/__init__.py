@@ -1,1 +1,1 @@
-"""Converters on SPI, through the kernel's spidev: one chip a file."""
+"""Converters on SPI, through the kernel's spidev: one file per chip."""

@@ -1,4 +1,4 @@
-"""A converter behind a device node /dev/spidevB.C: all its channels in one call of the kernel."""
+"""A converter at a device node /dev/spidevB.C: all its channels in one kernel call."""
 
 import ctypes
 import errno
@@ -14,7 +14,7 @@ from ..names import shortened
 from ..ports import check_node, device_fault
 from .chips import SpiChip
 
-# The kernel's linux/spi/spidev.h: struct spi_ioc_transfer, and _IOW('k', number, size of what is written).
+# The kernel's linux/spi/spidev.h: struct spi_ioc_transfer, and _IOW('k', number, size of the argument).
 TRANSFER = struct.Struct("=QQIIHBBBBBB")
 MODE, SPEED = 0x40016B01, 0x40046B04
 _BITS = 8
@@ -22,19 +22,19 @@ _MESSAGE, _SIZE_BITS = 0x40006B00, 16
 
 
 def message(transfers: int) -> int:
-    """Return the request that makes so many transfers."""
+    """Return the ioctl request for this number of transfers."""
     return _MESSAGE | transfers * TRANSFER.size << _SIZE_BITS
 
 
 class SpiDevice(Closing):
-    """The converter at one device node. To be used by one thread at a time.
+    """The converter at one device node. Use it from one thread at a time.
 
-    calls   how often the kernel was asked to transfer
-    silent  how many answers were no converter's
+    calls   number of kernel calls
+    silent  number of replies that did not come from a converter
     """
 
     def __init__(self, device: str, chip: SpiChip, clock_hz: int) -> None:
-        """Raise SettingError if `device` is no path of a device."""
+        """Raise SettingError if `device` is not the path of a device."""
         if fault := device_fault(device):
             raise SettingError(f"{shortened(repr(device))} {fault}")
         self.device, self.chip, self.clock_hz = device, chip, clock_hz
@@ -42,7 +42,7 @@ class SpiDevice(Closing):
         self._file: int | None = None
 
     def open(self) -> None:
-        """Open the node. Raises DeviceError with what to check."""
+        """Open the node. Raises DeviceError with a remedy."""
         self.close()
         check_node(self.device)
         try:
@@ -54,14 +54,15 @@ class SpiDevice(Closing):
             raise DeviceError(f"{self.device} cannot be opened: {_cause(error)}") from None
 
     def prepare(self, transfers: Sequence[Reading]) -> Callable[[], list[int | None]]:
-        """Return what makes these transfers in one call, chip select high in between, and returns the code of each.
+        """Return a function that makes these transfers in one call, with chip select high in between.
 
-        None stands for an answer that is no converter's. It raises DeviceError when the device is gone.
+        It returns the code of each, None for a reply that did not come from a converter, and raises DeviceError if the
+        device is gone.
         """
         sent = [ctypes.create_string_buffer(each.command, len(each.command)) for each in transfers]
         came = [ctypes.create_string_buffer(len(each.command)) for each in transfers]
         between = [1] * (len(transfers) - 1) + [0]
-        # The kernel writes where the table points to; the buffers live as long as what is returned.
+        # The kernel writes to the addresses in the table; the buffers live as long as the returned function.
         table = b"".join(
             TRANSFER.pack(
                 ctypes.addressof(out), ctypes.addressof(in_), len(out), self.clock_hz, 0, _BITS, high, *[0] * 4
@@ -78,7 +79,7 @@ class SpiDevice(Closing):
                 ioctl(self._file, request, table)
             except OSError as error:
                 raise DeviceError(f"{self.device} does not work: {_cause(error)}") from None
-            codes = [self.chip.code(answer.raw) for answer in buffers[1]]
+            codes = [self.chip.code(reply.raw) for reply in buffers[1]]
             self.silent += codes.count(None)
             return codes
 
@@ -95,5 +96,5 @@ def _cause(error: OSError) -> str:
     if error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
         return "there is no such device; is SPI switched on, is the module spidev loaded?"
     if error.errno in (errno.EACCES, errno.EPERM):
-        return "you may not; is your user in the group spi?"
+        return "permission denied; is your user in the group spi?"
     return f"{os.strerror(error.errno or errno.EIO)}; is it an SPI device?"

@@ -21,7 +21,7 @@ class Parameters(EffectParameters, frozen=True):
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that shifts every sensor, each subject's by degrees of their own."""
+    """Return the step that shifts every sensor, by a different number of degrees for each subject."""
 
     def step(batch: Batch, draw: Draw) -> None:
         batch.sensors_deg = batch.sensors_deg + parameters.sd_deg * draw.per_subject(len(SENSORS)).normal()

@@ -1,4 +1,4 @@
-"""A source of one's own joints: flex sensors whose codes another program sends as datagrams, a byte a joint."""
+"""A source for your own joints: flex sensors whose codes another program sends as datagrams, a byte per joint."""
 
 import os
 import socket

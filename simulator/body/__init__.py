@@ -1,1 +1,1 @@
-"""What is simulated: hands, gloves and objects, and how they lie."""
+"""The simulated bodies: hands, gloves and objects, and their poses."""

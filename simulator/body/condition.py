@@ -1,4 +1,4 @@
-"""A condition: one subject's hand, one grasp type, one object, and how that hand holds it when nothing disturbs."""
+"""A condition: one subject's hand, one grasp type, one object, and the undisturbed grasp."""
 
 from dataclasses import dataclass, field
 
@@ -23,7 +23,7 @@ class Thing:
 
 @dataclass(frozen=True, slots=True)
 class Pad:
-    """What presses on the object: a sphere of skin, and its force over the grip force."""
+    """A sphere of skin that presses on the object, and its force over the grip force."""
 
     sphere: int
     share: float
@@ -31,12 +31,12 @@ class Pad:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Held:
-    """How a hand of some size holds an object when nothing disturbs.
+    """The undisturbed grasp of an object by a hand of some size.
 
     posture_deg  (20,) joint angles, order of DOF
     pose         (6,) the object in hand axes: position in mm, rotation vector in radians
-    pads         what presses, with `grip_n` in all
-    down         (3,) which way its weight pulls, a unit vector in hand axes
+    pads         the pressing pads, with a total force of `grip_n`
+    down         (3,) direction of its weight, a unit vector in hand axes
     """
 
     posture_deg: Floats
@@ -48,7 +48,7 @@ class Held:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Condition:
-    """What the repetitions of one batch share."""
+    """The common properties of the repetitions of one batch."""
 
     subject: str
     hand: Hand
@@ -57,5 +57,5 @@ class Condition:
     held: Held
 
     def site(self, repetitions: NDArray[np.int64]) -> Site:
-        """Return whose draws some repetitions (n,) draw."""
+        """Return the draw site of some repetitions (n,)."""
         return Site(self.subject, self.grasp, self.thing.name, repetitions)

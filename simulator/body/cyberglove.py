@@ -1,7 +1,7 @@
 """The CyberGlove as a measuring instrument: a hand's 20 joint angles on its 18 sensors, and their bytes.
 
-Every sensor is a straight line of the angles that bend it. That a real glove's abduction sensors also feel flexion, and
-that its two sensors of the thumb's base must be read together, is not modelled; nor is the wrist.
+Every sensor is a linear function of the angles that bend it. Not modelled: that a real glove's abduction sensors also
+respond to flexion, that its two sensors of the thumb's base must be combined, and the wrist.
 """
 
 from dataclasses import dataclass
@@ -39,15 +39,15 @@ _BETWEEN = {
     "ring_middle_abduction": (2, 3),
     "little_ring_abduction": (3, 4),
 }
-# How far the palm arches with the MCP flexion of ring and little finger: at 95 degrees about the 10 and 15 degrees
-# that their metacarpals have. Ours.
+# The arch of the palm by MCP flexion of ring and little finger: at 95 degrees about the 10 and 15 degrees of their
+# metacarpals. Ours.
 _ARCH_RING, _ARCH_LITTLE = 0.10, 0.15
 
-# Degrees per count: the middle of what two published calibration files of real gloves say. The palm arch is ours.
+# Degrees per count: the mean of two published calibration files of real gloves. The palm arch is ours.
 _GAINS = {"thumb_rotation": 1.1, "thumb_mpj": 0.65, "thumb_ij": 1.0, "palm_arch": 0.3, "wrist_pitch": 0.7}
 _GAINS |= {"wrist_yaw": 0.3}
 _KIND_GAINS = {"mpj": 1.4, "pij": 0.7, "abduction": 0.5}
-# The byte at 0 degrees, near what open hands read, so that the whole range of every joint fits between 1 and 255.
+# The byte at 0 degrees, close to that of open hands, so that the whole range of every joint fits between 1 and 255.
 _ZEROS = {"thumb_rotation": 110.0, "thumb_mpj": 80.0, "thumb_ij": 80.0, "thumb_abduction": 70.0, "palm_arch": 90.0}
 _ZEROS |= {"wrist_pitch": 128.0, "wrist_yaw": 128.0}
 _KIND_ZEROS = {"mpj": 117.0, "pij": 50.0, "abduction": 110.0}
@@ -56,12 +56,12 @@ _GAIN_SPREAD, _ZERO_SPREAD = 0.12, 8.0
 
 _LEAST, _MOST = 1, 255  # 0 ends a frame
 
-# The common scale of all subjects: half degrees, the paper's resolution, from further down than any byte reaches.
+# The common scale of all subjects: half degrees, the paper's resolution, starting below any byte.
 _COMMON_ORIGIN_DEG, _COMMON_STEP_DEG = -250.0, 0.5
 
 
 def sensors_deg(posture_deg: Floats) -> Floats:
-    """Return what the sensors (..., 18) feel of joint angles (..., 20), both in degrees."""
+    """Return the sensor angles (..., 18) for joint angles (..., 20), both in degrees."""
     felt = {sensor: posture_deg[..., DOF.index(joint)] for sensor, joint in _FOLLOWS.items()}
     for sensor, (radial, ulnar) in _BETWEEN.items():
         fan = FAN_DEG[radial] - FAN_DEG[ulnar]
@@ -80,14 +80,14 @@ class Calibration:
 
     @classmethod
     def of_subject(cls, seed: int, subject: str) -> Self:
-        """Return how the glove reads on a subject of the scene with this seed. Not an effect: no ledger counts it."""
+        """Return the calibration for a subject of the scene with this seed. Not an effect: no ledger counts it."""
         site = Site(subject, "", "", np.zeros(0, dtype=np.int64))
         spread = 2.0 * Draw(seed, "glove.calibration", site, Draws()).per_subject(2, 18).uniform() - 1.0
         return cls._of(GAINS * (1.0 + _GAIN_SPREAD * spread[0]), ZEROS + _ZERO_SPREAD * spread[1])
 
     @classmethod
     def nominal(cls) -> Self:
-        """Return how the glove reads on the typical subject."""
+        """Return the calibration for the typical subject."""
         return cls._of(GAINS, ZEROS)
 
     @classmethod
@@ -96,7 +96,7 @@ class Calibration:
 
     @property
     def step_deg(self) -> Floats:
-        """What one count of each sensor (18,) is worth."""
+        """Degrees per count of each sensor (18,)."""
         return (self.high_deg - self.low_deg) / (_MOST - _LEAST)
 
     def bytes(self, degrees: Floats) -> Bytes:
@@ -115,13 +115,13 @@ class Calibration:
 
 
 def common_joints() -> tuple[Joint, ...]:
-    """Return what `Calibration.common_codes` mean: 16 joints, half a degree a code."""
+    """Return the joints of `Calibration.common_codes`: 16 joints, half a degree a code."""
     end = _COMMON_ORIGIN_DEG + 1000 * _COMMON_STEP_DEG
     return tuple(Joint(sensor, "deg", 0, _COMMON_ORIGIN_DEG, 1000, end) for sensor in SENSORS[:USED])
 
 
 def raw_joints() -> tuple[Joint, ...]:
-    """Return what the bare bytes mean on the typical subject: 16 joints."""
+    """Return the joints of the raw bytes on the typical subject: 16 joints."""
     nominal = Calibration.nominal()
     ends = zip(SENSORS[:USED], nominal.low_deg.tolist(), nominal.high_deg.tolist(), strict=False)
     return tuple(Joint(sensor, "deg", _LEAST, low, _MOST, high) for sensor, low, high in ends)

@@ -1,4 +1,4 @@
-"""The hand: how long its parts are, what its joints turn on, and how they lie for given joint angles.
+"""The hand: lengths of its parts, axes of its joints, and its forward kinematics.
 
 Frames are (d, 3, 3, n): axes as columns, d digits, n hands.
 
@@ -8,8 +8,8 @@ chain of four joints and three segments. A segment's own axes: x along it, z dor
 Degrees of freedom (`DOF`), digit by digit: thumb CMC abduction and flexion, MCP, IP; fingers MCP abduction (radial) and
 flexion, PIP, DIP. Capsules (`CAPSULES`): three segments of five digits, then five of the palm.
 
-Arrays of many hands carry them LAST, so that each operation runs along them, one hand never touches another, and a hand
-comes out the same in any company: (..., n).
+Arrays of many hands have the hand as LAST axis, so that operations run along it, hands are independent, and a hand's
+result does not depend on the others: (..., n).
 """
 
 from collections.abc import Iterator
@@ -34,9 +34,9 @@ SEGMENTS = np.array(
         [0.204, 0.117, 0.093],
     ]
 )
-# Where the first joint of each digit lies: distal of the wrist (over hand length) and radial of the middle finger's ray
-# (over hand breadth), the same source as commonly quoted; and dorsal (over hand breadth), which makes the palm's
-# transverse arch: ours.
+# The position of the first joint of each digit: distal of the wrist (over hand length) and radial of the middle
+# finger's ray (over hand breadth), the same source as commonly quoted; and dorsal (over hand breadth), which makes the
+# palm's transverse arch: ours.
 BASES = np.array(
     [
         [0.073, 0.196, -0.140],
@@ -63,7 +63,7 @@ FAN_DEG = np.array([0.0, 3.0, 0.0, -4.0, -9.0])
 
 @dataclass(frozen=True, slots=True)
 class Size:
-    """The two measures that everything else of a hand follows from."""
+    """The two measures that determine all dimensions of a hand."""
 
     length_mm: float
     breadth_mm: float
@@ -83,7 +83,7 @@ class Size:
 
 # The thumb at rest points distal, 30 degrees to the radial side and 10 to the palm; its nail looks radial and dorsal.
 _THUMB_RADIAL_DEG, _THUMB_PALMAR_DEG, _THUMB_ROLL_DEG = 30.0, 10.0, 50.0
-# Its first joint turns on axes that lean on the metacarpal, so that abduction and flexion also pronate it (opposition).
+# The axes of its first joint are tilted, so that abduction and flexion also pronate it (opposition).
 _ABDUCTION_LEAN_DEG, _FLEXION_LEAN_DEG = 40.0, 25.0
 
 
@@ -118,7 +118,7 @@ def about_y(frames: Floats, sine: Floats, cosine: Floats) -> Floats:
 
 
 def frame(x: Floats, dorsal: Floats) -> Floats:
-    """Return axes as columns: x as given, y and z square to it, z as near `dorsal` as can be."""
+    """Return axes as columns: x as given, y and z orthogonal to it, z as close to `dorsal` as possible."""
     y = np.cross(dorsal, x)
     y = y / np.sqrt(add_up(y * y))
     return np.stack([x, y, np.cross(x, y)], axis=1)
@@ -183,15 +183,14 @@ LIMITS_DEG = np.array(
     dtype=np.float64,
 )
 
-# Open hands that hold nothing, order of DOF. Flat: straight fingers, side by side. Relaxed is ours: half-way from there
-# to the position of function that hand surgery knows (MCP about 45, PIP 30 to 45, DIP 10 to 20), the little finger bent
-# most.
+# Open, empty hands, order of DOF. Flat: straight fingers, side by side. Relaxed is ours: half-way from there to the
+# position of function in hand surgery (MCP about 45, PIP 30 to 45, DIP 10 to 20), the little finger bent most.
 RESTS_DEG = {
     "relaxed": np.array([10, 10, 10, 15, 5, 20, 22, 8, 0, 22, 25, 9, -3, 25, 28, 10, -6, 28, 30, 11], np.float64),
     "flat": np.zeros(20),
 }
 
-# Where spheres of skin sit along each segment, over its length; the last one of a digit makes its round tip.
+# Positions of the spheres of skin along each segment, over its length; the last one of a digit is its round tip.
 TIP_SPHERE = 0.62
 _DISTAL, _MIDDLE, _PROXIMAL = (0.20, TIP_SPHERE), (0.30, 0.80), (0.25, 0.55, 0.85)
 _SPHERES = ((_PROXIMAL, _MIDDLE, _DISTAL),) * 5
@@ -210,12 +209,12 @@ _PALM = np.array(
 
 @dataclass(frozen=True, slots=True)
 class Skeleton:
-    """Where everything lies for n sets of joint angles; hand axes, mm.
+    """The positions of all parts for n sets of joint angles; hand axes, mm.
 
     frames   (20 capsules, 3, 3, n)  a capsule's own axes as columns
-    origins  (20, 3, n)              where each capsule begins
-    axes     (5 digits, 4 joints, 3, n)    what each joint turns on, unit vectors
-    centres  (5, 4, 3, n)            a point on it
+    origins  (20, 3, n)              start of each capsule
+    axes     (5 digits, 4 joints, 3, n)    rotation axis of each joint, unit vectors
+    centres  (5, 4, 3, n)            a point on each axis
     """
 
     frames: Floats
@@ -252,7 +251,7 @@ class Hand:
 
     @cached_property
     def sphere_offsets(self) -> Floats:
-        """How far along its capsule each sphere's centre lies (m,), mm."""
+        """Position of each sphere's centre along its capsule (m,), mm."""
         places = np.concatenate([np.array(places) for places in self._sphere_places])
         return places * self.lengths[self.sphere_capsules]
 
@@ -276,7 +275,7 @@ class Hand:
         return np.stack([frame(x, np.array([0.0, 0.0, 1.0])) for x in along])
 
     def skeleton(self, angles: Floats) -> Skeleton:
-        """Return how the hand lies for joint angles (20, n) in radians, order of DOF."""
+        """Return the hand's skeleton for joint angles (20, n) in radians, order of DOF."""
         n = angles.shape[1]
         a = angles.reshape(5, 4, n)
         sine, cosine = sincos(a)

@@ -1,8 +1,8 @@
-"""`murakami160`: where 160 switches lie on the glove.
+"""`murakami160`: the positions of 160 switches on the glove.
 
-The paper says: 160 switches, contacts 3.2 mm across and 0.4 mm high, spread uniformly over the palm side and the sides
-of the fingers; their places it gives only as a picture. This layout is ours, after that description: thumb and thenar
-26, each finger 26, palm 30.
+According to the paper, 160 switches with contacts 3.2 mm across and 0.4 mm high are spread uniformly over the palm side
+and the sides of the fingers; it gives their positions only in a picture. This layout is ours, after that description:
+thumb and thenar 26, each finger 26, palm 30.
 """
 
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from thenar.compiler.elementary import Floats, sincos
 
 from .hand import CAPSULES, TIP_SPHERE, Hand, Skeleton
 
-# How far a contact stands out of the skin (Panasonic EVQPLDA15, as the paper describes it).
+# The height of a contact above the skin (Panasonic EVQPLDA15, as the paper describes it).
 STANDS_OUT_MM = 0.4
 
-# Places on a segment: (how far along it, degrees around it: 0 on the pad, positive to the radial side of a finger).
+# Positions on a segment: (fraction along it, degrees around it: 0 on the pad, positive to the radial side of a finger).
 _TIP = (-1.0, 45.0)  # on the round tip, half way between pad and end
 _SIDE = 85.0
-# Rows of the palm along its five capsules, which meet at the wrist: about 11 mm apart; the thumb has its own ball.
+# Rows of the palm along its five capsules, which meet at the wrist: about 11 mm apart; the thumb has a separate ball.
 _PALM_ROWS = {
     "palm_index": (0.55, 0.78, 1.0),
     "palm_middle": (0.35, 0.65, 0.97),
@@ -54,7 +54,7 @@ _PLACES = {
 
 @dataclass(frozen=True, slots=True)
 class Patch:
-    """A switch: its name, its capsule, and where on it: along (0 to 1; -1: on the round tip) and around in degrees."""
+    """A switch: its name, its capsule, and its position: along (0 to 1; -1: on the round tip) and around in degrees."""
 
     name: str
     capsule: int
@@ -76,7 +76,7 @@ def murakami160() -> tuple[Patch, ...]:
 
 @dataclass(frozen=True)
 class Switches:
-    """The switches of `layout` on a hand: capsules (s,), and in each capsule's own axes places (s, 3) in mm."""
+    """The switches of `layout` on a hand: capsules (s,), and positions (s, 3) in each capsule's axes, mm."""
 
     hand: Hand
     layout: tuple[Patch, ...]

@@ -1,7 +1,7 @@
-"""Objects: their shapes and surfaces, and where they are.
+"""Objects: their shapes, surfaces and poses.
 
-Points are in the object's own axes, millimetres, many objects last: (m, 3, n). Distances are negative inside. Normals
-are of unit length everywhere: in the very middle of a ball or bar, where all ways out are as near, one is chosen.
+Points are in the object's axes, millimetres, many objects last: (m, 3, n). Distances are negative inside. Normals have
+unit length everywhere: in the exact middle of a ball or bar, where all directions are equally near, one is chosen.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from thenar.compiler.elementary import Floats, add_up, sincos
 
 Length = Annotated[float, msgspec.Meta(gt=0.0, le=2000.0)]
 
-# Nearer than this, squares lose their bits, and which way is out is no matter of distance any more.
+# Below this distance squares lose their bits, and the direction of the normal is arbitrary.
 _NEAREST_MM = 1e-150
 
 
@@ -31,7 +31,7 @@ class Sphere(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="spher
         return from_centre - self.diameter_mm / 2, _unit(points, from_centre[:, None], chosen)
 
     def curvature(self, points: Floats) -> Floats:
-        """Return how fast the normal turns (m, n) per mm that a point moves sideways, in any direction."""
+        """Return the rotation of the normal (m, n) per mm of sideways motion, in any direction."""
         return 1.0 / np.maximum(_norm(points), 1.0)
 
     def extent_mm(self) -> tuple[float, float, float]:
@@ -40,7 +40,7 @@ class Sphere(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="spher
 
 
 class Cylinder(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="cylinder", tag_field="shape"):
-    """A round bar, or a disk where it is short: `length_mm` along its own x; edges rounded by `edge_mm`."""
+    """A round bar, or a disk if it is short: `length_mm` along its own x; edges rounded by `edge_mm`."""
 
     diameter_mm: Length
     length_mm: Length
@@ -60,7 +60,7 @@ class Cylinder(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="cyl
         return distance - self.edge_mm, np.stack([along * np.where(x < 0.0, -1.0, 1.0), *(across * outward)], axis=1)
 
     def curvature(self, points: Floats) -> Floats:
-        """Return how fast the normal turns (m, n) per mm that a point moves across the bar; not at all at its ends."""
+        """Return the rotation of the normal (m, n) per mm of motion across the bar; 0 at its ends."""
         x, y, z = points[:, 0], points[:, 1], points[:, 2]
         radius = np.sqrt(y * y + z * z)
         return np.where(np.abs(x) < self.length_mm / 2, 1.0 / np.maximum(radius, 1.0), 0.0)
@@ -71,7 +71,7 @@ class Cylinder(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="cyl
 
 
 class Box(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="box", tag_field="shape"):
-    """A box, or a card where it is thin: length, width and height along its own x, y and z; edges rounded."""
+    """A box, or a card if it is thin: length, width and height along its own x, y and z; edges rounded."""
 
     length_mm: Length
     width_mm: Length
@@ -89,7 +89,7 @@ class Box(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="box", ta
         return distance - self.edge_mm, np.moveaxis(out, 0, 1) * np.where(points < 0.0, -1.0, 1.0)
 
     def curvature(self, points: Floats) -> Floats:
-        """Return how fast the normal turns (m, n): not at all on a plane."""
+        """Return the rotation of the normal (m, n): 0 on a plane."""
         return np.zeros_like(points[:, 0])
 
     def extent_mm(self) -> tuple[float, float, float]:
@@ -110,14 +110,14 @@ def _norm(points: Floats) -> Floats:
 
 
 def _unit(vectors: Floats, length: Floats, chosen: Floats) -> Floats:
-    """Return vectors over their length, and what was `chosen` where they have none."""
+    """Return vectors over their length, or `chosen` where the length is 0."""
     clear = length > _NEAREST_MM
     unit: Floats = np.where(clear, vectors / np.where(clear, length, 1.0), chosen)
     return unit
 
 
 def _rounded(beyond: Floats) -> tuple[Floats, Floats]:
-    """Return the distance from a corner whose sides lie `beyond` (sides, m, n) away, and its unit gradient by them."""
+    """Return the distance from a corner at offsets `beyond` (sides, m, n), and its unit gradient."""
     outside = np.maximum(beyond, 0.0)
     distance = np.sqrt(add_up(outside * outside))
     nearest = np.arange(len(beyond))[:, None, None] == beyond.argmax(axis=0)
@@ -185,7 +185,7 @@ def rotation_vector(matrix: Floats) -> Floats:
 
 
 def _quaternion(matrix: Floats) -> Floats:
-    """Return unit quaternions (4, n), the scalar first and not negative, by whichever of four ways cancels least."""
+    """Return unit quaternions (4, n), the scalar first and not negative, by the least cancelling of four formulas."""
     m = matrix
     w = [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]]
     xy, xz, yz = m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1]
@@ -207,7 +207,7 @@ def _quaternion(matrix: Floats) -> Floats:
 def _angle(sine: Floats, cosine: Floats) -> Floats:
     """Return the angle in the first quadrant with this sine and cosine; numpy's arctan2 differs between processors.
 
-    A guess is mended twice by the sine of what is left of it: 0.08 becomes 3e-7, and that nothing.
+    A guess is corrected twice by the sine of its error: 0.08 becomes 3e-7, then 0.
     """
     angle = 0.5 * np.pi * sine / (sine + cosine)
     for _ in range(2):

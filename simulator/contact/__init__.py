@@ -1,1 +1,1 @@
-"""Contact models: how hands told to grip come to rest, and what that does to the switches."""
+"""Contact models: the rest of gripping hands, and the forces on the switches."""

@@ -1,14 +1,14 @@
-"""Hand and object at one guess of rest: what hands are told, where their skin touches, and all forces.
+"""Hand and object at one candidate of rest: commands, contacts and all forces.
 
-Unknown are 20 joint angles and the object's 6 degrees of freedom. Every joint is a spring about its commanded angle,
-with the torque that presses the pads (model.py). Skin is a set of spheres, each a spring where it sinks into the
-object, with friction that sticks: a second spring, sideways, from the point of skin to the point of the object that
-first touched; it is let go beyond the Coulomb limit (settle.py says when, and how far beyond it skin may be at rest).
-The object bears its weight and what the skin does to it; a soft spring to where it was put keeps what nothing else
-holds, and whatever that spring carries is reported as the residual.
+The unknowns are 20 joint angles and the object's 6 degrees of freedom. Every joint is a spring about its commanded
+angle, with the torque that presses the pads (model.py). Skin is a set of spheres, each a spring where it penetrates the
+object, with sticking friction: a second, sideways spring from the point of skin to the point of the object that first
+touched; it is released beyond the Coulomb limit (settle.py defines when, and the excess that skin may have at rest).
+The object bears its weight and the forces of the skin; a soft spring to its initial pose holds any free motion, and the
+force of that spring is reported as the residual.
 
-Each digit meets the others only through the object, so the Newton system is eliminated digit by digit (4 x 4), then the
-object (6 x 6). All sums run in one fixed order: a repetition comes out the same in any company, on any machine.
+Digits interact only through the object, so the Newton system is eliminated digit by digit (4 x 4), then the object
+(6 x 6). All sums have one fixed order: a repetition's result does not depend on the others, or on the machine.
 
 Arrays: 5 digits, 7 spheres of skin a digit, 15 of the palm, 50 in all, n repetitions last.
 """
@@ -48,7 +48,7 @@ def length(vectors: Floats) -> Floats:
 
 
 def turn(now: Floats, then: Floats) -> Floats:
-    """Return the small turn (3, n) from rotations `then` to `now` (3, 3, n), in hand axes."""
+    """Return the small rotation (3, n) from `then` to `now` (3, 3, n), in hand axes."""
     columns = cross(then.swapaxes(0, 1), now.swapaxes(0, 1))
     return add_up(columns) * 0.5
 
@@ -83,7 +83,7 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True)
 class Surfaces:
-    """Shapes, and which of them is each repetition's object: `whose` (n,), rising."""
+    """Shapes, and the index of each repetition's shape: `whose` (n,), ascending."""
 
     shapes: tuple[Shape, ...]
     whose: Indices
@@ -105,13 +105,13 @@ class Surfaces:
         return distance, pose.outward(normal), curvature
 
     def bars(self) -> Floats:
-        """Return 1 for repetitions (n,) whose object is straight along its own x, 0 for others."""
+        """Return 1 for repetitions (n,) whose object is straight along its x, 0 for others."""
         straight = np.array([isinstance(shape, Cylinder) for shape in self.shapes], dtype=np.float64)
         return straight[self.whose]
 
 
 def surfaces(shapes: Sequence[Shape], counts: Sequence[int]) -> Surfaces:
-    """Return the surfaces of `counts` repetitions of each shape; neighbours of one shape are asked together."""
+    """Return the surfaces of `counts` repetitions of each shape; neighbours of one shape are evaluated together."""
     different: list[Shape] = []
     whose: list[int] = []
     for shape, count in zip(shapes, counts, strict=True):
@@ -123,10 +123,10 @@ def surfaces(shapes: Sequence[Shape], counts: Sequence[int]) -> Surfaces:
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """What the numbers that come out should hardly depend on: halved, it tells how much they do.
+    """Numerical parameters on which results should hardly depend; halving them measures how much they do.
 
-    rest_n, rest_nmm  what may be left out of balance, on the object and on each joint
-    parts             how many parts every Newton step is taken in, each found anew; all counts of steps grow as much
+    rest_n, rest_nmm  residual force and moment allowed at rest, on the object and on each joint
+    parts             number of parts of every Newton step, each recomputed; all counts of steps grow as much
     """
 
     rest_n: float = 0.05
@@ -139,9 +139,9 @@ USUAL = Pace()
 
 @dataclass(frozen=True, slots=True)
 class Skin:
-    """How skin gives: newtons per mm that a sphere sinks in, per mm that it is dragged sideways, and friction.
+    """The compliance of skin: newtons per mm of penetration, per mm of sideways drag, and friction.
 
-    The first `soft_mm` give twice as easily, as pulp does, so that forces begin without a kink.
+    The first `soft_mm` are softer, like pulp, so that forces begin without a kink.
     """
 
     press_n_per_mm: float
@@ -150,14 +150,14 @@ class Skin:
     friction: float
 
     def press(self, sunk: Floats) -> tuple[Floats, Floats]:
-        """Return force and stiffness of spheres that sink in by `sunk` mm, any shape."""
+        """Return force and stiffness of spheres at a depth of `sunk` mm, any shape."""
         deep = np.maximum(sunk, 0.0)
         soft = np.minimum(deep, self.soft_mm)
         stiffness = self.press_n_per_mm * soft / self.soft_mm
         return stiffness * (deep - soft / 2.0), stiffness
 
     def drag(self, sunk: Floats) -> Floats:
-        """Return the stiffness sideways of spheres that sink in by `sunk` mm: it grows over the first `soft_mm` too."""
+        """Return the sideways stiffness of spheres at a depth of `sunk` mm: it grows over the first `soft_mm` too."""
         return self.drag_n_per_mm * np.minimum(np.maximum(sunk, 0.0), self.soft_mm) / self.soft_mm
 
 
@@ -173,11 +173,11 @@ class Case:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Command:
-    """What n hands of one size were told.
+    """The commands of n hands of one size.
 
-    torque  (20, n)  what presses the pads, N mm
+    torque  (20, n)  that presses the pads, N mm
     weight  (3, n)   of the objects, N
-    skin_points, object_points (50, 3, n)  what stuck together, in the axes of capsule and object
+    skin_points, object_points (50, 3, n)  points that stuck together, in the axes of capsule and object
     """
 
     hand: Hand
@@ -204,7 +204,7 @@ class Command:
 
 
 def command(cases: Sequence[Case]) -> Command:
-    """Return what all `cases`, of one hand, are told, one after the other."""
+    """Return the commands of all `cases`, of one hand, one after the other."""
     hand = cases[0].condition.hand
     counts = [len(case.grip_n) for case in cases]
     shapes = surfaces([case.condition.thing.shape for case in cases], counts)
@@ -229,9 +229,9 @@ Bits = NDArray[np.bool_]
 DIGIT_SPHERES = 35
 LIMIT_NMM_PER_RAD = 20000.0  # of a joint beyond its range
 HOLD_N_PER_MM, HOLD_NMM_PER_RAD = 0.05, 100.0  # the soft spring on the object
-_LEVER_MM = 30.0  # what a moment is held against a force by
+_LEVER_MM = 30.0  # the lever that converts moments to forces
 _LOW, _HIGH = (LIMITS_DEG.T[side, :, None] * (np.pi / 180.0) for side in (0, 1))
-# Which joints (4) move each of a digit's spheres of skin (7): three on its first segment, two on each of the others.
+# The joints (4) that move each of a digit's spheres of skin (7): three on its first segment, two on each of the others.
 _REACH = np.array([[1, 1, 0, 0]] * 3 + [[1, 1, 1, 0]] * 2 + [[1, 1, 1, 1]] * 2, dtype=np.float64)
 
 
@@ -240,15 +240,15 @@ class Balance:
 
     normal (50, 3, n)     of the surface at each sphere of skin
     sunk, presses, press_stiffness (50, n)   mm, N, N per mm
-    dragged (50, 3, n)    how far each is dragged sideways, mm
-    kept (50, n)          how much of that friction bears, 1 where it sticks
-    drag (50, n)          N per mm of `dragged`: less where it slips, so that no force exceeds `sticks` times Coulomb's
+    dragged (50, 3, n)    sideways drag of each, mm
+    kept (50, n)          share of it that friction bears, 1 if it sticks
+    drag (50, n)          N per mm of `dragged`: less if it slips, so that no force exceeds `sticks` times Coulomb's
     drags, forces (50, 3, n)   of friction, and in all, on each sphere of skin, N
-    bent (50, n)          how much less it resists sideways for the surface bends under it, N per mm
-    levers (50, 3, n)     where each touches, from the object's middle
-    jacobian (5, 7, 4, 3, n)   how the skin of the digits moves with their joints, mm per radian
-    on_object (6, n), on_joints (20, n)      what is not in balance, N and N mm
-    residual_n, residual_nmm (n,)            what skin and weight leave unbalanced on the object
+    bent (50, n)          reduction of its sideways stiffness by the curvature of the surface, N per mm
+    levers (50, 3, n)     its contact point, from the object's centre
+    jacobian (5, 7, 4, 3, n)   motion of the skin of the digits with their joints, mm per radian
+    on_object (6, n), on_joints (20, n)      the imbalance, N and N mm
+    residual_n, residual_nmm (n,)            unbalanced force and moment of skin and weight on the object
     """
 
     def __init__(self, command: Command, skin: Skin, angles: Floats, pose: Pose, sticks: float = 1.0) -> None:
@@ -272,7 +272,7 @@ class Balance:
 
     @cached_property
     def of_skin(self) -> Floats:
-        """Where the points of skin are (50, 3, n) that touch first."""
+        """Positions of the points of skin (50, 3, n) that touch first."""
         capsules = self.command.hand.sphere_capsules
         return self.skeleton.origins[capsules] + turned(self.skeleton.frames[capsules], self.command.skin_points)
 
@@ -286,8 +286,9 @@ class Balance:
         return np.where(self.presses > 0.0, np.minimum(most / far, 1.0), 0.0)
 
     def slipped(self) -> Floats:
-        """Return what of the object sticks to the skin (50, 3, n) after slipping: a drag beyond friction is let go, and
-        all of it where skin is off the object.
+        """Return the points of the object that stick to the skin (50, 3, n) after slipping.
+
+        A drag beyond friction is released, and all of it if skin is off the object.
         """
         return self.pose.inward(self.of_skin - self.kept[:, None] * self.dragged)
 
@@ -320,11 +321,11 @@ class Balance:
 
     @cached_property
     def unrest(self) -> Floats:
-        """How far (n,) the forces are from balance: moments count over 30 mm."""
+        """The imbalance (n,) of the forces, with moments over 30 mm."""
         force, moment, joints = self._left
         return np.maximum(np.maximum(force, moment / _LEVER_MM), joints / _LEVER_MM)
 
     def at_rest(self, pace: Pace) -> Bits:
-        """Return which repetitions (n,) have come to rest; none that holds a NaN."""
+        """Return the mask (n,) of repetitions at rest, without any that hold a NaN."""
         force, moment, joints = self._left
         return (force < pace.rest_n) & (moment < pace.rest_nmm) & (joints < pace.rest_nmm)

@@ -1,8 +1,8 @@
-"""What every contact model takes and gives, what drives a grasp, and how forces are shared by switches.
+"""The interface of contact models, the torques of a grasp, and the sharing of forces by switches.
 
-A contact solver gives one net force a capsule, whatever its kind; the switches of that capsule share it by their depth
-in the object, since all stand for the same area of skin. Nothing is lost: what reaches no switch fell between them, and
-is returned as such.
+Every contact solver returns one net force per capsule; the switches of that capsule share it by their depth in the
+object, since all represent the same area of skin. No force is lost: the part that reaches no switch fell between them,
+and is returned separately.
 """
 
 from collections.abc import Sequence
@@ -22,15 +22,15 @@ from ..body.shapes import Pose
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """How n repetitions of a condition came to rest, s switches.
+    """The rest of n repetitions of a condition, with s switches.
 
     posture_deg (n, 20), pose (n, 6)   as settled
     forces_n    (n, s)                 on the switches
     capsules_n  (n, 20)                net normal force on every capsule
-    between_n   (n,)                   what fell between the switches
-    settled     (n,)                   False where the model gave up or warned
-    residual_n, residual_nmm (n,)      force and moment on the object that nothing balances
-    steps                              of the solver, all repetitions together
+    between_n   (n,)                   force between the switches
+    settled     (n,)                   False if the model gave up or warned
+    residual_n, residual_nmm (n,)      unbalanced force and moment on the object
+    steps                              of the solver, for all repetitions together
     """
 
     posture_deg: Floats
@@ -46,8 +46,8 @@ class Contact:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Load:
-    """What n hands of a condition are told: to take posture_deg (n, 20) round an object at pose (n, 6), mm and radians,
-    and to press it with grip_n (n,) in all.
+    """The commands of n hands of a condition: posture_deg (n, 20) around an object at pose (n, 6), mm and radians, and
+    a total pressing force of grip_n (n,).
     """
 
     condition: Condition
@@ -60,7 +60,7 @@ class ContactModel(Protocol):
     """Closes hands on objects."""
 
     def solve(self, loads: Sequence[Load]) -> list[Contact]:
-        """Return how the hands rest, a Contact a load. No repetition depends on which others are solved beside it."""
+        """Return the rest of the hands, one Contact per load. Repetitions are independent of each other."""
         ...
 
 
@@ -96,10 +96,10 @@ def _add_moments(total: Floats, skeleton: Skeleton, capsule: int, centre: Floats
 
 
 def split(switches: Switches, depths: Floats, forces: Floats) -> tuple[Floats, Floats]:
-    """Return the force on every switch (s, n), and what fell between them (n,), in newtons.
+    """Return the force on every switch (s, n), and the force between them (n,), in newtons.
 
-    depths (s, n): how deep each contact's top lies in the object, mm, negative outside; forces (20, n): net normal
-    force on each capsule. Their sums agree to rounding.
+    depths (s, n): depth of each contact's top in the object, mm, negative outside; forces (20, n): net normal force on
+    each capsule. Their sums agree up to rounding.
     """
     sunk = np.maximum(depths, 0.0)
     shared, between = np.zeros_like(sunk), np.zeros(forces.shape[1])
@@ -107,7 +107,7 @@ def split(switches: Switches, depths: Floats, forces: Floats) -> tuple[Floats, F
         own = np.flatnonzero(switches.capsules == capsule)
         total = add_up(sunk[own])
         touched = total > 0.0
-        # Depth over depth first: force over a hair of depth would overflow.
+        # Depth over depth first: force over a tiny depth would overflow.
         shared[own] = sunk[own] / np.where(touched, total, 1.0) * forces[capsule]
         between += np.where(touched, 0.0, forces[capsule])
     return shared, between

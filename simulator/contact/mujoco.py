@@ -1,9 +1,9 @@
 """Grasps in MuJoCo: the hand takes a posture and a grip, time runs until it rests, and the contacts are read.
 
 The model has the same capsules on the same joints as hand.py, in metres and kilograms. Every capsule of a digit is a
-body whose own axes are those of `Skeleton.frames`; the palm's are fixed. The object slides and turns on springs about
-its commanded pose, a soft weld. Gravity is off: the true weight is applied as a force, so that a light object can be
-given inertia enough for a stable step.
+body with the axes of `Skeleton.frames`; the palm's are fixed. The object slides and rotates on springs about its
+commanded pose, a soft weld. Gravity is off: the true weight is applied as a force, so that a light object can have
+enough inertia for a stable step.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,22 +24,22 @@ from .model import GRAVITY, STIFFNESS, Contact, Load, split, torques
 JOINTS = len(DOF)
 OBJECT = "object"
 MM, N_MM = 1e-3, 1e-3  # one millimetre in metres, one newton millimetre in newton metres
-# What the dynamics need and rest does not know: rotor inertia of the joints (kg m2), density of the fingers (kg/m3),
-# and the least mass (kg) and moment of inertia (kg m2) of an object. The springs on them are then slow enough for 5 ms.
+# Parameters of the dynamics that do not affect rest: rotor inertia of the joints (kg m2), density of the fingers
+# (kg/m3), and the least mass (kg) and moment of inertia (kg m2) of an object. This suits steps of 5 ms.
 _ARMATURE, _DENSITY, _LEAST_MASS, _LEAST_INERTIA = 2e-4, 1000.0, 0.1, 2e-4
-# MuJoCo refuses what has next to no size (m) or mass (kg, kg m2): so much has everything, far below what is felt.
+# MuJoCo rejects tiny sizes (m) and masses (kg, kg m2): these minima are far below any effect.
 _LEAST_SIZE, _LEAST_PART = 1e-9, 1e-12
 # Share of a contact that MuJoCo's solver takes as a hard constraint; the skin is the rest.
 _IMPEDANCE = 0.9
 # MuJoCo's friction creeps, the less the higher this ratio: at 1 nothing sticks for as long as a grasp takes to settle.
 _GRIPS = 20.0
-# Bits of who meets whom: parts of the hand meet the object, never one another.
+# Collision bits: parts of the hand collide with the object, never with each other.
 _HAND, _OBJECT = 1, 2
 
 
 @dataclass(frozen=True, slots=True)
 class Dynamics:
-    """How time is stepped, and how skin, friction and the hold on the object are (effects/contact_mujoco.py)."""
+    """The time step, and the parameters of skin, friction and the hold on the object (effects/contact_mujoco.py)."""
 
     dt_ms: float
     steps: int
@@ -52,7 +52,7 @@ class Dynamics:
 
 def build(hand: Hand, thing: Thing, dynamics: Dynamics) -> mujoco.MjModel:
     """Return the model of `hand` and `thing`: joints 0 to 19 in the order of DOF, then the object's three slides and
-    its ball joint; the object is the last body; geoms bear the names of CAPSULES and `OBJECT`.
+    its ball joint; the object is the last body; geoms have the names of CAPSULES and `OBJECT`.
     """
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
@@ -126,8 +126,8 @@ def _add_capsule(
 
 
 def _span_mm(hand: Hand, capsule: int) -> tuple[float, float]:
-    """Return where the axis of a capsule begins and ends: at the joints, and where there is none at the first or last
-    sphere of skin (hand.py), so that a digit has its round tip and what passes the wrist touches nothing.
+    """Return the start and the end of a capsule's axis: at the joints, or without one at the first or last sphere of
+    skin (hand.py), so that a digit has its round tip, and the part beyond the wrist touches nothing.
     """
     skin = hand.sphere_offsets[hand.sphere_capsules == capsule]
     begins_at_joint, ends_at_joint = capsule < 15, capsule < 15 and capsule % 3 < 2
@@ -152,12 +152,12 @@ def _add_spring(body: mujoco.MjsBody, kind: mujoco.mjtJoint, axis: Floats, stiff
 
 
 def _critical(stiffness: float, inertia: float) -> float:
-    """Return the damping that brings a mass on a spring to rest soonest."""
+    """Return the critical damping of a mass on a spring."""
     return 2.0 * float(np.sqrt(stiffness * inertia))
 
 
 def _geom(shape: Shape) -> tuple[mujoco.mjtGeom, Floats, list[float]]:
-    """Return kind, half sizes in metres (none is 0) and turn of the primitive; rounded edges are left sharp."""
+    """Return kind, half sizes in metres (none is 0) and rotation of the primitive, with sharp edges."""
     half = np.maximum(np.array(shape.extent_mm()) / 2 * MM, _LEAST_SIZE)
     straight = [1.0, 0.0, 0.0, 0.0]
     match shape:
@@ -170,7 +170,7 @@ def _geom(shape: Shape) -> tuple[mujoco.mjtGeom, Floats, list[float]]:
 
 
 def _inertia(thing: Thing) -> tuple[float, Floats]:
-    """Return mass and principal moments of a box of the object's size, each at least what a stable step needs."""
+    """Return mass and principal moments of a box of the object's size, each at least the minimum for a stable step."""
     mass = max(thing.mass_kg, _LEAST_MASS)
     square = (np.array(thing.shape.extent_mm()) * MM) ** 2
     return mass, np.maximum(mass * (square.sum() - square) / 12.0, _LEAST_INERTIA)
@@ -188,7 +188,7 @@ def _quaternion(frame: Floats) -> Floats:
 
 
 def _soften(model: mujoco.MjModel, skin_n_per_m: float) -> None:
-    """Give every capsule skin of one stiffness, critically damped.
+    """Set skin of one stiffness on every capsule, critically damped.
 
     A contact that rests at depth r bears aref / R = (solref / d^2) d r * d / ((1 - d) A), with impedance d and A the
     sum of both bodies' inverse masses (MuJoCo's documentation, Computation, Dynamics): solved for solref.
@@ -200,10 +200,10 @@ def _soften(model: mujoco.MjModel, skin_n_per_m: float) -> None:
 
 _SLIDES = slice(JOINTS, JOINTS + 3)
 _BALL = slice(JOINTS + 3, JOINTS + 6)
-_TURN = slice(JOINTS + 3, JOINTS + 7)  # of qpos, where a turn takes four numbers
-# At rest: neither joint nor object turns faster than this (rad/s; motion dies within some 20 ms, so little of it moves
-# a fingertip by tenths of a mm) or slides as fast, at a lever's end (m); and what nothing balances on the object is at
-# most so many newtons and such a share of all contacts. On a soft hold, little damped, balance alone is no rest.
+_TURN = slice(JOINTS + 3, JOINTS + 7)  # of qpos, where a rotation takes four numbers
+# Limits at rest: angular speed of joints and object (rad/s; motion decays within about 20 ms, so this moves a fingertip
+# by tenths of a mm at most), sliding speed as that of a lever's end (m); the unbalanced force on the object in newtons,
+# and as a share of all contacts. With a soft, weakly damped hold, balance alone does not imply rest.
 _SPEED, _LEVER, _UNBALANCED_N, _UNBALANCED_SHARE = 0.1, 0.03, 0.1, 0.02
 
 
@@ -220,7 +220,7 @@ class MujocoContact:
     layout: tuple[Patch, ...]
 
     def solve(self, loads: Sequence[Load]) -> list[Contact]:
-        """Return how the hands rest (contact.ContactModel), one repetition after another."""
+        """Return the rest of the hands (contact.ContactModel), one repetition after another."""
         with _warnings_counted_only():
             return [self._solve(load) for load in loads]
 
@@ -230,7 +230,7 @@ class MujocoContact:
         angles = np.radians(load.posture_deg.T)
         moments = load.grip_n * torques(condition, hand.skeleton(angles), Pose.of(load.pose.T))
         pair = Pair(hand, condition.thing, condition.held.down, self.dynamics)
-        rests = [pair.rest(*told) for told in zip(angles.T, load.pose, moments.T, strict=True)]
+        rests = [pair.rest(*commands) for commands in zip(angles.T, load.pose, moments.T, strict=True)]
         angles, pose, capsules_n, residual_n, residual_nmm, at_rest = map(np.array, zip(*rests, strict=True))
         switches = Switches(hand, self.layout)
         gaps = Pose.of(pose.T).distance(shape, switches.tops(hand.skeleton(angles.T)))[0]
@@ -249,7 +249,7 @@ class MujocoContact:
 
 
 class Pair:
-    """A hand and an object in MuJoCo, used again for every repetition."""
+    """A hand and an object in MuJoCo, reused for every repetition."""
 
     def __init__(self, hand: Hand, thing: Thing, down: Floats, dynamics: Dynamics) -> None:
         self._dynamics = dynamics
@@ -261,8 +261,8 @@ class Pair:
         self._capsules = np.array([CAPSULES.index(name) if name != OBJECT else -1 for name in names])
 
     def rest(self, angles: Floats, pose: Floats, moments: Floats) -> Settled:
-        """Return how the hand rests that is told angles (20,) in radians round an object at pose (6,), and whose
-        muscles turn its joints by moments (20,) in N mm. Nothing of the grasp before is left in the data.
+        """Return the rest of a hand commanded to angles (20,) in radians around an object at pose (6,), with
+        muscle moments (20,) in N mm. No data of the previous grasp remains.
         """
         data, model = self._data, self._model
         mujoco.mj_resetData(model, data)
@@ -291,9 +291,7 @@ class Pair:
         return angles, _pose(data.qpos), capsules_n, residual_n, residual_nmm, stands_still and balanced
 
     def _contacts(self) -> tuple[Floats, Floats, Floats]:
-        """Return the normal forces on the capsules (20,), and on the object the contacts' force and their moment about
-        its centre (3,).
-        """
+        """Return the normal forces on the capsules (20,), and the contacts' force and moment (3,) on the object."""
         contacts = self._data.contact
         meeting = contacts.efc_address >= 0
         address = contacts.efc_address[meeting]
@@ -310,7 +308,7 @@ class Pair:
 
 @contextmanager
 def _warnings_counted_only() -> Iterator[None]:
-    """Keep MuJoCo from writing a warning to the console and into a file of the working folder: `MjData` counts them."""
+    """Suppress MuJoCo's warnings on the console and in a file of the working folder: `MjData` counts them."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda message: None)
     try:

@@ -1,4 +1,4 @@
-"""Newton's method, until every repetition is at rest."""
+"""Newton's method to bring every repetition to rest."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -63,7 +63,7 @@ def backward(lower: Floats, right: Floats) -> Floats:
 
 
 def solve_arrow(limbs: Floats, coupling: Floats, body: Floats, on_limbs: Floats, on_body: Floats) -> Floats:
-    """Solve systems of d limbs that meet only in one body, by eliminating the limbs (Schur's complement).
+    """Solve systems of d limbs coupled only through one body, by eliminating the limbs (Schur complement).
 
     limbs (d, 4, 4, n), coupling (d, 4, 6, n), body (6, 6, n); right sides on_limbs (d, 4, n), on_body (6, n).
     Returns (4 d + 6, n).
@@ -87,12 +87,12 @@ def solve_arrow(limbs: Floats, coupling: Floats, body: Floats, on_limbs: Floats,
 Indices = NDArray[np.intp]
 
 _LARGEST_STEP = np.array([0.12] * 20 + [3.0] * 3 + [0.12] * 3)[:, None]  # radians; mm; radians
-_LARGEST_SINK_MM = 1.0  # what skin may sink in deeper by one step
+_LARGEST_SINK_MM = 1.0  # largest increase of penetration in one step
 _HOLD_STIFFNESS = np.array([HOLD_N_PER_MM] * 3 + [HOLD_NMM_PER_RAD] * 3)[:, None]
 
 
 def newton_step(balance: Balance) -> Floats:
-    """Return the step (26, n) of angles, position and turn; shortened, where it is long or would drive skin in deep."""
+    """Return the step (26, n) of angles, position and rotation; shortened if it is long or increases penetration."""
     joints, coupling, body = stiffness(balance)
     found = solve_arrow(joints, coupling, body, balance.on_joints.reshape(5, 4, -1), balance.on_object)
     longest: Floats = (np.abs(found) / _LARGEST_STEP).max(axis=0)
@@ -101,7 +101,7 @@ def newton_step(balance: Balance) -> Floats:
 
 
 def _unhurt(balance: Balance, step: Floats) -> Floats:
-    """Return how much of a step (n,) may be taken so that no skin sinks in much deeper than the step foresees."""
+    """Return the share of a step (n,) at which no skin penetrates much deeper than the step predicts."""
     n = step.shape[1]
     moved = balance.jacobian * step[:20].reshape(5, 1, 4, 1, n)
     nearing = step[20:23] + cross(np.broadcast_to(step[23:], balance.levers.shape), balance.levers)
@@ -114,7 +114,7 @@ def _unhurt(balance: Balance, step: Floats) -> Floats:
 def stiffness(balance: Balance) -> tuple[Floats, Floats, Floats]:
     """Return the matrix in blocks: joints (5, 4, 4, n), joints with object (5, 4, 6, n), object (6, 6, n).
 
-    Only spheres that touch in any of the repetitions are summed: the others would add nothing but zeros.
+    Only spheres that touch in any of the repetitions are summed: the others would only add zeros.
     """
     n = balance.angles.shape[1]
     joints, coupling, body = np.zeros((5, 4, 4, n)), np.zeros((5, 4, 6, n)), np.zeros((6, 6, n))
@@ -136,14 +136,14 @@ def stiffness(balance: Balance) -> tuple[Floats, Floats, Floats]:
 
 
 def _resisted(balance: Balance, rows: Floats, spheres: Indices) -> Floats:
-    """Return K r for rows r (m, k, 3, n), K being what the skin of m `spheres` resists with.
+    """Return K r for rows r (m, k, 3, n), with K the stiffness of the skin of m `spheres`.
 
-    K = sideways (I - n n^T) + press n n^T. Where the surface bends, pressing skin that moves sideways is pushed on:
-    that lessens K across a ball, and across a bar but not along it.
+    K = sideways (I - n n^T) + press n n^T. On a curved surface, pressing skin is pushed on when it moves sideways: this
+    reduces K across a ball, and across a bar but not along it.
 
-    Left out, so that K stays symmetric and positive: that sticking and slipping skin resists more where it sinks in
-    deeper, that slipping skin resists no more along its slip, that points of contact wander over skin and edges, and
-    that levers and normals turn with what they press.
+    Omitted, so that K stays symmetric and positive: sticking and slipping skin resists more at greater depth, slipping
+    skin does not resist along its slip, contact points move over skin and edges, and levers and normals rotate with
+    what they press.
     """
     normal, bent = balance.normal[spheres, None], balance.bent[spheres, None]
     sideways = balance.drag[spheres, None] - bent
@@ -160,7 +160,7 @@ def _resisted(balance: Balance, rows: Floats, spheres: Indices) -> Floats:
 
 
 def _body_rows(levers: Floats) -> Floats:
-    """Return how points of the object at `levers` (m, 3, n) move with its six degrees of freedom: (m, 6, 3, n)."""
+    """Return the motion (m, 6, 3, n) of the object's points at `levers` (m, 3, n) with its six degrees of freedom."""
     rows = np.zeros((len(levers), 6, 3, levers.shape[2]))
     x, y, z = levers[:, 0], levers[:, 1], levers[:, 2]
     for axis in range(3):
@@ -173,25 +173,25 @@ def _body_rows(levers: Floats) -> Floats:
 
 Bits = NDArray[np.bool_]
 
-# Where skin sticks and where it slips is found in these steps. Then points that stick are left alone, and skin may bear
-# so many times what it slips at: friction that follows the pressing force in every step may never come to rest.
+# Sticking and slipping skin is determined in these steps. Then sticking points stay fixed, and skin may bear this
+# multiple of its slip limit: friction that follows the pressing force in every step may never come to rest.
 _SEARCH = 10
 _SLIP_STEPS = frozenset((*range(_SEARCH), 18, 19))
 _STICKS = 2.0
-# A step counts as worse where it leads so much further from balance; it is shortened no further than to this part.
+# A step counts as worse if it increases the imbalance by this factor; it is shortened at most to this part.
 _WORSE, _LEAST_FRACTION = 1.6, 0.1
-# From this step on only half of each is taken: what has not come to rest by then swings to and fro.
+# From this step on only half of each is taken: repetitions not at rest by then oscillate.
 _HALF_FROM = 24
 
 
 @dataclass(slots=True)
 class Rest:
-    """Where n hands came to rest.
+    """The rest of n hands.
 
     angles (20, n) in radians, pose
     presses (50, n), drags (50, 3, n)  on the spheres of skin in N: along the normals, and of friction
-    residual_n, residual_nmm (n,)  force and moment on the object that skin and weight leave unbalanced
-    settled (n,)                   False where the forces never came into balance
+    residual_n, residual_nmm (n,)  unbalanced force and moment of skin and weight on the object
+    settled (n,)                   False if the forces never came into balance
     steps   (n,)                   Newton steps taken
     """
 
@@ -205,17 +205,17 @@ class Rest:
     steps: NDArray[np.int64]
 
     @classmethod
-    def of(cls, told: Command) -> "Rest":
-        """Return where hands are before any step."""
-        n = told.angles.shape[1]
-        pose = Pose(told.pose.position.copy(), told.pose.rotation.copy())
-        spheres = len(told.hand.sphere_capsules)
+    def of(cls, target: Command) -> "Rest":
+        """Return the state of the hands before any step."""
+        n = target.angles.shape[1]
+        pose = Pose(target.pose.position.copy(), target.pose.rotation.copy())
+        spheres = len(target.hand.sphere_capsules)
         nowhere, none = np.zeros((spheres, n)), np.zeros(n)
         drags, steps = np.zeros((spheres, 3, n)), np.zeros(n, dtype=np.int64)
-        return cls(told.angles.copy(), pose, nowhere, drags, none, none.copy(), none > 0.0, steps)
+        return cls(target.angles.copy(), pose, nowhere, drags, none, none.copy(), none > 0.0, steps)
 
     def note(self, which: Indices, balance: Balance, at_rest: Bits, count: int) -> None:
-        """Enter where repetitions `which` are after `count` steps, and whether they are at rest."""
+        """Store the state of repetitions `which` after `count` steps, and whether they are at rest."""
         self.angles[:, which], self.presses[:, which] = balance.angles, balance.presses
         self.drags[..., which] = balance.drags
         self.pose.position[:, which], self.pose.rotation[..., which] = balance.pose.position, balance.pose.rotation
@@ -229,33 +229,32 @@ class Rest:
 
 
 def close(cases: Sequence[Case], skin: Skin, most_steps: int, pace: Pace = USUAL) -> list[Rest]:
-    """Return how the hands of `cases`, all of one size, come to rest, a Rest a case."""
-    told = command(cases)
-    rest, walk = Rest.of(told), _Walk.start(told)
-    left = np.arange(told.angles.shape[1])
+    """Return the rest of the hands of `cases`, all of one size, one Rest per case."""
+    target = command(cases)
+    rest, walk = Rest.of(target), _Walk.start(target)
+    left = np.arange(target.angles.shape[1])
     for count in range(most_steps * pace.parts + 1):
         whole = count // pace.parts
-        balance = Balance(told, skin, walk.angles, walk.pose, 1.0 if whole < _SEARCH else _STICKS)
+        balance = Balance(target, skin, walk.angles, walk.pose, 1.0 if whole < _SEARCH else _STICKS)
         slipping, at_rest = whole in _SLIP_STEPS, balance.at_rest(pace)
         if slipping:
-            told = replace(told, object_points=balance.slipped())
+            target = replace(target, object_points=balance.slipped())
         rest.note(left, balance, at_rest, count)
         going = np.flatnonzero(~at_rest)
         if not going.size or whole == most_steps:
             break
         walk = walk.onward(balance, going, (0.5 if whole >= _HALF_FROM else 1.0) / pace.parts, always=slipping)
         if going.size < left.size:
-            left, told = left[going], told.rows(going)
+            left, target = left[going], target.rows(going)
     ends = np.cumsum([len(case.grip_n) for case in cases])
     return [rest.part(int(end) - len(case.grip_n), int(end)) for case, end in zip(cases, ends, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)
 class _Walk:
-    """Where r repetitions are looked for: at `fraction` of a Newton step from the best place so far.
+    """The current candidates of r repetitions: at `fraction` of a Newton step from the best candidate so far.
 
-    A step that leads much further from balance is shortened, again and again: it ran into a contact that it did not
-    foresee.
+    A step that much increases the imbalance is shortened repeatedly: it ran into a contact that it did not predict.
     """
 
     from_angles: Floats
@@ -267,13 +266,13 @@ class _Walk:
     pose: Pose
 
     @classmethod
-    def start(cls, told: Command) -> "_Walk":
-        n = told.angles.shape[1]
+    def start(cls, target: Command) -> "_Walk":
+        n = target.angles.shape[1]
         far = np.full(n, np.inf)
-        return cls(told.angles, told.pose, np.zeros((26, n)), np.ones(n), far, told.angles, told.pose)
+        return cls(target.angles, target.pose, np.zeros((26, n)), np.ones(n), far, target.angles, target.pose)
 
     def onward(self, balance: Balance, going: Indices, share: float, *, always: bool) -> "_Walk":
-        """Return the next places of the repetitions `going`, a `share` of a step on from where these are."""
+        """Return the next candidates of the repetitions `going`, a `share` of a step further."""
         unrest = balance.unrest[going]
         better = (unrest < _WORSE * self.unrest[going]) | (self.fraction[going] < _LEAST_FRACTION) | always
         step = np.where(better, newton_step(balance)[:, going], self.step[:, going])

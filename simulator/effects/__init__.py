@@ -1,1 +1,1 @@
-"""The effects, one module each: `MEMBER` is the record of it (pipeline/effect.py)."""
+"""The effects, one per module: `MEMBER` is its record (pipeline/effect.py)."""

@@ -1,4 +1,4 @@
-"""Switches that are not read at once: sixteen to a port, one port after the other over the bus."""
+"""Switches that are not read simultaneously: sixteen per port, one port after the other over the bus."""
 
 from typing import Annotated
 
@@ -16,7 +16,7 @@ from ..streams import Draw
 
 
 class Parameters(EffectParameters, frozen=True):
-    """Microseconds to read one port, and how much longer on average; that share is drawn from an exponential law.
+    """Microseconds to read one port, and the mean of an additional exponential delay.
 
     The default is one MCP23017 at 400 kHz: 5 bytes on the wire are 48 clocks, and the bus must then be free for 1.3 us.
     """
@@ -26,16 +26,16 @@ class Parameters(EffectParameters, frozen=True):
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that says how long after the frame's start each switch is read: when its port's reading ends.
+    """Return the step that sets the delay of each switch from the frame's start: the end of its port's reading.
 
-    Raises SceneError where all ports together take longer than there is from one frame to the next.
+    Raises SceneError if all ports together take longer than the period of frames.
     """
     there = port_count(len(murakami160()))
     scan_us = there * (parameters.us_per_port + parameters.jitter_us)
     if scan_us > setting.period_us:
         raise SceneError(
-            f"effects.bus.latency: {there} ports take {scan_us:g} us on average, and there are {setting.period_us} us"
-            " from one frame to the next: lower us_per_port, jitter_us or recording.rate_hz"
+            f"effects.bus.latency: {there} ports take {scan_us:g} us on average, and the period of frames is"
+            f" {setting.period_us} us: lower us_per_port, jitter_us or recording.rate_hz"
         )
     rows = drawn_rows(setting)
 

@@ -12,16 +12,17 @@ from ..pipeline.effect import CONTACT_READS, CONTACT_WRITES, Effect, EffectParam
 
 
 class Parameters(EffectParameters, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How MuJoCo steps time, and what skin, friction and the hold on the object are.
+    """The time step, and the parameters of skin, friction and the hold on the object.
 
-    dt_ms, steps     60 steps of 5 ms come closer to rest than 100 of 2 ms, and cost less; what steps too long make of a
-                     grasp is reported as not settled
-    friction         of skin on things: ours, of the order measured on dry fingertips (0.5 to 1.5)
+    dt_ms, steps     60 steps of 5 ms come closer to rest than 100 of 2 ms, and cost less; a grasp that fails because of
+                     too long steps is reported as not settled
+    friction         of skin on objects: ours, of the order measured on dry fingertips (0.5 to 1.5)
     skin_n_per_mm    stiffness of the skin of one capsule: ours, of the order measured on finger pulps pressed by a few
                      newtons
-    reach_mm         a switch shares in the force on its capsule if its top comes as near the object as this: the glove
-                     bridges what it stands out less, as in contact.quasistatic
-    weld_n_per_m, weld_nm_per_rad    what holds the object to its commanded pose; a soft hold lets a pinched one creep
+    reach_mm         a switch shares the force on its capsule if its top is at most this far from the object: the glove
+                     bridges the difference, as in contact.quasistatic
+    weld_n_per_m, weld_nm_per_rad    the hold of the object at its commanded pose; with a soft one a pinched object
+                     creeps
     """
 
     dt_ms: Annotated[float, Meta(gt=0.0, le=10.0)] = 5.0
@@ -34,7 +35,7 @@ class Parameters(EffectParameters, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 def model(parameters: Parameters, setting: Setting) -> ContactModel:
-    """Return the contact model. Raises SimMissingError where MuJoCo is not installed: a scene is read without it."""
+    """Return the contact model. Raises SimMissingError if MuJoCo is not installed; reading a scene does not need it."""
     try:
         from ..contact.mujoco import Dynamics, MujocoContact
     except ImportError as missing:

@@ -1,4 +1,4 @@
-"""contact.quasistatic: hand and object at rest, in numpy. The contact model of every scene that names no other."""
+"""contact.quasistatic: hand and object at rest, in numpy. The default contact model of a scene."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -17,16 +17,16 @@ from ..contact.settle import Rest, close
 from ..pipeline.effect import CONTACT_READS, CONTACT_WRITES, Effect, EffectParameters, Setting
 
 _Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)]
-# So many repetitions are solved at a time: enough to outweigh numpy's calls, few enough for the processor's cache.
+# Repetitions solved at a time: enough to amortise numpy's calls, few enough for the processor's cache.
 _TOGETHER = 512
 
 
 class Parameters(EffectParameters, frozen=True):
-    """How skin gives, and how long to look for rest. Defaults are ours, of the order of published finger pulp.
+    """The compliance of skin, and the limit of steps. Defaults are ours, of the order of published finger pulp.
 
-    press_n_per_mm, soft_mm  each place of skin, and how far it gives more easily at first
+    press_n_per_mm, soft_mm  stiffness of each point of skin, and the depth of its softer first part
     drag_n_per_mm, friction  sideways, until it slips
-    reach_mm                 how far above its top a switch feels an object: skin bulges, and a glove spreads the load
+    reach_mm                 height above its top at which a switch touches: skin bulges, and a glove spreads the load
     most_steps               Newton steps before a repetition counts as not settled
     """
 
@@ -47,7 +47,7 @@ class Quasistatic:
         self.reach_mm, self.most_steps = parameters.reach_mm, parameters.most_steps
 
     def solve(self, loads: Sequence[Load]) -> list[Contact]:
-        """Return how the hands rest (contact.ContactModel)."""
+        """Return the rest of the hands (contact.ContactModel)."""
         solved: list[Contact] = []
         for _, same_hand in groupby(loads, key=lambda load: load.condition.hand.size):
             for together in _bundles(list(same_hand)):

@@ -1,8 +1,8 @@
-"""First contact is no blow: the grip grows, and each switch closes when the force on it passes its threshold.
+"""The grip grows gradually, and each switch closes when the force on it passes its threshold.
 
-The contact model is solved at evenly spaced levels of grip; between them force grows in a straight line, from nothing
-at the first touch. On release the same happens backwards.
-A switch that is pressed only in passing closes and opens once.
+The contact model is solved at evenly spaced levels of grip; forces are interpolated linearly, from 0 at the first
+touch. The release runs in reverse.
+A switch that is pressed only temporarily closes and opens once.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from ..streams import Draw
 
 
 class Parameters(EffectParameters, frozen=True):
-    """How long the grip grows, in milliseconds, and at how many levels it is solved.
+    """The duration of the growth in milliseconds, and the number of solved levels.
 
     The default time is ours, of the order of the load phase of lifts (Johansson and Westling 1984, Exp. Brain Res. 56).
     """
@@ -31,7 +31,7 @@ class Parameters(EffectParameters, frozen=True):
 
 
 def prepare(parameters: Parameters, setting: Setting, contact: ContactModel) -> Together:
-    """Return what times every switch. Raises SceneError where the grip is not full when the row is read."""
+    """Return the step that times every switch. Raises SceneError if the grip is not full when the row is read."""
     rise_us = 1e3 * parameters.rise_ms
     if rise_us > setting.hold_us:
         raise SceneError(
@@ -52,22 +52,22 @@ def prepare(parameters: Parameters, setting: Setting, contact: ContactModel) -> 
 
 
 def _loads(batch: Batch, levels: int) -> list[Load]:
-    """Return what a batch tells its hands at every level of grip below the full one."""
-    told = (batch.condition, batch.commanded_deg, batch.commanded_pose)
-    return [Load(*told, batch.grip_n * (level / levels)) for level in range(1, levels)]
+    """Return the loads of a batch at every level of grip below the full one."""
+    commanded = (batch.condition, batch.commanded_deg, batch.commanded_pose)
+    return [Load(*commanded, batch.grip_n * (level / levels)) for level in range(1, levels)]
 
 
 def _time(batch: Batch, grown: Sequence[Contact], rise_us: float) -> None:
-    """Enter when the switches of a batch close and open, from the contacts at the levels below the full grip, and how
-    forces grow.
+    """Set the times at which the switches of a batch close and open, and the growth of forces, from the contacts at the
+    levels below the full grip.
 
-    A repetition that does not settle at one of them has not settled, and is told by what was left there.
+    A repetition that does not settle at one level counts as not settled, with the residuals there.
     """
     forces = np.array([np.zeros_like(batch.forces_n), *(one.forces_n for one in grown), batch.forces_n])
     batch.ramp = Ramp(forces, rise_us)
     up_us, down_us = crossings(forces, batch.thresholds_n, rise_us / (len(grown) + 1))
     lets_go = (batch.off_us != NEVER) & (up_us != NEVER) & (down_us == NEVER)
-    # Backwards from where the hand lets go, the force that first closed a switch is the last to keep it closed.
+    # In reverse from the release, the force that first closed a switch is the last to keep it closed.
     batch.off_us = np.where(lets_go, batch.off_us + np.where(lets_go, round(rise_us) - up_us, 0), down_us)
     batch.on_us = up_us
     for one in grown:

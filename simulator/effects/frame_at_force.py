@@ -1,7 +1,7 @@
-"""Initial contact, newton by newton: frames come when the place that is pressed hardest bears so and so much.
+"""Initial contact by force: frames come when the most loaded place bears given forces.
 
-Of the frames from contact to read-out the first comes at contact and the last as ever, at read-out; those between are
-spread evenly over the force. What never bears so much has its frame at read-out.
+Of the frames from contact to read-out the first comes at contact and the last, as usual, at read-out; those between are
+spread evenly over the force. If the force is never reached, the frame comes at read-out.
 """
 
 from typing import Annotated
@@ -16,13 +16,13 @@ from ..streams import Draw
 
 
 class Parameters(EffectParameters, frozen=True):
-    """The force on the place that is pressed hardest, in newtons, of the last frame but one."""
+    """The force on the most loaded place, in newtons, at the last frame but one."""
 
     to_n: Annotated[float, Meta(gt=0.0, le=100.0)] = 1.0
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that moves the frames. Raises SceneError where there are too few."""
+    """Return the step that moves the frames. Raises SceneError if there are too few."""
     times = frame_times(setting)
     held = np.flatnonzero((times >= 0) & (times <= setting.hold_us))
     between = len(held) - 2
@@ -34,7 +34,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 
     def step(batch: Batch, draw: Draw) -> None:
         if batch.ramp is None:
-            return  # All force is there at once.
+            return  # The full force is present at once.
         steps = [batch.ramp.reached_us(parameters.to_n * number / between) for number in range(1, between + 1)]
         moved = batch.frame_us.copy()
         moved[:, held[:-1]] = np.minimum(np.column_stack([np.zeros(len(batch), np.int64), *steps]), setting.hold_us)

@@ -1,4 +1,4 @@
-"""Frames that do not start on the beat: the computer's clock ticks evenly, its scheduler does not."""
+"""Frames that do not start on time: the computer's clock is regular, its scheduler is not."""
 
 from typing import Annotated
 
@@ -11,13 +11,13 @@ from ..streams import Draw
 
 
 class Parameters(EffectParameters, frozen=True):
-    """How far frames stray from their beat: standard deviation in microseconds."""
+    """Standard deviation of the start of frames in microseconds."""
 
     sd_us: Annotated[float, Meta(gt=0.0, le=1e6)] = 300.0
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that moves every frame by a normal deviate of its own, and keeps them in order."""
+    """Return the step that moves every frame by an independent normal deviate, and keeps them in order."""
     rows = drawn_rows(setting)
 
     def step(batch: Batch, draw: Draw) -> None:

@@ -1,4 +1,4 @@
-"""No grasp is pressed twice alike: grip force varies from repetition to repetition."""
+"""Grip force varies from repetition to repetition."""
 
 from typing import Annotated
 
@@ -12,7 +12,7 @@ from ..streams import Draw
 
 
 class Parameters(EffectParameters, frozen=True):
-    """Standard deviation of the logarithm of the force: 0.25 is about a quarter of it. Fitted to the paper's rates."""
+    """Standard deviation of the logarithm of the force: 0.25 is about a quarter. Fitted to the paper's rates."""
 
     log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.25
 

@@ -1,4 +1,4 @@
-"""No object is taken twice at the same place: its pose in the hand varies from repetition to repetition."""
+"""The object's pose in the hand varies from repetition to repetition."""
 
 from typing import Annotated
 
@@ -20,7 +20,7 @@ class Parameters(EffectParameters, frozen=True):
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that shifts and turns the object by normal deviates."""
+    """Return the step that shifts and rotates the object by normal deviates."""
 
     def step(batch: Batch, draw: Draw) -> None:
         deviates = draw.per_repetition(6).normal()
@@ -32,11 +32,11 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 
 
 def turned(vectors: Floats, turn: Floats) -> Floats:
-    """Return rotation vectors (n, 3), none a whole turn, after a small further `turn` (n, 3) about hand axes.
+    """Return rotation vectors (n, 3), none a whole turn, after a small additional `turn` (n, 3) about hand axes.
 
     To first order in `turn`, by the inverse left Jacobian of the rotation group (Barfoot 2017, State Estimation for
-    Robotics, eq. 7.77), which needs no inverse sine. It leaves out at most half the square of the turn in radians: of
-    5 degrees 0.2, of 30 degrees 8.
+    Robotics, eq. 7.77), which needs no inverse sine. Its error is at most half the square of the turn in radians: for
+    5 degrees 0.2, for 30 degrees 8.
     """
     half = np.sqrt(add_up((vectors * vectors).T)) / 2.0
     sine, cosine = sincos(half)

@@ -1,4 +1,4 @@
-"""No grasp is shaped twice alike: joint angles vary from repetition to repetition."""
+"""Joint angles vary from repetition to repetition."""
 
 from typing import Annotated
 
@@ -12,13 +12,13 @@ from ..streams import Draw
 
 
 class Parameters(EffectParameters, frozen=True):
-    """Standard deviation of each joint angle, one by one. The default was fitted to the paper's rates."""
+    """Standard deviation of each joint angle, independently. The default was fitted to the paper's rates."""
 
     sd_deg: Annotated[float, Meta(ge=0.0, le=45.0)] = 1.5
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that shifts every joint by a normal deviate of its own, within what it can reach."""
+    """Return the step that shifts every joint by an independent normal deviate, within its range."""
 
     def step(batch: Batch, draw: Draw) -> None:
         shifted = batch.posture_deg + parameters.sd_deg * draw.per_repetition(len(DOF)).normal()

@@ -1,4 +1,4 @@
-"""Everybody holds things in a way of their own: habits of the hand, and of each grasp type, and how hard one grips."""
+"""Subjects differ: in habits of posture, general and by grasp type, and in grip force."""
 
 from typing import Annotated
 
@@ -18,8 +18,8 @@ _Degrees = Annotated[float, Meta(ge=0.0, le=45.0)]
 class Parameters(EffectParameters, frozen=True):
     """Standard deviations between subjects. All defaults are ours.
 
-    sd_deg        of each joint angle, the same in all that the subject does
-    habit_sd_deg  of each joint angle besides, for each grasp type of the subject's
+    sd_deg        of each joint angle, the same in all grasps of the subject
+    habit_sd_deg  additional, of each joint angle, for each grasp type of the subject
     log_sd        of the logarithm of the grip force
     """
 
@@ -29,7 +29,7 @@ class Parameters(EffectParameters, frozen=True):
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that gives the posture and the grip of a batch its subject's style."""
+    """Return the step that applies the subject's style to the posture and the grip of a batch."""
 
     def step(batch: Batch, draw: Draw) -> None:
         own = draw.per_subject(len(DOF) + 1).normal()
@@ -43,7 +43,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 
 MEMBER = Effect(
     name="hand.style",
-    summary="every subject has habits of posture, also by grasp type, and a grip of their own",
+    summary="every subject has individual habits of posture, also by grasp type, and grip force",
     stage="posture",
     place=1,
     reads=("posture_deg", "grip_n"),

@@ -1,9 +1,9 @@
-"""From one grasp to the next: the hand leaves the posture of the trial before, opens, and closes on the object.
+"""From one grasp to the next: the hand leaves the posture of the previous trial, opens, and closes on the object.
 
-In a scene with rests it comes from its rest, and after the release goes back the same way, in the same time.
+In a scene with rests it comes from its rest, and after the release returns on the same path, in the same time.
 
-Joints follow a minimum-jerk path (Flash and Hogan 1985, J. Neurosci. 5: 1688, from point to point). On top of it all
-flexion is undone for a while, most at two thirds of the way, where the grip aperture of a reaching hand is largest
+Joints follow a minimum-jerk path (Flash and Hogan 1985, J. Neurosci. 5: 1688, from point to point). In addition all
+flexion is reduced on the way, most at two thirds of it, where the grip aperture of a reaching hand is largest
 (Jeannerod 1984, J. Motor Behav. 16: 235).
 """
 
@@ -26,7 +26,7 @@ _BUMP = 3.0**9 / 2.0**6  # makes t^6 (1 - t)^3 one at its top, t = 2/3
 
 
 class Parameters(EffectParameters, frozen=True):
-    """By how many degrees every joint that flexes opens on the way."""
+    """The opening of every flexing joint on the way, in degrees."""
 
     opening_deg: Annotated[float, Meta(ge=0.0, le=90.0)] = 20.0
 
@@ -34,7 +34,7 @@ class Parameters(EffectParameters, frozen=True):
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that moves the angles of the frames before contact, and after the release where the hand rests.
 
-    Raises SceneError where there are none before contact.
+    Raises SceneError if there are none before contact.
     """
     if not (frame_times(setting) < 0).any():
         raise SceneError(
@@ -61,7 +61,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 def path(start_deg: Floats, end_deg: Floats, way: Floats, opening_deg: float) -> Floats:
     """Return the joint angles (n, F, 20) between postures (n, 20) when a share `way` (n, F) of the time has gone.
 
-    Joints open no further than they can, and stand still at both ends.
+    Joints stay within their ranges, and are still at both ends.
     """
     t = way[:, :, None]
     cubed = t * t * t

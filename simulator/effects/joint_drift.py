@@ -11,13 +11,13 @@ from ..streams import Draw
 
 
 class Parameters(EffectParameters, frozen=True):
-    """Standard deviation, over sensors and subjects, of how far a sensor has drifted when the session ends. Ours."""
+    """Standard deviation, over sensors and subjects, of a sensor's drift by the end of the session. Ours."""
 
     deg_per_session: Annotated[float, Meta(ge=0.0, le=90.0)] = 5.0
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that shifts every sensor in proportion to the trials that went before."""
+    """Return the step that shifts every sensor in proportion to the number of previous trials."""
 
     def step(batch: Batch, draw: Draw) -> None:
         whole = parameters.deg_per_session * draw.per_subject(len(SENSORS)).normal()
@@ -29,7 +29,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 
 MEMBER = Effect(
     name="joint.drift",
-    summary="joint sensors drift, trial by trial, each subject's in their own way",
+    summary="joint sensors drift, trial by trial, differently for each subject",
     stage="sense",
     place=3,
     reads=("trials", "sensors_deg"),

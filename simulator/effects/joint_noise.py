@@ -1,7 +1,7 @@
-"""The CyberGlove's sensors are noisy, from frame to frame, and the glove sits a little otherwise in every repetition.
+"""The CyberGlove's sensors are noisy, from frame to frame, and the glove fits slightly differently in every repetition.
 
-Simulated angles alone tell grasp types apart far too well; the offset of a repetition is what brings them down to what
-the paper's glove did: 5, 10 and 15 degrees span its 85 to 100 %.
+Simulated angles alone distinguish grasp types far too well; the offset of a repetition reduces them to the performance
+of the paper's glove: 5, 10 and 15 degrees span its 85 to 100 %.
 """
 
 from typing import Annotated
@@ -17,7 +17,7 @@ _Degrees = Annotated[float, Meta(ge=0.0, le=45.0)]
 
 
 class Parameters(EffectParameters, frozen=True):
-    """Standard deviations of each sensor: `sd_deg` anew in every frame, `trial_sd_deg` once for a whole repetition."""
+    """Standard deviations of each sensor: `sd_deg` drawn for every frame, `trial_sd_deg` once per repetition."""
 
     sd_deg: _Degrees = 2.0
     trial_sd_deg: _Degrees = 0.0

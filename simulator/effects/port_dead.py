@@ -1,6 +1,6 @@
-"""Ports that answer no more: their sixteen switches read as open.
+"""Ports that no longer reply: their sixteen switches read as open.
 
-Their wires still carry current: in a matrix (switch.ghosting) their closed switches join the columns all the same.
+Their wires still carry current: in a matrix (switch.ghosting) their closed switches still connect the columns.
 """
 
 from typing import Annotated
@@ -15,19 +15,19 @@ from ..streams import Draw
 
 
 class Parameters(EffectParameters, frozen=True):
-    """Either which ports are dead, from 0, or how many, drawn for the glove; one where neither is said."""
+    """Either the numbers of the dead ports, from 0, or their count, drawn for the glove; one by default."""
 
     ports: Annotated[tuple[Annotated[int, Meta(ge=0)], ...], Meta(min_length=1)] | None = None
     count: Annotated[int, Meta(ge=1)] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse both at once."""
+        """Reject both at once."""
         if self.ports is not None and self.count is not None:
             raise ValueError("say which `ports` are dead or their `count`, not both")
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that opens every switch of the dead ports. Raises SceneError where there are no such ports."""
+    """Return the step that opens every switch of the dead ports. Raises SceneError if there are no such ports."""
     switches = len(murakami160())
     dead = chooser("port.dead", "port", "dead", port_count(switches), parameters.ports or (), parameters.count)
     port = port_of(switches)

@@ -1,8 +1,7 @@
-"""Contacts that bounce: a switch that closes or opens chatters before it rests.
+"""Contacts that bounce when they close or open.
 
-EVQPL series (Panasonic data sheet, 2019): at most 3 ms when it closes, 8 ms when it opens. How it chatters within that
-is ours: a burst of any length up to the limit, of 2 to 10 edges that follow closer and closer as the contact comes to
-rest.
+EVQPL series (Panasonic data sheet, 2019): at most 3 ms when it closes, 8 ms when it opens. The pattern within that is
+ours: a burst of any length up to the limit, of 2 to 10 edges at decreasing intervals as the contact comes to rest.
 """
 
 from typing import Annotated
@@ -32,7 +31,7 @@ class Parameters(EffectParameters, frozen=True):
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that flips the bits read while their contact chatters."""
+    """Return the step that flips the bits read while their contact bounces."""
 
     def step(batch: Batch, draw: Draw) -> None:
         chances = draw.per_repetition(batch.on_us.shape[1], 4).uniform()
@@ -45,7 +44,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 
 
 def _flipped(batch: Batch, edge_us: Integers, next_us: Integers, length_us: Floats, chance: Floats) -> Bits:
-    """Return where a reading (n, F, s) falls between an odd edge of a burst and the even one after it.
+    """Return the mask of readings (n, F, s) between an odd edge of a burst and the even one after it.
 
     A burst begins at edge_us (n, s) and lasts length_us, but not beyond next_us. Its edges lie at
     length * sqrt(k / edges): the last at its end, each gap shorter than the one before.

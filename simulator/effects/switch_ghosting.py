@@ -1,8 +1,8 @@
-"""Switches in a matrix without diodes: where three corners of a rectangle are closed, the fourth reads closed.
+"""Switches in a matrix without diodes: if three corners of a rectangle are closed, the fourth reads closed.
 
-Current takes any way round: a switch reads closed wherever closed ones join its row and its column, in however many
-steps. Keyboards call it ghosting; with one diode a switch there is none. Every switch of a frame counts as it was when
-its own row was read: what changes from one row to the next (bus.latency) is not followed.
+Current takes any path: a switch reads closed if closed ones connect its row and its column, in any number of steps.
+This is the ghosting of keyboards; one diode per switch prevents it. Every switch of a frame counts with its state at
+the reading of its row: changes from one row to the next (bus.latency) are ignored.
 """
 
 import numpy as np
@@ -17,11 +17,11 @@ Bits = NDArray[np.bool_]
 
 
 class Parameters(EffectParameters, frozen=True):
-    """Nothing to set: a row of the matrix is a port, a column one of its sixteen places."""
+    """No parameters: a row of the matrix is a port, a column one of its sixteen places."""
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that closes every switch to which current finds a way."""
+    """Return the step that closes every switch with a current path."""
 
     def step(batch: Batch, draw: Draw) -> None:
         batch.bits = joined(batch.bits)
@@ -30,13 +30,13 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 
 
 def joined(bits: Bits) -> Bits:
-    """Return what a matrix reads (..., s) whose closed switches are bits (..., s)."""
+    """Return the readings (..., s) of a matrix with closed switches `bits` (..., s)."""
     switches = bits.shape[-1]
     rows, columns = port_of(switches), np.arange(switches) % PORT
     wires = _columns(bits)
     for row in range(len(wires)):
-        # Rows that share a column with this one become one net with it. Rows that touch fall into one net at the latest
-        # when the first of them has its turn, and nets move as one from then on: after the last row all is joined.
+        # Rows that share a column with this one become one net with it. Connected rows join one net at the latest when
+        # the first of them is processed, and nets stay joined from then on: after the last row all are joined.
         touching = (wires & wires[row]) != 0
         net = np.bitwise_or.reduce(np.where(touching, wires, 0), axis=0)
         wires = np.where(touching, net, wires)
@@ -44,7 +44,7 @@ def joined(bits: Bits) -> Bits:
 
 
 def _columns(bits: Bits) -> NDArray[np.uint16]:
-    """Return for each row (rows, ...) the columns it is joined to, one bit each."""
+    """Return for each row (rows, ...) its connected columns, one bit each."""
     rows = port_count(bits.shape[-1])
     packed = np.zeros((*bits.shape[:-1], rows * 2), dtype=np.uint8)
     bytes_ = np.packbits(bits, axis=-1, bitorder="little")

@@ -1,4 +1,4 @@
-"""Switches that are always closed: a short circuit, a dome that is jammed."""
+"""Switches that are always closed: a short circuit, a jammed dome."""
 
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, Setting, Step
@@ -11,7 +11,7 @@ class Parameters(StuckParameters, frozen=True):
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that closes them. Raises SceneError where the glove has no such switch."""
+    """Return the step that closes them. Raises SceneError if the glove has no such switch."""
     chosen = stuck(MEMBER.name, parameters)
 
     def step(batch: Batch, draw: Draw) -> None:

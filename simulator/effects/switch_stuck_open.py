@@ -11,7 +11,7 @@ class Parameters(StuckParameters, frozen=True):
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that opens them. Raises SceneError where the glove has no such switch."""
+    """Return the step that opens them. Raises SceneError if the glove has no such switch."""
     chosen = stuck(MEMBER.name, parameters)
 
     def step(batch: Batch, draw: Draw) -> None:

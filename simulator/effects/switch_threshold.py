@@ -1,4 +1,4 @@
-"""Switches are not all alike: each closes at a force of its own, around 1.0 N."""
+"""Switches differ: each has its own closing force, around 1.0 N."""
 
 from typing import Annotated
 
@@ -14,13 +14,13 @@ LEAST_N = 0.2
 
 
 class Parameters(EffectParameters, frozen=True):
-    """Standard deviation of the force between the switches of a glove, in newtons. Ours; none is below `LEAST_N`."""
+    """Standard deviation of the closing force between the switches of a glove, in newtons. Ours; minimum `LEAST_N`."""
 
     sd_n: Annotated[float, Meta(ge=0.0, le=5.0)] = 0.15
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that shifts every threshold by a normal deviate, the glove's own."""
+    """Return the step that shifts every threshold by a normal deviate, drawn per glove."""
 
     def step(batch: Batch, draw: Draw) -> None:
         deviates = draw.per_glove(len(batch.thresholds_n)).normal()
@@ -31,7 +31,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 
 MEMBER = Effect(
     name="switch.threshold",
-    summary="each switch closes at a force of its own",
+    summary="each switch has its own closing force",
     stage="switch",
     place=1,
     reads=("thresholds_n",),

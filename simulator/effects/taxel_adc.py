@@ -1,8 +1,8 @@
-"""A converter makes counts of forces, in even steps, and ends where its range does.
+"""A converter quantises forces to counts, in even steps, and saturates at its range.
 
-An amplifier turns a pad's conductance into a voltage in proportion, and so its force (Interlink's FSR integration
+An amplifier converts a pad's conductance, and so its force, to a proportional voltage (Interlink's FSR integration
 guide, current-to-voltage converter): counts are linear in newtons. 12 bits are those of an MCP3208 or ADS7828; 10 N is
-the end of the range that data sheets of the FSR 402 name (0.1 to 10 N; newer ones: 0.2 to 20 N).
+the upper limit in data sheets of the FSR 402 (0.1 to 10 N; newer ones: 0.2 to 20 N).
 """
 
 from typing import Annotated
@@ -16,7 +16,7 @@ from ..streams import Draw
 
 
 class Parameters(Converter, frozen=True):
-    """How many bits, and at how many newtons they end."""
+    """Number of bits, and full-scale force in newtons."""
 
     bits: Annotated[int, Meta(ge=1, le=15)] = 12
     full_n: Annotated[float, Meta(gt=0.0, le=1000.0)] = 10.0
@@ -33,7 +33,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 
 MEMBER = Effect(
     name="taxel.adc",
-    summary="a converter of so many bits makes counts of forces",
+    summary="a converter quantises forces to counts",
     stage="read",
     place=6,
     reads=("taxels_n",),

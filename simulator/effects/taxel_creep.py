@@ -1,9 +1,8 @@
-"""A pad that is pressed reads more and more as time goes on, and does not fall back at once when it is let go.
+"""The reading of a pressed pad grows over time, and does not fall at once on release.
 
-Resistance under a load that stays falls with the logarithm of time; of Interlink's FSR 400 series (data sheet
+Resistance under a constant load falls with the logarithm of time; for Interlink's FSR 400 series (data sheet
 PDS-10004-C) by less than 5 % a decade, which is published. Three relaxations (Kelvin-Voigt), a decade apart, follow
-that law from a few hundredths of a second to ten seconds; that they are three is ours. Nothing is left of the grasp
-before.
+that law from a few hundredths of a second to ten seconds; their number is ours. Nothing remains of the previous grasp.
 """
 
 from typing import Annotated
@@ -21,18 +20,18 @@ _TIMES_US = np.array([0.1e6, 1e6, 10e6])
 
 
 class Parameters(EffectParameters, frozen=True):
-    """By what share of the force a reading grows when the time since the load has grown tenfold."""
+    """Growth of a reading, as a share of the force, per tenfold time under load."""
 
     per_decade: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.05
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that adds to each reading what has crept since contact."""
+    """Return the step that adds the creep since contact to each reading."""
 
     def step(batch: Batch, draw: Draw) -> None:
         crept: list[Floats] = []
         states = np.zeros((len(_TIMES_US), len(batch), batch.taxels_n.shape[2]))
-        # A frame's force has been there since the frame before, at the earliest since contact.
+        # A frame's force has been present since the previous frame, at the earliest since contact.
         before = np.zeros(len(batch))
         for frame in range(batch.taxels_n.shape[1]):
             at, force = np.maximum(batch.frame_us[:, frame], 0).astype(np.float64), batch.taxels_n[:, frame]

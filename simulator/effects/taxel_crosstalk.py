@@ -1,11 +1,11 @@
-"""Pads in a matrix take from one another: the switch that drives a row has a resistance, and the more all pads of the
-row conduct, the less voltage is left for each.
+"""Crosstalk of pads in a matrix: the switch that drives a row has a resistance, and the more all pads of the row
+conduct, the less voltage is left for each.
 
-The matrix is read against virtual ground, an amplifier a column, so that nothing is added by detours; what a switch of
-the row costs is then exact (D'Alessio 1999, Sensors and Actuators A 72: 71, and Hidalgo-Lopez et al. 2018, J. Sensors
-9735741, name it the main cause of crosstalk): G / (1 + R sum of G over the row). Published: 70 ohms typical of the
-multiplexer CD74HC4067 at 4.5 V (its data sheet). Read off the force curve of the FSR 402's data sheet: 10 kilohms at 1
-N, to some tens of percent. A piezoresistive fabric is of the same order (ours).
+The matrix is read against virtual ground, with one amplifier per column, so that there are no sneak paths; the loss at
+the row's switch is then exact (D'Alessio 1999, Sensors and Actuators A 72: 71, and Hidalgo-Lopez et al. 2018, J.
+Sensors 9735741, name it the main cause of crosstalk): G / (1 + R sum of G over the row). Published: 70 ohms typical of
+the multiplexer CD74HC4067 at 4.5 V (its data sheet). Read off the force curve of the FSR 402's data sheet: 10 kilohms
+at 1 N, to some tens of percent. A piezoresistive fabric is of the same order (ours).
 """
 
 from typing import Annotated
@@ -22,14 +22,14 @@ from ..streams import Draw
 
 
 class Parameters(EffectParameters, frozen=True):
-    """The resistance of what drives a row, and of a pad at 1 N (its conductance grows as the force)."""
+    """The resistance of the driver of a row, and of a pad at 1 N (its conductance is proportional to the force)."""
 
     row_ohm: Annotated[float, Meta(ge=0.0, le=1e5)] = 70.0
     pad_ohm: Annotated[float, Meta(gt=0.0, le=1e9)] = 10_000.0
 
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
-    """Return the step that lowers every reading by what its row conducts; a row has the places of a port."""
+    """Return the step that lowers every reading by its row's conductance; a row has the places of a port."""
     rows = np.array(setting.taxels, dtype=np.intp) // PORT
     per_n = parameters.row_ohm / parameters.pad_ohm
 

@@ -1,8 +1,8 @@
-"""No two pads are alike: each has a gain of its own, and feels nothing until it is pressed hard enough to make contact.
+"""Each pad has its own gain, and reads 0 until it is pressed hard enough to make contact.
 
-Of Interlink's FSR 400 series (data sheet PDS-10004-C): repeatable from part to part to 6 % of one batch (a standard
-deviation), which is published; that a pad's conductance follows the force in a straight line above is the usual
-approximation. The same sheet says 0.2 N for the least force that actuates; earlier ones say 0.1 N.
+For Interlink's FSR 400 series (data sheet PDS-10004-C) the published repeatability from part to part is 6 % within a
+batch (a standard deviation); linear conductance above the actuation force is the usual approximation. The same data
+sheet gives 0.2 N as actuation force; earlier ones give 0.1 N.
 """
 
 from typing import Annotated
@@ -18,8 +18,8 @@ from ..streams import Draw
 
 
 class Parameters(EffectParameters, frozen=True):
-    """Standard deviation of the logarithm of the gain between the pads of a glove, and below how many newtons a typical
-    pad reads nothing: each as much more or less as its gain is low or high.
+    """Standard deviation of the logarithm of the gain between the pads of a glove, and the actuation force of a typical
+    pad in newtons, which is inversely proportional to the gain.
     """
 
     log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.06
@@ -39,7 +39,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 
 MEMBER = Effect(
     name="taxel.gain",
-    summary="each pad has a gain of its own, and actuates at some force",
+    summary="each pad has its own gain and actuation force",
     stage="sense",
     place=4,
     reads=("taxels_n",),

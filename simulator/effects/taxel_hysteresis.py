@@ -1,9 +1,9 @@
-"""A pad that is released reads more than one that is pressed as hard: its reading falls only once the force has fallen
+"""Hysteresis: during release a pad reads more than during loading; its reading falls only after the force has fallen
 by a share.
 
 The model is the play operator (Krasnosel'skii and Pokrovskii 1989), here on the logarithm of the force, so that the
-loop is as wide in proportion at any force. Published for Interlink's FSR 400 series (data sheet PDS-10004-C): +10 % on
-average. Piezoresistive fabrics have more: 0.2 and above is of their order (ours).
+relative width of the loop is the same at any force. Published for Interlink's FSR 400 series (data sheet
+PDS-10004-C): +10 % on average. Piezoresistive fabrics have more: 0.2 and above is of their order (ours).
 """
 
 from typing import Annotated
@@ -17,7 +17,7 @@ from ..streams import Draw
 
 
 class Parameters(EffectParameters, frozen=True):
-    """By what share of the force a pad reads more as the force falls than as it rises."""
+    """Excess of the reading at falling over rising force, as a share of the force."""
 
     share: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.1
 

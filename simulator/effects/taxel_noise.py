@@ -1,4 +1,4 @@
-"""Pads are off a little: pressed as hard again, they read otherwise; and every reading is noisy.
+"""Repeatability of pads: readings of equal forces differ between repetitions, and every reading is noisy.
 
 Published for Interlink's FSR 400 series (data sheet PDS-10004-C): a single part repeats to 2 % (a standard deviation).
 The noise of a reading is ours: two counts of 12 bits over 10 N.
@@ -16,7 +16,7 @@ from ..streams import Draw
 
 
 class Parameters(EffectParameters, frozen=True):
-    """Standard deviations: of the logarithm of a pad's gain, anew in each repetition; of each reading, in newtons."""
+    """Standard deviations: of the logarithm of a pad's gain, drawn for each repetition; of each reading, in newtons."""
 
     trial_log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.02
     sd_n: Annotated[float, Meta(ge=0.0, le=5.0)] = 0.005

@@ -1,4 +1,4 @@
-"""Bytes that arrive with one of their eight bits turned: noise on a line without parity."""
+"""Bytes that arrive with one of their eight bits flipped: noise on a line without parity."""
 
 from dataclasses import replace
 from typing import Annotated
@@ -15,13 +15,13 @@ Bytes = NDArray[np.uint8]
 
 
 class Parameters(EffectParameters, frozen=True):
-    """The share of all bytes that is damaged."""
+    """The share of damaged bytes."""
 
     rate: Annotated[float, Meta(gt=0.0, lt=1.0)] = 1e-4
 
 
 def damaged(data: Bytes, chances: NDArray[np.float64], rate: float) -> Bytes:
-    """Return the bytes as they arrive, for one uniform number each, any shape: below `rate` it says which bit turns."""
+    """Return the received bytes, for one uniform number each, any shape: below `rate` it selects the flipped bit."""
     bit = np.minimum(8.0 * chances / rate, 7.0).astype(np.uint8)
     return np.where(chances < rate, data ^ (np.uint8(1) << bit), data)
 

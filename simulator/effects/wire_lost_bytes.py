@@ -1,4 +1,4 @@
-"""Bytes that never arrive: an overrun receiver, a plug that is pulled for a moment."""
+"""Bytes that never arrive: an overrun receiver, a plug pulled briefly."""
 
 from dataclasses import replace
 from typing import Annotated
@@ -13,13 +13,13 @@ from ..streams import Draw
 
 
 class Parameters(EffectParameters, frozen=True):
-    """The share of all bytes that is lost."""
+    """The share of lost bytes."""
 
     rate: Annotated[float, Meta(gt=0.0, lt=1.0)] = 1e-4
 
 
 def arrives(chances: NDArray[np.float64], rate: float) -> NDArray[np.bool_]:
-    """Return which bytes arrive, for one uniform number each, any shape."""
+    """Return the mask of bytes that arrive, for one uniform number each, any shape."""
     return chances >= rate
 
 

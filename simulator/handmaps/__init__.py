@@ -1,1 +1,1 @@
-"""Hand maps: the glove as one sees one's own palm."""
+"""Hand maps: the glove in the view of the wearer's own palm."""

@@ -1,7 +1,7 @@
 """The glove as a picture: hands side by side, palm up, the sides of the digits unfolded, every switch a circle.
 
-Shades run from light to dark, perceptually even and never back in lightness, so that they hold in grey and for the
-colour-blind. In an SVG each circle says on hovering what it is.
+Shades run from light to dark, perceptually uniform and monotonic in lightness, so that they work in grey and for the
+colour-blind. In an SVG each circle has a tooltip.
 """
 
 import re
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Dot:
-    """A switch as drawn: hollow, or of a shade from 0 to 1; `mark` is written into it, `hint` is said on hovering.
+    """A drawn switch: hollow, or of a shade from 0 to 1; `mark` is its text, `hint` its tooltip.
 
-    absent: not in the set, a mere point.
+    absent: not in the set, drawn as a point.
     """
 
     hint: str
@@ -49,10 +49,10 @@ class Panel:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """The hand, side by side once for each panel, what full and hollow dots mean ("" for none), and what shade 1 of the
-    colour bar is worth.
+    """The hand, once per panel side by side, the meanings of full and hollow dots ("" for none), and the value at shade
+    1 of the colour bar.
 
-    full: what a full dot means when there is no colour bar, and the bar's title when there is one.
+    full: the meaning of a full dot if there is no colour bar, else the bar's title.
     """
 
     hand: HandShape
@@ -60,11 +60,11 @@ class Picture:
     full: str
     hollow: str
     bar_top: float | None = None
-    hollow_mark: str = ""  # what the key writes into its hollow dot
+    hollow_mark: str = ""  # text in the hollow dot of the key
 
 
 class _Words(NamedTuple):
-    """What happens to what is drawn: in a word, of one, and of several."""
+    """The drawn event: as a word, for one switch, and for several."""
 
     word: str
     full: str
@@ -90,7 +90,7 @@ def all_switches(glove: HandShape, numbered: bool) -> Picture:
 
 
 def contacts(glove: HandShape, grasp_set: GraspSet, per_grasp: bool) -> Picture:
-    """Return how often each switch closed, and each taxel was pressed (above Otsu's threshold of all readings),
+    """Return a picture of the frequency of closed switches and pressed taxels (above Otsu's threshold of all readings),
     over all rows in which something is held or, one hand each, in each grasp type that has rows.
 
     All hands share one scale, up to the largest share. Raises MapError if the set has no rows, no switches or taxels,
@@ -122,7 +122,7 @@ def contacts(glove: HandShape, grasp_set: GraspSet, per_grasp: bool) -> Picture:
 def kept(glove: HandShape, placements: Sequence[tuple[str, Sequence[str]]]) -> Picture:
     """Return the glove once for each (title, names of switches in the order in which they were chosen).
 
-    Raises MapError if a name is not a switch of the glove, or stands twice in one placement.
+    Raises MapError if a name is not a switch of the glove, or occurs twice in one placement.
     """
     panels = tuple(_kept_panel(glove, title, names) for title, names in placements)
     return Picture(glove, panels, "kept, in the order chosen", "left out")
@@ -156,7 +156,7 @@ def _kept_panel(glove: HandShape, title: str, names: Sequence[str]) -> Panel:
         raise MapError(f"{title}: switch {twice!r} is kept twice")
     dots = [Dot(f"{name}: left out") for name in glove.names]
     for place, (number, name) in reversed(list(enumerate(zip(numbers.tolist(), names, strict=True), 1))):
-        # Of the levels of a taxel, the first marks it.
+        # A taxel is marked by its first level.
         more = dots[number].hint.partition(": ")[2] if dots[number].shade is not None else ""
         level = name[len(glove.names[number]) :]
         hint = f"{glove.names[number]}: kept, number {place}{f' (counts {level})' * bool(level)}"
@@ -174,15 +174,15 @@ SKIN, SIDE, LINE, CREASE, INK = map(on_paper, ("skin", "side", "outline", "creas
 _COLOURS, _LIGHTEST = "magma_r", 0.07  # a switch that closed at all is no longer white
 _MARGIN_MM, _USUAL_MM = 3.0, 1.8  # around a hand; the radius of a dot whose edge is as thick as thin lines are
 _LONGEST_TITLE = 40
-_SPELT_OUT = 1.5  # printer's points per mm of the map from which on digits are named in full
+_SPELT_OUT = 1.5  # points per mm of the map above which digits have full names
 
 
 def bounds(glove: HandShape) -> tuple[float, float, float, float]:
-    """Return left, right, bottom and top of a hand with all that is drawn of it, mm."""
+    """Return left, right, bottom and top of a drawn hand, mm."""
     reach = np.array([glove.radius_mm, glove.radius_mm])
     points = np.concatenate([glove.outline, *glove.strips, glove.labels, glove.places - reach, glove.places + reach])
     (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
-    # The names of the digits reach out beyond their places.
+    # The names of the digits extend beyond their positions.
     return left - 2 * _MARGIN_MM, right + 3 * _MARGIN_MM, bottom - _MARGIN_MM, top + 2 * _MARGIN_MM
 
 
@@ -197,7 +197,7 @@ def colour(dot: Dot, graded: bool) -> str:
 
 
 def paint(axes: "Axes", glove: HandShape, panel: Panel, number: int, points: float, graded: bool) -> None:
-    """Draw hand `number` of a page, at `points` of a printer (1/72 inch) per mm; dots' ids are dot-NUMBER-SWITCH."""
+    """Draw hand `number` of a page, at `points` (1/72 inch) per mm; dots' ids are dot-NUMBER-SWITCH."""
     left, right, bottom, top = bounds(glove)
     axes.set(xlim=(left, right), ylim=(bottom, top))
     axes.axis("off")
@@ -275,7 +275,7 @@ def draw(picture: Picture, kind: str) -> bytes:
 
 
 def _draw_key(figure: "Figure", picture: Picture) -> None:
-    """Draw what hollow and full dots, the strips and the colours mean, along the bottom."""
+    """Draw the key of hollow and full dots, the strips and the colours, along the bottom."""
     width, height = figure.get_size_inches().tolist()
     axes = figure.add_axes((0, 0, 1, _KEY_INCHES / height))
     axes.set(xlim=(0, width), ylim=(0, _KEY_INCHES))
@@ -301,7 +301,7 @@ def _draw_key(figure: "Figure", picture: Picture) -> None:
 
 
 def _say(axes: "Axes", x: float, y: float, words: str) -> float:
-    """Write `words` from `x` on and return where the next may begin."""
+    """Write `words` from `x` on and return the next free position."""
     axes.text(x, y, words, va="center")
     return x + 0.062 * len(words) + 0.3
 

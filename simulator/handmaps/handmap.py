@@ -1,11 +1,11 @@
-"""Where the 160 switches of `murakami160` lie on the hand laid flat, all from the layout's own data.
+"""Positions of the 160 switches of `murakami160` on the flat hand, all from the layout's data.
 
-Paper axes: x to the right, which is the thumb's side of one's own right palm, y up to the fingertips; millimetres of a
-hand of middling size. Lengths and proportions are those of `hand.py`. A draughtsman's are: digits spread, and a palm
-broadened until the unfolded sides find room between the fingers, and fingers a little slimmer than they are thick.
+Paper axes: x to the right, the thumb's side of the viewer's own right palm, y up to the fingertips; millimetres of a
+medium hand. Lengths and proportions are those of `hand.py`. For drawing, digits are spread, the palm is broadened to
+make room for the unfolded sides between the fingers, and fingers are slightly slimmer than they are thick.
 
-On a digit, `along` is kept and `around` is bent flat. Switches on the sides go to the strips beside the digit. The ball
-of the thumb is turned to the viewer as a whole. On the palm, capsules are spread as their knuckles are.
+On a digit, `along` is kept and `around` is flattened. Switches on the sides go to the strips along the digit. The ball
+of the thumb is turned to the viewer as a whole. On the palm, capsules are spread like their knuckles.
 """
 
 from collections.abc import Sequence
@@ -26,11 +26,11 @@ Places = Floats | Sequence[float]
 
 HAND = Hand(Size(190.0, 88.0))
 
-# The first joints of little, ring, middle and index finger on paper; how far thumb to little finger lean to the right.
+# The first joints of little, ring, middle and index finger on paper; the inclination of each digit to the right.
 _BASES_X = (-51.0, -26.5, 0.0, 27.0)
 _LEANS_DEG = (46.0, 8.5, -0.5, -10.0, -21.0)
 _SLIM = 0.92
-_STRIP_MM, _GAP_MM = 4.6, 0.9  # how broad a strip is, and how far from its digit
+_STRIP_MM, _GAP_MM = 4.6, 0.9  # width of a strip, and its distance from its digit
 _ARC = np.linspace(0.0, np.pi, 9)
 
 
@@ -38,7 +38,7 @@ _ARC = np.linspace(0.0, np.pi, 9)
 class Ray:
     """A digit on paper: from `base` (2,) straight along `ahead` (2,), a unit vector, to its tip at `end` mm.
 
-    joints (4,): where its segments begin and the last one ends; halves (3,): half its breadth at their `middles` (3,).
+    joints (4,): starts of its segments and the end of the last; halves (3,): half its breadth at their `middles` (3,).
     """
 
     base: Floats
@@ -55,11 +55,11 @@ class Ray:
         return places
 
     def half(self, along: Places) -> Floats:
-        """Return half the breadth (n,) at places along the digit; the rounding of its tip is not in it."""
+        """Return half the breadth (n,) at positions along the digit, without the rounding of its tip."""
         return np.interp(along, self.middles, self.halves)
 
     def beside(self, along: Places) -> Floats:
-        """Return how far from the digit's middle the middle of a strip lies (n,)."""
+        """Return the distance of the middle of a strip from the digit's middle (n,)."""
         return self.half(along) + _GAP_MM + _STRIP_MM / 2
 
     def strip(self, side: int, first: float, last: float) -> Floats:
@@ -91,7 +91,7 @@ def _ray(digit: int) -> Ray:
     joints = np.array([0.0, *np.cumsum(lengths)])
     sine, cosine = sincos(np.array([_LEANS_DEG[digit] * np.pi / 180.0]))
     distal, radial, _ = HAND.size.bases_mm()[digit]
-    # The flesh of the tip, bent flat, reaches a little further than the bone.
+    # The flattened flesh of the tip extends slightly beyond the bone.
     end = float(joints[2] + 0.62 * lengths[2] + 1.3 * radii[2])
     ahead = np.array([float(sine[0]), float(cosine[0])])
     return Ray(
@@ -100,7 +100,7 @@ def _ray(digit: int) -> Ray:
 
 
 def palm_at(places: Floats) -> Floats:
-    """Return where on paper points of the palm (n, 2), distal and radial of the wrist's middle in mm, lie: (n, 2)."""
+    """Return the paper positions (n, 2) of palm points (n, 2), distal and radial of the wrist's middle in mm."""
     distal, radial = places.T
     bases = HAND.size.bases_mm()[:0:-1, 1]
     slopes = np.diff(_BASES_X) / np.diff(bases)
@@ -108,7 +108,7 @@ def palm_at(places: Floats) -> Floats:
     return np.stack([np.interp(radial, bases, _BASES_X) + beyond, distal], axis=1)
 
 
-# Points that the lines of the palm go through (x, y), drawn to fit the digits of `flathand`.
+# Points on the lines of the palm (x, y), drawn to fit the digits of `flathand`.
 _ULNAR_EDGE = ((-36.5, -13.0), (-38.0, -2.0), (-47.0, 13.0), (-56.0, 33.0), (-60.5, 55.0), (-61.0, 68.0))
 _RADIAL_EDGE = ((37.5, 82.0), (39.0, 70.0), (43.5, 60.0))
 _WRIST = ((37.5, -4.0), (36.5, -13.0))
@@ -118,7 +118,7 @@ _PALM_CREASES = (
     ((-60.0, 60.5), (-42.0, 61.0), (-22.0, 68.5), (-4.0, 75.5), (8.0, 78.5), (13.5, 84.5)),
     ((-36.5, -4.0), (-17.0, -6.5), (10.0, -6.5), (36.0, -3.5)),
 )
-_ROOT = 0.22  # where a finger leaves the palm, over its first segment
+_ROOT = 0.22  # start of a finger at the palm, over its first segment
 _CURVED = 12  # steps of a curve between two of its points
 
 
@@ -126,7 +126,7 @@ _CURVED = 12  # steps of a curve between two of its points
 def outlines() -> tuple[Floats, tuple[Floats, ...]]:
     """Return the outline of the hand (k, 2) from cuff to cuff, and that of each digit, thumb first.
 
-    A digit's outline is the piece of the hand's that goes round it; straight across its root it is closed.
+    A digit's outline is its part of the hand's outline, closed straight across its root.
     """
     thumb, index, middle, ring, little = rays()
     pieces = [np.array(_ULNAR_EDGE), _round(little)]
@@ -203,14 +203,14 @@ RADIUS_MM = 1.8  # of a switch on paper: no two overlap
 PARTS = (*DIGITS, "palm")
 
 _SIDE_DEG = 75.0  # from here on around a segment is its side
-_STRIP_END_MM = 1.6  # of a strip before its first and after its last switch, besides its round end
+_STRIP_END_MM = 1.6  # of a strip before its first and after its last switch, in addition to its round end
 _LABEL_MM = 5.0  # from a fingertip to the middle of its name
-_PALM_SPREAD = 1.2  # how much further than on the hand a switch of the palm lies from its capsule's axis
+_PALM_SPREAD = 1.2  # factor on the distance of a palm switch from its capsule's axis
 
 
 @lru_cache(maxsize=1)
 def hand_map() -> HandShape:
-    """Return the glove `murakami160` laid flat."""
+    """Return the flat map of the glove `murakami160`."""
     switches = Switches(HAND, murakami160())
     around = np.array([patch.around_deg for patch in switches.layout])
     sides = np.where(np.abs(around) > _SIDE_DEG, np.sign(around), 0.0).astype(np.intp)
@@ -247,13 +247,13 @@ def hand_map() -> HandShape:
 
 
 def _along(switches: Switches) -> Floats:
-    """Return how far from their digit's base switches lie (s,)."""
+    """Return the distance of switches from their digit's base (s,)."""
     begins = np.array([*np.concatenate([ray.joints[:3] for ray in rays()]), *np.zeros(5)])
     return begins[switches.capsules] + switches.places[:, 0]
 
 
 def _flat(switches: Switches, mine: NDArray[np.bool_], sides: NDArray[np.intp]) -> Floats:
-    """Return how far right of the middle switches of one segment lie when its skin is bent flat (m,)."""
+    """Return the offset to the right of the middle of one segment's switches on flattened skin (m,)."""
     layout = [patch for patch, is_mine in zip(switches.layout, mine, strict=True) if is_mine]
     on_tip = np.array([patch.along < 0.0 for patch in layout])
     around = np.array([patch.around_deg for patch in layout])
@@ -271,7 +271,7 @@ def _strip(ray: Ray, along: Floats, side: int) -> Floats:
 
 
 def _on_palm(switches: Switches) -> Floats:
-    """Return places of switches on the palm's capsules (s, 2), beside axes that are spread like the knuckles."""
+    """Return positions of switches on the palm's capsules (s, 2), along axes that are spread like the knuckles."""
     skeleton = HAND.skeleton(np.zeros((20, 1)))
     tops = switches.tops(skeleton)[:, :2, 0]
     ahead = skeleton.frames[switches.capsules, :2, 0, 0]

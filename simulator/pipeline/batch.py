@@ -1,4 +1,4 @@
-"""A batch: repetitions of one condition on their way through the pipeline."""
+"""A batch: repetitions of one condition in the pipeline."""
 
 from dataclasses import dataclass, field
 
@@ -15,14 +15,14 @@ from .ramp import NEVER, Ramp
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Traffic:
-    """The bytes of n repetitions, F frames each; of a frame's B bytes the first `scanner` go over the scanner's line,
-    the others over the CyberGlove's.
+    """The bytes of n repetitions, F frames each; of a frame's B bytes the first `scanner` are on the scanner's line,
+    the others on the CyberGlove's.
 
-    A byte keeps its place from sending to receiving, so that what happens to one never shifts the fate of another.
+    A byte keeps its index from sending to receiving, so that faults of one byte do not affect another.
 
     data    (n, F, B) uint8  as they arrive
-    at_us   (n, F, B)        when each has arrived in full
-    arrives (n, F, B)        False where one is lost on the way
+    at_us   (n, F, B)        arrival time of each full byte
+    arrives (n, F, B)        False for a lost byte
     """
 
     data: NDArray[np.uint8]
@@ -34,40 +34,40 @@ class Traffic:
 Integers = NDArray[np.int64]
 Bits = NDArray[np.bool_]
 
-# An object that slid so far was dropped: ours.
+# An object that slid this far was dropped: ours.
 SLID_OUT_MM = 20.0
 
 
 @dataclass(slots=True, eq=False)
 class Batch:
-    """n repetitions, s switches, F frames. A field is there once a step has written it, not before.
+    """n repetitions, s switches, F frames. A field exists only after a step has written it.
 
-    Time runs from the first contact of a repetition, in microseconds; the transition before it is negative.
+    Time starts at the first contact of a repetition, in microseconds; the transition before it is negative.
 
     repetitions (n,)      their numbers within the condition, from 0
     trials      (n,)      their places in the subject's session, from 0
-    previous_deg (n, 20)  where the hand comes from: the planned posture of the trial before, or its rest
-    rest_deg    (n, 20)   the rest to which it goes after the release; None: it does not rest
+    previous_deg (n, 20)  start of the hand: the planned posture of the previous trial, or its rest
+    rest_deg    (n, 20)   the rest after the release; None: it does not rest
     posture_deg (n, 20)   joint angles; first as commanded, then as settled by the contact model
     pose        (n, 6)    the object in hand axes: mm, rotation vector in radians; likewise
-    commanded_deg, commanded_pose  what the contact model was told, (n, 20) and (n, 6)
-    grip_n      (n,)      the force that the pads share
+    commanded_deg, commanded_pose  the input of the contact model, (n, 20) and (n, 6)
+    grip_n      (n,)      total force of the pads
     forces_n    (n, s)    on every switch at full grip
-    settled     (n,)      False where the contact model gave up: such a repetition is reported, never kept in silence
-    residual_n, residual_nmm (n,)   force and moment on the object that nothing balances
-    between_n   (n,)      pressed on skin between the switches
-    thresholds_n (s,)     what closes each switch
+    settled     (n,)      False if the contact model gave up: such a repetition is always reported
+    residual_n, residual_nmm (n,)   unbalanced force and moment on the object
+    between_n   (n,)      force on skin between the switches
+    thresholds_n (s,)     closing force of each switch
     on_us, off_us (n, s)  when each switch closes and opens; NEVER
     frame_us    (n, F)    when each frame's scan begins
-    delay_us              how much later each switch is read, as broadcasts to (n, F, s); None: at once
-    bits        (n, F, s) what the scanner reads; of a place with a taxel, what a switch there would say
-    sensors_deg (n, F, 18) what the CyberGlove's sensors feel
+    delay_us              delay of the reading of each switch, broadcast to (n, F, s); None: 0
+    bits        (n, F, s) the scanner's readings; for a place with a taxel, those of a switch there
+    sensors_deg (n, F, 18) angles of the CyberGlove's sensors
     raw         (n, F, 18) uint8, its bytes, 1 to 255
-    traffic               the bytes on the serial lines, while they are there
+    traffic               the bytes on the serial lines, between sending and receiving
     lost        (n, F)    frames that did not arrive
-    ramp                  how the forces grow; None: at once
-    taxels_n    (n, F, t) the force that each taxel feels
-    taxels      (n, F, t) uint16, its counts; None: there are none
+    ramp                  the growth of the forces; None: at once
+    taxels_n    (n, F, t) force on each taxel
+    taxels      (n, F, t) uint16, its counts; None: no taxels
     """
 
     condition: Condition
@@ -103,7 +103,7 @@ class Batch:
         return len(self.repetitions)
 
     def site(self) -> Site:
-        """Return whose draws its effects draw."""
+        """Return the draw site of its effects."""
         return self.condition.site(self.repetitions)
 
     def holds(self, let_go_us: int | None) -> Bits:
@@ -119,11 +119,11 @@ class Batch:
         return held
 
     def load(self) -> Load:
-        """Return what the batch tells its hands."""
+        """Return the commands of the batch's hands."""
         return Load(self.condition, self.posture_deg, self.pose, self.grip_n)
 
     def slid_mm(self) -> Floats:
-        """Return how far (n,) each object lies from where the hand was told to hold it."""
+        """Return the distance (n,) of each object from its commanded position."""
         x, y, z = (self.pose[:, :3] - self.commanded_pose[:, :3]).T
         distance: Floats = np.sqrt(x * x + y * y + z * z)
         return distance

@@ -1,19 +1,19 @@
-"""What an effect is: one record of one way to change a batch; and in which order effects and the glove's own steps act.
+"""Effects: the record of one change of a batch, and the order of effects and the glove's own steps.
 
-Such a module holds three things:
+An effect's module holds three things:
 
-    class Parameters(EffectParameters)         what a scene may set, with defaults and limits
-    def prepare(parameters, setting) -> Step   everything that is done once; the step does the rest, batch by batch
-    MEMBER = Effect(...)                       its name, where it belongs, what it reads and writes, and these two
+    class Parameters(EffectParameters)         the parameters of a scene, with defaults and limits
+    def prepare(parameters, setting) -> Step   the one-time work; the step does the rest, batch by batch
+    MEMBER = Effect(...)                       its name, stage, fields that it reads and writes, and these two
 
-A contact model has `model(parameters, setting) -> ContactModel` instead of `prepare`. An effect that asks the contact
+A contact model has `model(parameters, setting) -> ContactModel` instead of `prepare`. An effect that calls the contact
 model again has `together(parameters, setting, contact) -> Together`.
 
 `Effect.name` is the key of the scene: [effects.joint.noise] is "joint.noise", in the module effects/joint_noise.py.
 Other packages add effects by entry points of that name in the group `thenar.effects`.
 
-Stage by stage. Within a stage, an effect acts after the glove's own step that makes what it touches, and before the one
-that reads what it alters; after those that `Effect.after` and the scene's `after` name; and else by its rank.
+Steps act stage by stage. Within a stage, an effect acts after the glove's own step that creates its fields, and before
+the one that reads them; after those named in `Effect.after` and the scene's `after`; and otherwise by its rank.
 """
 
 import heapq
@@ -37,7 +37,7 @@ from .batch import Batch
 Stage = Literal["posture", "contact", "switch", "frame", "sense", "read", "wire"]
 STAGES: tuple[Stage, ...] = ("posture", "contact", "switch", "frame", "sense", "read", "wire")
 
-# What a contact model reads and writes of a batch (`Batch.load`, `Batch.take`).
+# The fields of a batch that a contact model reads and writes (`Batch.load`, `Batch.take`).
 CONTACT_READS = ("posture_deg", "pose", "grip_n")
 CONTACT_WRITES = (
     *("posture_deg", "pose", "commanded_deg", "commanded_pose", "forces_n"),
@@ -45,28 +45,28 @@ CONTACT_WRITES = (
 )
 
 Step = Callable[[Batch, Draw], None]
-# What is done with several batches at once, each with its draws.
+# A step on several batches at once, each with its draws.
 Together = Callable[[Sequence[Batch], Sequence[Draw]], None]
 
 
 class EffectParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What every effect takes: names of effects that must act before it, beyond the usual order."""
+    """The parameters common to all effects: names of effects that must act before it, beyond the usual order."""
 
     after: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What the pipeline must know of an effect.
+    """The record of an effect for the pipeline.
 
-    place          among the effects of its stage, where nothing else decides
+    place          among the effects of its stage, if nothing else decides
     reads, writes  fields of `Batch`
     after          effects that act before it when they are listed too
-    conflicts      effects that cannot be listed beside it
-    timed          True where the effect lives in time, so that whole streams of frames are simulated
-    on_wire        True where it acts on bytes, so that frames are sent and received as bytes
-    parameters     what a scene may set
-    prepare, model, together   one of them makes what acts
+    conflicts      effects that cannot be listed together with it
+    timed          True if the effect depends on time, so that whole streams of frames are simulated
+    on_wire        True if it acts on bytes, so that frames are sent and received as bytes
+    parameters     the parameters of a scene
+    prepare, model, together   one of them creates the step
     """
 
     name: str
@@ -86,22 +86,22 @@ class Effect:
 
     @property
     def rank(self) -> tuple[int, int]:
-        """Who goes first where nothing else decides."""
+        """The sort key of effects if nothing else decides."""
         return STAGES.index(self.stage), self.place
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What of a scene the effects and the glove itself must know.
+    """The properties of a scene that effects and the glove's own steps need.
 
     seed, session_trials  trials of one subject's session
-    threshold_n           what closes a switch (the paper: 1.0 N)
+    threshold_n           closing force of a switch (the paper: 1.0 N)
     period_us, first_us, hold_us, release_us   frames are scanned every period_us from first_us (the transition before
                           contact is negative) to hold_us, where the row is read out, and on through release_us more
     timed, on_wire        whether any effect of the scene is
     taxels                numbers of the places that bear taxels, not switches
     every_frame           whether every frame becomes a row
-    rest, rest_us         the posture (`RESTS_DEG`) of the rest between grasps, and how long it is; None: there is none
+    rest, rest_us         the posture (`RESTS_DEG`) of the rest between grasps, and its duration; None: no rest
     """
 
     seed: int
@@ -120,36 +120,36 @@ class Setting:
 
     @property
     def released_us(self) -> int:
-        """When the release is over, and the hand goes to its rest."""
+        """The end of the release, when the hand goes to its rest."""
         return self.hold_us + self.release_us
 
     @property
     def let_go_us(self) -> int | None:
-        """When the hand lets go: as the frame after the read-out begins, so that a row that takes a while to read is
-        still whole. None where the recording ends before.
+        """The time of the release: the start of the frame after the read-out, so that a row that takes long to read is
+        complete. None if the recording ends before.
         """
         return self.hold_us + self.period_us if self.release_us > 0 else None
 
 
-# A scene imports the effects that it lists, and no other.
+# A scene imports only the effects that it lists.
 EFFECTS = MembersByName("effect", Effect, "thenar.simulator.effects", "thenar.effects")
 
 
 Integers = NDArray[np.int64]
 
-# So many frames are simulated at a time: with all that is worked out of them, each takes two to five kilobytes.
+# The most frames simulated at a time: with all derived data, each takes two to five kilobytes.
 _MOST = 50_000
 
 
 def frame_times(setting: Setting) -> Integers:
-    """Return when the frames (F,) of a repetition begin, in microseconds from first contact.
+    """Return the start times of the frames (F,) of a repetition, in microseconds from first contact.
 
-    They are counted from the one at hold_us, whose row is read out: so it is always among them. Where nothing lives in
-    time it is the only one.
+    They are aligned with the one at hold_us, whose row is read out, so it is always among them. If nothing depends on
+    time, it is the only one.
     """
     if not setting.timed:
         return np.array([setting.hold_us], dtype=np.int64)
-    # The hand goes to its rest in the time in which it comes from there.
+    # The hand takes as long to its rest as from it.
     away_us = 0 if setting.rest is None else setting.rest_us - setting.first_us
     after = (setting.release_us + away_us) // setting.period_us
     return setting.hold_us + setting.period_us * np.arange(-hold_frame(setting), after + 1, dtype=np.int64)
@@ -161,18 +161,18 @@ def hold_frame(setting: Setting) -> int:
 
 
 def at_a_time(setting: Setting, repetitions: int) -> int:
-    """Return how many repetitions are simulated at a time where `repetitions` would be if they had one frame each.
+    """Return the number of repetitions simulated at a time, `repetitions` if they have one frame each.
 
-    Fewer where each has so many frames that they would fill the memory, but at least one.
+    With many frames each it is fewer, to limit the memory, but at least one.
     """
     return max(min(repetitions, _MOST // len(frame_times(setting))), 1)
 
 
 def drawn_rows(setting: Setting) -> NDArray[np.intp]:
-    """Return which row of the random numbers of a repetition each frame (F,) takes.
+    """Return the row of a repetition's random numbers for each frame (F,).
 
-    The frame at hold_us takes the first, so that its numbers are the same whether or not there are others; frames after
-    the release take the last, so that no other's change by a rest.
+    The frame at hold_us takes the first, so that its numbers do not depend on other frames; frames after the release
+    take the last, so that a rest does not change the numbers of the others.
     """
     times, held = frame_times(setting), hold_frame(setting)
     frames, moving = np.arange(len(times), dtype=np.intp), int((times <= setting.released_us).sum())
@@ -181,7 +181,7 @@ def drawn_rows(setting: Setting) -> NDArray[np.intp]:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A step that wants its place: `own` steps keep the order they have, `parameters` are what the scene sets."""
+    """A step to be ordered: `own` steps keep their order, `parameters` come from the scene."""
 
     effect: Effect
     own: bool
@@ -191,8 +191,7 @@ class Place:
 def in_order(places: Sequence[Place]) -> list[Place]:
     """Return the steps in the order in which they act.
 
-    Raises SceneError where two conflict, where an `after` names an effect that is not there, or where some wait for one
-    another in a circle.
+    Raises SceneError if two conflict, if an `after` names a missing effect, or if some wait for each other in a circle.
     """
     _check_conflicts(places)
     _check_after(places)
@@ -243,7 +242,7 @@ def _sorted(places: list[Place]) -> Iterator[Place]:
 
 
 def _waits_for(place: Place, places: list[Place]) -> set[str]:
-    """Return the names of those of one stage that act before `place`."""
+    """Return the names of the steps of its stage that act before `place`."""
     named = {*place.parameters.after, *place.effect.after} & {other.effect.name for other in places}
     return named | {other.effect.name for other in places if other is not place and _precedes(other, place, places)}
 

@@ -1,6 +1,6 @@
-"""What every scene does whatever its effects: the hand recalls a posture, switches close, frames are scanned and read.
+"""The steps of every scene: the hand recalls a posture, switches close, frames are scanned and read.
 
-`STEPS` holds these steps in the order in which they act within a stage; effects come in between (`effect.in_order`).
+`STEPS` holds these steps in their order within a stage; effects come in between (`effect.in_order`).
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ STEPS: tuple[Effect, ...] = ()
 
 
 def _own(stage: Stage, summary: str, reads: tuple[str, ...], writes: tuple[str, ...]) -> Callable[[Act], Act]:
-    """Add what is decorated to `STEPS`; _recall is "glove.recall". It draws nothing."""
+    """Add the decorated function to `STEPS`; _recall is "glove.recall". It draws no random numbers."""
 
     def add(act: Act) -> Act:
         def prepare(_parameters: EffectParameters, setting: Setting) -> Step:
@@ -43,7 +43,7 @@ def _recall(batch: Batch, setting: Setting) -> None:
     batch.grip_n = np.full(len(batch), held.grip_n)
 
 
-@_own("switch", "gives every switch the force that closes it", ("forces_n",), ("thresholds_n",))
+@_own("switch", "sets the closing force of every switch", ("forces_n",), ("thresholds_n",))
 def _threshold(batch: Batch, setting: Setting) -> None:
     batch.thresholds_n = np.full(batch.forces_n.shape[1], setting.threshold_n)
 
@@ -56,7 +56,7 @@ def _close(batch: Batch, setting: Setting) -> None:
     batch.off_us = np.where(closed, let_go_us, NEVER)
 
 
-@_own("frame", "says when frames are scanned", (), ("frame_us",))
+@_own("frame", "sets the times of frames", (), ("frame_us",))
 def _frames(batch: Batch, setting: Setting) -> None:
     batch.frame_us = np.tile(frame_times(setting), (len(batch), 1))
 
@@ -67,7 +67,7 @@ def _sense(batch: Batch, setting: Setting) -> None:
     batch.sensors_deg = np.repeat(felt[:, None], batch.frame_us.shape[1], axis=1)
 
 
-@_own("sense", "makes bytes of the sensors as the subject's calibration has it", ("sensors_deg",), ("raw",))
+@_own("sense", "converts the sensors to bytes by the subject's calibration", ("sensors_deg",), ("raw",))
 def _encode(batch: Batch, setting: Setting) -> None:
     batch.raw = Calibration.of_subject(setting.seed, batch.condition.subject).bytes(batch.sensors_deg)
 

@@ -1,4 +1,4 @@
-"""Parts of a glove: how switches are wired, and which of them are faulty."""
+"""Parts of a glove: the wiring of switches, and faulty parts."""
 
 from collections.abc import Callable, Sequence
 from typing import Annotated
@@ -19,7 +19,7 @@ _MANY = {"port": "ports", "switch": "switches"}
 
 
 def port_count(switches: int) -> int:
-    """Return how many ports so many switches need."""
+    """Return the number of ports for `switches` switches."""
     return -(-switches // PORT)
 
 
@@ -32,22 +32,22 @@ Bits = NDArray[np.bool_]
 
 
 class StuckParameters(EffectParameters, frozen=True):
-    """Either `switches`, by number from 0 or by name, or their `count`, drawn for the glove; one where neither is said.
+    """Either `switches`, by number from 0 or by name, or their `count`, drawn for the glove; one by default.
 
-    Each effect draws by itself: a switch may be drawn by two.
+    Effects draw independently: two may draw the same switch.
     """
 
     switches: Annotated[tuple[int | str, ...], Meta(min_length=1)] | None = None
     count: Annotated[int, Meta(ge=1)] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse both at once."""
+        """Reject both at once."""
         if self.switches is not None and self.count is not None:
             raise ValueError("say which `switches` are stuck or their `count`, not both")
 
 
 def stuck(effect: str, parameters: StuckParameters) -> Callable[[Draw], Bits]:
-    """Return what tells which switches (s,) of the glove are stuck. Raises SceneError where it has no such switch."""
+    """Return a function for the mask (s,) of stuck switches. Raises SceneError if there is no such switch."""
     names, numbers = [patch.name for patch in murakami160()], list[int]()
     for switch in parameters.switches or ():
         if isinstance(switch, str) and switch not in names:
@@ -59,8 +59,8 @@ def stuck(effect: str, parameters: StuckParameters) -> Callable[[Draw], Bits]:
 def chooser(
     effect: str, part: str, fault: str, there: int, numbers: Sequence[int], count: int | None
 ) -> Callable[[Draw], Bits]:
-    """Return what tells which of the glove's parts (there,) have a fault: those of these numbers, or `count` of them
-    (None: one), drawn by the least uniform numbers. Raises SceneError where there are no such parts.
+    """Return a function for the mask (there,) of faulty parts: those of these numbers, or `count` of them (None: one),
+    those with the smallest uniform numbers. Raises SceneError if there are no such parts.
     """
     parts = _MANY[part]
     for number in numbers:

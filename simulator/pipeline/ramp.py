@@ -1,4 +1,4 @@
-"""How forces grow with the grip: in straight lines from level to level, from nothing at the first touch."""
+"""The growth of forces with the grip: linear between levels, from 0 at the first touch."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class Ramp:
 
     def forces_at(self, at_us: Integers, places: Sequence[int], let_go_us: int | None) -> Floats:
         """Return the forces (n, F, t) on some places at times (n, F, t or 1). From let_go_us on, they fall as they
-        grew; None: the hand does not let go.
+        grew; None: no release.
         """
         forces = self.forces_n[:, :, places]
         levels = len(forces) - 1
@@ -39,14 +39,14 @@ class Ramp:
         return grown
 
     def reached_us(self, newtons: float) -> Integers:
-        """Return when (n,) any place bears more than this, NEVER where none does."""
+        """Return the first time (n,) at which any place bears more than this, or NEVER."""
         thresholds = np.full(self.forces_n.shape[2], newtons)
         found: Integers = crossings(self.forces_n, thresholds, self.rise_us / (len(self.forces_n) - 1))[0].min(axis=1)
         return found
 
 
 def crossings(forces_n: Floats, thresholds_n: Floats, level_us: float) -> tuple[Integers, Integers]:
-    """Return when (n, s) each switch closes for the first time and opens for the last, NEVER where it does not.
+    """Return the times (n, s) at which each switch first closes and last opens, or NEVER.
 
     forces_n (levels + 1, n, s) come level_us apart, the first at 0; thresholds_n (s,). One that is closed at the end
     does not open.
@@ -61,8 +61,8 @@ def crossings(forces_n: Floats, thresholds_n: Floats, level_us: float) -> tuple[
 
 
 def _between(forces_n: Floats, thresholds_n: Floats, level: NDArray[np.intp]) -> Floats:
-    """Return at which level, and what part of the way to the next, force passes the threshold; the level where it does
-    not: what is left to a threshold over hardly any change would overflow.
+    """Return the fractional level at which the force passes the threshold, or the level itself if it does not: dividing
+    by a tiny change would overflow.
     """
     here = np.take_along_axis(forces_n, level[None], axis=0)[0]
     change = np.take_along_axis(forces_n, level[None] + 1, axis=0)[0] - here

@@ -1,4 +1,4 @@
-"""The rest between grasps: an open hand that holds nothing, from which every grasp comes and to which it goes."""
+"""The rest between grasps: an open, empty hand, from which every grasp starts and to which it returns."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -17,7 +17,7 @@ _STYLE, _POSTURE, _TRANSITION = "hand.style", "hand.posture", "hand.transition"
 
 
 class Parameters(EffectParameters, frozen=True):
-    """How far rests vary, in degrees: between subjects as all postures do, and besides; and from rest to rest."""
+    """Standard deviations of rests in degrees: between subjects, in addition to that of all postures; between rests."""
 
     sd_deg: float = 0.0
     habit_sd_deg: float = 0.0
@@ -37,7 +37,7 @@ def _prepare(parameters: Parameters, setting: Setting) -> Step:
             varied = mean + parameters.each_sd_deg * before.per_repetition(len(DOF)).normal()
             return np.clip(varied, LIMITS_DEG[:, 0], LIMITS_DEG[:, 1])
 
-        # The rest after a trial is that before the next one.
+        # The rest after a trial is the one before the next.
         batch.previous_deg, batch.rest_deg = rest(resting), rest(draw.at_rest(batch.trials + 1))
 
     return step
@@ -55,9 +55,9 @@ _REST = Effect(
 
 
 def resting(listed: Mapping[str, EffectParameters], setting: Setting) -> Place:
-    """Return the step that says how the hand rests, varied as the `listed` effects vary postures.
+    """Return the step that sets the rests of the hand, varied by the `listed` effects like other postures.
 
-    Raises SceneError where nothing would move the hand, or no row would show it.
+    Raises SceneError if nothing would move the hand, or no row would show it.
     """
     needs = {
         'rows = "all"': setting.every_frame,

@@ -1,4 +1,4 @@
-"""Taxels: places of the glove that say how hard they are pressed, and the counts that are made of it."""
+"""Taxels: places of the glove that measure force, and their conversion to counts."""
 
 from typing import Annotated
 
@@ -18,20 +18,20 @@ Codes = NDArray[np.uint16]
 
 
 class Converter(EffectParameters, frozen=True):
-    """Counts of `bits` bits in even steps up to `full_n` newtons, where they end. Without an effect that says another:
-    a thousandth of a newton a count.
+    """Counts of `bits` bits in even steps up to the full scale of `full_n` newtons; by default a thousandth of a newton
+    per count.
     """
 
     bits: Annotated[int, msgspec.Meta(ge=1, le=15)] = 15
     full_n: Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)] = 32.768
 
     def codes(self, newtons: Floats) -> Codes:
-        """Return the counts of forces of any shape; what is below the first or above the last reads as these."""
+        """Return the counts of forces of any shape, clipped to the first and the last."""
         steps = 1 << self.bits
         return np.clip(np.rint(newtons * (steps / self.full_n)), 0.0, steps - 1.0).astype(np.uint16)
 
     def column(self, name: str) -> Joint:
-        """Return what the counts of a taxel of this name mean."""
+        """Return the joint that describes the counts of a taxel of this name."""
         return Joint(name, "N", 0, 0.0, 1 << (self.bits - 1), self.full_n / 2.0)
 
 
@@ -62,7 +62,7 @@ def _count(parameters: EffectParameters, setting: Setting) -> Step:
     return step
 
 
-# What the pipeline of a glove with taxels does besides, whatever its effects.
+# Additional steps for a glove with taxels, with any effects.
 STEPS = (
     Effect(
         name="glove.feel",
@@ -74,7 +74,7 @@ STEPS = (
     ),
     Effect(
         name="glove.count",
-        summary="makes counts of the taxels' newtons",
+        summary="converts the taxels' newtons to counts",
         stage="read",
         reads=("taxels_n",),
         writes=("taxels",),
@@ -84,9 +84,9 @@ STEPS = (
 
 
 def taxel_places(listed: tuple[str, ...] | str) -> tuple[int, ...]:
-    """Return the numbers of the places that bear a taxel: "all", or names of places or of segments, as "index_distal".
+    """Return the numbers of the places with taxels: "all", or names of places or of segments, as "index_distal".
 
-    Raises ValueError about the first that the layout does not have.
+    Raises ValueError for the first that the layout does not have.
     """
     names = [patch.name for patch in murakami160()]
     if listed == "all":

@@ -1,9 +1,9 @@
-"""The serial lines: frames sent as bytes, and what a driver makes of the bytes that arrive.
+"""The serial lines: frames sent as bytes, and their decoding by drivers.
 
 Two lines of 115200 baud, 8 data bits, no parity, one stop bit: the scanner's STATE frames, after each the ANALOG frames
-of its taxels, and the CyberGlove's streamed records, which the glove sends once it has digitised its sensors one by
-one: hence its 160 records a second at most.
-Between `SEND` and `RECEIVE` the wire effects do what they will with the bytes.
+of its taxels, and the CyberGlove's streamed records, which the glove sends after digitising its sensors one by one,
+which limits it to 160 records a second.
+The wire effects act on the bytes between `SEND` and `RECEIVE`.
 """
 
 from collections.abc import Callable, Iterator
@@ -24,7 +24,7 @@ from .effect import Effect, EffectParameters, Setting, Step
 Bits = NDArray[np.bool_]
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]
-# Chunks of bytes in, what the frames they complete carry out.
+# From chunks of bytes to the payloads of completed frames.
 Feed = Callable[[bytes], list[bytes]]
 
 BAUD = 115_200
@@ -36,9 +36,7 @@ def _send(parameters: EffectParameters, setting: Setting) -> Step:
     _check_rate(setting)
 
     def send(batch: Batch, draw: Draw) -> None:
-        """Put bits and counts on the line once their scan is through, raw once it is digitised from the frame's
-        beginning on.
-        """
+        """Send bits and counts after their scan, and raw bytes after digitisation, which starts with the frame."""
         scanned = batch.frame_us if batch.delay_us is None else batch.frame_us + batch.delay_us.max(axis=-1)
         states, records = np.concatenate([_states(batch.bits), *_analogs(batch.taxels)], axis=2), _records(batch.raw)
         data = np.concatenate([states, records], axis=2)
@@ -56,16 +54,16 @@ def _check_rate(setting: Setting) -> None:
     if setting.timed and setting.period_us < longest:
         raise SceneError(
             f"recording.rate_hz: {1e6 / setting.period_us:g} frames a second are more than the glove's serial lines"
-            f" deliver: one takes {longest} us; ask for at most {1_000_000 // longest}, or list no wire effects"
+            f" deliver: one takes {longest} us; request at most {1_000_000 // longest}, or list no wire effects"
         )
 
 
 def receive(batch: Batch, draw: Draw) -> None:
-    """Decode what arrived, as a driver does, and take for each frame the newest there is by the time it is due.
+    """Decode the received bytes like a driver, and take for each frame the newest data when it is due.
 
-    A frame of switches or taxels or a glove record that did not arrive leaves the one before it in place. Before the
-    first: no contact,
-    and the joints of the first to come. A repetition to which one of the lines brought nothing at all is not `settled`.
+    If a frame of switches or taxels or a glove record is lost, the previous one stays valid. Before the first there is
+    no contact, and the joints are those of the first to come. A repetition without any data on one line is not
+    `settled`.
     """
     traffic, switches = batch.traffic, batch.bits.shape[2]
     line = slice(0, traffic.scanner)
@@ -105,7 +103,7 @@ _HEAD = scanner.Analog.LAYOUT.size
 
 
 def _parts(taxels: int) -> list[slice]:
-    """Return the taxels of each ANALOG: as many as it has room for."""
+    """Return the taxels of each ANALOG, up to its capacity."""
     return [slice(first, min(first + scanner.MOST_ASKED, taxels)) for first in range(0, taxels, scanner.MOST_ASKED)]
 
 
@@ -118,7 +116,7 @@ def _analogs(taxels: NDArray[np.uint16] | None) -> list[Bytes]:
         return []
     sent = []
     for part in _parts(taxels.shape[2]):
-        # The first of its taxels for a token tells an ANALOG from the others.
+        # The number of its first taxel as token distinguishes an ANALOG from the others.
         head = scanner.Analog.LAYOUT.pack(0, part.start)
         codes = taxels[:, :, part].astype("<u2")
         frames = [
@@ -139,7 +137,7 @@ def _matrix(sent: list[bytes], shape: tuple[int, ...]) -> Bytes:
 
 
 def _arrivals(ready_us: Integers, size: int) -> Integers:
-    """Return when each byte (n, F, size) is in, of frames ready at (n, F): each waits until the one before is out."""
+    """Return the arrival times of bytes (n, F, size) of frames ready at (n, F), sent one after the other."""
     turn = np.arange(ready_us.shape[1]) * _sent_us(size)
     starts = np.maximum.accumulate(ready_us - turn, axis=1) + turn
     times: Integers = starts[:, :, None] + np.array([_sent_us(count) for count in range(1, size + 1)])
@@ -151,7 +149,7 @@ def _sent_us(size: int) -> int:
 
 
 def _received(traffic: Traffic, line: slice, width: int, decoder: Callable[[], Feed]) -> tuple[Bytes, Bits]:
-    """Return what arrived in time for each frame (n, F, width), and whether anything did (n, F)."""
+    """Return the data received in time for each frame (n, F, width), and whether there was any (n, F)."""
     at_us, arrives = traffic.at_us[:, :, line], traffic.arrives[:, :, line]
     values = np.ones((*at_us.shape[:2], width), dtype=np.uint8)
     came = np.zeros(at_us.shape[:2], dtype=np.bool_)
@@ -165,7 +163,7 @@ def _received(traffic: Traffic, line: slice, width: int, decoder: Callable[[], F
 
 
 def _decoded(data: Bytes, at_us: Integers, feed: Feed) -> Iterator[tuple[int, bytes]]:
-    """Yield what each frame carries, and when its last byte was in; like a driver's, a reading goes up to a zero."""
+    """Yield the payload of each frame and the arrival time of its last byte; like a driver, split at zeros."""
     start, whole = 0, data.tobytes()
     for zero in np.flatnonzero(data == 0).tolist():
         for value in feed(whole[start : zero + 1]):
@@ -191,7 +189,7 @@ def _sensors() -> Feed:
 
 
 def _newest(came: Bits) -> NDArray[np.intp]:
-    """Return for each frame (n, F) the number of the newest that came, -1 before the first."""
+    """Return for each frame (n, F) the number of the newest received one, -1 before the first."""
     return np.maximum.accumulate(np.where(came, np.arange(came.shape[1]), -1), axis=1)
 
 
@@ -206,7 +204,7 @@ SEND = Effect(
 )
 RECEIVE = Effect(
     name="glove.receive",
-    summary="decodes the bytes that arrive, as a driver does",
+    summary="decodes the received bytes like a driver",
     stage="wire",
     reads=("traffic", "bits", "settled", "taxels"),
     writes=("bits", "raw", "lost", "settled", "taxels"),

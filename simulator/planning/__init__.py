@@ -1,1 +1,1 @@
-"""Planned postures: how hands of any length hold each object, made once and kept as data."""
+"""Planned postures of hands of any length for each object, computed once and stored as data."""

@@ -20,20 +20,20 @@ from .planner import TOLERANCE_MM, Plan, measure, plan
 from .postures import Entry, HeldAt, Postures
 from .prehension import Prehension, load_prehensions
 
-# Hands are planned every so many millimetres, as broad as hands are on average (AIST 2012: 83.3 of 183.4 mm).
+# Spacing of planned hand lengths in mm, and the average ratio of breadth to length (AIST 2012: 83.3 of 183.4 mm).
 EVERY_MM = 15.0
 BREADTH = 0.455
-# What is planned for any object, if hands so small and so large can hold it, and where planning begins: who else is in
-# a scene then changes no one's postures.
+# The lengths planned for any object, as far as hands of these sizes can hold it, and the first planned length: both are
+# fixed, so that other subjects of a scene do not change postures.
 USUAL_LENGTHS_MM = (150.0, 225.0)
 START_MM = 195.0
-_BETTER = 0.99  # a cost over another's that is no mere rounding
+_BETTER = 0.99  # a ratio of costs that is not just rounding
 
 
 @dataclass(frozen=True, slots=True)
 class Planned:
-    """One object planned for one grasp type, and the worst over the hand lengths of what `Plan` measures; gap and depth
-    also halfway between two lengths.
+    """One object planned for one grasp type, with the worst values of `Plan` over the hand lengths; gap and depth also
+    halfway between two lengths.
     """
 
     entry: Entry
@@ -58,14 +58,14 @@ class Work:
 
 
 def average_hand(length_mm: float) -> Hand:
-    """Return the hand that is planned for a length."""
+    """Return the average hand of a length, which is planned."""
     return Hand(Size(length_mm, BREADTH * length_mm))
 
 
 def plan_object(work: Work) -> Planned:
     """Return an object's postures for hands of all lengths.
 
-    Raises PlanError where a length fails that is asked for; beyond these, the usual ones are planned until one fails.
+    Raises PlanError if a requested length fails; beyond these, the usual ones are planned until one fails.
     """
     plans = _outwards(work)
     entry = entry_of(work, plans)
@@ -83,7 +83,7 @@ def plan_object(work: Work) -> Planned:
 
 
 def _outwards(work: Work) -> dict[float, Plan]:
-    """Return plans by hand length, in order: outwards from a middle length, each from the one before."""
+    """Return plans by hand length, in order: outwards from a middle length, each from the previous one."""
     first = min(max(START_MM, work.shortest_mm), work.longest_mm)
     plans = {first: work.at(first)}
     for step, needed, usual in (
@@ -101,9 +101,9 @@ def _outwards(work: Work) -> dict[float, Plan]:
 
 
 def _evened(work: Work, plans: dict[float, Plan]) -> dict[float, Plan]:
-    """Return plans with those replaced that are worse than what follows from their neighbours.
+    """Return plans, with those replaced that are worse than a plan from their neighbours.
 
-    Two lengths may hold an object differently, so that halfway a finger goes through it: one of them has got stuck.
+    Two lengths may hold an object differently, so that halfway a finger goes through it: one is a local minimum.
     """
     found, lengths = dict(plans), list(plans)
     for order in (lengths, lengths[::-1]):
@@ -125,7 +125,7 @@ def _halfway(entry: Entry, thing: Thing) -> tuple[float, float]:
 
 
 def entry_of(work: Work, plans: dict[float, Plan]) -> Entry:
-    """Return plans by hand length, in order, as data: rounded, and each turn as near the one before as can be."""
+    """Return plans by hand length, in order, as data: rounded, each rotation close to the previous one."""
     held: list[HeldAt] = []
     for length, one in plans.items():
         pose = one.held.pose.copy()
@@ -150,7 +150,7 @@ def _held_at(length: float, held: Held, pose: Floats) -> HeldAt:
 
 
 def _nearest_turn(vector: Floats, before: Floats) -> Floats:
-    """Return the rotation vector of the same rotation that is nearest to `before`: a turn is also one the other way."""
+    """Return the equivalent rotation vector nearest to `before`: a rotation has two, in opposite directions."""
     angle = float(np.linalg.norm(vector))
     if angle == 0.0:
         return vector
@@ -166,19 +166,19 @@ Progress = Callable[[int, int], None]
 def plan_scene(
     scene: Scene, jobs: int = -1, progress: Progress | None = None, *, anew: bool = False
 ) -> tuple[Postures, list[Planned]]:
-    """Return the postures of a scene, and what of them was planned now: what had none, or all of it `anew`.
+    """Return the postures of a scene, and those planned now: missing ones, or all with `anew`.
 
-    The scene's objects come in their order, before what else was known; neither depends on `jobs`. Raises SceneError
-    where the taxonomy has no table of prehensions, PlanError where a hand of the scene cannot hold an object.
+    The scene's objects come in their order, before other known ones, for any `jobs`. Raises SceneError if the taxonomy
+    has no table of prehensions, PlanError if a hand of the scene cannot hold an object.
     """
     known = _known(scene, anew)
     works = list(_works(scene, known))
-    answers: dict[int, Planned | PlanError] = {}
-    for number, answer in in_workers(_answer, enumerate(works), jobs):
-        answers[number] = answer
+    results: dict[int, Planned | PlanError] = {}
+    for number, result in in_workers(_result, enumerate(works), jobs):
+        results[number] = result
         if progress is not None:
-            progress(len(answers), len(works))
-    planned = _successes([answers[number] for number in range(len(works))], works)
+            progress(len(results), len(works))
+    planned = _successes([results[number] for number in range(len(works))], works)
     found = Postures(scene.taxonomy, (*known.entries, *(one.entry for one in planned)))
     own = [found.entry(item.grasp, item.thing()) for item in scene.objects]
     return Postures(scene.taxonomy, (*filter(None, own), *found.entries)), planned
@@ -189,13 +189,13 @@ def shipped_prehensions(taxonomy: str) -> dict[str, Prehension]:
     table = files(__package__) / "data" / f"{taxonomy}.toml"
     if not table.is_file():
         raise SceneError(
-            f"there is no table of how the grasp types of {taxonomy!r} hold things: nothing can be planned"
+            f"there is no table of prehensions for the grasp types of {taxonomy!r}: nothing can be planned"
         )
     return load_prehensions(table)
 
 
 def _known(scene: Scene, anew: bool) -> Postures:
-    """Return what needs no planning. The scene may name the file that is only to be written."""
+    """Return the postures that need no planning. The scene may name the file that is yet to be written."""
     if anew:
         return Postures(scene.taxonomy, ())
     if scene.postures is not None and not scene.postures.exists():
@@ -204,7 +204,7 @@ def _known(scene: Scene, anew: bool) -> Postures:
 
 
 def _works(scene: Scene, known: Postures) -> Iterator[Work]:
-    """Yield what lacks postures for the scene's hands, once each."""
+    """Yield the objects without postures for the scene's hands, once each."""
     hands = [subject.hand_length_mm for subject in scene.subjects]
     shortest, longest = EVERY_MM * math.floor(min(hands) / EVERY_MM), EVERY_MM * math.ceil(max(hands) / EVERY_MM)
     lacking: dict[object, SceneObject] = {}
@@ -216,23 +216,22 @@ def _works(scene: Scene, known: Postures) -> Iterator[Work]:
     for item in lacking.values():
         if item.grasp not in prehensions:
             raise SceneError(
-                f"{scene.taxonomy} has no table of how grasp type {item.grasp!r} holds things: "
-                f"{item.name!r} cannot be planned"
+                f"{scene.taxonomy} has no prehension for grasp type {item.grasp!r}: {item.name!r} cannot be planned"
             )
         yield Work(item.grasp, prehensions[item.grasp], item.thing(), shortest, longest)
 
 
-def _successes(answers: Sequence[Planned | PlanError], works: Sequence[Work]) -> list[Planned]:
-    """Return the answers. Raises the first PlanError among them, in the scene's order, and names the other objects."""
-    failed = [(answer, work) for answer, work in zip(answers, works, strict=True) if isinstance(answer, PlanError)]
+def _successes(results: Sequence[Planned | PlanError], works: Sequence[Work]) -> list[Planned]:
+    """Return the results. Raises the first PlanError among them, in the scene's order, and names the other objects."""
+    failed = [(result, work) for result, work in zip(results, works, strict=True) if isinstance(result, PlanError)]
     if failed:
         others = ", ".join(f"{work.thing.name!r} ({work.grasp})" for _, work in failed[1:])
         raise PlanError(f"{failed[0][0]}; nor can these be held: {others}" if others else str(failed[0][0]))
-    return [answer for answer in answers if isinstance(answer, Planned)]
+    return [result for result in results if isinstance(result, Planned)]
 
 
-def _answer(task: tuple[int, Work]) -> tuple[int, Planned | PlanError]:
-    # Which worker is first must not decide which object an error names: failures are answers, too.
+def _result(task: tuple[int, Work]) -> tuple[int, Planned | PlanError]:
+    # Failures are results, too, so that an error does not depend on which worker is first.
     number, work = task
     try:
         return number, plan_object(work)

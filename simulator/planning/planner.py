@@ -1,10 +1,9 @@
-"""Postures that hold an object as a grasp type wants it, by least squares over how far they are from it.
+"""Planning of postures that hold an object with a grasp type, by least squares.
 
-A candidate is 26 numbers: 20 joint angles in radians, a shift of the object in mm and a turn of it in radians, both
-from where the type's table puts it.
+A candidate is 26 numbers: 20 joint angles in radians, a shift of the object in mm and a rotation in radians, both
+relative to the pose in the type's table.
 
-Least squares over 20 joint angles and 6 numbers of the object's pose, from the type's nominal posture (scipy, needed
-for planning only: postures are kept as data).
+The least squares start from the type's nominal posture (scipy, needed only for planning: postures are stored as data).
 """
 
 from collections.abc import Iterator
@@ -24,7 +23,7 @@ from .prehension import Prehension, pad_side, pad_sphere
 
 Indices = NDArray[np.intp]
 
-# What a residual of 1 stands for. All ours.
+# The values at which residuals are 1. All ours.
 TOUCH_MM = 0.4
 SINK_MM = 0.7
 SQUARE = 0.45  # of a pad to the surface, as the length of a difference of unit vectors
@@ -34,9 +33,9 @@ TURN_RAD = 0.25
 BALANCE = 0.25
 EVENNESS = 0.6  # of the pads' shares, against their balance
 
-_SINK_IN_MM = 0.3  # how deep a pad that touches lies
-_CLEAR_MM = 1.0  # how far everything else keeps away
-_OVERLAP = 0.85  # of two fingers' radii: how near they come
+_SINK_IN_MM = 0.3  # depth of a touching pad
+_CLEAR_MM = 1.0  # distance of everything else
+_OVERLAP = 0.85  # smallest distance of two fingers over their radii
 
 
 class Misfit:
@@ -52,7 +51,7 @@ class Misfit:
         self._pairs = _digit_pairs(hand)
 
     def pose(self, shift: Floats) -> Pose:
-        """Return where the object is after shifts (6, n)."""
+        """Return the object's pose after shifts (6, n)."""
         return Pose.of(np.repeat(self.start[:, None], shift.shape[1], axis=1)).moved(shift)
 
     def residuals(self, unknowns: Floats) -> Floats:
@@ -84,20 +83,20 @@ class Misfit:
         return shares(wrenches(normal[self.pads], centres[self.pads] - position))
 
     def _looking(self, skeleton: Skeleton) -> Floats:
-        """Return which way the pads look (p, 3, n)."""
+        """Return the directions of the pads (p, 3, n)."""
         frames = skeleton.frames[self.hand.sphere_capsules[self.pads]]
         looking: Floats = (frames * self._sides[:, None, :, None]).sum(axis=2)
         return looking
 
     def _room(self, centres: Floats) -> Floats:
-        """Return how far pairs of spheres (q, n) are from running into one another."""
+        """Return the distances of pairs of spheres (q, n) from collision."""
         first, second = self._pairs
         between, radii = centres[first] - centres[second], self.hand.sphere_radii
         room: Floats = np.sqrt((between * between).sum(axis=1)) - _OVERLAP * (radii[first] + radii[second])[:, None]
         return room
 
     def _imbalance(self, normal: Floats, centres: Floats, pose: Pose) -> Floats:
-        """Return the best balance (6, n) of pushing pads: what is left, over the grip force; moments over 30 mm."""
+        """Return the residual (6, n) of the best balance of pushing pads, over the grip force; moments over 30 mm."""
         rows = [self.balance(normal[:, :, k], centres[:, :, k], pose.position[:, k])[1] for k in range(normal.shape[2])]
         return np.stack(rows, axis=1)
 
@@ -108,7 +107,7 @@ def wrenches(normals: Floats, levers: Floats) -> Floats:
 
 
 def shares(wrench: Floats) -> tuple[Floats, Floats]:
-    """Return how p pads share a grip force of 1 so that they balance best, none pulling, and what is left (6,)."""
+    """Return the shares of p pads in a grip force of 1 with the best balance, none pulling, and the residual (6,)."""
     from scipy.optimize import nnls
 
     count = wrench.shape[1]
@@ -121,7 +120,7 @@ def shares(wrench: Floats) -> tuple[Floats, Floats]:
 
 
 def object_start(hand: Hand, prehension: Prehension, shape: Shape) -> Floats:
-    """Return the pose (6,) where the type's table puts the object."""
+    """Return the object's pose (6,) from the type's table."""
     x = _unit(np.array(prehension.axis))
     up = np.array(prehension.up)
     z = _unit(up - x * (up @ x))
@@ -134,7 +133,7 @@ def object_start(hand: Hand, prehension: Prehension, shape: Shape) -> Floats:
 
 
 def _half(shape: Shape, direction: Floats) -> float:
-    """Return how far the object reaches from its middle in a direction (3,) of its own axes."""
+    """Return the extent of the object from its middle in a direction (3,) of its axes."""
     extent = np.array(shape.extent_mm()) / 2
     if isinstance(shape, Sphere):
         return float(extent[0])
@@ -148,7 +147,7 @@ def _unit(vector: Floats) -> Floats:
 
 
 def _digit_pairs(hand: Hand) -> tuple[Indices, Indices]:
-    """Return pairs of spheres of skin that must not run into one another: neighbouring fingers, thumb and fingers."""
+    """Return pairs of spheres of skin that must not collide: neighbouring fingers, thumb and fingers."""
     digit = np.where(hand.sphere_capsules < 15, hand.sphere_capsules // 3, -9)
     first, second = np.triu_indices(len(digit), 1)
     near = (np.abs(digit[first] - digit[second]) == 1) & (digit[first] > 0)
@@ -156,19 +155,19 @@ def _digit_pairs(hand: Hand) -> tuple[Indices, Indices]:
     return first[near | thumb], second[near | thumb]
 
 
-TOLERANCE_MM = 4.0  # what the contact model still closes, or presses out
-# How much of the push friction bears when pads do not push straight against each other: the sine of its angle.
+TOLERANCE_MM = 4.0  # gaps and depths up to this are resolved by the contact model
+# The share of the push borne by friction if pads do not push straight against each other: the sine of its angle.
 BORNE = FRICTION / float(np.sqrt(1.0 + FRICTION * FRICTION))
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A planned posture, and how good it is.
+    """A planned posture and its quality.
 
-    cost       what the planner made as small as it could
+    cost       the minimised cost
     gap_mm     the widest gap under a pad
-    sunk_mm    the deepest that any skin sinks in
-    imbalance  what the pads' pushes leave unbalanced, over the grip force (friction bears it)
+    sunk_mm    the greatest depth of any skin
+    imbalance  residual of the pads' pushes, over the grip force (borne by friction)
     """
 
     held: Held
@@ -178,28 +177,28 @@ class Plan:
     imbalance: float
 
     def holds(self) -> bool:
-        """Return whether every pad is near enough, no skin too deep in the object, and friction does the rest."""
+        """Return whether every pad is near enough, no skin too deep in the object, and friction bears the imbalance."""
         return self.excess() <= 1.0
 
     def excess(self) -> float:
-        """Return the worst fault over what is tolerated of it."""
+        """Return the worst fault over its tolerance."""
         return max(self.gap_mm / TOLERANCE_MM, self.sunk_mm / TOLERANCE_MM, self.imbalance / BORNE)
 
 
 def plan(hand: Hand, grasp: str, prehension: Prehension, thing: Thing, near: Held | None = None) -> Plan:
-    """Return a posture of `hand` that holds `thing`; `near` is one of a hand of nearly the same size to start from.
+    """Return a posture of `hand` that holds `thing`; `near` is a starting posture of a hand of similar size.
 
-    Raises PlanError if the best one leaves a pad too far off, lets skin sink in too deep, or pushes the object away.
+    Raises PlanError if the best one leaves a pad too far off or skin too deep, or pushes the object away.
     """
     from threadpoolctl import threadpool_limits
 
     misfit = Misfit(hand, prehension, thing.shape)
-    # Small matrices: more threads would take longer, and come to other last digits.
+    # Small matrices: more threads would take longer, and change the last digits.
     with threadpool_limits(1):
         plans = [] if near is None else [_descend(misfit, _start_near(misfit, near))]
         if not any(one.holds() for one in plans):
             plans += [_descend(misfit, start) for start in _starts(misfit)]
-    # The plan of the least cost among those that hold; if none does, what comes nearest to holding.
+    # The plan of the least cost among those that hold; if none does, the one closest to holding.
     best = min(plans, key=lambda one: (not one.holds(), one.cost if one.holds() else one.excess()))
     if not best.holds():
         raise PlanError(_refusal(hand, grasp, thing, best))
@@ -207,7 +206,7 @@ def plan(hand: Hand, grasp: str, prehension: Prehension, thing: Thing, near: Hel
 
 
 def measure(hand: Hand, held: Held, shape: Shape) -> tuple[float, float]:
-    """Return the widest gap under a pad, and the deepest that any skin sinks in, in mm."""
+    """Return the widest gap under a pad, and the greatest depth of any skin, in mm."""
     centres = hand.spheres(hand.skeleton(np.radians(held.posture_deg)[:, None]))
     gap = Pose.of(held.pose[:, None]).distance(shape, centres)[0][:, 0] - hand.sphere_radii
     return float(gap[[pad.sphere for pad in held.pads]].max()), float(-gap.min())
@@ -234,7 +233,7 @@ def _start_near(misfit: Misfit, near: Held) -> Floats:
 
 
 def _starts(misfit: Misfit) -> Iterator[Floats]:
-    """Yield candidates (26,): the nominal posture, and opener ones with the object further away."""
+    """Yield candidates (26,): the nominal posture, and more open ones with the object further away."""
     away = np.array(misfit.prehension.away)
     away = away / np.linalg.norm(away)
     for further, opened in ((0.0, 1.0), (12.0, 0.8), (25.0, 0.55)):

@@ -1,7 +1,7 @@
-"""Planned postures as data: for every grasp type and object, how hands of some lengths hold it.
+"""Planned postures as data: for every grasp type and object, postures at some hand lengths.
 
-A hand between two lengths takes a posture between theirs; lengths are planned one from the next, so neighbours differ
-little. An entry is found by its grasp type and the object's shape, so a changed object never meets an old posture.
+Postures are interpolated between two lengths; each length is planned from the next, so neighbours differ little. An
+entry is found by its grasp type and the object's shape, so a changed object never gets an old posture.
 
 The file is JSON: {"format": 1, "taxonomy": NAME, "entries": [{grasp, object, shape, grip_n, down, spheres, held:
 [{length_mm, posture_deg, pose, shares}, ...]}, ...]}.
@@ -28,14 +28,14 @@ from ..errors import SceneError
 from ..scenes.scene import Scene
 
 FORMAT = 1
-LARGEST = 10_000_000  # bytes; what ships has a two-hundredth of it
+LARGEST = 10_000_000  # bytes; the shipped files have a two-hundredth of it
 _SPHERES = len(Hand(Size(1.0, 1.0)).sphere_capsules)
 
 _Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 _Sphere = Annotated[int, msgspec.Meta(ge=0, lt=_SPHERES)]
 
-# A hand presses an object as it presses a weightless one, and besides so much that pads with this friction on its two
-# sides would bear twice its weight.
+# A hand presses an object like a weightless one, plus a force at which pads with this friction on its two sides would
+# bear twice its weight.
 FRICTION = 0.8
 
 _ADVICE = 'plan it with `thenar plan SCENE -o FILE`, and write postures = "FILE" in the scene'
@@ -51,7 +51,7 @@ class HeldAt(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How one grasp type holds one object: spheres of skin that press, and a posture a hand length, in order."""
+    """The grasp of one object with one grasp type: spheres of skin that press, and a posture per hand length."""
 
     grasp: str
     object: str
@@ -66,10 +66,10 @@ class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if any(low >= high for low, high in pairwise(lengths)):
             raise ValueError(f"the hands of {self.object!r} are not in order, shortest first")
         if any(len(held.shares) != len(self.spheres) for held in self.held):
-            raise ValueError(f"{self.object!r} has {len(self.spheres)} spheres, and not a share for each")
+            raise ValueError(f"{self.object!r} has {len(self.spheres)} spheres, but not a share for each")
 
     def covers(self, length_mm: float) -> bool:
-        """Return whether a hand so long lies between planned ones."""
+        """Return whether a hand of this length is between planned ones."""
         return self.held[0].length_mm <= length_mm <= self.held[-1].length_mm
 
 
@@ -93,13 +93,13 @@ class Postures:
 
     @classmethod
     def shipped(cls, taxonomy: str) -> Self:
-        """Return the postures that come with thenar for a taxonomy; none if it has none."""
+        """Return the shipped postures for a taxonomy, which may be none."""
         resource = files(__package__) / "data" / f"{taxonomy}.postures.json"
         return cls.decode(resource.read_bytes(), resource.name) if resource.is_file() else cls(taxonomy, ())
 
     @classmethod
     def load(cls, path: Path) -> Self:
-        """Return the postures that `save` wrote. Raises SceneError if the file is missing or none of those."""
+        """Return the postures that `save` wrote. Raises SceneError if the file is missing or invalid."""
         try:
             content = read_file(path, LARGEST, SceneError)
         except FileNotFoundError:
@@ -126,9 +126,9 @@ class Postures:
 
     @classmethod
     def of(cls, scene: Scene) -> Self:
-        """Return what a scene can use: the shipped postures, and those of its own file, which come first.
+        """Return the postures for a scene: the shipped ones, and those of the scene's file, which come first.
 
-        Raises SceneError if that file is missing, no such file, or of another taxonomy.
+        Raises SceneError if that file is missing, invalid, or of another taxonomy.
         """
         shipped = cls.shipped(scene.taxonomy)
         if scene.postures is None:
@@ -146,13 +146,13 @@ class Postures:
         write_atomically(path, msgspec.json.encode(_File(FORMAT, self.taxonomy, self.entries)) + b"\n")
 
     def entry(self, grasp: str, thing: Thing) -> Entry | None:
-        """Return how this grasp type holds an object of this shape, if it was planned."""
+        """Return the planned entry of this grasp type and object shape, if any."""
         return self._found.get((grasp, thing.shape))
 
     def held(self, hand: Hand, grasp: str, thing: Thing) -> Held:
-        """Return how `hand` holds `thing`, between the two planned lengths next to its own.
+        """Return the grasp of `thing` by `hand`, interpolated between the two planned lengths next to its own.
 
-        Raises SceneError naming grasp and object where nothing was planned, or not for so small or large a hand.
+        Raises SceneError naming grasp and object if nothing was planned, or not for this size of hand.
         """
         entry = self.entry(grasp, thing)
         what = f"grasp type {grasp!r} with object {thing.name!r}"
@@ -181,8 +181,9 @@ def _between(entry: Entry, low: HeldAt, high: HeldAt, length: float, grip_n: flo
 
 
 def _near(low: HeldAt, high: HeldAt) -> tuple[float, ...]:
-    """Return the pose at `high`, its turn the other way round where that is nearer to that at `low`: which of the two
-    a turn of some 180 degrees comes as is a matter of rounding, and half way between them there is no turn at all.
+    """Return the pose at `high`, with the rotation vector nearest to that at `low`.
+
+    For a rotation of about 180 degrees rounding decides between two opposite vectors, whose mean would be no rotation.
     """
     turn = np.array(high.pose[3:])
     angle = float(np.sqrt(np.add.reduce(turn * turn)))

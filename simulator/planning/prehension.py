@@ -1,7 +1,7 @@
-"""What a grasp type is to the planner: which pads must touch, and roughly how the hand and the object lie.
+"""Grasp types for the planner: the pads that must touch, and the approximate pose of hand and object.
 
-A taxonomy's types stand in a table of data (`data/kamakura14.toml`, `data/cutkosky16.toml`), so that a new taxonomy is
-a new table and no new code.
+A taxonomy's types are in a table of data (`data/kamakura14.toml`, `data/cutkosky16.toml`), so that a new taxonomy needs
+a new table but no code.
 """
 
 import re
@@ -25,7 +25,7 @@ Angles = tuple[float, float, float, float]
 
 _SIDES = {"pad": (0.0, 0.0, -1.0), "radial": (0.0, 1.0, 0.0), "ulnar": (0.0, -1.0, 0.0), "tip": (0.7, 0.0, -0.7)}
 _PAD = re.compile(r"(\w*)(?:\.(\d+))?(?::(\w+))?", re.ASCII)
-# Of any size: which spheres a segment has does not depend on it.
+# Of any size: the number of spheres of a segment does not depend on it.
 _HAND = Hand(Size(1.0, 1.0))
 
 
@@ -33,13 +33,13 @@ class Prehension(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """A grasp type.
 
     thumb, index, middle, ring, little   nominal joint angles in degrees: abduction, first flexion, second, third
-    pads      what must touch: CAPSULE, CAPSULE.N for its Nth sphere of skin, CAPSULE:SIDE for another side than the pad
+    pads      that must touch: CAPSULE, CAPSULE.N for its Nth sphere of skin, CAPSULE:SIDE for another side than the pad
     at        a point of the object's surface: distal over hand length, radial and dorsal over hand breadth
     away      the direction from there to the object's middle
-    axis, up  the object's own x and z, all in hand axes
-    grip_n    what the pads press in all, before any weight
-    down      which way the weight pulls
-    loose     how far the object may be from where `at` puts it: mm
+    axis, up  the object's x and z, all in hand axes
+    grip_n    total force of the pads, before any weight
+    down      direction of the weight
+    loose     allowed distance of the object from `at`: mm
     """
 
     thumb: Angles
@@ -81,12 +81,12 @@ def pad_sphere(hand: Hand, pad: str) -> int:
     if which is None:
         return int(spheres[-1 if capsule.endswith("distal") else len(spheres) // 2])
     if not 1 <= int(which) <= len(spheres):
-        raise ValueError(f"{pad!r}: {capsule} has spheres of skin 1 to {len(spheres)}, and no {which}")
+        raise ValueError(f"{pad!r}: {capsule} has spheres of skin 1 to {len(spheres)}, not {which}")
     return int(spheres[int(which) - 1])
 
 
 def pad_side(pad: str) -> Floats:
-    """Return the direction (3,) that `pad` looks to, in its capsule's own axes. Raises ValueError if there is none."""
+    """Return the direction (3,) of `pad` in its capsule's axes. Raises ValueError if there is none."""
     return np.array(_SIDES[_parts(pad)[2]])
 
 
@@ -94,7 +94,7 @@ def _parts(pad: str) -> tuple[str, str | None, str]:
     """Return the capsule, the number of the sphere, and the side that `pad` names."""
     found = _PAD.fullmatch(pad)
     if found is None:
-        raise ValueError(f"{pad!r} is no pad: write CAPSULE, CAPSULE.NUMBER, or CAPSULE:SIDE")
+        raise ValueError(f"{pad!r} is not a pad: write CAPSULE, CAPSULE.NUMBER, or CAPSULE:SIDE")
     capsule, which, side = found[1], found[2], found[3] or "pad"
     if capsule not in CAPSULES:
         raise ValueError(f"{pad!r}: there is no segment {capsule!r}{nearest(capsule, CAPSULES)}")
@@ -111,7 +111,7 @@ def _prehension(source: TomlText, place: Place, table: object) -> Prehension:
 
 
 def _faults(prehension: Prehension) -> Iterator[tuple[Place, str]]:
-    """Yield what cannot be planned, with the key that it stands under."""
+    """Yield the faults that prevent planning, with their keys."""
     yield from _bad_angles(prehension)
     yield from _bad_pads(prehension.pads)
     for key in ("away", "axis", "up", "down"):
@@ -120,7 +120,7 @@ def _faults(prehension: Prehension) -> Iterator[tuple[Place, str]]:
     axis, up = np.array(prehension.axis), np.array(prehension.up)
     across = np.cross(axis, up)
     if across @ across < 1e-6 * (axis @ axis) * (up @ up):
-        yield ("up",), "points along `axis`: the object's own z lies across its x"
+        yield ("up",), "is parallel to `axis`: the object's z must be across its x"
 
 
 def _bad_angles(prehension: Prehension) -> Iterator[tuple[Place, str]]:
@@ -128,7 +128,7 @@ def _bad_angles(prehension: Prehension) -> Iterator[tuple[Place, str]]:
     for digit in DIGITS:
         for number, (angle, (low, high)) in enumerate(zip(getattr(prehension, digit), limits[digit], strict=True)):
             if not low <= angle <= high:
-                yield (digit, number), f"must be {low:g} to {high:g}, as far as the joint goes, not {angle:g}"
+                yield (digit, number), f"must be {low:g} to {high:g}, the range of the joint, not {angle:g}"
 
 
 def _bad_pads(pads: tuple[str, ...]) -> Iterator[tuple[Place, str]]:

@@ -1,4 +1,4 @@
-"""The devices of a harness, emulated: what they are connected to, where a client finds them, what their wires do."""
+"""The emulated devices of a harness: their wiring, their ports for clients, and the faults of their wires."""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
@@ -27,16 +27,16 @@ _CODE_BITS = 16
 
 
 def levels_of(chip: ChipWiring, closed: Sequence[bool], numbers: Mapping[str, int]) -> int:
-    """Return the levels of a chip's pins, bit p for pin p: open pins are pulled to where no switch is closed.
+    """Return the levels of a chip's pins, bit p for pin p: open pins are pulled to the level of an open switch.
 
-    numbers are the places in `closed` of the switches by name; a switch that is not among them is open.
+    numbers  the index in `closed` of each switch by name; other switches are open
     """
     shut = sum(1 << pin for pin, name in chip.numbered_pins.items() if name in numbers and closed[numbers[name]])
     return shut if chip.closed == "high" else _ALL_HIGH & ~shut
 
 
 def codes_of(chip: ChipWiring | SpiWiring, taxels: Sequence[int], numbers: Mapping[str, int]) -> int:
-    """Return the counts at a converter's channels, 16 bits each; a taxel that is not among `numbers` is at 0."""
+    """Return the counts at a converter's channels, 16 bits each; a taxel not among `numbers` is at 0."""
     pins = chip.numbered_pins.items()
     return sum(taxels[numbers[name]] << _CODE_BITS * channel for channel, name in pins if name in numbers)
 
@@ -45,9 +45,9 @@ Cable = Callable[[bytes], bytes]
 
 
 def cable_of(scene: Scene, line: int) -> Cable | None:
-    """Return what the cable of line number `line` does to a message on its way out; None where the scene lists nothing.
+    """Return the effect of the cable of line number `line` on an outgoing message; None if the scene lists none.
 
-    The draws of every line are its own, and the same for the same seed.
+    Each line has its own draws, reproducible by the seed.
     """
     rates = {listed.name: listed.parameters for listed in scene.effects}
     lost, damaged = rates.get(wire_lost_bytes.MEMBER.name), rates.get(wire_damaged_bytes.MEMBER.name)
@@ -72,8 +72,8 @@ _USUAL_BAUD = 115_200
 class Bench:
     """Emulated devices for every device of `harness`, their serial ports linked in `folder`.
 
-    harness      the same harness with the ports where the emulated devices are
-    environment  what a process needs besides its own environment to see the emulated I2C buses and SPI devices
+    harness      the same harness with the ports of the emulated devices
+    environment  variables that a process needs to see the emulated I2C buses and SPI devices
     lines        the serial lines, the CyberGlove's first, then the scanners'
     """
 
@@ -88,10 +88,10 @@ class Bench:
         bits: int = 10,
         joints: Sequence[tuple[str, str]] = (),
     ) -> None:
-        """Start the devices. cable(n) is what happens to the messages of serial line n; boards convert to so many bits;
+        """Start the devices. cable(n) is applied to the messages of serial line n; boards convert to `bits` bits;
         joints are the names and units of those that streams send.
 
-        Raises DeviceError if something that emulates is not installed.
+        Raises DeviceError if a package for the emulation is not installed.
         """
         self._numbers = {name: number for number, name in enumerate(switch_names)}
         self._taxels = {name: number for number, name in enumerate(taxel_names)}
@@ -135,7 +135,7 @@ class Bench:
         return line
 
     def _stream(self, number: int, wiring: StreamWiring, stack: ExitStack) -> tuple[LineSender, str]:
-        """Return what sends the rows of a stream, and from which port; those of LSL and ROS as lines, too."""
+        """Return the sender of a stream's rows, and its port; LSL and ROS streams are also sent as lines."""
         if "://" in wiring.port or wiring.port.startswith(("-", "unix:", "lsl:", "ros:")):
             way = lines_like(wiring.port, self._folder / f"stream{number}")
             stack.callback(way.close)
@@ -151,7 +151,7 @@ class Bench:
     def _numbers_of(
         self, number: int, closed: Sequence[bool], taxels: Sequence[int], joints: Sequence[float]
     ) -> dict[str, float]:
-        """Return the numbers of a stream's columns, as its sender has them."""
+        """Return the values of a stream's columns, in the sender's units."""
         wiring, found = self.harness.streams[number], dict[str, float]()
         for name in wiring.switches:
             shut = name in self._numbers and closed[self._numbers[name]]
@@ -173,7 +173,7 @@ class Bench:
     def show(
         self, closed: Sequence[bool], sensors: bytes, taxels: Sequence[int] = (), joints: Sequence[float] = ()
     ) -> None:
-        """Put one frame on all devices: switches (s,) that are closed, the glove's sensors, the taxels' counts (t,),
+        """Set one frame on all devices: the mask of closed switches (s,), the glove's sensors, the taxels' counts (t,),
         and the joints (j,) of streams.
         """
         for number, sender in enumerate(self.streams):
@@ -195,7 +195,7 @@ class Bench:
         return codes_of(chip, taxels, self._taxels) if chip.measures else levels_of(chip, closed, self._numbers)
 
     def close(self) -> None:
-        """Stop all devices and take their ports away."""
+        """Stop all devices and remove their ports."""
         self._stack.close()
 
     def __enter__(self) -> Self:
@@ -216,7 +216,7 @@ def _emulated(wiring: BusWiring, adapter: AdapterKind) -> EmulatedBus:
 
 
 def _lines_of(wiring: StreamWiring) -> dict[str, Callable[[float], int]]:
-    """Return what finds the byte of an angle, for the joints that are calibrated."""
+    """Return functions from angle to byte, for the calibrated joints."""
     if wiring.calibration is None:
         return {}
 

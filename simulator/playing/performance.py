@@ -1,4 +1,4 @@
-"""What an emulated glove plays of a scene, a set of grasps or a recording, and the playing of it."""
+"""Playback of a scene, a set of grasps or a recording by an emulated glove."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -29,7 +29,7 @@ Bytes = NDArray[np.uint8]
 Codes = NDArray[np.uint16]
 
 _WIRE, _TRANSITION = "wire.", "hand.transition"
-# Takes of every frame that is shown its number, its grasp type, and the monotonic clock in microseconds.
+# Called for every shown frame with its number, its grasp type, and the monotonic clock in microseconds.
 Log = Callable[[int, str, int], None]
 
 
@@ -39,11 +39,11 @@ class Performance:
 
     switches     (F, s) bool       switch_names  s names
     sensors      (F, 18) uint8     the CyberGlove's bytes, in wire order
-    grasps       (F,) str          the grasp types that are held, "none" where nothing is
+    grasps       (F,) str          the held grasp types, "none" if nothing is held
     period_us                      from one frame to the next
-    calibration  what the bytes mean on this subject's hand
+    calibration  of the bytes on this subject's hand
     taxels       (F, t) uint16     taxel_names  t names
-    taxel_calibration  what the taxels' counts mean; None: counts
+    taxel_calibration  of the taxels' counts; None: plain counts
     joints       (F, j) float64    joint_names  j names: the same joints, or more of them, for streams of numbers; in
                  the units of `joint_units`, of which "raw" are bytes
     """
@@ -71,9 +71,7 @@ class Performance:
         return len(self.switches)
 
     def with_rests(self, ends: NDArray[np.intp], rest_us: int) -> "Performance":
-        """Return it with a straight hand that holds nothing after each of the frames `ends`, for `rest_us` rounded up
-        to whole frames.
-        """
+        """Return it with a straight, empty hand for `rest_us`, in whole frames, after each of the frames `ends`."""
         at = np.repeat(ends + 1, max(-(-rest_us // self.period_us), 1))
         lines = {} if self.taxel_calibration is None else {one.name: one.rest for one in self.taxel_calibration.taxels}
         return replace(
@@ -86,13 +84,14 @@ class Performance:
         )
 
     def _open(self) -> list[float]:
-        """Return the joints of an open hand: straight where they are angles, and as far back as they went otherwise."""
+        """Return the joints of an open hand: straight for angles, otherwise their lowest values."""
         least = self.joints.min(axis=0, initial=np.inf).tolist()
         return [0.0 if unit == "deg" else end for unit, end in zip(self.joint_units, least, strict=True)]
 
     def play(self, show: Callable[[list[bool], bytes, list[int], list[float]], None], log: Log, stop: Event) -> bool:
-        """Show all frames once, each `period_us` after the one before, whatever showing them takes: lateness does not
-        add up. Returns False if `stop` was set before the last one had its time.
+        """Show all frames once, each `period_us` after the previous one; delays do not accumulate.
+
+        Returns False if `stop` was set before the end of the last one.
         """
         start_us = monotonic_ns() // 1000
         for row in range(len(self)):
@@ -114,11 +113,11 @@ def of_scene(
     period_us: int | None = None,
     rest_us: int | None = None,
 ) -> Performance:
-    """Return one subject's session of `scene`, the first one's by default, without what happens on its wires.
+    """Return one subject's session of `scene`, by default the first subject's, without the wire effects.
 
-    A scene that keeps every frame is played frame by frame; one that keeps a row of each grasp shows each row as long
-    as the grasp is held; period_us plays it faster or slower. With rest_us the hand rests between grasps for so long:
-    it goes there where the scene moves it, and is there at once where it does not. Raises SceneError.
+    A scene that keeps every frame is played frame by frame; one that keeps one row per grasp shows each row as long as
+    the grasp is held; period_us plays it faster or slower. With rest_us the hand rests between grasps for this time: it
+    moves there if the scene has transitions, otherwise it is there at once. Raises SceneError.
     """
     names = [each.name for each in scene.subjects]
     if subject is not None and subject not in names:
@@ -156,7 +155,7 @@ def of_scene(
 
 
 def _angles(performance: Performance) -> NDArray[np.float64]:
-    """Return what the bytes of its CyberGlove mean."""
+    """Return the angles of its CyberGlove's bytes."""
     lines = [
         [line.value(raw) for raw in range(256)]
         for name in SENSORS
@@ -180,12 +179,12 @@ def of_set(
     *,
     cyberglove: bool = True,
 ) -> Performance:
-    """Return the rows of `grasp_set`, one after the other, as a glove of this calibration would send them; with
-    rest_us, a straight hand after each movement for so long.
+    """Return the rows of `grasp_set`, in order, as sent by a glove with this calibration; with rest_us, a straight hand
+    after each movement for this time.
 
-    A code that no byte of a sensor gives is played as the byte that comes nearest. Sensors that the set does not have
-    rest. Without a calibration: of a typical hand. Raises SceneError where a `cyberglove` is to play it, and none of
-    its joints is a sensor's.
+    A code between two bytes of a sensor is played as the nearest byte. Sensors missing from the set rest. The default
+    calibration is that of a typical hand. Raises SceneError if a `cyberglove` must play it, but none of its joints is a
+    sensor.
     """
     meant = calibration or typical()
     known = {sensor.name: sensor for sensor in meant.sensors}
@@ -224,9 +223,9 @@ def _values(grasp_set: GraspSet) -> NDArray[np.float64]:
 
 
 def _taxel_calibration(columns: tuple[Joint, ...]) -> TaxelCalibration | None:
-    """Return what says of codes that are played as counts what they mean; None where that is the counts themselves.
+    """Return the calibration of codes played as counts; None if they are plain counts.
 
-    Raises SceneError where no calibration of a glove can say it.
+    Raises SceneError if no calibration of a glove can express it.
     """
     meant = [taxel for taxel in columns if (taxel.code_a, taxel.code_b) != (taxel.value_a, taxel.value_b)]
     if not meant:
@@ -242,14 +241,14 @@ def _taxel_calibration(columns: tuple[Joint, ...]) -> TaxelCalibration | None:
             or abs(taxel.value(rest)) > 1e-6 * value
         ):
             raise SceneError(
-                f"taxel {taxel.name!r}: its codes cannot be a converter's counts of {meant[0].unit}: 0 is no code of it"
+                f"taxel {taxel.name!r}: its codes cannot be a converter's counts of {meant[0].unit}: none of them is 0"
             )
         lines.append(TaxelLine(taxel.name, rest, press, value))
     return TaxelCalibration(unit=meant[0].unit, taxels=tuple(lines))
 
 
 def _nearest(rising: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return, for each wanted value, the place of the nearest of `rising`; of two, the lower."""
+    """Return, for each wanted value, the index of the nearest of `rising`; of two, the lower."""
     above = np.clip(np.searchsorted(rising, wanted), 1, len(rising) - 1)
     return np.where(wanted - rising[above - 1] <= rising[above] - wanted, above - 1, above)
 
@@ -271,7 +270,7 @@ def _byte_at_zero(sensor: SensorCalibration) -> int:
 
 
 def typical() -> GloveCalibration:
-    """Return what the bytes mean on a typical hand."""
+    """Return the calibration of a typical hand."""
     return _in_points(Calibration.nominal(), "")
 
 
@@ -289,10 +288,10 @@ Moment = tuple[int, bytes, tuple[int, ...], str]
 
 
 def of_recording(path: Path, period_us: int, warn: Callable[[str], None] = lambda _: None) -> Performance:
-    """Return the newest frames of a recording every `period_us`, with the grasp type recognised, or collected, by then.
+    """Return the newest frames of a recording every `period_us`, with the grasp type predicted, or collected, by then.
 
-    Where there was no CyberGlove its sensors rest. `warn` takes a sentence on each fault of the file. Raises McapError
-    if it is no recording, SceneError if it holds no frames.
+    Without a CyberGlove its sensors rest. `warn` gets a sentence on each fault of the file. Raises McapError if it is
+    not a recording, SceneError if it holds no frames.
     """
     reader = Reader(path)
     calibration = reader.session.calibration or typical()
@@ -300,7 +299,7 @@ def of_recording(path: Path, period_us: int, warn: Callable[[str], None] = lambd
     for fault in reader.faults():
         warn(fault.message)
     if not rows:
-        raise SceneError(f"{path.name}: holds no frame of a glove")
+        raise SceneError(f"{path.name}: holds no glove frames")
     names = reader.session.switches
     assert reader.end is not None
     width = len(names) + len(rows[0][1]) + 2 * len(rows[0][2]) + 4 * max(len(grasp) for *_, grasp in rows)
@@ -323,7 +322,7 @@ def of_recording(path: Path, period_us: int, warn: Callable[[str], None] = lambd
 
 
 def _ticks(reader: Reader, rest: bytes, period_us: int) -> Iterator[Moment]:
-    """Yield a moment every `period_us`, from when all devices that the recording names have been read."""
+    """Yield a moment every `period_us`, starting when all devices named by the recording have been read."""
     closed: int | None = 0 if not reader.session.switches else None
     sensors: bytes | None = rest if not reader.session.sensors else None
     codes = None if reader.session.taxels else tuple[int, ...]()

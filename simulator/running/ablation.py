@@ -1,4 +1,4 @@
-"""What accuracy costs in time, for simulation: a scene with each of its effects removed in turn."""
+"""Ablation of a simulation: a scene with each of its effects removed in turn, its accuracy and its time."""
 
 from collections.abc import Callable
 
@@ -13,9 +13,9 @@ from .simulation import simulate
 
 
 def ablate(scene: Scene, jobs: int = -1, progress: Callable[[int, int], None] | None = None) -> Ablation:
-    """Return what each effect of a scene does to the recognition rate and the time; a grasp is one row, its read-out.
+    """Return the influence of each effect of a scene on accuracy and time; a grasp is one row, its read-out.
 
-    No scene can do without a contact model: contact.quasistatic is never removed, and takes the place of another.
+    Every scene needs a contact model: contact.quasistatic is never removed, and replaces another.
     Raises SceneError if the scene cannot be simulated, EvaluationError if it has too few repetitions to cross-validate.
     """
     recording = msgspec.structs.replace(scene.recording, rows="last", rest=False)

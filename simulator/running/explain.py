@@ -1,4 +1,4 @@
-"""What simulating a scene will do and cost, before it is done: the steps, and each one's time on a few grasps."""
+"""The steps and the estimated cost of a simulation, from the time of each step on a few grasps."""
 
 from collections.abc import Sequence
 from time import process_time
@@ -19,9 +19,9 @@ _ROUNDS = 3
 
 
 def middle_session(scene: Scene) -> Session:
-    """Return the session of the middle subject; of all subjects, an order alone can take minutes.
+    """Return the session of the middle subject; the order of trials of all subjects alone can take minutes.
 
-    Raises SceneError where any subject's hand has no planned posture of an object.
+    Raises SceneError if any subject's hand has no planned posture of an object.
     """
     postures = Postures.of(scene)
     conditions = [conditions_of(scene, subject, postures) for subject in scene.subjects]
@@ -37,8 +37,8 @@ def sample(session: Session, most: int) -> list[Batch]:
 def best_us(scene: Scene, variants: Sequence[str | None], most: int = 128) -> list[float]:
     """Return the microseconds of processor time a grasp of the scene without each of `variants` (None: all of it).
 
-    The same few grasps for each, in turn, several times over; the shortest time counts: what else the machine does only
-    adds to it.
+    The same few grasps for each, in turn, repeated several times; the shortest time counts, since other load on the
+    machine only adds to it.
     """
     session = middle_session(scene)
     pipelines = [compile_pipeline(scene, without) for without in variants]
@@ -55,15 +55,15 @@ def _seconds(pipeline: Pipeline, session: Session, most: int) -> float:
     return process_time() - start
 
 
-# So many grasps are measured, fewer where each has many frames.
+# Number of measured grasps, fewer if each has many frames.
 _MEASURED = 256
 
 
 class StepPlan(msgspec.Struct, frozen=True):
-    """A step: what it is, and what it drew and took on the grasps that were measured.
+    """A step, and its draws and time on the measured grasps.
 
     own      True for a step that every scene has      reads, writes  fields of a batch
-    timed    whether it lives in time, so that whole streams of frames are simulated
+    timed    whether it depends on time, so that whole streams of frames are simulated
     on_wire  whether it acts on bytes, so that frames are sent and received
     share    of the time of all steps
     """
@@ -82,10 +82,10 @@ class StepPlan(msgspec.Struct, frozen=True):
 
 
 class Explanation(msgspec.Struct, frozen=True):
-    """The steps of a scene in order, and what to expect.
+    """The steps of a scene in order, and their estimated time.
 
     timed, on_wire  whether frames are simulated one by one, and sent as bytes
-    measured        grasps that were simulated to measure, of so many `conditions`
+    measured        number of measured grasps, of `conditions` conditions
     us_a_grasp      of one process        expected_s  for all repetitions on `workers` processes
     """
 
@@ -102,13 +102,13 @@ class Explanation(msgspec.Struct, frozen=True):
 
 
 def explain(scene: Scene, jobs: int = -1) -> Explanation:
-    """Return what `simulate` would do with a scene, measured on a few grasps.
+    """Return the steps of `simulate` for a scene, measured on a few grasps.
 
     Raises SceneError if the scene cannot be simulated.
     """
     pipeline = compile_pipeline(scene)
     session = middle_session(scene)
-    pipeline.run(sample(session, 1)[:1], Ledger())  # what is done once, such as importing
+    pipeline.run(sample(session, 1)[:1], Ledger())  # one-time work, such as imports
     ledger = Ledger()
     pipeline.run(sample(session, at_a_time(pipeline.setting, _MEASURED)), ledger)
     first = ledger.entries[pipeline.stops[0].effect.name]

@@ -1,4 +1,4 @@
-"""The pipeline: what a scene calls for, compiled once into one list of steps, and what each step costs.
+"""The pipeline: a scene, compiled once to a list of steps, and the cost of each step.
 
 Effects that the scene does not list are not imported; no step asks whether it is enabled.
 """
@@ -26,14 +26,14 @@ from ..streams import Draw, Draws
 
 @dataclass(slots=True)
 class Cost:
-    """What one step has done so far.
+    """The costs of one step so far.
 
     own          True for a step that every scene has, False for an effect that the scene lists
     calls        batches
     grasps       repetitions in them
     draws        random numbers
     nanoseconds  wall time
-    counters     what the step itself counts: solver steps, bytes sent, ...
+    counters     the step's own counts: solver steps, bytes sent, ...
     """
 
     own: bool
@@ -44,7 +44,7 @@ class Cost:
     counters: Counter[str] = field(default_factory=Counter)
 
     def add(self, other: Self) -> None:
-        """Add what another worker's entry of the same step says."""
+        """Add another worker's entry of the same step."""
         self.calls += other.calls
         self.grasps += other.grasps
         self.draws += other.draws
@@ -59,9 +59,9 @@ class Ledger:
     entries: dict[str, Cost] = field(default_factory=dict)
 
     def enter(self, name: str, own: bool, calls: int, grasps: int, nanoseconds: int, draws: Draws) -> None:
-        """Enter `calls` calls of step `name`, a batch each, together `grasps` repetitions.
+        """Record `calls` calls of step `name`, one batch each, with `grasps` repetitions in total.
 
-        What `draws` holds under that name are random numbers; under any other name, what the step counted.
+        `draws` holds the number of random numbers under that name, and the step's own counts under other names.
         """
         counters = draws.counts.copy()
         drawn = counters.pop(name, 0)
@@ -81,13 +81,13 @@ class Ledger:
         self.entries.setdefault(name, Cost(entry.own)).add(entry)
 
 
-# What closes the hand on its object where the scene names no other: every scene needs one.
+# The default contact model: every scene needs one.
 DEFAULT_CONTACT = "contact.quasistatic"
 
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """One step of a pipeline; `own` if it is there whatever effects the scene lists."""
+    """One step of a pipeline; `own` if every scene has it."""
 
     effect: Effect
     act: Together
@@ -102,9 +102,9 @@ class Pipeline:
     stops: tuple[Stop, ...]
 
     def run(self, batches: Sequence[Batch], ledger: Ledger) -> None:
-        """Take batches through all steps, and enter in the ledger what each step cost.
+        """Run all steps on batches, and record the cost of each step in the ledger.
 
-        They go side by side, which saves time where hands are closed; none depends on which others are there.
+        Batches are processed together, which saves time in the contact model; they are independent of each other.
         """
         repetitions = sum(map(len, batches))
         for stop in self.stops:
@@ -134,10 +134,10 @@ def _closing(model: ContactModel) -> Together:
 
 
 def compile_pipeline(scene: Scene, without: str | None = None) -> Pipeline:
-    """Return the steps of `scene`, less the listed effect `without`.
+    """Return the steps of `scene`, except for the listed effect `without`.
 
-    Raises SceneError where effects conflict, wait for one another in a circle, or cannot do with their parameters;
-    SimMissingError where one needs a package that is not installed.
+    Raises SceneError if effects conflict, wait for each other in a circle, or have impossible parameters;
+    SimMissingError if one needs a package that is not installed.
     """
     listed = list(_listed(scene, without))
     setting = scene.setting(place.effect for place in listed)
@@ -160,7 +160,7 @@ def compile_pipeline(scene: Scene, without: str | None = None) -> Pipeline:
 
 
 def _listed(scene: Scene, without: str | None) -> Iterator[Place]:
-    """Yield the effects that the scene lists, and a contact model where it names none: there must be one."""
+    """Yield the effects that the scene lists, and the default contact model if it lists none."""
     names = [listed.name for listed in scene.effects]
     _check_without(names, without)
     closes = False
@@ -197,13 +197,11 @@ def _check_taxels(listed: Sequence[Place], setting: Setting) -> None:
     for place in listed:
         name = place.effect.name
         if not setting.taxels and {"taxels", "taxels_n"} & {*place.effect.writes}:
-            raise SceneError(
-                f'effects.{name}: the glove has no taxels: say in [glove] which places are, as taxels = "all"'
-            )
+            raise SceneError(f'effects.{name}: the glove has no taxels: list them in [glove], as in taxels = "all"')
 
 
 def _prepared(place: Place, setting: Setting) -> Together:
     effect = place.effect
     if effect.prepare is None:
-        raise SceneError(f"effect {effect.name!r} has nothing that acts: give its record a `prepare`")
+        raise SceneError(f"effect {effect.name!r} has no step: give its record a `prepare`")
     return _each(effect.prepare(place.parameters, setting))

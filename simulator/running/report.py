@@ -1,4 +1,4 @@
-"""What is kept of a simulation: rows that become a set of grasps, and a report of what came out and what it cost."""
+"""The results of a simulation: rows of a set of grasps, and a report of the results and their cost."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -31,8 +31,8 @@ class Unsettled(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Notes:
-    """Of the repetitions of one grasp type in a batch: which did not settle, and of the others the largest force and
-    moment on the object that nothing balances, the force between switches in all, and the frames that did not arrive.
+    """Notes on the repetitions of one grasp type in a batch: the unsettled ones, and of the others the largest
+    unbalanced force and moment on the object, the total force between switches, and the lost frames.
     """
 
     grasp: str
@@ -77,7 +77,7 @@ def _why(batch: Batch, row: int) -> str:
     if slid > SLID_OUT_MM:
         return f"the object slid {slid:.0f} mm, out of the hand"
     force, moment = batch.residual_n[row], batch.residual_nmm[row]
-    return f"the hand did not come to rest; left on the object: {force:.3g} N, {moment:.3g} N mm"
+    return f"the hand did not come to rest; residual on the object: {force:.3g} N, {moment:.3g} N mm"
 
 
 Places = NDArray[np.intp]
@@ -92,9 +92,9 @@ class Rows:
     codes     (m, 16) uint16           the joints
     taxels    (m, t) uint16
     condition (m,) uint32              number of the condition
-    trial     (m,) uint32              place in the subject's session
+    trial     (m,) uint32              index in the subject's session
     read_out  (m,) bool                the row of its repetition that is read while the object is held
-    held      (m,) bool                whether anything is
+    held      (m,) bool                whether anything is held
     time_us   (m,) int64               on the subject's clock, movement after movement
     """
 
@@ -138,9 +138,9 @@ def rows_of(batch: Batch, kept: Places, number: int, codes: Codes, setting: Sett
 
 
 def joined(blocks: Sequence[Rows], subject: Places) -> Rows:
-    """Return all rows by subject, trial and frame, however they were cut into blocks and in whichever order these came.
+    """Return all rows by subject, trial and frame, for any division into blocks and any order of these.
 
-    subject (c,) is the place of each condition's subject in the scene; the frames of a repetition are in one block, in
+    subject (c,) is the index of each condition's subject in the scene; the frames of a repetition are in one block, in
     order.
     """
     whole = Rows(*(np.concatenate([getattr(block, field.name) for block in blocks]) for field in fields(Rows)))
@@ -158,11 +158,10 @@ def grasp_set(
     *,
     timed: bool,
 ) -> GraspSet:
-    """Return the set of grasps that `rows` of these conditions make; `simulated` says what made them.
+    """Return the set of grasps of `rows` of these conditions; `simulated` is their origin.
 
-    With `timed` the rows have their times; a clock never goes back, and begins at 0.
-
-    Of the places of the glove, those that are no taxels are switches.
+    With `timed` the rows have their times; a clock never goes back, and begins at 0. Places of the glove that are not
+    taxels are switches.
     """
     bits = np.unpackbits(rows.bits, axis=1, count=len(places)).view(np.bool_)
     bits = bits if not taxels else bits[:, ~np.isin(places, [taxel.name for taxel in taxels])]
@@ -194,13 +193,13 @@ def grasp_set(
 
 
 class GraspReport(msgspec.Struct, frozen=True):
-    """What came out for one grasp type. Switches are those closed at read-out, in grasps whose rows are in the set.
+    """The results for one grasp type. Switches are those closed at read-out, in grasps whose rows are in the set.
 
-    repetitions  all that were made                  rows        in the set, with something held
+    repetitions  all simulated ones                  rows        in the set, with something held
     unsettled    of them, not settled                patterns    distinct sets of closed switches
     switches_mean, switches_least, switches_most     no_contact  grasps without any closed switch
-    residual_n, residual_nmm  largest force and moment on the object that nothing balances, of the settled repetitions
-    between_n    mean force that fell between the switches, of the same
+    residual_n, residual_nmm  largest unbalanced force and moment on the object, of the settled repetitions
+    between_n    mean force between the switches, of the same
     """
 
     grasp: str
@@ -218,14 +217,14 @@ class GraspReport(msgspec.Struct, frozen=True):
 
 
 class Count(msgspec.Struct, frozen=True):
-    """What a step counted: solver steps, bytes sent, ..."""
+    """A count of a step: solver steps, bytes sent, ..."""
 
     what: str
     number: int
 
 
 class StepReport(msgspec.Struct, frozen=True):
-    """What a step cost: an effect's, or (`own`) one that every scene has. Seconds are summed over all workers.
+    """The cost of a step: an effect, or (`own`) one that every scene has. Seconds are summed over all workers.
 
     calls  batches      grasps  repetitions in them      draws  random numbers      share  of the time of all steps
     """
@@ -242,13 +241,13 @@ class StepReport(msgspec.Struct, frozen=True):
 
 
 class Report(msgspec.Struct, frozen=True):
-    """A simulation: what came out by grasp type, what each step cost, and what did not settle.
+    """A simulation: results by grasp type, costs of steps, and unsettled repetitions.
 
-    simulated       True, so that nobody takes a result for a recording
-    done            repetitions of each grasp type that were made before these
+    simulated       True, so that a result is not mistaken for a recording
+    done            earlier repetitions of each grasp type
     seconds         from start to end, on all workers
     lost_frames     frames that did not arrive
-    kept_unsettled  whether repetitions that did not settle are in the set all the same
+    kept_unsettled  whether unsettled repetitions are in the set
     """
 
     simulated: bool
@@ -267,7 +266,7 @@ class Report(msgspec.Struct, frozen=True):
 
 
 def grasp_reports(rows: Rows, grasps: Places, names: Sequence[str], notes: Sequence[Notes]) -> tuple[GraspReport, ...]:
-    """Return a report a grasp type: `names` in order, `grasps` (m,) the type of each row."""
+    """Return one report per grasp type: `names` in order, `grasps` (m,) the type of each row."""
     made = [[note for note in notes if note.grasp == name] for name in names]
     return tuple(
         _grasp_report(name, rows.pick(np.flatnonzero(grasps == number)), made[number])
@@ -296,7 +295,7 @@ def _grasp_report(name: str, rows: Rows, notes: Sequence[Notes]) -> GraspReport:
 
 
 def step_reports(ledger: Ledger) -> Iterator[StepReport]:
-    """Yield what each step cost, in the order in which they run."""
+    """Yield the cost of each step, in their order."""
     total = ledger.nanoseconds
     for name, entry in ledger.entries.items():
         yield StepReport(

@@ -45,10 +45,10 @@ class Session:
     """The trials of one subject: p conditions in the order of the scene's objects, t trials.
 
     first       (p,)     the number of each condition's first repetition
-    done        trials that were made before
-    trials      an array a condition: the trial of each of its repetitions, counted from these
+    done        number of earlier trials
+    trials      one array per condition: the trial of each of its repetitions, counted from these
     planned_deg (p, 20)  the conditions' planned postures
-    before      (t,)     the condition of the trial before each trial; of the first: its own
+    before      (t,)     the condition of the previous trial; for the first, its own
     """
 
     conditions: tuple[Condition, ...]
@@ -59,19 +59,19 @@ class Session:
     before: Integers
 
     def batch(self, place: int, repetitions: Integers) -> Batch:
-        """Return some repetitions (n,) of a condition of the session, its first is 0, ready for the pipeline."""
+        """Return some repetitions (n,) of a condition of the session, counted from 0, ready for the pipeline."""
         trials = self.trials[place][repetitions]
         numbers = self.first[place] + repetitions
         return Batch(self.conditions[place], numbers, self.done + trials, self.planned_deg[self.before[trials]])
 
 
 def sessions(scene: Scene, postures: Postures) -> tuple[Session, ...]:
-    """Return every subject's session. Raises SceneError where an object has no planned posture."""
+    """Return every subject's session. Raises SceneError if an object has no planned posture."""
     return tuple(session_of(scene, conditions_of(scene, subject, postures)) for subject in scene.subjects)
 
 
 def conditions_of(scene: Scene, subject: Subject, postures: Postures) -> tuple[Condition, ...]:
-    """Return what a subject does with every object. Raises SceneError where one has no planned posture."""
+    """Return a subject's conditions, one per object. Raises SceneError if one has no planned posture."""
     hand = subject.hand()
     things = [(item.grasp, item.thing()) for item, repetitions in scene.shares() if repetitions]
     return tuple(
@@ -80,10 +80,10 @@ def conditions_of(scene: Scene, subject: Subject, postures: Postures) -> tuple[C
 
 
 def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> Session:
-    """Return the session of the subject whose conditions these are."""
+    """Return the session of the subject with these conditions."""
     numbers = [share for _, share in scene.shares() if share]
     sites = [each.site(np.array(share)) for each, share in zip(conditions, numbers, strict=True)]
-    # All repetitions in the order of one random word each: no other repetition, type or object changes a word.
+    # Repetitions are sorted by one random word each, which does not depend on other repetitions, types or objects.
     words = [Draw(scene.seed, ORDER, site, Draws()).per_repetition().words for site in sites]
     counts = [len(each) for each in words]
     owner = np.repeat(np.arange(len(conditions)), counts)
@@ -105,7 +105,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, slots=True)
 class Simulated:
-    """What came of a scene."""
+    """The results of a scene."""
 
     grasp_set: GraspSet
     report: Report
@@ -117,7 +117,7 @@ _Batches = tuple[tuple[int, Batch], ...]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Done:
-    """What came of them."""
+    """The results of a group of batches."""
 
     rows: list[Rows] = field(default_factory=list)
     notes: list[Notes] = field(default_factory=list)
@@ -135,16 +135,16 @@ def simulate(
 ) -> Simulated:
     """Return the set of grasps of `scene`, and the report. The set is the same for any `jobs` and `block`.
 
-    jobs      worker processes, as joblib counts them: -1 for all cores, 1 for none beside this one
+    jobs      worker processes, as in joblib: -1 for all cores, 1 for none in addition to this one
     progress  called with repetitions (done, all)
-    block     about so many repetitions are simulated at a time, fewer where each has many frames
-    keep_unsettled  keep repetitions that did not settle; the report names them either way
-    without   a listed effect that is left out
+    block     approximate number of repetitions simulated at a time, fewer if each has many frames
+    keep_unsettled  keep repetitions that did not settle; the report names them in any case
+    without   a listed effect to omit
 
-    Raises SceneError if the scene cannot be simulated, or if nothing of it settles.
+    Raises SceneError if the scene cannot be simulated, or if none of it settles.
     """
     start = perf_counter()
-    # What is wrong with the scene shows here and not in a worker.
+    # Errors of the scene are raised here and not in a worker.
     setting = compile_pipeline(scene, without).setting
     plan = sessions(scene, Postures.of(scene))
     run = partial(_run, scene, without, keep_unsettled)
@@ -193,9 +193,9 @@ def _codes(scene: Scene, batch: Batch) -> Codes:
     return Calibration.of_subject(scene.seed, batch.condition.subject).common_codes(batch.raw)
 
 
-def _gathered(answers: Iterator[_Done], total: int, progress: Progress | None) -> _Done:
+def _gathered(results: Iterator[_Done], total: int, progress: Progress | None) -> _Done:
     everything, repetitions = _Done(), 0
-    for done in answers:
+    for done in results:
         everything.rows.extend(done.rows)
         everything.notes.extend(done.notes)
         everything.ledger.merge(done.ledger)
@@ -206,7 +206,7 @@ def _gathered(answers: Iterator[_Done], total: int, progress: Progress | None) -
 
 
 def _taxels(scene: Scene, without: str | None) -> tuple[Joint, ...]:
-    """Return what the counts of the scene's taxels mean: as the effect that makes them has it."""
+    """Return the joints of the scene's taxels: the meaning of counts by the effect that converts them."""
     listed = (each.parameters for each in scene.effects if each.name != without)
     converter = next((each for each in listed if isinstance(each, Converter)), IDEAL)
     return tuple(converter.column(murakami160()[place].name) for place in taxel_places(scene.glove.taxels))

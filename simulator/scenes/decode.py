@@ -1,4 +1,4 @@
-"""From a scene's TOML file to a Scene; what is wrong in it is said with file, line, key, and what to write instead."""
+"""From a scene's TOML file to a Scene; errors name file, line, key, and a remedy."""
 
 import re
 from collections.abc import Iterator
@@ -42,7 +42,7 @@ class _CatalogueFile(msgspec.Struct, frozen=True):
 
 
 def load_catalogue(name_or_path: str | Path) -> Catalogue:
-    """Read the catalogue that is shipped under a name, or lies in a file. Raises SceneError with file, line and key."""
+    """Read a shipped catalogue by name, or a file. Raises SceneError with file, line and key."""
     file = name_or_path if isinstance(name_or_path, Path) else _shipped(name_or_path)
     source = read_source(file, SceneError)
     tables = source.tables()
@@ -61,9 +61,9 @@ def find_taxonomy(source: TomlText, name: str) -> Taxonomy:
 
 
 def objects_of(source: TomlText, tables: object, taxonomy: Taxonomy) -> tuple[SceneObject, ...]:
-    """Return the `[[objects]]` of a scene or catalogue; grasp types may be written as anything that `taxonomy` finds.
+    """Return the `[[objects]]` of a scene or catalogue; grasp types may be written in any form that `taxonomy` finds.
 
-    Raises SceneError about the first that is wrong, and if a grasp type has none.
+    Raises SceneError for the first that is wrong, or if a grasp type has none.
     """
     place: Place = ("objects",)
     found = tuple(_object(source, (*place, n), item, taxonomy) for n, item in enumerate(as_list(source, place, tables)))
@@ -74,14 +74,14 @@ def objects_of(source: TomlText, tables: object, taxonomy: Taxonomy) -> tuple[Sc
 
 
 def check_names(source: TomlText, place: Place, names: list[str]) -> None:
-    """Raise SceneError about the first of the tables at `place` whose name is taken or would not survive a file."""
+    """Raise SceneError for the first of the tables at `place` whose name is taken or would not survive a file."""
     first: dict[str, int] = {}
     for number, name in enumerate(names):
         if reason := fault(name):
             raise source.error((*place, number, "name"), f"{name!r} {reason}")
         if name in first:
             line = source.line((*place, first[name]))
-            raise source.error((*place, number, "name"), f"{name!r} is taken (line {line}): give every one its own")
+            raise source.error((*place, number, "name"), f"{name!r} is taken (line {line}): give each a unique name")
         first[name] = number
 
 
@@ -120,7 +120,7 @@ def _shipped(name: str) -> Traversable:
 
 
 class _SceneFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A scene as it is written: tables are decoded one by one."""
+    """A scene's file: tables are decoded one by one."""
 
     name: str | None = None
     seed: Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
@@ -143,12 +143,12 @@ class Shipped(msgspec.Struct, frozen=True):
 
 
 def shipped_scenes() -> list[Shipped]:
-    """Return the scenes that are shipped."""
+    """Return the shipped scenes."""
     return [Shipped(name, file.read_text().partition("\n")[0].removeprefix("# ")) for name, file in shipped().items()]
 
 
 def load_scene(name_or_path: str | Path) -> Scene:
-    """Return the scene that is shipped under a name, or lies in a TOML file: what has a suffix or a folder is a file.
+    """Return a shipped scene by name, or one from a TOML file: a path has a suffix or a folder.
 
     Raises SceneError with file, line and key.
     """
@@ -160,9 +160,9 @@ def load_scene(name_or_path: str | Path) -> Scene:
 
 
 def located(name_or_path: str | Path, fault: SceneError) -> ThenarError:
-    """Return an error about a key of a scene with file and line added, where it says which key but not where.
+    """Return an error about a key of a scene with file and line added, if it names a key but no location.
 
-    That is what shows when the effects are put together; any other error comes back as it is.
+    Such errors come from the combination of effects; any other error is returned unchanged.
     """
     key, _, reason = str(fault).partition(": ")
     if not re.fullmatch(r"(effects|recording)(\.\w+)+", key):
@@ -171,7 +171,7 @@ def located(name_or_path: str | Path, fault: SceneError) -> ThenarError:
 
 
 def own_file(name_or_path: str | Path) -> Path | None:
-    """Return the file of the user's own that a scene is; None where it is a shipped one's name."""
+    """Return the user's own scene file; None for the name of a shipped scene."""
     path = Path(name_or_path)
     return path if path.suffix or len(path.parts) > 1 else None
 
@@ -180,17 +180,17 @@ def _file(path: Path) -> Traversable:
     known = shipped()
     if own_file(path):
         if not path.exists():
-            raise SceneError(f"there is no file {path}; scenes that are shipped go by name: {', '.join(known)}")
+            raise SceneError(f"there is no file {path}; shipped scenes have the names {', '.join(known)}")
         return path
     if path.name not in known:
-        advice = "; a file of your own ends in .toml"
+        advice = "; the path of your own scene file ends in .toml"
         raise SceneError(f"no shipped scene is called {path.name!r}{nearest(path.name, list(known))}{advice}")
     return known[path.name]
 
 
 @dataclass(frozen=True, slots=True)
 class _Decoder:
-    """A scene half way: `folder` is where its file lies."""
+    """A scene being decoded; `folder` is that of its file."""
 
     source: TomlText
     file: _SceneFile
@@ -262,7 +262,7 @@ class _Decoder:
         return listed
 
     def _placed(self, words: str, names: list[str]) -> ThenarError:
-        """Return an error about the order of effects, with the line of the key or of the first effect that it names."""
+        """Return an error about the order of effects, with the line of the key or of the first named effect."""
         where, _, what = words.partition(": ")
         if where.startswith("effects."):
             return self.source.error(tuple(where.split(".")), what)

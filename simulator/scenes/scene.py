@@ -1,10 +1,10 @@
-"""What a scene is: whose hands grasp which objects how often, what the glove is like, and which effects act.
+"""Scenes: subjects, objects and repetitions, the glove, and the effects.
+
+A scene comes from a TOML file (decode.py) or is built here; lengths are in millimetres, times in milliseconds.
 
 A scene comes from a TOML file (decode.py) or is put together here; lengths are in millimetres, times in milliseconds.
 
-A scene comes from a TOML file (decode.py) or is put together here; lengths are in millimetres, times in milliseconds.
-
-Every subject has draws of their own, so that raising the count leaves the first ones as they were.
+Every subject has separate draws, so that a larger count leaves the first subjects unchanged.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -29,7 +29,7 @@ from ..streams import Draw, Draws, Site
 # No hand is smaller or larger.
 HAND_LENGTHS_MM = (130.0, 240.0)
 HAND_BREADTHS_MM = (55.0, 115.0)
-# An object that is broader than this wherever it is held fits no hand; whether a smaller one fits is planned.
+# An object broader than this in every direction fits no hand; the planner decides on smaller ones.
 SPAN_MM = 200.0
 
 Rest = Literal["relaxed", "flat"]
@@ -37,7 +37,7 @@ _Milliseconds = Annotated[float, msgspec.Meta(ge=0.0, le=60_000.0)]
 
 
 class Subject(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Somebody's right hand: wrist crease to tip of the middle finger, and across the knuckles without the thumb."""
+    """A right hand: length from wrist crease to tip of the middle finger, breadth across the knuckles without thumb."""
 
     name: str
     hand_length_mm: Annotated[float, msgspec.Meta(ge=HAND_LENGTHS_MM[0], le=HAND_LENGTHS_MM[1])]
@@ -49,7 +49,7 @@ class Subject(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class SceneObject(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What is grasped, and by which grasp type of the scene's taxonomy."""
+    """A grasped object, and its grasp type in the scene's taxonomy."""
 
     name: str
     grasp: str
@@ -58,15 +58,15 @@ class SceneObject(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     def __post_init__(self) -> None:
         if min(self.shape.extent_mm()) > SPAN_MM:
-            raise ValueError(f"no hand holds what is more than {SPAN_MM:g} mm across in every direction")
+            raise ValueError(f"no hand holds an object of more than {SPAN_MM:g} mm in every direction")
 
     def thing(self) -> Thing:
-        """Return what the contact models know of it."""
+        """Return the object for the contact models."""
         return Thing(self.name, self.shape, self.mass_g / 1000.0)
 
 
 class Recording(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How a grasp is recorded: frames at `rate_hz`, from `lead_ms` before contact through `hold_ms` of holding and
+    """The recording of a grasp: frames at `rate_hz`, from `lead_ms` before contact through `hold_ms` of holding and
     `release_ms` more. A row of the set is the frame at the end of holding ("last"), or every frame ("all").
 
     With `rest` (True: "relaxed"), the hand opens after each release and rests for `rest_ms`.
@@ -82,9 +82,9 @@ class Recording(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 class Glove(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The glove: where its switches lie, what closes them, and whether joint codes are the sensors' bare bytes ("raw")
-    or mapped through every subject's calibration to one scale ("common"). The places `taxels`, by their names or those
-    of their segments, bear taxels instead of switches.
+    """The glove: the layout and threshold of its switches, and whether joint codes are the sensors' bytes ("raw") or
+    mapped by every subject's calibration to one scale ("common"). The places `taxels`, by their names or those of their
+    segments, have taxels instead of switches.
     """
 
     layout: Literal["murakami160"] = "murakami160"
@@ -97,21 +97,21 @@ class Glove(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class Listed(NamedTuple):
-    """An effect that the scene asks for."""
+    """An effect that the scene lists."""
 
     name: str
     parameters: EffectParameters
 
 
 class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Everything that decides what comes out of a simulation.
+    """All inputs of a simulation.
 
     taxonomy     a published one
     objects      at least one for every grasp type of the taxonomy
     repetitions  of every grasp type by every subject, shared evenly by the type's objects
-    done         repetitions that were made before: these have the numbers, and trials, that follow
+    done         earlier repetitions: the numbers and trials of these follow
     effects      by their rank, at most one contact model among them
-    postures     a file of planned postures for objects that are not shipped
+    postures     a file of planned postures for your own objects
     """
 
     name: str
@@ -134,10 +134,10 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         more: int | None = None,
         rest: Rest | None = None,
     ) -> "Scene":
-        """Return the scene with other repetitions, another seed, only the `subjects` of these names, or such a `rest`.
+        """Return the scene with other repetitions, another seed, only the `subjects` of these names, or another `rest`.
 
-        With `more`, it makes so many fresh repetitions instead, by the same hands: those that follow its own. Another
-        seed draws everything anew but the sizes of the hands. Raises SceneError if it has no such subject.
+        With `more`, it has this many new repetitions instead, by the same hands, which follow its own. Another seed
+        changes all draws except the sizes of the hands. Raises SceneError if it has no such subject.
         """
         known = {subject.name: subject for subject in self.subjects}
         for subject in subjects:
@@ -154,7 +154,7 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         )
 
     def setting(self, effects: Iterable[Effect]) -> Setting:
-        """Return what `effects`, those of this scene, must know of it."""
+        """Return the properties of this scene that its `effects` need."""
         effects, recording = tuple(effects), self.recording
         return Setting(
             seed=self.seed,
@@ -164,7 +164,7 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             first_us=-round(recording.lead_ms * 1000),
             hold_us=round(recording.hold_ms * 1000),
             release_us=round(recording.release_ms * 1000),
-            # Whoever wants every frame wants frames, whether or not an effect lives in time.
+            # Every frame as a row requires frames, even if no effect depends on time.
             timed=recording.rows == "all" or any(effect.timed for effect in effects),
             on_wire=any(effect.on_wire for effect in effects),
             taxels=taxel_places(self.glove.taxels),
@@ -175,19 +175,17 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     @property
     def types(self) -> int:
-        """How many grasp types are made."""
+        """Number of grasp types."""
         return len({item.grasp for item in self.objects})
 
     @property
     def origin(self) -> str:
-        """What made its grasps, as a set says of itself."""
+        """The origin of its grasps, stored in the set."""
         numbers = f", {self.repetitions} more after {self.done} repetitions" if self.done else ""
         return f"scene {self.name}, seed {self.seed}{numbers}"
 
     def shares(self) -> Iterator[tuple[SceneObject, range]]:
-        """Yield every object with the numbers of its repetitions; of what does not go out, a type's first objects get
-        one each.
-        """
+        """Yield every object with the numbers of its repetitions; a type's first objects share the remainder."""
         grasps = [item.grasp for item in self.objects]
         for number, item in enumerate(self.objects):
             count, place = grasps.count(item.grasp), grasps[:number].count(item.grasp)
@@ -208,7 +206,7 @@ class Spread:
     sd: float
 
     def at(self, normal: float, limits: tuple[float, float]) -> float:
-        """Return the hand that is `normal` deviations from the mean, inside `limits`, to a tenth of a millimetre."""
+        """Return the size `normal` deviations from the mean, inside `limits`, to a tenth of a millimetre."""
         return min(max(round(self.mean + self.sd * normal, 1), limits[0]), limits[1])
 
 
@@ -237,7 +235,7 @@ SURVEYS = {
 
 
 class Population(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """So many subjects of a survey, men and women mixed evenly to the share of women."""
+    """Subjects of a survey, men and women mixed evenly to the share of women."""
 
     survey: Literal["ansur2", "aist2012"]
     count: Annotated[int, msgspec.Meta(ge=1, le=10_000)]

@@ -1,4 +1,4 @@
-"""Codes at the ends of their range, neighbours, and what floating-point degrees become on the way in."""
+"""Codes at the ends of their range, neighbouring codes, and the coding of floating-point degrees on import."""
 
 import csv
 import math
@@ -34,8 +34,8 @@ HARD_DOUBLES = sorted(
     }
 )
 
-# Values, and the grid that they are coded on: half a step from two codes, a billionth apart, far from zero, next to the
-# closest grid there may be, subnormal, zeros, without an end in binary, huge and tiny.
+# Values and their coding grids: half a step from two codes, a billionth apart, far from zero, next to the finest grid
+# allowed, subnormal, zeros, infinite binary fractions, huge and tiny.
 HARD_DEGREES: tuple[tuple[tuple[float, ...], float], ...] = (
     ((0.24999, 0.25, 0.75, 1.25, 32767.5), 0.5),
     ((1.0, 1.000000001, 1.000000002), 0.5),
@@ -49,25 +49,25 @@ HARD_DEGREES: tuple[tuple[tuple[float, ...], float], ...] = (
     ((1e-200, 1.4e-200, 2.3e-199), 1e-200),
 )
 
-# The cells of a joint and a switch that are no such thing; the empty ones are missing.
+# Invalid cells of a joint and a switch; the empty ones are missing.
 NO_NUMBERS = ("inf", "-inf", "Infinity", "1e400", "-1e400", "nan", "NaN", "", "?", "1_0", "0x10", "1,5", "one")
 NO_CODES = (*NO_NUMBERS, "-1", "65536", "0.5", "1e12", "5e-324")
 NO_BITS = (*NO_NUMBERS, "2", "-1", "0.5", "5e-324")
-# Any other text names a trial.
+# Any other text is a valid trial name.
 MISSING = ("nan", "NaN", "", "?")
 NO_FLOATS = (math.inf, -math.inf, math.nan)
 
 
 CASE = Case(
     title="Codes and degrees at their ends",
-    danger="a threshold falls on the wrong side of a code, or what is no number becomes one in silence",
+    danger="a threshold falls on the wrong side of a code, or invalid text silently becomes a number",
 )
 
 EVERY_CODE = np.arange(HIGHEST_CODE + 1)
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Part neighbouring values, send every code through stumps and tables, and import what is hard to import."""
+    """Split neighbouring values, evaluate every code with stumps and tables, and import hard values."""
     yield _midpoints(200 if full else 20)
     yield _every_code(60 if full else 6)
     yield from _coded()
@@ -75,7 +75,7 @@ def findings(full: bool) -> Iterator[Finding]:
 
 
 def _midpoints(draws: int) -> Finding:
-    """A threshold between neighbours parts them, half an ulp from their middle at most: one rounding."""
+    """A threshold between neighbours separates them, at most half an ulp from their middle: one rounding."""
     off = Worst("thresholds between neighbouring doubles", "fractions", 0.5, "ulp")
     random = np.random.default_rng(4)
     lists = [np.array(HARD_DOUBLES)]
@@ -90,7 +90,7 @@ def _midpoints(draws: int) -> Finding:
 
 
 def hard_codes(seed: int) -> tuple[NDArray[np.uint16], NDArray[np.intp]]:
-    """Return codes (n, 6) and labels (n,): ends only, neighbours at both ends, all equal, two 1 apart, and all over."""
+    """Return codes (n, 6) and labels (n,): only ends, neighbours at both ends, all equal, two 1 apart, and random."""
     random = np.random.default_rng(seed)
     labels = np.arange(48) % 3
     within = int(random.integers(1, HIGHEST_CODE - 1))
@@ -106,8 +106,8 @@ def hard_codes(seed: int) -> tuple[NDArray[np.uint16], NDArray[np.intp]]:
 
 
 def _every_code(sets: int) -> Finding:
-    """A bin of the tables holds exactly the codes that every stump of its joint sends the same way."""
-    wrong = Worst("codes that tables put on another side than stumps do", "every code there is", 0, "codes")
+    """A bin of the tables holds exactly the codes that every stump of its joint sends to the same branch."""
+    wrong = Worst("codes on different sides for tables and stumps", "every code there is", 0, "codes")
     for seed in range(sets):
         codes, labels = hard_codes(seed)
         stumps, _ = boost(codes, labels, 3, rounds=20)
@@ -121,13 +121,13 @@ def _every_code(sets: int) -> Finding:
 
 
 def _coded() -> Iterator[Finding]:
-    """A value is at most half a step from what its code means, and a value that a code means gets that code again.
+    """A value is at most half a step from its code's value, and a code's value gets that code again.
 
-    Half a step, and what rounding adds: the origin, the difference, the quotient and the code's value each lose 2^-53
-    of at most 1e9 steps (more than that `Joint` refuses) to 65536: 4.5e-7 of a step.
+    Half a step plus rounding: the origin, the difference, the quotient and the code's value each lose 2^-53 of at most
+    1e9 steps (`Joint` rejects more) to 65536: 4.5e-7 of a step.
     """
-    off = Worst("degrees, beside what their codes mean", "fractions", 0.5 + 4.5e-7, "steps")
-    told = Worst("largest coding error, beside the one that import reports", "fractions", 4.5e-7, "steps")
+    off = Worst("degrees compared with their codes", "fractions", 0.5 + 4.5e-7, "steps")
+    reported = Worst("largest coding error that import reports", "fractions", 4.5e-7, "steps")
     again = Worst("codes that do not come back from their own value", "the code itself", 0, "codes")
     for values, grid in HARD_DEGREES:
         grasp_set, report = _imported(values, grid)
@@ -139,10 +139,10 @@ def _coded() -> Iterator[Finding]:
         ]
         what = f"{values[0]!r} and on, grid {grid:g}"
         off.see(float(max(errors)), what, tried=len(values))
-        told.see(float(abs(max(errors) - Fraction(report.coding[0].largest_error) / step)), what)
+        reported.see(float(abs(max(errors) - Fraction(report.coding[0].largest_error) / step)), what)
         again.see(int((joint.code(joint.value(EVERY_CODE)) != EVERY_CODE).sum()), what, tried=len(EVERY_CODE))
     yield off.finding()
-    yield told.finding()
+    yield reported.finding()
     yield again.finding()
 
 
@@ -166,8 +166,8 @@ def _csv(folder: Path, rows: Sequence[Sequence[str]], heads: Sequence[str] = ("g
 
 
 def _refused() -> Finding:
-    """What is no number, code, bit or trial is refused, and its row and column are named."""
-    named = Worst("bad cells not refused with row and column", "the cell's row and column", 0, "cells")
+    """Import rejects a cell that is not a number, code, bit or trial, and names its row and column."""
+    named = Worst("bad cells not rejected with row and column", "the cell's row and column", 0, "cells")
     with TemporaryDirectory() as name:
         for what, complaint, where in _complaints(Path(name)):
             named.see(where not in complaint, f"{what}: {complaint}")
@@ -175,7 +175,7 @@ def _refused() -> Finding:
 
 
 def _complaints(folder: Path) -> Iterator[tuple[str, str, str]]:
-    """Yield what the cell is, what importing it says, and the place that this has to name."""
+    """Yield a description of the cell, the error message of its import, and the location that it must name."""
     heads = ("grasp", "switch", "joint", "trial")
     degrees, codes = JointColumns(("joint",)), JointColumns(("joint",), codes=True)
     for column, entry, cells in (
@@ -201,4 +201,4 @@ def _complaint(path: Path, entry: JointColumns) -> str:
         import_table(read_table(path), _columns(entry, trial="trial"))
     except TableError as complaint:
         return str(complaint)
-    return "it is imported"
+    return "no error"

@@ -1,4 +1,4 @@
-"""Constant, equal, complementary, nearly constant columns; no gain at all; gains next to equal."""
+"""Constant, equal, complementary and nearly constant columns; zero gains; nearly equal gains."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
@@ -18,11 +18,11 @@ from ..inputs.small_sets import parity
 from ..reference.information import compare_gains
 
 CASE = Case(
-    title="Columns that say nothing, or the same",
-    danger="rounding decides between equal columns, or a tree without a gain stops in silence",
+    title="Uninformative and duplicate columns",
+    danger="rounding decides between equal columns, or a tree without a gain stops silently",
 )
 
-# Counts at which one row more or less is lost in a double's sum of n ln n: one in 1e9.
+# Counts at which one row more or less vanishes in a double's sum of n ln n: one in 1e9.
 _LARGE = 10**9
 _EXACT = "gains as products of whole numbers' powers"
 
@@ -30,7 +30,7 @@ Bits = NDArray[np.bool_]
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Look at every decision of trees on such columns, at every small table there is, and at tables of 1e9 rows."""
+    """Check every decision of trees on such columns, all small tables, and tables of 1e9 rows."""
     sets = [hard_columns(seed) for seed in range(60 if full else 8)]
     yield _decisions(sets)
     yield _unchanged_by_useless_columns(sets)
@@ -40,7 +40,7 @@ def findings(full: bool) -> Iterator[Finding]:
 
 
 def hard_columns(seed: int) -> tuple[Bits, NDArray[np.intp]]:
-    """Return X (n, 14) and labels (n,): noise, a constant, equals, complements, columns of which one row differs."""
+    """Return X (n, 14) and labels (n,): noise, a constant, duplicates, complements, columns that differ in one row."""
     random = np.random.default_rng(seed)
     rows = int(random.integers(20, 60))
     labels = random.integers(0, 4, rows)
@@ -54,8 +54,8 @@ def hard_columns(seed: int) -> tuple[Bits, NDArray[np.intp]]:
 
 
 def _decisions(sets: Sequence[tuple[Bits, NDArray[np.intp]]]) -> Finding:
-    """Every decision asks for the column of largest gain, the lowest-numbered of equal ones, and no constant one."""
-    wrong = Worst("decisions of ID3 for another than the best column", _EXACT, 0, "decisions")
+    """Every decision takes the column of largest gain, the lowest-numbered of equal ones, and never a constant one."""
+    wrong = Worst("decisions of ID3 that do not take the best column", _EXACT, 0, "decisions")
     for seed, (X, labels) in enumerate(sets):
         tree = grow_id3(X, labels)
         for number, rows in _rows_of_nodes(tree, X):
@@ -74,7 +74,7 @@ def _rows_of_nodes(tree: Tree, X: Bits) -> Iterator[tuple[int, NDArray[np.intp]]
 
 
 def _due(X: Bits, labels: NDArray[np.intp]) -> int | None:
-    """Return the first column that varies and that no other one out-gains, by the reference."""
+    """Return the first varying column of the largest gain, by the reference."""
     best: tuple[int, list[list[int]]] | None = None
     for column in range(X.shape[1]):
         table = table_of(X[:, column], labels)
@@ -84,28 +84,28 @@ def _due(X: Bits, labels: NDArray[np.intp]) -> int | None:
 
 
 def table_of(column: Bits, labels: NDArray[np.intp]) -> list[list[int]]:
-    """Return the counts of each label (rows) at each value (columns) that occurs."""
+    """Return the counts of each label (rows) at each occurring value (columns)."""
     values = np.unique(column)
     return [[int(((labels == label) & (column == value)).sum()) for value in values] for label in np.unique(labels)]
 
 
 def _unchanged_by_useless_columns(sets: Sequence[tuple[Bits, NDArray[np.intp]]]) -> Finding:
-    """Constants, and equals and complements that stand behind, are never asked for, and move no bit of an ensemble."""
+    """Constants, and later duplicates and complements, are never selected, and change no bit of an ensemble."""
     changed = Worst(
-        "sets whose ensemble useless columns change", "the same, trained without them, bit by bit", 0, "sets"
+        "sets whose ensemble useless columns change", "the same, trained without them, bit for bit", 0, "sets"
     )
     for seed, (X, labels) in enumerate(sets):
         behind = np.hstack([X, ~X, X, np.zeros((len(X), 2), bool)])
-        alone, beside = (boost(inputs, labels, 4, rounds=20)[0] for inputs in (X, behind))
+        alone, padded = (boost(inputs, labels, 4, rounds=20)[0] for inputs in (X, behind))
         same = all(
-            np.array_equal(getattr(alone, part), getattr(beside, part)) for part in ("columns", "thresholds", "values")
+            np.array_equal(getattr(alone, part), getattr(padded, part)) for part in ("columns", "thresholds", "values")
         )
         changed.see(not same or grow_id3(X, labels).nodes != grow_id3(behind, labels).nodes, f"set {seed}")
     return changed.finding()
 
 
 def _parities(sizes: range) -> Iterator[Finding]:
-    """The XOR of k switches: nothing gains before the last is asked for, and the tree gets there all the same."""
+    """The XOR of k switches: no gain before the last decision, but the tree still grows."""
     wrong = Worst("frames of an XOR that the tree gets wrong", "the XOR itself", 0, "frames")
     silent = Worst("decisions without a gain that the tree does not mark", "2^(k-1) - 1 of them", 0, "decisions")
     for k in sizes:
@@ -113,16 +113,16 @@ def _parities(sizes: range) -> Iterator[Finding]:
         tree = grow_id3(grasp_set.switches, grasp_set.grasps)
         wrong.see(int((tree.predict(grasp_set.switches) != grasp_set.grasps).sum()), f"k = {k}", len(grasp_set))
         due = 2 ** (k - 1) - 1
-        told = tree.text().count("no input gains anything alone\n")
-        silent.see(abs(told - due) + abs(tree.n_zero_gain - due), f"k = {k}", due)
+        marked = tree.text().count("no input gains anything alone\n")
+        silent.see(abs(marked - due) + abs(tree.n_zero_gain - due), f"k = {k}", due)
     yield wrong.finding()
     yield silent.finding()
 
 
 def _small_tables(most: int) -> Iterator[Finding]:
-    """Compare every two tables of two classes and two values with the same classes, up to `most` rows."""
-    signs = Worst("comparisons of two gains that come out wrong", _EXACT, 0, "pairs")
-    ties = Worst("equal gains of which the lowest number does not win", _EXACT, 0, "pairs")
+    """Compare all pairs of tables with two values and the same counts of two classes, up to `most` rows."""
+    signs = Worst("wrong comparisons of two gains", _EXACT, 0, "pairs")
+    ties = Worst("equal gains for which the lowest number does not win", _EXACT, 0, "pairs")
     for classes, tables in small_tables(most).items():
         for one, other in combinations(tables, 2):
             sign = compare_gains(one.tolist(), other.tolist())
@@ -135,7 +135,7 @@ def _small_tables(most: int) -> Iterator[Finding]:
 
 
 def small_tables(most: int) -> dict[tuple[int, int], list[Counts]]:
-    """Return all tables (2, 2) by their class counts, of 2 to `most` rows."""
+    """Return all tables (2, 2) of 2 to `most` rows, by their class counts."""
     found = defaultdict(list)
     for a, b in product(range(1, most), repeat=2):
         if a + b <= most:
@@ -144,13 +144,13 @@ def small_tables(most: int) -> dict[tuple[int, int], list[Counts]]:
 
 
 def _best(one: Counts, other: Counts, numbers: tuple[int, int] = (0, 1)) -> int | None:
-    """Return which of two inputs with these tables and numbers is asked for: 0, the first, or 1."""
+    """Return which of two inputs with these tables and numbers is selected: 0 or 1."""
     return best_position(node_of(one, other), np.array(numbers))
 
 
 def _large_tables(draws: int) -> Finding:
-    """Gains of tables of some 1e9 rows, of which one row lies in another cell: only whole numbers tell them apart."""
-    wrong = Worst("wrong choices between gains that one row in 10^9 parts", _EXACT, 0, "pairs")
+    """Gains of tables of about 1e9 rows that differ by the cell of one row: only integers distinguish them."""
+    wrong = Worst("wrong choices between gains that differ by one row in 10^9", _EXACT, 0, "pairs")
     for one, other in large_tables(draws):
         sign = compare_gains(one.tolist(), other.tolist())
         due = [0 if sign >= 0 else 1, 0 if sign <= 0 else 1]
@@ -159,7 +159,7 @@ def _large_tables(draws: int) -> Finding:
 
 
 def large_tables(draws: int) -> Iterator[tuple[Counts, Counts]]:
-    """Yield pairs of tables (3, 2) with the same classes: of a random table, or one without a gain, one row moved."""
+    """Yield pairs of tables (3, 2) with the same classes: a random table, or one without a gain, and one row moved."""
     random = np.random.default_rng(3)
     for _ in range(draws):
         table = random.integers(_LARGE // 10, _LARGE, (3, 2))
@@ -169,7 +169,7 @@ def large_tables(draws: int) -> Iterator[tuple[Counts, Counts]]:
                 moved = base.copy()
                 moved[label] += [1, -1]
                 yield base, moved
-                # Against the same row moved the other way.
+                # Compared with the same row moved the other way.
                 turned = base.copy()
                 turned[label] += [-1, 1]
                 yield moved, turned

@@ -1,8 +1,8 @@
-"""Hands and objects that are hard to bring to rest: singular, coincident, weightless, huge; and steps halved.
+"""Hands and objects that are hard to bring to rest: singular, coincident, weightless, huge; and halved steps.
 
-What stands for mass where there is none: in contact.quasistatic mass is a weight and nothing else, so an object of none
-is one without weight, held by skin and its soft spring. contact.mujoco moves in time, which needs inertia: any object
-has that of 0.1 kg at least there, and its true weight pulls.
+Zero mass: in contact.quasistatic mass is only a weight, so a massless object is one without weight, held by skin and
+its soft spring. contact.mujoco integrates over time, which needs inertia: every object has at least that of 0.1 kg
+there, with its true weight.
 """
 
 from collections.abc import Iterator
@@ -13,11 +13,11 @@ from ..finding import Case, Finding
 
 CASE = Case(
     title="Contact in the simulator",
-    danger="no weight, no contact or all of it at one point: NaN for forces, or a grasp called settled that is not",
+    danger="no weight, no contact or all contact at one point: NaN forces, or an unsettled grasp reported as settled",
 )
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield errors of surfaces and turns, of the Newton system, of what is called rest, and of steps halved."""
+    """Yield errors of surfaces and rotations, of the Newton system, of rest, and of halved steps."""
     parts = (surfaces, systems, rest, halving)
     return chain.from_iterable(part.findings(full) for part in parts)

@@ -1,8 +1,8 @@
-"""The same frame with different grasps, one class a million times the other, labels that are noise.
+"""The same frame with different grasps, one class a million times as frequent as the other, random labels.
 
-Whatever learns from frames can do no better than the share of each class among the rows of a frame: that is the truth
-here, and the entropy that it leaves is the least loss there is. Where one switch parts the frames, stumps can reach
-both; so boosting must come to rest on them, but for rounding. The case `separable` says when the loss falls on the way.
+The best possible prediction is the share of each class among the rows of a frame: that is the reference here, and its
+entropy is the least possible loss. If one switch separates the frames, stumps can reach both, so boosting must converge
+to them up to rounding. The case `separable` explains when the loss falls on the way.
 """
 
 from collections.abc import Iterator
@@ -22,12 +22,12 @@ from ..reference.numbers import distance
 
 CASE = Case(
     title="Contradictions",
-    danger="frames that belong to several classes make boosting swing; one row among 10^6 is rounded away",
+    danger="frames that belong to several classes make boosting oscillate; one row among 10^6 is rounded away",
 )
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield where boosting comes to rest on contradictory frames, what repetition changes, and what noise does."""
+    """Yield errors of the limit on contradictory frames, and the effects of repetition and noise."""
     yield from _rest(frames(full), 2_000 if full else 120)
     yield _ties()
     yield _repetition((10**4, 10**6) if full else (10**4,))
@@ -35,7 +35,7 @@ def findings(full: bool) -> Iterator[Finding]:
 
 
 def frames(full: bool) -> Iterator[HardSet]:
-    """Yield sets of two frames that one switch parts, with the classes' counts on each."""
+    """Yield sets of two frames that one switch separates, with the classes' counts on each."""
     for power in range(1, 8) if full else (1, 6, 7):
         yield imbalanced(10**power)
         yield contradictory([[1, 10**power], [10**power, 3]])
@@ -49,9 +49,9 @@ def frames(full: bool) -> Iterator[HardSet]:
 
 
 def _rest(sets: Iterator[HardSet], rounds: int) -> Iterator[Finding]:
-    """Yield how far P is off the shares of the counts in the end, and losses off the entropy that is left."""
-    shares = Worst("P of a class on a contradictory frame, in the end", "shares of the counts", 1.0, "x rounding")
-    losses = Worst("the loss in the end", "the entropy left, 60 digits", 1.0, "x rounding")
+    """Yield the final errors of P against the shares of the counts, and of losses against the remaining entropy."""
+    shares = Worst("final P of a class on a contradictory frame", "shares of the counts", 1.0, "x rounding")
+    losses = Worst("the final loss", "the remaining entropy, 60 digits", 1.0, "x rounding")
     for hard in sets:
         stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, weights=hard.weights)
         *_, last = moments(hard, stumps)
@@ -63,7 +63,7 @@ def _rest(sets: Iterator[HardSet], rounds: int) -> Iterator[Finding]:
 
 
 def _ties() -> Finding:
-    """Classes of equal counts on a frame: the one of the lowest number is answered, as the rule of ties has it."""
+    """Classes of equal counts on a frame: the lowest-numbered is predicted, by the tie rule."""
     worst = Worst("equal counts go to the lowest class", "the rule itself", 0.0, "frames")
     for counts in (
         [[1, 1], [2, 2]],
@@ -73,15 +73,15 @@ def _ties() -> Finding:
     ):
         hard = contradictory(counts)
         stumps, _ = boost(hard.X, hard.labels, hard.n_classes, rounds=100, weights=hard.weights)
-        answers = winners(stumps.scores(np.array([[0], [1]]))).tolist()
-        for answer, row in zip(answers, counts, strict=True):
-            worst.see(float(answer != row.index(max(row))), hard.name)
+        predicted = winners(stumps.scores(np.array([[0], [1]]))).tolist()
+        for prediction, row in zip(predicted, counts, strict=True):
+            worst.see(float(prediction != row.index(max(row))), hard.name)
     return worst.finding()
 
 
 def _repetition(ratios: tuple[int, ...]) -> Finding:
-    """Rows that are really there as often as they weigh come to rest on the same shares."""
-    worst = Worst("P where rows are really repeated", "shares of the counts", 1.0, "x rounding")
+    """Rows repeated as often as their weight converge to the same shares."""
+    worst = Worst("P with repeated rows", "shares of the counts", 1.0, "x rounding")
     for ratio in ratios:
         hard = repeated(imbalanced(ratio))
         stumps, _ = boost(hard.X, hard.labels, 2, rounds=60)
@@ -92,12 +92,12 @@ def _repetition(ratios: tuple[int, ...]) -> Finding:
 
 
 def _noise(rounds: int) -> Iterator[Finding]:
-    """Sets of 16 frames, 0 to 60 % of labels drawn anew: rounds, losses, and that the loss falls where it must."""
+    """Sets of 16 frames with 0 to 60 % random labels: rounds, losses, and the fall of the loss where it is required."""
     chosen = Worst("stumps chosen under label noise", REFERENCE, 1.0, "x rounding")
-    answers = Worst("answers of branches under label noise", REFERENCE, 1.0, "x rounding")
-    told = Worst("losses under label noise", REFERENCE, 1.0, "x rounding")
-    below = Worst("losses are above the entropy left", REFERENCE, 0.0, "rounds")
-    rises = Worst("rise of the loss, where it must fall", "convexity", 1.0, "x rounding")
+    outputs = Worst("outputs of branches under label noise", REFERENCE, 1.0, "x rounding")
+    losses = Worst("losses under label noise", REFERENCE, 1.0, "x rounding")
+    below = Worst("losses below the remaining entropy", REFERENCE, 0.0, "rounds")
+    rises = Worst("rise of the loss where it must fall", "convexity", 1.0, "x rounding")
     for hard, shrinkage in noisy_sets():
         stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, shrinkage=shrinkage)
         least = float(entropy_left(hard))
@@ -107,18 +107,18 @@ def _noise(rounds: int) -> Iterator[Finding]:
         for number, moment in enumerate(moments(hard, stumps)):
             at = f"{hard.name}, round {number}"
             if number % (rounds // 2) == 1:
-                see_round(hard, stumps, number, moment.scores, 3.0, chosen, answers)
+                see_round(hard, stumps, number, moment.scores, 3.0, chosen, outputs)
                 truth = mean_loss(moment.scores.T.tolist(), hard.labels.tolist())
-                told.see(distance(moment.loss, truth) / loss_rounding(hard.n_classes, float(truth)), at)
+                losses.see(distance(moment.loss, truth) / loss_rounding(hard.n_classes, float(truth)), at)
             if before is not None and shrinkage * (hard.n_classes - 1) <= 1:
                 rise = max(0.0, moment.loss - before.loss)
                 rises.see(rise / rise_rounding(hard.n_classes, before, moment), at)
             before = moment
-    yield from (worst.finding() for worst in (chosen, answers, told, below, rises))
+    yield from (worst.finding() for worst in (chosen, outputs, losses, below, rises))
 
 
 def noisy_sets() -> Iterator[tuple[HardSet, float]]:
-    """Yield sets of 16 frames, and the shrinkage to train them with: at 1/(K - 1) or below the loss must fall."""
+    """Yield sets of 16 frames and their shrinkage: at 1/(K - 1) or below the loss must fall."""
     for percent in (0, 10, 20, 30, 40, 50, 60):
         for classes, shrinkage in ((2, 1.0), (5, 0.25), (5, 1.0)):
             hard = noisy(classes, 60, percent / 100, seed=percent)

@@ -1,4 +1,4 @@
-"""One row, column or class, a class with one row or none, as many classes as rows, no switch kept."""
+"""Sets with one row, column or class, a class with one row or none, as many classes as rows, no kept switch."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -23,12 +23,12 @@ from ..reference.numbers import precisely, ulps
 
 CASE = Case(
     title="Degenerate sets",
-    danger="a set with next to nothing in it ends in a warning, a traceback, or an answer that is wrong in silence",
+    danger="an almost empty set ends in a warning, a traceback, or a silently wrong result",
 )
 
-# The answer is sum P / sum P (1 - P), with one P throughout: it keeps the rounding of P in 1 - P, no more than one of
-# 1 - P, then that of 1 - P itself, of the product, of either sum (two each, on its two grids) and of the quotient: 8
-# times 2^-53 of the answer, each less than an ulp. Clamped, 1/3 stands for P there, and the roundings are 7.
+# The output is sum P / sum P (1 - P), with one P throughout: it keeps the rounding of P in 1 - P, at most one rounding
+# of 1 - P, then that of 1 - P itself, of the product, of either sum (two each, on its two grids) and of the quotient: 8
+# times 2^-53 of the output, each less than an ulp. If clamped, 1/3 replaces P there, and there are 7 roundings.
 _VALUE_ULPS = 8
 
 _FRAMES = [[0, 0], [0, 1], [1, 0], [1, 1]]
@@ -37,7 +37,7 @@ _ONE_CLASS = make_set(["a"] * 8, _FRAMES * 2, [[3], [4], [5], [6]] * 2)
 _CONSTANT = make_set(["a"] + ["b"] * 11, [[1, 1]] * 12, [[65535]] * 12)
 
 UNSOLVABLE = {"one row": _ONE_ROW, "one class": _ONE_CLASS, "constants": _CONSTANT}
-# Sets whose rows a sum of stumps can tell apart, and does.
+# Sets whose rows a sum of stumps can separate.
 SOLVABLE = {
     "two rows": make_set(["a", "b"], [[1, 0], [0, 1]]),
     "one switch": make_set(["a", "b"] * 4, [[0], [1]] * 4),
@@ -52,19 +52,19 @@ SOLVABLE = {
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Build, place and evaluate such sets, and hold the first round's values against their closed forms."""
+    """Build, place and evaluate such sets, and compare the first round's values with their closed forms."""
     yield _recognised()
     yield _refused()
     yield _one_class(50 if full else 10)
     classes = range(2, 34) if full else (2, 3, 4, 7, 33)
     yield from _first_round(classes)
-    yield _never_answered(classes, 200 if full else 20)
+    yield _never_predicted(classes, 200 if full else 20)
     yield _nothing_to_see()
 
 
 def _recognised() -> Finding:
-    """A build of a set that can be told apart recognises every row of it."""
-    rows = Worst("rows that a build made of them does not recognise", "their labels", 0, "rows")
+    """A build of a separable set predicts every row of it correctly."""
+    rows = Worst("rows that their build predicts wrongly", "their labels", 0, "rows")
     for name, grasp_set in SOLVABLE.items():
         with TemporaryDirectory() as folder:
             built = compile_build(grasp_set, Path(folder) / "build", rounds=20, folds=0)
@@ -77,7 +77,7 @@ def _recognised() -> Finding:
 
 
 def _refused() -> Finding:
-    """What has no answer ends in a sentence for people."""
+    """An impossible request ends in a readable error message."""
     fewer = "1 rows cannot be cut into 4 folds"
     asked: list[tuple[str, Callable[[Path], object], str]] = [
         ("build of one row", lambda f: compile_build(_ONE_ROW, f), "hold 1 grasp type"),
@@ -94,7 +94,7 @@ def _refused() -> Finding:
         ("rates of one row", lambda _: evaluate(_ONE_ROW), fewer),
         ("rates without the one subject", lambda _: evaluate(_ONE_CLASS, Options(scheme="subject")), "two or more"),
     ]
-    found = Worst("impossible requests not refused with the sentence that fits", "the sentence", 0, "answers")
+    found = Worst("impossible requests not rejected with the right message", "the message", 0, "requests")
     for what, question, sentence in asked:
         with TemporaryDirectory() as folder:
             found.see(sentence not in _complaint(question, Path(folder) / "build"), what)
@@ -106,11 +106,11 @@ def _complaint(question: Callable[[Path], object], folder: Path) -> str:
         question(folder)
     except ThenarError as complaint:
         return str(complaint)
-    return "it answers"
+    return "no error"
 
 
 def _one_class(rounds: int) -> Finding:
-    """Of one class every share is 1 and every loss 0, however long it is boosted, exactly."""
+    """With one class every share is exactly 1 and every loss exactly 0 in every round."""
     off = Worst("share, score and loss of the only class", "1, 0 and 0", 0, "score")
     for grasp_set in (_ONE_ROW, _ONE_CLASS):
         X = np.hstack([grasp_set.switches, grasp_set.codes])
@@ -123,12 +123,12 @@ def _one_class(rounds: int) -> Finding:
 
 
 def _first_round(classes: Sequence[int]) -> Iterator[Finding]:
-    """At the start all K shares are 1/K: a row of its own answers K, clamped to 3, others -K/(K - 1)."""
-    own = Worst("first answers, as many classes as rows", "min(K, 3) and -K/(K - 1)", _VALUE_ULPS, "ulp")
-    empty = Worst("first answers of a class without rows", "-K/(K - 1)", _VALUE_ULPS, "ulp")
+    """At the start all K shares are 1/K: a class's own row has output K, clamped to 3, others -K/(K - 1)."""
+    own = Worst("first outputs, as many classes as rows", "min(K, 3) and -K/(K - 1)", _VALUE_ULPS, "ulp")
+    empty = Worst("first outputs of a class without rows", "-K/(K - 1)", _VALUE_ULPS, "ulp")
     for k in classes:
         stumps, _ = boost(np.eye(k), np.arange(k), k, rounds=1)
-        # Of two classes, both ask for the first column: the row that is one's own lies right of it, or left.
+        # With two classes, both use the first column: a class's own row lies right of it, or left.
         low, high = np.sort(stumps.values[0, :, :2], axis=1).T
         own.see(max(_error(low, _others(k)), _error(high, mpf(min(k, 3)))), f"{k} classes", tried=2 * k)
         stumps = _without_the_last(k, 1)
@@ -147,26 +147,26 @@ def _error(values: NDArray[np.float64], truth: mpf) -> float:
 
 
 def _without_the_last(k: int, rounds: int) -> Stumps:
-    """Train k classes of which the last has no row."""
+    """Train k classes, the last without rows."""
     labels = np.arange(4 * k) % (k - 1)
     X = np.stack([labels, np.arange(4 * k) % 3], axis=1)
     return boost(X, labels, k, rounds=rounds)[0]
 
 
-def _never_answered(classes: Sequence[int], rounds: int) -> Finding:
-    """A class without rows is never the answer, on frames that were never seen as well."""
-    answers = Worst("frames that a class without rows wins", "every frame there is", 0, "frames")
+def _never_predicted(classes: Sequence[int], rounds: int) -> Finding:
+    """A class without rows is never predicted, not even for unseen frames."""
+    wins = Worst("frames that a class without rows wins", "every frame there is", 0, "frames")
     for k in classes:
         frames = np.array([[code, other] for code in range(-1, k + 1) for other in range(-1, 4)])
         scores = _without_the_last(k, rounds).scores(frames)
-        answers.see(int((winners(scores) == k - 1).sum()), f"{k} classes", tried=len(frames))
-    return answers.finding()
+        wins.see(int((winners(scores) == k - 1).sum()), f"{k} classes", tried=len(frames))
+    return wins.finding()
 
 
 def _nothing_to_see() -> Finding:
-    """Where no input varies, the most frequent grasp type is answered, in every table of the evaluation."""
+    """If no input varies, every table of the evaluation predicts the most frequent grasp type."""
     study = evaluate(_CONSTANT, Options(rounds=2, repeats=1), jobs=1)
-    off = Worst("rows recognised where no input varies: off by", "the commonest type's rows", 0, "rows")
+    off = Worst("correct rows if no input varies: off by", "the commonest type's rows", 0, "rows")
     for table in study.tables:
         for row in table.rows:
             for cell in row.cells:

@@ -1,4 +1,4 @@
-"""Entropy, information gain, and the choice of the best input, for counts up to 10^9 and more."""
+"""Entropy, information gain, and the choice of the best input, for counts beyond 10^9."""
 
 from collections.abc import Iterator
 
@@ -18,15 +18,15 @@ from ..reference.numbers import precisely
 
 CASE = Case(
     title="Information gain",
-    danger="a gain that rounding made decides which switch is kept; a gain of one count in 10^9 is taken for none",
+    danger="a gain made by rounding decides which switch is kept; a gain of one count in 10^9 is taken for zero",
 )
 WHOLE_NUMBERS = "products of whole numbers"
 
-Pair = tuple[int, int | None]  # a bit, and what is given
+Pair = tuple[int, int | None]  # a bit, and the bit given
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield errors of gains and entropies, and how many choices between inputs go wrong."""
+    """Yield errors of gains and entropies, and the number of wrong choices between inputs."""
     rng, more = np.random.default_rng(2), 10 if full else 1
     tables = [*hand_made(), *(random_table(rng) for _ in range(150 * more))]
     yield gains_of(tables)
@@ -45,7 +45,7 @@ def _n_log_n(counts: list[int]) -> mpf:
 
 
 def gains_of(tables: list[Counts]) -> Finding:
-    """Hold gains of tables (K, values) against the reference."""
+    """Compare gains of tables (K, values) with the reference."""
     # A term m ln m is off by 5 roundings: a logarithm within 2 ulp counts for 4, the product for one. They are summed
     # exactly and rounded once, and divided by n ln 2, a product of a constant: 4 roundings of the gain itself.
     worst = Worst("gain", REFERENCE, 1.0, "x rounding")
@@ -59,7 +59,7 @@ def gains_of(tables: list[Counts]) -> Finding:
 
 
 def entropies_of(tables: list[Counts]) -> Finding:
-    """Hold entropies of the classes of tables (K, values) against the reference."""
+    """Compare entropies of the classes of tables (K, values) with the reference."""
     # As for the gain, of terms m ln m of the classes and of all rows.
     worst = Worst("entropy", REFERENCE, 1.0, "x rounding")
     for table in tables:
@@ -72,8 +72,8 @@ def entropies_of(tables: list[Counts]) -> Finding:
 
 
 def _nothing(rng: np.random.Generator, n: int) -> Finding:
-    """An input that is independent of the class gains exactly 0; with one row more somewhere, more than 0."""
-    worst = Worst("a gain of exactly nothing", "the rule itself", 0.0, "gains")
+    """An input that is independent of the class gains exactly 0; with one more row in a cell, more than 0."""
+    worst = Worst("a gain of exactly zero", "the rule itself", 0.0, "gains")
     wrong = 0
     for _ in range(n):
         classes, values = rng.integers(1, 30_000, 3), rng.integers(1, 30_000, 2)
@@ -86,16 +86,16 @@ def _nothing(rng: np.random.Generator, n: int) -> Finding:
 
 
 def comparisons_of(pairs: list[tuple[Counts, Counts]]) -> Finding:
-    """Count comparisons of two gains that go wrong."""
-    worst = Worst("which of two gains is greater", WHOLE_NUMBERS, 0.0, "answers")
+    """Count wrong comparisons of two gains."""
+    worst = Worst("which of two gains is greater", WHOLE_NUMBERS, 0.0, "choices")
     wrong = [compare_scores(a, b) != truth.compare_gains(a.tolist(), b.tolist()) for a, b in pairs]
     worst.see(float(sum(wrong)), tried=len(pairs))
     return worst.finding()
 
 
 def choices_of(pairs: list[tuple[Counts, Counts]]) -> Finding:
-    """Return how often the best of three inputs is another, in whichever order they stand; equal ones: the lowest."""
-    worst = Worst("which input is kept", WHOLE_NUMBERS, 0.0, "answers")
+    """Count wrong choices of the best of three inputs, in any order; of equal ones the lowest must win."""
+    worst = Worst("which input is kept", WHOLE_NUMBERS, 0.0, "choices")
     wrong = 0
     for one, other in pairs:
         for tables in ((one, other, one), (other, one, other)):
@@ -107,7 +107,7 @@ def choices_of(pairs: list[tuple[Counts, Counts]]) -> Finding:
 
 
 def _tables(X: NDArray[np.bool_], labels: NDArray[np.intp], bit: int, given: int | None) -> list[truth.Table]:
-    """Return the counts (K, 2) of classes at the values of `bit`, a table for each value of what is given."""
+    """Return the counts (K, 2) of classes at the values of `bit`, one table for each value of the given bit."""
     condition = np.zeros(len(X), bool) if given is None else X[:, given]
     classes = range(int(labels.max()) + 1)
     return [
@@ -117,8 +117,8 @@ def _tables(X: NDArray[np.bool_], labels: NDArray[np.intp], bit: int, given: int
 
 
 def given_of(sets: list[BitSet]) -> Finding:
-    """Hold what bits tell of the class, alone and given another, against the reference."""
-    worst = Worst("what a bit tells, given another", REFERENCE, 1.0, "x rounding")
+    """Compare the information of bits about the class, alone and given another bit, with the reference."""
+    worst = Worst("information of a bit, given another", REFERENCE, 1.0, "x rounding")
     for X, labels, classes in sets:
         counted = Cooccurrence(X, labels, classes)
         for given in (None, 0, 3):
@@ -145,12 +145,12 @@ def _given_error(tables: list[truth.Table]) -> mpf:
 
 
 def given_comparisons_of(sets: list[BitSet], rng: np.random.Generator) -> Finding:
-    """Count comparisons of what two bits tell that go wrong, both alone or given another."""
-    worst = Worst("which of two bits tells more, given others", WHOLE_NUMBERS, 0.0, "answers")
+    """Count wrong comparisons of the information of two bits, both alone or given another."""
+    worst = Worst("which of two bits is more informative, given others", WHOLE_NUMBERS, 0.0, "choices")
     for X, labels, classes in sets:
         counted = Cooccurrence(X, labels, classes)
         wrong = 0
-        # Each of the first three pairs tells the same, of terms in another order: opposites, and one bit xor another.
+        # The first three pairs are equally informative, with reordered terms: opposites, and one bit xor another.
         pairs: list[Pair] = [(0, None), (0, None), (0, 3), *_pairs(rng, X.shape[1])]
         others: list[Pair] = [(1, None), (2, None), (4, 3), *_pairs(rng, X.shape[1])]
         for one, other in zip(pairs, others, strict=True):

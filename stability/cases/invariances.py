@@ -1,9 +1,10 @@
-"""Facts without a scale: what a set says twice, in another order or in other words must not change an answer.
+"""Invariances: repeating, reordering or renaming the parts of a set must not change the trained model.
 
-What is exact: the order of rows, constant and copied columns, codes recoded in order, weights times a power of two, two
-classes swapped; and for ID3, which compares gains exactly, all of it but ties. Three and more classes add up in another
-order when they are renumbered, and three times the rows lie on another grid: then scores move by rounding. Whatever
-ties goes to the lowest number, so that renumbered columns may part two trainings, but on stumps that explain as much.
+Exact invariances: the order of rows, constant and copied columns, order-preserving recoding of codes, weights times a
+power of two, two swapped classes; and for ID3, which compares gains exactly, all of these except ties. Three or more
+renumbered classes are summed in another order, and three times the rows are summed on another grid: then scores change
+by rounding. Ties go to the lowest number, so that two trainings with renumbered columns may diverge, but only at stumps
+that explain equally much.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -32,10 +33,10 @@ from ..reference.numbers import precisely
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Change:
-    """A set that says the same as another.
+    """A set equivalent to another.
 
-    inputs[i] is the column that was number i, classes[k] the number that class k has now, and the rows of the other set
-    are those of this one at `rows`.
+    inputs[i] is the new number of column i, classes[k] the new number of class k; the rows of the other set are the
+    rows of this one at `rows`.
     """
 
     name: str
@@ -49,7 +50,7 @@ def _same(name: str, hard: HardSet, changed: HardSet) -> Change:
 
 
 def unweighted(hard: HardSet) -> HardSet:
-    """Return the set with every row as good as any other."""
+    """Return the set without weights."""
     return replace(hard, weights=None)
 
 
@@ -59,18 +60,18 @@ def rows_in_another_order(hard: HardSet, rng: np.random.Generator) -> Change:
 
 
 def rows_several_times(hard: HardSet, times: int) -> Change:
-    """Write the whole set several times over."""
+    """Repeat the whole set several times."""
     return _same(f"the set {times} times", hard, with_rows(hard, np.tile(np.arange(len(hard.labels)), times)))
 
 
 def with_rows(hard: HardSet, rows: NDArray[np.intp]) -> HardSet:
-    """Return the set of rows of these numbers."""
+    """Return the set of the rows at these indices."""
     weights = None if hard.weights is None else hard.weights[rows]
     return replace(hard, X=hard.X[rows], labels=hard.labels[rows], weights=weights)
 
 
 def constant_columns(hard: HardSet) -> Change:
-    """Put an open switch before all, and a silent joint behind."""
+    """Insert a constant open switch first, and append a constant joint."""
     n, d = hard.X.shape
     X = np.column_stack([np.zeros(n, np.int64), hard.X, np.full(n, 77)])
     changed = replace(hard, X=X, n_switches=hard.n_switches + 1)
@@ -78,12 +79,12 @@ def constant_columns(hard: HardSet) -> Change:
 
 
 def copied_columns(hard: HardSet) -> Change:
-    """Put every column behind the others once more, as a joint: equal columns tie, and the lowest number wins."""
+    """Append a copy of every column as a joint: equal columns tie, and the lowest number wins."""
     return _same("columns twice", hard, replace(hard, X=np.column_stack([hard.X, hard.X])))
 
 
 def codes_recoded(hard: HardSet, rng: np.random.Generator) -> Change:
-    """Replace the codes of every joint by others in the same order, 0 and the largest among them."""
+    """Replace the codes of every joint by others in the same order, including 0 and the largest."""
     X = hard.X.copy()
     for column in range(hard.n_switches, X.shape[1]):
         values, ranks = np.unique(X[:, column], return_inverse=True)
@@ -100,14 +101,14 @@ def weights_scaled(hard: HardSet, power: int) -> Change:
 
 
 def classes_permuted(hard: HardSet, rng: np.random.Generator) -> Change:
-    """Number the classes in another order; two classes swap."""
+    """Renumber the classes; two classes are swapped."""
     classes = rng.permutation(hard.n_classes) if hard.n_classes > 2 else np.array([1, 0])
     changed = replace(hard, labels=classes[hard.labels].astype(np.intp))
     return Change("classes numbered otherwise", changed, tuple(range(hard.X.shape[1])), tuple(classes.tolist()))
 
 
 def columns_reversed(hard: HardSet) -> Change:
-    """Number the switches from the last to the first, and the joints."""
+    """Reverse the numbers of the switches, and those of the joints."""
     switches = np.arange(hard.n_switches)[::-1]
     joints = np.arange(hard.n_switches, hard.X.shape[1])[::-1]
     order = np.concatenate([switches, joints])
@@ -121,7 +122,7 @@ ROUNDS = 30
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Learnt:
-    """What `learn` returns."""
+    """The result of `learn`."""
 
     tree: Tree
     stumps: Stumps
@@ -131,7 +132,7 @@ class Learnt:
 
 
 def learn(hard: HardSet, rounds: int = ROUNDS) -> Learnt:
-    """Learn from `hard` all that there is to learn. ID3 knows no weights."""
+    """Train all models on `hard`. ID3 does not use weights."""
     stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, weights=hard.weights)
     tables = collapse(stumps, hard.n_switches)
     integers = fit_lost(quantise(tables, hard.bits, hard.codes), hard.bits, hard.codes, hard.labels)
@@ -139,7 +140,7 @@ def learn(hard: HardSet, rounds: int = ROUNDS) -> Learnt:
 
 
 def numbers(learnt: Learnt, inputs: Sequence[int], classes: Sequence[int]) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield name and array of everything learnt but thresholds, of `inputs` and `classes` as if they were numbered so.
+    """Yield name and array of all trained parameters except thresholds, with inputs and classes in the given numbering.
 
     A stump or node of any other input has number -1.
     """
@@ -150,7 +151,7 @@ def numbers(learnt: Learnt, inputs: Sequence[int], classes: Sequence[int]) -> It
     joints = [column - n_switches for column in inputs if column >= n_switches]
     columns = np.vectorize(lambda column: place.get(column, -1), otypes=[np.intp])(learnt.stumps.columns)
     yield "columns", columns[:, order]
-    yield "answers", learnt.stumps.values[:, order]
+    yield "outputs", learnt.stumps.values[:, order]
     yield "losses", np.array(learnt.losses)
     yield "tree", np.array([place.get(-1 if node.input is None else node.input, -1) for node in learnt.tree.nodes])
     yield "counts", _counts(learnt.tree, order)
@@ -165,7 +166,7 @@ def numbers(learnt: Learnt, inputs: Sequence[int], classes: Sequence[int]) -> It
 
 
 def _counts(tree: Tree, order: list[int]) -> NDArray[np.int64]:
-    """Return the rows by class at every node; a tree numbers only the classes that have rows."""
+    """Return the number of rows by class at every node; a tree numbers only the classes that have rows."""
     counts = np.zeros((len(tree.nodes), len(order)), np.int64)
     counts[:, np.array(tree.classes, np.intp)] = [node.counts for node in tree.nodes]
     return counts[:, order]
@@ -176,12 +177,13 @@ def _stacked(rows: list[NDArray[Any]], like: NDArray[Any]) -> NDArray[Any]:
 
 
 Z_MAX = 3.0
-SAME = "what is learnt from the set as it was"
+SAME = "training on the original set"
 
 
 class Followed:
-    """A training on a set, weights left out, of which every round is worked out at 60 digits once, when it is reached:
-    all changes of the set are held against the same numbers.
+    """A training on an unweighted set whose rounds are computed at 60 digits once, on demand.
+
+    All changes of the set are compared with the same numbers.
     """
 
     def __init__(self, hard: HardSet, rounds: int) -> None:
@@ -192,7 +194,7 @@ class Followed:
         self._steps: dict[int, Step] = {}
 
     def given(self, number: int) -> list[ClassRound]:
-        """Return what the stumps of round `number`, from 0, are fitted to."""
+        """Return the targets of the stumps of round `number`, from 0."""
         if number not in self._given:
             F = self.scores[number - 1] if number else np.zeros((len(self.hard.X), self.hard.n_classes))
             self._given[number] = class_rounds(F.tolist(), self.hard.labels.tolist(), Z_MAX)
@@ -209,23 +211,23 @@ class Followed:
 
 
 class Partings:
-    """Gathers how far the scores of two trainings are apart, and which rows they give to different classes, as long as
-    their stumps are the same; and where these first are not, by how much the stumps differ in what they explain.
+    """Collects differences of scores and predictions between two trainings while their stumps are equal, and the
+    difference in explained variation where their stumps first differ.
 
-    Once they have parted on a tie nothing more is claimed: stumps that explain as much are not the same stumps.
+    After they have diverged at a tie no invariance holds: stumps that explain equally much are not the same stumps.
     """
 
     def __init__(self) -> None:
         self._apart = Worst("scores, renumbered or repeated, while stumps agree", SAME, 1.0, "x growth")
-        self._answers = Worst("winners, but for ties, while stumps agree", SAME, 0.0, "rows")
-        self._parted = Worst("what two stumps explain, where they first differ", "60 digits", 1.0, "x rounding")
+        self._winners = Worst("winners, except ties, while stumps agree", SAME, 0.0, "rows")
+        self._diverged = Worst("variation explained by two stumps that first differ", "60 digits", 1.0, "x rounding")
 
     def findings(self) -> Iterator[Finding]:
-        """Yield what was found."""
-        return (worst.finding() for worst in (self._apart, self._answers, self._parted))
+        """Yield the findings."""
+        return (worst.finding() for worst in (self._apart, self._winners, self._diverged))
 
     def see(self, training: Followed, change: Change) -> None:
-        """Train on the other set, weights left out, and follow the rounds to the end or to where the two part."""
+        """Train on the other set without weights, and follow the rounds until the end or until the two diverge."""
         one, hard, of = training.stumps, training.hard, change.hard
         other = renumbered(boost(of.X, of.labels, of.n_classes, rounds=one.n_rounds)[0], change)
         steps: list[Step] = []
@@ -235,21 +237,21 @@ class Partings:
                 return
             steps.append(training.step(number, float(np.abs(both).max())))
             self._apart.see(float((np.abs(both[0] - both[1]).ravel() / (2 * grown(steps))).max()), at)
-            self._answers.see(_answered_otherwise(*both), at, len(hard.X))
+            self._winners.see(_predicted_otherwise(*both), at, len(hard.X))
 
     def _see_stumps(self, training: Followed, number: int, other: Stumps, change: Change, at: str) -> bool:
-        """Return whether the stumps of round `number` differ; then see by how much they do in what they explain."""
+        """Return whether the stumps of round `number` differ; if so, record the difference in explained variation."""
         both = (training.stumps, other)
         places = [list(zip(of.columns[number].tolist(), of.thresholds[number].tolist(), strict=True)) for of in both]
         for k, (first, second) in enumerate(zip(*places, strict=True)):
             if first != second:
                 given = training.given(number)[k]
-                self._parted.see(_doubt(training.hard, given, (first, second), len(change.hard.labels)), at)
+                self._diverged.see(_doubt(training.hard, given, (first, second), len(change.hard.labels)), at)
         return places[0] != places[1]
 
 
 def renumbered(other: Stumps, change: Change) -> Stumps:
-    """Return the ensemble of a changed set in the numbers of inputs and classes of the set itself."""
+    """Return the ensemble of a changed set with the original numbering of inputs and classes."""
     place = np.full(other.n_inputs, -1, np.int32)
     place[list(change.inputs)] = np.arange(len(change.inputs))
     order = list(change.classes)
@@ -259,16 +261,16 @@ def renumbered(other: Stumps, change: Change) -> Stumps:
 
 @precisely()
 def _doubt(hard: HardSet, given: ClassRound, places: Sequence[tuple[int, float]], rows: int) -> float:
-    """Return by how much two stumps differ in what they explain, as a share of what makes them equal to training.
+    """Return the difference of two stumps in explained variation, as a share of the tolerance of training.
 
-    `rows` are those of the larger set, with whose number grows what its grid rounds away.
+    `rows` is the number of rows of the larger set, on which the rounding of its grid depends.
     """
     one, other = (given.explained(hard.X, *place) for place in places)
     return float(abs(one - other) / given.doubt(Z_MAX, rows / len(given.weights)))
 
 
-def _answered_otherwise(one: Floats, other: Floats) -> int:
-    """Return how many rows of scores (n, K) have another winner, and not because two scores are tied in either."""
+def _predicted_otherwise(one: Floats, other: Floats) -> int:
+    """Return the number of rows of scores (n, K) with different winners, except for ties in either."""
     rows, first, second = np.arange(len(one)), one.argmax(axis=1), other.argmax(axis=1)
     leads = one[rows, first] - one[rows, second], other[rows, second] - other[rows, first]
     return int(np.count_nonzero(np.minimum(*leads) > TIE))
@@ -276,7 +278,7 @@ def _answered_otherwise(one: Floats, other: Floats) -> int:
 
 CASE = Case(
     title="Scale-free facts",
-    danger="the order of rows, columns or classes, copies, units or names of codes decide what is learnt",
+    danger="the order of rows, columns or classes, copies, units or names of codes change the trained model",
 )
 
 _EXACT: dict[str, Callable[[HardSet, np.random.Generator], Change]] = {
@@ -290,7 +292,7 @@ _EXACT: dict[str, Callable[[HardSet, np.random.Generator], Change]] = {
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield what each change of a set changes in all that is learnt from it."""
+    """Yield the effect of each change of a set on the trained models."""
     sets = list(hard_sets(12 if full else 1))
     yield from _exact(sets)
     yield from _tree(sets)
@@ -300,7 +302,7 @@ def findings(full: bool) -> Iterator[Finding]:
 def hard_sets(draws: int) -> Iterator[HardSet]:
     """Yield sets with and without ties of columns, of 2 to 6 classes, separable, contradictory and noisy, draw by draw.
 
-    The sets that are not drawn are the same objects at every draw: what is learnt of them is learnt once.
+    The sets that are not random are the same objects at every draw, so they are trained once.
     """
     both = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
     fixed = (
@@ -320,11 +322,11 @@ def hard_sets(draws: int) -> Iterator[HardSet]:
 
 
 def _exact(sets: list[HardSet]) -> Iterator[Finding]:
-    """Yield, change by change, how many of the arrays that are learnt change in any bit."""
+    """Yield, change by change, the number of trained arrays that differ in any bit."""
     before = {hard: learn(hard) for hard in dict.fromkeys(sets)}
     for name, change_of in _EXACT.items():
         rng = np.random.default_rng(1)
-        worst = Worst(f"{name}: all that is learnt", SAME, 0.0, "arrays")
+        worst = Worst(f"{name}: all trained parameters", SAME, 0.0, "arrays")
         for hard in sets:
             if change_of is not classes_permuted or hard.n_classes == 2:
                 _see_exact(before[hard], change_of(hard, rng), worst)
@@ -339,30 +341,30 @@ def _see_exact(learnt: Learnt, change: Change, worst: Worst) -> None:
 
 
 def _tree(sets: list[HardSet]) -> Iterator[Finding]:
-    """What ID3 answers: its tree where classes or the number of copies change, its rows' classes where columns do."""
+    """Check ID3: the same tree if classes or the number of copies change, the same predictions if columns do."""
     rng = np.random.default_rng(2)
-    trees = Worst("ID3: classes renumbered, the set 3 times", "the tree of the set as it was", 0.0, "trees")
+    trees = Worst("ID3: classes renumbered, the set 3 times", "the tree of the original set", 0.0, "trees")
     rows = Worst("ID3: columns renumbered", "the most frequent class of each frame", 0.0, "rows")
     for hard in sets:
         inputs = _asked(hard)
         for change in (classes_permuted(hard, rng), rows_several_times(hard, 3)):
             trees.see(float(_asked(change.hard) != inputs), f"{hard.name}, {change.name}")
         change = columns_reversed(hard)
-        answers = grow_id3(change.hard.X, change.hard.labels).predict(change.hard.X).tolist()
+        predicted = grow_id3(change.hard.X, change.hard.labels).predict(change.hard.X).tolist()
         most = counted(unweighted(hard))
-        for frame, answer in zip(hard.X.tolist(), answers, strict=True):
+        for frame, prediction in zip(hard.X.tolist(), predicted, strict=True):
             own = most[tuple(frame)]
-            rows.see(float(answer != own.index(max(own))), hard.name)
+            rows.see(float(prediction != own.index(max(own))), hard.name)
     yield from (trees.finding(), rows.finding())
 
 
 def _asked(hard: HardSet) -> list[tuple[int | None, tuple[int, ...]]]:
-    """Return what each node of ID3's tree asks for, and the values it meets there."""
+    """Return the input of each node of ID3's tree, and its values."""
     return [(node.input, node.values) for node in grow_id3(hard.X, hard.labels).nodes]
 
 
 def _near(sets: list[HardSet], rounds: int) -> Iterator[Finding]:
-    """What moves by rounding: how far, why trainings part if they do, and that rows get the same class until then."""
+    """Yield the changes by rounding, the reasons of divergence, and differing predictions until then."""
     rng, partings = np.random.default_rng(3), Partings()
     trainings = {hard: Followed(unweighted(hard), rounds) for hard in dict.fromkeys(sets)}
     for training in map(trainings.__getitem__, sets):

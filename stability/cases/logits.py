@@ -1,4 +1,4 @@
-"""The additive logit where its problem is hard: classes that can be parted, copies, extreme penalties and weights."""
+"""The additive logit on hard problems: separable classes, copied columns, extreme penalties and weights."""
 
 import math
 from collections.abc import Iterator
@@ -24,21 +24,21 @@ from ..reference.numbers import precisely
 
 CASE = Case(
     title="Additive logit",
-    danger="scores grow without end, a step overshoots, or rounding ends the search before the minimum is reached",
+    danger="scores grow without bound, a step overshoots, or rounding ends the search before the minimum is reached",
 )
 
-# Pulls of scores to zero, and of neighbouring bins to each other.
+# Penalties on scores, and on differences of neighbouring bins.
 USUAL, TINY, HUGE = (1.0, 3.0), (1e-6, 0.0), (1e6, 1e6)
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield how near the minimum each answer is, and what may not change it."""
-    at_rest = Worst("largest derivative at the answer", REFERENCE, 1.0, "x tolerance and rounding")
-    large = Worst("entries that are larger than the pull lets them be, or no numbers", "the loss of zeros", 0.0, "sets")
+    """Yield the distance of each solution from the minimum, and the invariances."""
+    at_rest = Worst("largest derivative at the solution", REFERENCE, 1.0, "x tolerance and rounding")
+    large = Worst("entries beyond the limit of the penalty, or not finite", "the loss of zeros", 0.0, "sets")
     overflow = Worst("largest sum of the integer tables, any order", "all rows' extremes", LIMIT, "steps")
-    wrong = Worst("frames not named right by tables and integers", "their labels", 0.0, "frames")
-    changed = Worst("answers that rows in another order, or a constant column, change", "itself", 0.0, "answers")
-    for hard, pulls, parted in _fits(full):
+    wrong = Worst("frames predicted wrongly by tables and integers", "their labels", 0.0, "frames")
+    changed = Worst("solutions changed by the order of rows or a constant column", "itself", 0.0, "solutions")
+    for hard, pulls, is_separable in _fits(full):
         at = f"{hard.name}, penalty {pulls[0]:g}"
         tables = _fit(hard, pulls)
         at_rest.see(_unrest(hard, tables, pulls), at)
@@ -47,7 +47,7 @@ def findings(full: bool) -> Iterator[Finding]:
         scores = tables.score_tables(hard.n_switches)
         integers = quantise(scores, hard.bits, hard.codes)
         overflow.see(largest_sum(rows_of(integers)), at)
-        if parted:
+        if is_separable:
             named = tables.scores(hard.X).argmax(axis=1), integer_scores(integers, hard.bits, hard.codes).argmax(axis=1)
             wrong.see(float(sum(np.count_nonzero(each != hard.labels) for each in named)), at, len(hard.X))
         order = np.random.default_rng(1).permutation(len(hard.X))
@@ -62,7 +62,7 @@ def findings(full: bool) -> Iterator[Finding]:
 
 
 def _fits(full: bool) -> Iterator[tuple[HardSet, tuple[float, float], bool]]:
-    """Yield sets and pulls, and whether the answer must name every frame right."""
+    """Yield sets and penalties, and whether the solution must predict every frame correctly."""
     for classes in (2, 14, 33) if full else (2, 14):
         for hard in (separable(classes, 1), separable(classes), words(classes)):
             yield hard, USUAL, True
@@ -87,10 +87,10 @@ def _fit(hard: HardSet, pulls: tuple[float, float]) -> ColumnTables:
 
 @precisely()
 def _unrest(hard: HardSet, tables: ColumnTables, pulls: tuple[float, float]) -> float:
-    """Return the largest derivative as a share of what the tolerance, and rounding, allow.
+    """Return the largest derivative as a share of the tolerance plus rounding.
 
-    Scores are exact. A probability of K classes is within K + 8 roundings; the grid of residuals, and what pulls a row,
-    which is at most all the weight there is, round a few times more.
+    Scores are exact. A probability of K classes is within K + 8 roundings; the grid of residuals, and the penalty of a
+    row, which is at most the total weight, add a few more roundings.
     """
     weights, (penalty, smoothness) = _weights(hard), pulls
     columns = [Column([0] * len(hard.X), [tables.bias.tolist()], [BIAS_SHARE * penalty], [])]
@@ -107,8 +107,8 @@ def _unrest(hard: HardSet, tables: ColumnTables, pulls: tuple[float, float]) -> 
 
 
 def _copies() -> Finding:
-    """Of equal columns none is preferred: each has the same rows, to the last bit."""
-    worst = Worst("copies of a column that do not share what it says equally", "each other", 0.0, "columns")
+    """Equal columns must have the same rows, to the last bit."""
+    worst = Worst("copies of a column with different rows", "each other", 0.0, "columns")
     hard = noisy(5, 60, 0.3, seed=1)
     doubled = replace(hard, X=np.column_stack([hard.X[:, :3], hard.X, hard.X[:, -1]]))
     for pulls in (USUAL, TINY, HUGE):
@@ -119,28 +119,28 @@ def _copies() -> Finding:
 
 
 def _pairs(full: bool) -> Iterator[Finding]:
-    """Yield the same of tables of pairs of joints, where types are apart by two joints together, or by nothing."""
+    """Yield the same for tables of pairs of joints, with types separable only by two joints together, or not at all."""
     at_rest = Worst("largest derivative with pairs of joints", REFERENCE, 1.0, "x tolerance and rounding")
-    overflow = Worst("largest sum of integer tables with pairs", "what the tables prove", LIMIT, "steps")
-    wrong = Worst("frames of crossed joints not named right by integers", "their labels", 0.0, "frames")
-    changed = Worst("tables of pairs that rows in another order change", "themselves", 0.0, "tables")
+    overflow = Worst("largest sum of integer tables with pairs", "the proven bound of the tables", LIMIT, "steps")
+    wrong = Worst("frames of crossed joints predicted wrongly by integers", "their labels", 0.0, "frames")
+    changed = Worst("tables of pairs that change with the order of rows", "themselves", 0.0, "tables")
     for apart, (penalty, smoothness) in product((1, 1000), (USUAL, TINY, HUGE)):
         random = np.random.default_rng(apart)
         codes = random.integers(0, 4, (160 if full else 60, 4)).astype(np.uint16) * np.uint16(apart)
         labels = ((codes[:, 0] > apart) ^ (codes[:, 1] > apart)).astype(np.intp)
         none, order = np.zeros((len(codes), 0), bool), random.permutation(len(codes))
         own: dict[str, Any] = {"penalty": penalty, "smoothness": smoothness, "pair_smoothness": smoothness}
-        for answers, parted in ((labels, penalty < 1), (random.permutation(labels), False)):
+        for targets, is_separable in ((labels, penalty < 1), (random.permutation(labels), False)):
             tables, again = (
-                fit_pairs(none[rows], codes[rows], answers[rows], 2, max_bins=8, **own) for rows in (slice(None), order)
+                fit_pairs(none[rows], codes[rows], targets[rows], 2, max_bins=8, **own) for rows in (slice(None), order)
             )
             at = f"codes {apart} apart, penalty {penalty:g}"
-            at_rest.see(_pairs_unrest(tables, codes, answers, penalty, smoothness), at)
+            at_rest.see(_pairs_unrest(tables, codes, targets, penalty, smoothness), at)
             integers = quantise(tables, none, codes)
             overflow.see(float(integers.bound), at)
-            if parted:
+            if is_separable:
                 named = integer_scores(integers, none, codes).argmax(axis=1)
-                wrong.see(float(np.count_nonzero(named != answers)), at, len(codes))
+                wrong.see(float(np.count_nonzero(named != targets)), at, len(codes))
             same = zip(_numbers(tables), _numbers(again), strict=True)
             changed.see(float(not all(np.array_equal(one, other) for one, other in same)), at)
     yield from (worst.finding() for worst in (at_rest, overflow, wrong, changed))

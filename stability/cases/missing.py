@@ -1,4 +1,4 @@
-"""Ports that do not answer and joints that fall silent; what is fitted to the rows trained on stands in for them."""
+"""Ports that do not reply and joints that stop sending; rows fitted to the training rows replace them."""
 
 from collections.abc import Iterator, Sequence
 from itertools import product
@@ -23,7 +23,7 @@ from ..reference.tables import balanced, mean_row, mean_switch, table_scores
 
 
 class Loss(NamedTuple):
-    """Masks of kept switches (s,) and joints (j,) that cannot be read, and in words what is silent."""
+    """Masks of kept switches (s,) and joints (j,) that cannot be read, and a description."""
 
     switches: Bits
     joints: Bits
@@ -38,7 +38,7 @@ class Loss(NamedTuple):
 def every_loss(build: Build, width: int) -> Iterator[Loss]:
     """Yield every subset of ports, `width` switches each in the order of their columns, and joints.
 
-    On the last port there is no kept switch.
+    The last port has no kept switch.
     """
     ports = np.array([switch.column // width for switch in build.manifest.switches])
     n_ports, n_joints = int(ports.max()) + 2, build.tables.n_joints
@@ -49,7 +49,7 @@ def every_loss(build: Build, width: int) -> Iterator[Loss]:
 
 
 def changes(tables: IntegerTables, sign: int) -> list[NDArray[np.int64]]:
-    """Return per input, times `sign`, what stands in adds to a score beyond what each value adds, (values, K) steps."""
+    """Return per input, times `sign`, the replacement row minus the row of each value, (values, K) steps."""
     pairs = [
         (np.stack([0 * row, row]), mean) for row, mean in zip(tables.switch_rows, tables.switch_means, strict=True)
     ]
@@ -60,8 +60,8 @@ def changes(tables: IntegerTables, sign: int) -> list[NDArray[np.int64]]:
 def worst_frames(tables: IntegerTables) -> Iterator[tuple[Bits, Codes]]:
     """Yield the frames in which a loss changes a score most, and those whose sums get furthest from zero.
 
-    Inputs know nothing of each other, so the first are, for a class and a direction, the same whatever is lost. Codes
-    are the lowest, then the highest, of their bins.
+    Inputs are independent, so for a class and a direction the first are the same for every loss. Codes are the lowest,
+    then the highest, of their bins.
     """
     for sign in (1, -1):
         most = [change.argmax(axis=0) for change in changes(tables, sign)]
@@ -81,10 +81,10 @@ _T = TypeVar("_T")
 
 
 class ExactTables:
-    """The score tables of a build, balanced, in steps; and what stands in for lost inputs, in whole steps as it is
-    fitted to the recordings with the build's own whole rows.
+    """The balanced score tables of a build in steps, and the replacement rows of lost inputs in whole steps, fitted to
+    the recordings with the build's own whole rows.
 
-    strays  by how many steps what stands in for each input of the build is off at the most: switches, then joints
+    strays  largest error in steps of each input's replacement in the build: switches, then joints
     """
 
     @precisely()
@@ -108,7 +108,7 @@ class ExactTables:
             self.strays += strays
 
     def scores(self, bits: Sequence[bool], codes: Sequence[int], loss: Loss) -> list[mpf]:
-        """Return the scores (K,) of a frame that lost some inputs: these have one row, whatever they read."""
+        """Return the scores (K,) of a frame that lost some inputs: each of these has one row for all values."""
         switches, joints = loss.switches.tolist(), loss.joints.tolist()
         for_switches, for_joints = self._stand_ins[: len(switches)], self._stand_ins[len(switches) :]
         return table_scores(
@@ -124,8 +124,8 @@ class ExactTables:
     def most(self, loss: Loss) -> list[mpf]:
         """Return the most (K,) that the loss can change each score, up or down.
 
-        What stands in for an input is added instead of one of its rows, whatever the other inputs say; so that is, for
-        each direction, the sum over lost inputs of the most that one can change.
+        An input's replacement is added instead of one of its rows, independently of other inputs. So for each direction
+        this is the sum over lost inputs of the largest change by one input.
         """
         lost = [rows for rows, is_lost in zip(self.changes(), loss.inputs, strict=True) if is_lost]
         return [
@@ -135,7 +135,7 @@ class ExactTables:
 
     @precisely()
     def changes(self) -> list[list[list[mpf]]]:
-        """Return per input, for each of its values, what stands in adds to the scores (K,) beyond what that adds."""
+        """Return per input, for each of its values, the replacement row minus the value's row (K,)."""
         inputs = [*([[mpf(0)] * len(row), row] for row in self._switches), *self._joints]
         return [
             [[a - b for a, b in zip(lost, row, strict=True)] for row in rows]
@@ -144,7 +144,7 @@ class ExactTables:
 
 
 def _kinds(small: SmallBuild) -> tuple[Kind, Kind]:
-    """Return the switches and the joints of a build with what its whole rows add to the rows that it was trained on."""
+    """Return the switches and the joints of a build, with the scores of its whole rows for its training rows."""
     tables, labels = small.build.tables, small.labels.tolist()
     choices = [np.stack([0 * row, row]).astype(np.int64) for row in tables.switch_rows]
     values: list[NDArray[np.intp]] = list(small.bits.T.astype(np.intp))
@@ -163,7 +163,7 @@ def _kinds(small: SmallBuild) -> tuple[Kind, Kind]:
 
 
 def _strays(one: Rows, other: Sequence[Sequence[int]]) -> list[int]:
-    """Return how far each row of one is at the most from that of the other."""
+    """Return the largest difference between the rows of one and of the other."""
     pairs = zip(one, other, strict=True)
     return [max(abs(a - b) for a, b in zip(*rows, strict=True)) for rows in pairs]
 
@@ -178,14 +178,14 @@ def _swapped(all_: Sequence[_T], others: Sequence[_T], which: Sequence[bool]) ->
 
 CASE = Case(
     title="Missing ports and silent joints",
-    danger="with a fitted row in place of what is missing a score strays further than proved, or nobody is told",
+    danger="with a fitted row for a missing input a score changes more than proven, or the loss is not reported",
 )
 
 _SUBSETS = "every subset of ports and joints"
 
 
 class Lost(NamedTuple):
-    """What is lost, and n frames: bits (n, s), codes (n, j), and their scores (n, K) without it."""
+    """A loss, and n frames: bits (n, s), codes (n, j), and their scores (n, K) under it."""
 
     loss: Loss
     bits: Bits
@@ -210,7 +210,7 @@ def findings(full: bool) -> Iterator[Finding]:
     yield from _exactly(small, exact, cases)
     yield _integers(small, cases)
     yield _sums(small, cases)
-    yield from _told(small, cases)
+    yield from _reported(small, cases)
 
 
 def _scores(small: SmallBuild, loss: Loss, bits: Bits, codes: Codes) -> NDArray[np.int64]:
@@ -220,23 +220,23 @@ def _scores(small: SmallBuild, loss: Loss, bits: Bits, codes: Codes) -> NDArray[
 
 
 def _fitted(exact: ExactTables) -> Finding:
-    """Hold what stands in for each input against the same fit at 60 digits.
+    """Compare the replacement of each input with the same fit at 60 digits.
 
-    All of it is whole numbers, so nothing may differ. A number next to a half may be rounded either way, where what
-    doubles lose decides (reference/standing_in.py): what follows from either is right.
+    All of it is integers, so nothing may differ. A number close to a half may be rounded either way if the error of
+    doubles decides (reference/standing_in.py): the results of both are right.
     """
-    worst = Worst("what stands in for each input", "the fit at 60 digits", 0, "steps")
+    worst = Worst("the replacement of each input", "the fit at 60 digits", 0, "steps")
     for number, strays in enumerate(exact.strays):
         worst.see(strays, f"input {number}")
     return worst.finding()
 
 
 def _exactly(small: SmallBuild, exact: ExactTables, cases: list[Lost]) -> Iterator[Finding]:
-    """Hold scores against the exact ones with what stands in, and against those of the whole frame."""
-    # Half a step for the bias and for the row of each input; what stands in is whole.
+    """Compare scores with the exact ones with replacements, and with those of the whole frame."""
+    # Half a step for the bias and for the row of each input; the replacements are whole.
     rounding = (small.tables.n_inputs + 1) / 2 + _float_slack(small)
     scores = Worst(f"scores, {_SUBSETS} lost", "the fit at 60 digits", rounding, "steps")
-    proved = Worst(f"what losing {_SUBSETS} changes", "the whole frame, 60 digits", 1, "of the proved bound")
+    proved = Worst(f"change by losing {_SUBSETS}", "the whole frame, 60 digits", 1, "of the proven bound")
     nothing = cases[0].loss
     frames = list(zip(cases[0].bits.tolist(), cases[0].codes.tolist(), strict=True))
     whole = [exact.scores(*frame, nothing) for frame in frames]
@@ -253,7 +253,7 @@ def _exactly(small: SmallBuild, exact: ExactTables, cases: list[Lost]) -> Iterat
 
 
 def _float_slack(small: SmallBuild) -> float:
-    """Return the most steps that doubles can move a score on the way to integers and to their means.
+    """Return the most steps that doubles can change a score on the way to integers and to their means.
 
     Counted as in compare.float_slack: with S the sum of the largest magnitudes of all rows, 2^-53 S times the number of
     joints for the bias that balancing sums up, 2 for balanced rows, at most twice as large as before, 2 for the bias,
@@ -265,8 +265,8 @@ def _float_slack(small: SmallBuild) -> float:
 
 
 def _integers(small: SmallBuild, cases: list[Lost]) -> Finding:
-    """Among integers nothing is rounded: the worst frames must change by the bound itself, and no frame by more."""
-    worst = Worst(f"most that losing {_SUBSETS} changes", "the bound itself, in integers", 0, "steps")
+    """Integers do not round: the worst frames must change by exactly the bound, and no frame by more."""
+    worst = Worst(f"largest change by losing {_SUBSETS}", "the bound itself, in integers", 0, "steps")
     whole = cases[0].scores
     for case in cases:
         for sign in (1, -1):
@@ -278,7 +278,7 @@ def _integers(small: SmallBuild, cases: list[Lost]) -> Finding:
 
 
 def _sums(small: SmallBuild, cases: list[Lost]) -> Finding:
-    """No running sum, in the order of the inputs, may leave what the build says is its bound."""
+    """No running sum, in the order of the inputs, may exceed the bound of the build."""
     tables = small.build.tables
     worst = Worst(f"running sums, {_SUBSETS} lost", "the build's bound, at most 32767", tables.bound, "steps")
     for case in cases:
@@ -288,15 +288,15 @@ def _sums(small: SmallBuild, cases: list[Lost]) -> Finding:
         joints = np.stack([rows[np.searchsorted(steps, codes)] for steps, rows, codes in pairs]).astype(np.int64)
         joints[case.loss.joints] = tables.joint_means[case.loss.joints, np.newaxis]
         running = tables.bias + np.cumsum(np.concatenate([switches, joints]), axis=0)
-        # What does not add up to the scores that run would be the running sum of something else.
+        # The running sums must end at the scores of the scorer.
         differs = not np.array_equal(running[-1], case.scores)
         worst.see(float("inf") if differs else float(np.abs(running).max()), case.loss.name, len(case.bits))
     return worst.finding()
 
 
-def _told(small: SmallBuild, cases: list[Lost]) -> Iterator[Finding]:
-    degraded = Worst("frames called degraded", "those that lost a kept switch or a joint", 0, "frames")
-    unread = Worst("answers that hang on what a lost input reads", "the answer without it", 0, "frames")
+def _reported(small: SmallBuild, cases: list[Lost]) -> Iterator[Finding]:
+    degraded = Worst("frames reported as degraded", "those that lost a kept switch or a joint", 0, "frames")
+    unread = Worst("outputs that depend on the value of a lost input", "the output without it", 0, "frames")
     build, grasps = small.build, small.build.grasps
     for case in cases:
         lost = case.loss.switches, case.loss.joints

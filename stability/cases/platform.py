@@ -1,7 +1,7 @@
-"""Another number of threads, another processor, another Python, another numpy.
+"""Other numbers of threads, processors, Pythons and numpys.
 
-Every setting is a process of its own: these are read once, when libraries are loaded. They do change numbers: each
-finding says in how many of its settings numpy's and Python's own exp and matrix products gave other bits than here.
+Every setting is a separate process, since libraries read it once on loading. They do change numbers: each finding gives
+the number of its settings in which numpy's or Python's exp or matrix products gave other bits than here.
 """
 
 import os
@@ -20,10 +20,10 @@ from ..pythons import made
 
 CASE = Case(
     title="The platform",
-    danger="the same recordings give another build where threads, the processor's instructions or the Python differ",
+    danger="the same recordings give another build with other threads, processor instructions or Python",
 )
 
-# What may have been set around us, and would make settings less different than they look.
+# Variables that may be set outside, and would make the settings less different than intended.
 _OURS = (
     "OPENBLAS_NUM_THREADS",
     "OMP_NUM_THREADS",
@@ -33,16 +33,16 @@ _OURS = (
     "GLIBC_TUNABLES",
 )
 
-# OpenBLAS's kernels by the processors they need, each of which runs those before it; no numpy runs on older ones than
-# Nehalem. ARM's have one in common.
+# OpenBLAS's kernels by the processors they need, each of which also runs those before it; numpy needs at least Nehalem.
+# ARM's have one in common.
 _X86_KERNELS = ("Nehalem", "Sandybridge", "Haswell", "SkylakeX")
 _ARM_KERNELS = ("ARMV8",)
-# glibc's exp, log, sin and pow have variants for fused multiply-add and AVX2; without them the plain ones run.
+# glibc's exp, log, sin and pow have variants for fused multiply-add and AVX2; without them the plain variants run.
 _PLAIN_LIBM = "glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA,-FMA4"
 
 
 class Setting(NamedTuple):
-    """A process to be: what is asked of its environment, in which Python."""
+    """A process to run: its environment and its Python."""
 
     name: str
     environment: tuple[tuple[str, str], ...] = ()
@@ -50,7 +50,7 @@ class Setting(NamedTuple):
 
 
 class Ran(NamedTuple):
-    """What became of it: what it made, or how it ended without."""
+    """The result of a process: the files it made, or how it failed."""
 
     name: str
     built: Built | None
@@ -61,7 +61,7 @@ AS_IT_IS = Setting("as it is")
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Hold the files of every setting against those that this Python makes as it is."""
+    """Compare the files of every setting with those of this Python without settings."""
     here = run(AS_IT_IS, full)
     if here.built is None:
         yield _failed(here)
@@ -73,13 +73,13 @@ def findings(full: bool) -> Iterator[Finding]:
 
 
 def _settings(here: Built, full: bool) -> Iterator[tuple[str, list[Setting]]]:
-    """Yield (what is looked at, its settings)."""
+    """Yield (check, its settings)."""
     if not full:
         yield "threads, kernels, SIMD, libm, hash order", [plainest(here), _threads(2)]
         return
     yield "BLAS threads 1 and 2", [_threads(1), _threads(2)]
     yield "BLAS kernels", [_set("OPENBLAS_CORETYPE", kernel) for kernel in _kernels(here)]
-    # Instruction sets are taken away from the newest on, until none is left.
+    # Instruction sets are disabled from the newest on, until none is left.
     limits = (" ".join(here.simd[kept:]) for kept in range(len(here.simd)))
     yield "numpy's SIMD limited", [_set("NPY_DISABLE_CPU_FEATURES", limit) for limit in limits]
     yield "libm without FMA and AVX2", [_set("GLIBC_TUNABLES", _PLAIN_LIBM)]
@@ -88,7 +88,7 @@ def _settings(here: Built, full: bool) -> Iterator[tuple[str, list[Setting]]]:
 
 
 def _in_python(here: Built, python: Path) -> Finding:
-    """Hold another Python against this one: as it is, and with its own libraries at their plainest."""
+    """Compare another Python with this one: as it is, and with its libraries at their plainest."""
     there = run(AS_IT_IS._replace(python=python), full=True)
     if there.built is None:
         return _failed(there)
@@ -98,11 +98,11 @@ def _in_python(here: Built, python: Path) -> Finding:
 
 
 def _failed(ran: Ran) -> Finding:
-    return Finding("a build as it is", "a process that ends well", 1, 0, "processes", 1, ran.ending)
+    return Finding("a build as it is", "a process that succeeds", 1, 0, "processes", 1, ran.ending)
 
 
 def held(check: str, here: Built, others: list[Ran]) -> Finding:
-    """Count the files that differ from this process's. Bound 0: there is no rounding between the bytes of two files."""
+    """Count the files that differ from this process's. The bound is 0: bytes of files are not rounded."""
     wrong = []
     for ran in others:
         there = dict(ran.built.files) if ran.built is not None else {}
@@ -110,7 +110,7 @@ def held(check: str, here: Built, others: list[Ran]) -> Finding:
     moved = sum(ran.built is not None and ran.built.plain != here.plain for ran in others)
     return Finding(
         check=check,
-        reference=f"bytes of a plain run (numpy's own exp or products differ in {moved} of {len(others)})",
+        reference=f"bytes of a plain run (numpy's exp or products differ in {moved} of {len(others)})",
         error=sum(len(files) for _, files in wrong),
         bound=0,
         unit="files",
@@ -128,7 +128,7 @@ def _set(name: str, value: str) -> Setting:
 
 
 def _kernels(built: Built) -> tuple[str, ...]:
-    """Return the kernels that this processor runs for certain: those older than what OpenBLAS chose by itself."""
+    """Return the kernels that this processor certainly runs: those older than OpenBLAS's default choice."""
     if platform.machine().lower() not in ("x86_64", "amd64"):
         return _ARM_KERNELS
     chosen = {kernel.partition(" ")[0] for kernel in built.kernels}

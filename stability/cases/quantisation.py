@@ -1,4 +1,4 @@
-"""From scores to integers of 4 to 16 bits, in the worst frame there is."""
+"""Quantisation of scores to integers of 4 to 16 bits, in the worst possible frame."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -26,7 +26,7 @@ from ..reference.tables import steps, table_scores
 
 
 class BothWays:
-    """Tables and their integers, arranged for one frame after another."""
+    """Tables and their integers, prepared for one frame after another."""
 
     def __init__(self, tables: ScoreTables, integers: IntegerTables) -> None:
         self._scorer, self._scale = Scorer(integers), integers.scale
@@ -39,18 +39,18 @@ class BothWays:
 
     @precisely()
     def run(self, bits: Sequence[bool], codes: Sequence[int]) -> tuple[list[mpf], list[int]]:
-        """Return the frame's scores (K,) in steps: exact ones, and those that run."""
+        """Return the frame's scores (K,) in steps: exact, and from the integer tables."""
         exact = [score * self._scale for score in table_scores(*self._rows, bits, codes)]
         return exact, [lane - LANE_OFFSET for lane in self._scorer.lanes(bits, codes)]
 
 
 @precisely()
-def lost(exact: Sequence[mpf], deployed: Sequence[int], leader: int, competitor: int) -> mpf:
-    """Return how many steps of the lead of class `leader` over `competitor` are gone."""
-    return (exact[leader] - exact[competitor]) - (deployed[leader] - deployed[competitor])
+def lost(exact: Sequence[mpf], deployed: Sequence[int], leader: int, other: int) -> mpf:
+    """Return the lost steps of the lead of class `leader` over `other`."""
+    return (exact[leader] - exact[other]) - (deployed[leader] - deployed[other])
 
 
-# What can add the last step to a sum, and in which array it stands.
+# The rows that can add the last step to a sum, and their arrays.
 LAST = (
     ("the bias", "bias"),
     ("a closed switch", "switch_rows"),
@@ -61,9 +61,9 @@ LAST = (
 
 
 def edges(full: bool) -> Iterator[Finding]:
-    """Hold tables whose sums reach 32767 and those that reach one more, the one too far by whatever can add it."""
-    right = Worst("sums of exactly +-32767", "accepted, and added up without a spill", 0, "tables")
-    wrong = Worst("sums of 32768", "refused, in memory and as a file", 0, "tables")
+    """Check tables whose sums reach 32767, and those that reach 32768 by each possible row."""
+    right = Worst("sums of exactly +-32767", "accepted, and summed without overflow", 0, "tables")
+    wrong = Worst("sums of 32768", "rejected, in memory and as a file", 0, "tables")
     for sign, classes, (name, arrays) in product((1, -1), (2, 3, MAX_CLASSES if full else 33), LAST):
         tables = edge_tables(classes, sign, arrays)
         at = f"{classes} classes, {'+' if sign > 0 else '-'} by {name}"
@@ -74,9 +74,9 @@ def edges(full: bool) -> Iterator[Finding]:
 
 
 def edge_tables(classes: int, sign: int, last: str) -> IntegerTables:
-    """Return tables of one switch and one joint in which class 1 gets to 32767 steps by what stands in `last`.
+    """Return tables of one switch and one joint in which class 1 reaches 32767 steps by the row in `last`.
 
-    Its neighbours get as far the other way, so that a spill into the next lane would show.
+    Its neighbours reach as far in the other direction, so that an overflow into the next lane would show.
     """
     arrays = {name: np.zeros((1, classes), np.int16) for _, name in LAST}
     towards = np.full(classes, -sign)
@@ -105,7 +105,7 @@ def _is_right(tables: IntegerTables, sign: int) -> bool:
 def _is_refused(tables: IntegerTables, last: str, sign: int) -> bool:
     row = tables.joint_rows[0] if last == "joint_rows" else getattr(tables, last)
     if last == "bias" and sign > 0:
-        row = tables.switch_rows  # 32768 is no int16: the step too many comes from elsewhere
+        row = tables.switch_rows  # 32768 does not fit int16: the extra step comes from another row
     row[..., 1].flat[0] += sign
     altered = tables_to_bytes(tables)
     return _refuses(lambda: replace(tables)) and _refuses(lambda: tables_from_bytes(altered))
@@ -119,13 +119,13 @@ def _refuses(make: Callable[[], IntegerTables]) -> bool:
     return False
 
 
-# Products of a row and the scale are doubles: relative 2^-53 off, so the scale at which one passes half a step is off
-# by as much, one unit in its last place at the most; and the next double is another.
+# Products of a row and the scale are doubles with a relative error of 2^-53, so the scale at which one passes half a
+# step has the same error, at most one unit in its last place; the next double adds another.
 _BOUND = 2
 
 
 def finest_scales(seeds: range) -> Finding:
-    """Compare the compiler's scale with the finest, for classes alike and for one that dominates by up to 10^12."""
+    """Compare the compiler's scale with the finest, for similar classes and for one that dominates by up to 10^12."""
     worst = Worst("scale, one class up to 10^12 times the others", "bisection in exact arithmetic", _BOUND, "ulp")
     for seed in seeds:
         for width, factor in ((4, 1.0), (16, 1.0), (8, 1e3), (16, 1e-3), (16, 1e6), (16, 1e12)):
@@ -142,7 +142,7 @@ def _error(tables: ScoreTables, width: int) -> float:
 
 
 def _finest(tables: ScoreTables, limit: int) -> float:
-    """Return the largest double at which rows, rounded half to even from exact products, cannot add up beyond limit."""
+    """Return the largest scale at which sums of rows, rounded half to even from exact products, stay within limit."""
     inputs = rows_of(tables)
     fits, too_fine = 0.0, 1.0
     while _furthest(inputs, too_fine) <= limit:
@@ -158,7 +158,7 @@ def _furthest(inputs: list[list[list[float]]], scale: float) -> float:
 
 CASE = Case(
     title="Integers of 4 to 16 bits",
-    danger="rounding moves a score further than promised, a sum overflows, or a tie falls the other way in C",
+    danger="rounding changes a score more than guaranteed, a sum overflows, or a tie is broken differently in C",
 )
 
 WIDTHS = range(4, 17)
@@ -167,7 +167,7 @@ _N = _SWITCHES + len(_BINS)
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Hold the integers against 60 digits in frames, all of them where tables are small, and against plain counting."""
+    """Compare the integers with 60 digits in frames, in all frames of small tables, and with plain counting."""
     seeds = range(40 if full else 3)
     yield _witnesses(seeds)
     yield from _all_frames(range(12 if full else 2))
@@ -181,27 +181,27 @@ def findings(full: bool) -> Iterator[Finding]:
 
 
 def _witnesses(seeds: range) -> Finding:
-    # Both sides are exact: rows of some 75 bits between their highest and lowest place, times a scale of 53, fit into
-    # the 199 bits that 60 digits are.
+    # Both sides are exact: rows of about 75 bits between their highest and lowest place, times a scale of 53 bits, fit
+    # into the 199 bits of 60 digits.
     worst = Worst("worst frame of every pair of classes", "60 digits and the scorer, in that frame", 0, "steps")
     small = small_build(small_set(7, rows=200, switches=24, joints=3, types=6, noise=0.15), rounds=40)
     for case in (Quantised("a compiled build", small.tables, small.build.tables), *_tables(seeds)):
         rounding, both = Rounding(case.tables, case.integers), BothWays(case.tables, case.integers)
-        for leader, competitor in permutations(range(case.integers.n_classes), 2):
-            frame = rounding.worst(leader, competitor)
+        for leader, other in permutations(range(case.integers.n_classes), 2):
+            frame = rounding.worst(leader, other)
             exact, deployed = both.run(frame.bits.tolist(), frame.codes.tolist())
             with precisely():
-                error = float(abs(lost(exact, deployed, leader, competitor) - ratio(frame.loss)))
-            worst.see(error, f"{case.name}, classes {leader} and {competitor}")
+                error = float(abs(lost(exact, deployed, leader, other) - ratio(frame.loss)))
+            worst.see(error, f"{case.name}, classes {leader} and {other}")
     return worst.finding()
 
 
 def _all_frames(seeds: range) -> Iterator[Finding]:
-    """Small tables: what the worst frame is said to lose, beside the most that any frame loses."""
-    most = Worst("most that any frame loses, all pairs", "60 digits, every frame there is", 0, "steps")
-    # A share of what is proved: no frame can exceed 1.
+    """Small tables: compare the computed loss of the worst frame with the largest loss of any frame."""
+    most = Worst("largest loss of any frame, all pairs", "60 digits, every frame there is", 0, "steps")
+    # A share of the proven bound: no frame can exceed 1.
     overturned = Worst(
-        "widest margin that integers overturn", "60 digits, every frame there is", 1, "of the safe margin"
+        "widest margin that integers reverse", "60 digits, every frame there is", 1, "of the safe margin"
     )
     for case in _small(seeds):
         rounding, pairs = Rounding(case.tables, case.integers), list(permutations(range(case.integers.n_classes), 2))
@@ -216,15 +216,15 @@ def _all_frames(seeds: range) -> Iterator[Finding]:
                 max(exact) - sorted(exact)[-2] for exact, deployed in runs if first_best(exact) != first_best(deployed)
             ]
             largest_margin = max(margins, default=0)
-            # Nothing is overturned where the safe margin is none at all.
+            # Nothing is reversed if the safe margin is 0.
             overturned.see(float(largest_margin / safe) if largest_margin else 0.0, case.name, len(runs))
     yield most.finding()
     yield overturned.finding()
 
 
 def _leads(seeds: range) -> Finding:
-    # Half a step for the bias and each input's row, twice, for two classes; besides, what doubles lose on the way. As a
-    # share of n + 1 steps, that being the same for all of these tables.
+    # Half a step for the bias and each input's row, twice, for two classes; plus the error of doubles on the way. As a
+    # share of n + 1 steps, which is the same for all of these tables.
     cases = list(_tables(seeds))
     slack = max(2 * float_slack(case.tables, case.integers.scale) for case in cases)
     worst = Worst("lead lost in the worst frame, 4 to 16 bits", "half a step an input", _N + 1 + slack, "steps")
@@ -234,7 +234,7 @@ def _leads(seeds: range) -> Finding:
 
 
 def _half_steps(full: bool) -> Finding:
-    # The bound itself, reached: every row is exactly half a step off, in opposite directions for the two classes.
+    # The bound is attained: every row is exactly half a step off, in opposite directions for the two classes.
     worst = Worst("all rows half a step off", "half a step an input, exactly", 0, "steps")
     for switches, width in ((1, 4), (1, 16), (2, 8), (31, 8), (MAX_SWITCHES if full else 256, 16)):
         case = quantised(f"{switches} switches, {width} bits", half_a_step_off(switches, 2 ** (width - 1) - 1), width)
@@ -250,7 +250,7 @@ def _tables(seeds: range) -> Iterator[Quantised]:
         for factor in (1e-6, 1e3, 1e6):
             tables = dominated(seed, 4, _SWITCHES, _BINS, factor)
             yield quantised(f"draw {seed}, one class times {factor:g}", tables)
-        # Nothing at all, subnormal, one or two steps at the finest scale, and next to the largest doubles.
+        # Zero, subnormal, one or two steps at the finest scale, and close to the largest doubles.
         for factor in (0.0, 1e-310, 1e-10, 1e300):
             tables = sized(drawn(seed, 4, _SWITCHES, _BINS), factor)
             yield quantised(f"draw {seed}, all times {factor:g}", tables)

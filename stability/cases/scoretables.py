@@ -1,4 +1,4 @@
-"""From ensembles of thousands of rounds to score tables and whole steps."""
+"""Conversion of ensembles of thousands of rounds to score tables and whole steps."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -29,23 +29,23 @@ BITS = np.array([*_BESIDE[2:4], -0.5, 0.0, 0.5, 1.0, 1e300, -1e300])
 
 
 def ensembles(rng: np.random.Generator, n: int, rounds: int) -> Iterator[tuple[str, Stumps]]:
-    """Yield n ensembles of each kind and up to 33 classes, over 3 switches and 2 joints; answers within 3."""
+    """Yield n ensembles of each kind and up to 33 classes, over 3 switches and 2 joints; outputs within 3."""
     for number in range(n):
         classes = int(rng.choice([2, 3, 5, 14, 33]))
         shape = rounds, classes, 3
         shrinkage = (1.0, 0.1, 1e-5)[number % 3]
-        yield "answers of +-3", _stumps(rng, rng.choice([-3.0, 3.0], shape), shrinkage)
+        yield "outputs of +-3", _stumps(rng, rng.choice([-3.0, 3.0], shape), shrinkage)
         sizes = rng.choice([-3.0, 3.0], shape) * 10.0 ** rng.uniform(-20, 0, shape)
-        yield "answers of all sizes", _stumps(rng, sizes, shrinkage)
+        yield "outputs of all sizes", _stumps(rng, sizes, shrinkage)
         once = _stumps(rng, rng.uniform(-3, 3, (1, classes, 3)), shrinkage)
         again = {part: getattr(once, part).repeat(rounds, axis=0) for part in ("columns", "thresholds", "values")}
-        yield "one round again and again", replace(once, **again)
+        yield "one round repeated", replace(once, **again)
         subnormal = np.ldexp(rng.integers(-9, 10, (20, classes, 3)).astype(np.float64), -1074)
-        yield "answers next to nothing", _stumps(rng, subnormal, 1.0)
+        yield "outputs close to zero", _stumps(rng, subnormal, 1.0)
 
 
 def frames(rng: np.random.Generator, n: int) -> tuple[NDArray[np.bool_], NDArray[np.uint16]]:
-    """Return bits (n, 3) and codes (n, 2), those at thresholds among them."""
+    """Return bits (n, 3) and codes (n, 2), including codes at thresholds."""
     codes = rng.choice([0, 1, 6, 7, 8, 128, 129, 65534, 65535], (n, JOINTS)).astype(np.uint16)
     return rng.random((n, SWITCHES)) < 0.5, codes
 
@@ -59,7 +59,7 @@ def _stumps(rng: np.random.Generator, values: NDArray[np.float64], shrinkage: fl
 
 CASE = Case(
     title="Score tables",
-    danger="scores drift over thousands of rounds, tables say something else than the stumps they are made of",
+    danger="scores drift over thousands of rounds, tables differ from the stumps they are made of",
 )
 X_ROUNDING = "x rounding"
 
@@ -77,11 +77,11 @@ def findings(full: bool) -> Iterator[Finding]:
 
 
 def scores_of(hard: list[tuple[str, Stumps]], bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> Iterator[Finding]:
-    """Hold the ensembles' scores of frames against the reference."""
-    # Of a step (K - 1)/K (g - mean g) the following round, by 2^-53 of so many times the largest |g|: shrinkage 2, here
-    # and in the mean, partial sums over K (K + 1)/2, mean 1, difference 2, all times (K - 1)/K, and the last two
-    # operations 2 ((K - 1)/K)^2 each; for every K > 1 that is below K + 4. Rounds are added with compensation, so that
-    # their sum rounds once.
+    """Compare the ensembles' scores of frames with the reference."""
+    # A step is (K - 1)/K (g - mean g). Its roundings, in units of 2^-53 times the largest |g|: shrinkage 2, here and in
+    # the mean, partial sums over K (K + 1)/2, mean 1, difference 2, all times (K - 1)/K, and the last two operations
+    # 2 ((K - 1)/K)^2 each; for every K > 1 the sum is below K + 4. Rounds are added with compensation, so that their
+    # sum rounds once.
     worst = Worst("scores of thousands of rounds", REFERENCE, 1.0, X_ROUNDING)
     mean = Worst("mean of the scores of all classes", "zero", 1.0, X_ROUNDING)
     X = np.hstack([bits, codes])
@@ -99,12 +99,12 @@ def scores_of(hard: list[tuple[str, Stumps]], bits: NDArray[np.bool_], codes: ND
 
 
 def _listed(stumps: Stumps) -> tuple[Any, Any, Any, float]:
-    """Return an ensemble as the reference takes it."""
+    """Return an ensemble in the form of the reference."""
     return stumps.columns.tolist(), stumps.thresholds.tolist(), stumps.values.tolist(), stumps.shrinkage
 
 
 def _sizes(stumps: Stumps) -> Floats:
-    """Return the sum over an input's stumps of the magnitudes that they add left and right, (n_inputs, K)."""
+    """Return the sum over an input's stumps of the magnitudes of their left and right branches, (n_inputs, K)."""
     K = stumps.n_classes
     spread = stumps.shrinkage * (K - 1) / K * np.abs(np.eye(K) - 1 / K)
     sizes = np.zeros((stumps.n_inputs, K))
@@ -113,9 +113,9 @@ def _sizes(stumps: Stumps) -> Floats:
 
 
 def tables_of(hard: list[tuple[str, Stumps]]) -> Iterator[Finding]:
-    """Hold the tables of ensembles against the reference."""
-    # A stump's part g - mean g, of one g that is not 0, rounds 5 times; a switch's closed less opened once more. They
-    # are summed with compensation, and rounded once; the bias is a sum over the switches.
+    """Compare the tables of ensembles with the reference."""
+    # A stump's part g - mean g, with one nonzero g, rounds 5 times; the difference of a switch's two values once more.
+    # They are summed with compensation, and rounded once; the bias is a sum over the switches.
     rows = Worst("rows of score tables", REFERENCE, 1.0, X_ROUNDING)
     thresholds = Worst("thresholds of score tables", "whole numbers", 0.0, "joints")
     for name, stumps in hard:
@@ -138,8 +138,8 @@ def tables_of(hard: list[tuple[str, Stumps]]) -> Iterator[Finding]:
 
 
 def table_scores_of(hard: list[tuple[str, Stumps]], bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> Finding:
-    """Hold the scores that tables give to frames against the reference, given the tables."""
-    # A row an input is added to the bias: one rounding each, of a partial sum.
+    """Compare the scores of frames by tables with the reference, given the tables."""
+    # One row per input is added to the bias: one rounding each, of a partial sum.
     worst = Worst("scores from tables", REFERENCE, 1.0, X_ROUNDING)
     for name, stumps in hard:
         ours = collapse(stumps, SWITCHES)
@@ -159,9 +159,9 @@ def table_scores_of(hard: list[tuple[str, Stumps]], bits: NDArray[np.bool_], cod
 
 
 def balanced_of(hard: list[tuple[str, Stumps]]) -> Finding:
-    """Hold balanced tables against the reference, given those they are made of."""
-    # With j joints and M = |bias| + what rows reach: the bias that is wanted away rounds j + 1 times, the share of a
-    # span j + 3 times, its product, sum and difference 3 times; the new bias is a sum of j of those and the old one.
+    """Compare balanced tables with the reference, given the original tables."""
+    # With j joints and M = |bias| + the largest rows: the bias to remove rounds j + 1 times, the share of a span j + 3
+    # times, its product, sum and difference 3 times; the new bias is a sum of j of those and the old one.
     worst = Worst("balanced tables", REFERENCE, 1.0, X_ROUNDING)
     for name, stumps in hard:
         before = collapse(stumps, SWITCHES)
@@ -180,8 +180,8 @@ def balanced_of(hard: list[tuple[str, Stumps]]) -> Finding:
 
 
 def whole_steps_of(rng: np.random.Generator, hard: list[tuple[str, Stumps]]) -> Iterator[Finding]:
-    """Look at the rounding to whole steps, of rows and of their means."""
-    # Rounding is by half a step; the product before it by 2^-53 of 32767 steps; what stands in for a missing input is a
+    """Check the rounding of rows and of their means to whole steps."""
+    # Rounding is by half a step; the product before it by 2^-53 of 32767 steps; the replacement of a missing input is a
     # mean, whose sum, quotient and product with a row round as well: 4 such roundings.
     rows = Worst("rows in whole steps", "fractions", 0.5 + 32767 * 2.0**-53, "steps")
     means = Worst("rows for missing inputs, in whole steps", REFERENCE, 0.5 + 4 * 32767 * 2.0**-53, "steps")
@@ -213,7 +213,7 @@ def _means(
     bits: NDArray[np.bool_],
     codes: NDArray[np.uint16],
 ) -> Iterator[tuple[int, mpf]]:
-    """Yield what stands in for a missing input in whole steps, and what it is the mean of in units of score."""
+    """Yield the replacement of each input in whole steps, and the rows that it averages in units of score."""
     exact: list[Sequence[mpf]] = [
         tables.mean_switch(*pair) for pair in zip(of.switch_rows.tolist(), bits.T.tolist(), strict=True)
     ]

@@ -1,13 +1,14 @@
-"""Classes that can be parted perfectly, boosted long after they are.
+"""Perfectly separable classes, boosted long after they are separated.
 
-When does the loss fall? Friedman's step moves F_k by (K - 1)/K g_k in all classes at once, g_k one Newton step of class
-k against the rest. The loss is convex, so that the step raises it no more than the mean of K steps (K - 1) g_k, each of
-one class alone. With K = 2, and with a shrinkage of 1/(K - 1) or less, these are Newton steps or shorter; and under the
-clamp of 3 (up to 4) such a step never overshoots, whatever the rows (tests/stability/cases/test_separable.py holds the
-inequality). So on any data at all the loss of two classes falls, and that of more under such a shrinkage. With more
-classes and a shrinkage of 1 it falls where each class has a stump of its own that parts it perfectly: its members rise,
-all others sink. In between LogitBoost itself can rise: two classes of many declared are the clearest case, where their
-difference moves by almost two Newton steps. There the loss that is told is held against 60 digits instead.
+When does the loss fall? Friedman's step moves F_k by (K - 1)/K g_k in all classes at once, where g_k is one Newton step
+of class k against the rest. The loss is convex, so the step raises it by at most the mean of K steps (K - 1) g_k of a
+single class each. With K = 2, and with a shrinkage of 1/(K - 1) or less, these are Newton steps or shorter; and with
+the clamp of 3 (up to 4) such a step never overshoots for any rows (tests/stability/cases/test_separable.py checks the
+inequality). So on any data the loss of two classes falls, and that of more classes with such a shrinkage. With more
+classes and a shrinkage of 1 it falls if each class has its own stump that separates it perfectly: scores of its members
+rise, all others fall. Otherwise the loss of LogitBoost can rise: two occurring classes among many declared ones are the
+clearest case, as their difference moves by almost two Newton steps. There the reported loss is compared with 60 digits
+instead.
 """
 
 from collections.abc import Iterator
@@ -32,12 +33,12 @@ from ..reference.tables import table_scores
 
 CASE = Case(
     title="Separable classes",
-    danger="P goes to 0 and 1, 1/P to infinity, weights to 0; training creeps on, and tables overflow",
+    danger="P goes to 0 and 1, 1/P to infinity, weights to 0; training goes on forever, and tables overflow",
 )
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield what boosting does to sets of 2 to 33 classes in 10,000 rounds, in 300 quickly."""
+    """Yield the errors of boosting sets of 2 to 33 classes for 10,000 rounds, or 300 in the quick run."""
     classes = (2, 3, 6, 14, 33)
     falling = [separable(k) for k in classes] + [intervals(2), words(2)]
     others = [make(k) for make in (intervals, words) for k in (classes[2:] if full else (14,))]
@@ -46,21 +47,21 @@ def findings(full: bool) -> Iterator[Finding]:
     runs = [(hard, rounds, True) for hard in falling] + [(hard, rounds, False) for hard in others]
     yield from _trained(runs + [(hard, 300, True) for hard in between])
     yield from _stopped([*falling[-4:], *others, *between])
-    yield _told(_rising(60 if full else 12))
+    yield _reported(_rising(60 if full else 12))
 
 
 def _trained(runs: list[tuple[HardSet, int, bool]]) -> Iterator[Finding]:
-    """Train sets for so many rounds, some of whose loss can only fall, and look at every round and at what comes of it.
+    """Train sets for the given rounds, and check every round and the result; the loss of some sets must fall.
 
-    At 60 digits, after 1, 2, 4, 8 and so on.
+    Checks at 60 digits come after rounds 1, 2, 4, 8 and so on.
     """
-    outside = Worst("P, w, w z and answers finite and in range", "the rules themselves", 0.0, "rounds")
+    outside = Worst("P, w, w z and outputs finite and in range", "the rules themselves", 0.0, "rounds")
     sums = Worst("shares of a row add up to 1", "exact sums", 1.0, "x rounding")
-    rises = Worst("rise of the loss, where it must fall", "convexity", 1.0, "x rounding")
-    told = Worst("losses told of a round that are not the ensemble's", "the ensemble", 0.0, "losses")
-    losses = Worst("losses, however small", "60 digits", 1.0, "x rounding")
+    rises = Worst("rise of the loss where it must fall", "convexity", 1.0, "x rounding")
+    reported = Worst("reported losses that are not the ensemble's", "the ensemble", 0.0, "losses")
+    losses = Worst("losses, even tiny ones", "60 digits", 1.0, "x rounding")
     overflow = Worst("largest sum of the integer tables, any order", "all rows' extremes", LIMIT, "steps")
-    wrong = Worst("frames not named right by ensemble and integers", "their labels", 0.0, "frames")
+    wrong = Worst("frames predicted wrongly by ensemble and integers", "their labels", 0.0, "frames")
     for hard, rounds, must_fall in runs:
         stumps, fallen = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds)
         before: Moment | None = None
@@ -70,7 +71,7 @@ def _trained(runs: list[tuple[HardSet, int, bool]]) -> Iterator[Finding]:
             # P = e/S: S, a sum of K numbers, rounds K - 1 times and the quotient once; the sum of P K - 1 times again.
             off = np.abs(moment.shares.sum(axis=0) - 1.0).max()
             sums.see(float(off / (2 * hard.n_classes * ROUNDING)), at)
-            told.see(float(moment.loss != fallen[number]), at)
+            reported.see(float(moment.loss != fallen[number]), at)
             if before is not None and must_fall:
                 rise = max(0.0, moment.loss - before.loss)
                 rises.see(rise / rise_rounding(hard.n_classes, before, moment), at)
@@ -79,11 +80,11 @@ def _trained(runs: list[tuple[HardSet, int, bool]]) -> Iterator[Finding]:
             before = moment
         outside.see(float(not (np.abs(stumps.values) <= 3.0).all()), hard.name)
         _see_tables(hard, stumps, overflow, wrong)
-    yield from (worst.finding() for worst in (outside, sums, rises, told, losses, overflow, wrong))
+    yield from (worst.finding() for worst in (outside, sums, rises, reported, losses, overflow, wrong))
 
 
 def _in_range(hard: HardSet, moment: Moment) -> bool:
-    """Whether 0 <= P <= 1; 0 <= w <= 1/3, the largest of (1 - p) max(p, 1/3); |w z| = |Y - P|; a settled row has none.
+    """Whether 0 <= P <= 1; 0 <= w <= 1/3, the largest of (1 - p) max(p, 1/3); |w z| = |Y - P|; 0 for a settled row.
 
     1/3, |Y - P| and their product round once each.
     """
@@ -114,7 +115,7 @@ def _see_tables(hard: HardSet, stumps: Stumps, overflow: Worst, wrong: Worst) ->
 
 
 def _steps(tables: IntegerTables, row: list[int]) -> list[int]:
-    """Return the integer scores (K,) of one frame, as the definition has them."""
+    """Return the integer scores (K,) of one frame, by definition."""
     n, (bias, *switches) = len(tables.switch_rows), rows_of(tables)
     thresholds = [steps.tolist() for steps in tables.thresholds]
     switch_rows = [of_closed for (of_closed,) in switches[:n]]
@@ -123,8 +124,8 @@ def _steps(tables: IntegerTables, row: list[int]) -> list[int]:
 
 
 def _stopped(sets: list[HardSet]) -> Iterator[Finding]:
-    """The tolerance ends training in the first round that changes the loss by less, keeps it, and is told."""
-    worst = Worst("trainings that the tolerance ends in another round", "the losses without it", 0.0, "trainings")
+    """The tolerance ends training in the first round that changes the loss by less, and this round is kept."""
+    worst = Worst("trainings that the tolerance ends in the wrong round", "the losses without it", 0.0, "trainings")
     for hard in sets:
         long, losses = boost(hard.X, hard.labels, hard.n_classes, rounds=100)
         changes = np.abs(np.diff(losses))
@@ -142,7 +143,7 @@ def _stopped(sets: list[HardSet]) -> Iterator[Finding]:
 
 
 def _rising(n: int) -> Iterator[tuple[HardSet, Stumps, tuple[float, ...]]]:
-    """Yield trainings of two classes of 12 to 33 declared, separable and on few frames, whose loss rises somewhere."""
+    """Yield trainings with two of 12 to 33 declared classes, separable and on few frames, whose loss rises."""
     rng = np.random.default_rng(1)
     while n:
         X = np.unique(rng.integers(0, 5, (12, 2)), axis=0)
@@ -155,9 +156,9 @@ def _rising(n: int) -> Iterator[tuple[HardSet, Stumps, tuple[float, ...]]]:
                 yield hard, stumps, losses
 
 
-def _told(trainings: Iterator[tuple[HardSet, Stumps, tuple[float, ...]]]) -> Finding:
-    """Where the loss does rise, the rise is true: before and after it the loss is that of the scores."""
-    worst = Worst("the loss, where it may rise (2 classes, many declared)", "60 digits", 1.0, "x rounding")
+def _reported(trainings: Iterator[tuple[HardSet, Stumps, tuple[float, ...]]]) -> Finding:
+    """Check that a rise of the loss is real: before and after it the loss is that of the scores."""
+    worst = Worst("the loss if it may rise (2 of many declared classes)", "60 digits", 1.0, "x rounding")
     for hard, stumps, losses in trainings:
         scores = [np.zeros((len(hard.X), hard.n_classes)), *stumps.staged_scores(hard.X)]
         rise = int(np.diff(losses).argmax())

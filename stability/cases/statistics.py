@@ -1,4 +1,4 @@
-"""Intervals at rates 0 and 1, classes smaller than the folds, subjects that lack a class."""
+"""Intervals at rates 0 and 1, classes with fewer rows than folds, subjects that lack a class."""
 
 from collections.abc import Iterator
 from itertools import product
@@ -26,7 +26,7 @@ from ..reference.numbers import distance, precisely
 
 
 def lopsided() -> dict[str, tuple[GraspSet, Scheme]]:
-    """Return sets that lack something on one side of a cut, by what it is, each with the scheme that cuts it so."""
+    """Return sets, by description, that lack something on one side of a split, each with the scheme of the split."""
     frames = [[0, 0], [0, 1], [1, 0], [1, 1]] * 4
     subjects = ["A"] * 8 + ["B"] * 8
     apart, lacking = ["a"] * 8 + ["b"] * 8, ["a", "b"] * 4 + ["a", "b", "c", "c"] * 2
@@ -44,19 +44,19 @@ def parts_of(grasp_set: GraspSet, scheme: Scheme) -> tuple[Population, ...]:
 
 
 def tested_labels(grasp_set: GraspSet, part: Population) -> NDArray[np.intp]:
-    """Return how many rows of each label (K,) the population's folds test, over all repeats."""
+    """Return the number of rows of each label (K,) that the population's folds test, over all repeats."""
     rows = np.concatenate([fold.test for fold in part.folds])
     return np.bincount(grasp_set.labels[rows], minlength=len(grasp_set.taxonomy.types))
 
 
 def differs(cell: Cell, tested: NDArray[np.intp]) -> bool:
-    """Return whether a cell's matrix does not hold the rows tested, or recognises others than its rate says."""
+    """Return whether a cell's matrix does not match the tested rows or its rate."""
     confusion = np.array(cell.confusion)
     return not np.array_equal(confusion.sum(axis=1), tested) or confusion.trace() != sum(cell.rate.correct)
 
 
 def guessed_untrained(grasp_set: GraspSet, scheme: Scheme) -> int:
-    """Return how many tested rows are taken for a class that their fold was not trained on."""
+    """Return the number of tested rows predicted as a class that their fold was not trained on."""
     data = Data.of(grasp_set)
     elements, joints = elements_of(data.samples), tuple(range(len(grasp_set.joints)))
     wrong = 0
@@ -70,21 +70,21 @@ def guessed_untrained(grasp_set: GraspSet, scheme: Scheme) -> int:
 
 CASE = Case(
     title="Rates and folds at their ends",
-    danger="an interval leaves 0 to 1 or has no width, or a row is tested twice, never, or by what it trained",
+    danger="an interval leaves 0 to 1 or has no width, or a row is tested twice, never, or by its own training",
 )
 
-# Wilson's ends are (centre -+ reach) / shrink, where neither centre nor reach exceeds shrink, so that an error in them
-# weighs no more than one in the end. Roundings, of relative size 2^-53: centre 5 (the rate, z^2 twice, quotient, sum),
+# Wilson's ends are (centre -+ reach) / shrink, where neither centre nor reach exceeds shrink, so that their errors
+# count no more than an error of the end. Relative roundings of 2^-53: centre 5 (the rate, z^2 twice, quotient, sum),
 # reach 9 (those of two terms under a root that halves them, the root, the product), shrink 4, difference, quotient.
 WILSON_BOUND = (5 + 9 + 4 + 2) * ROUNDING
-# Student's reach is t s / sqrt n: scipy's t is off by 4 ulp for up to 3 degrees of freedom (8 roundings; a test of the
-# rates holds it), the rest by 4.
+# Student's reach is t s / sqrt n: scipy's t is off by 4 ulp for up to 3 degrees of freedom (8 roundings; checked by a
+# test of the rates), the rest by 4.
 STUDENT_ROUNDINGS = 8 + 4
 _TOTALS = (1, 2, 3, 5, 12, 33, 100, 999, 65536, 10**6, 10**9, 10**12)
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Hold intervals against 60 digits, and folds and evaluations against what must be true of every one."""
+    """Compare intervals with 60 digits, and check the rules for all folds and evaluations."""
     yield from _wilson(range(1, 150) if full else range(1, 40))
     yield from _repeated(4 if full else 3)
     yield from _clusters(3000 if full else 300)
@@ -93,9 +93,9 @@ def findings(full: bool) -> Iterator[Finding]:
 
 
 def _wilson(totals: range) -> Iterator[Finding]:
-    """One repeat: of every count up to some, and next to both ends of large ones."""
+    """One repeat: every count of small totals, and counts near both ends of large ones."""
     off = Worst("ends of Wilson's interval", REFERENCE, WILSON_BOUND, "rate")
-    odd = Worst("rates of 0 and 1 whose interval does not end there, or has no width", "the rule itself", 0, "rates")
+    odd = Worst("rates of 0 and 1 whose interval does not end there or has no width", "the rule itself", 0, "rates")
     counts = [(correct, total) for total in totals for correct in range(total + 1)]
     counts += [(correct, n) for n in _TOTALS for correct in {0, 1, n // 2, n - 1, n}]
     for correct, total in counts:
@@ -109,14 +109,14 @@ def _wilson(totals: range) -> Iterator[Finding]:
 
 
 def _repeated(repeats: int) -> Iterator[Finding]:
-    """Several repeats: the smallest interval around Wilson's and Student's, cut off at 0 and 1.
+    """Several repeats: the smallest interval around Wilson's and Student's, clipped to 0 and 1.
 
-    A rate's own rounding moves the deviations by 2^-53 each, so the reach by t sqrt(n / (n - 1)) / sqrt n of that.
+    The rounding of a rate changes the deviations by 2^-53 each, so the reach by t sqrt(n / (n - 1)) / sqrt n of that.
     """
     worst_t = float(student_quantile(1, mpf("0.975")))
     bound = WILSON_BOUND + (STUDENT_ROUNDINGS * worst_t + 2 * worst_t) * ROUNDING
     off = Worst("ends of the interval of repeats", REFERENCE, bound, "rate")
-    outside = Worst("intervals that leave 0 to 1, or their own mean", "the rule itself", 0, "rates")
+    outside = Worst("intervals that leave 0 to 1 or exclude their mean", "the rule itself", 0, "rates")
     for n in range(2, repeats + 1):
         for total in (1, 2, 7, 1000):
             for correct in product(sorted({0, 1, total // 2, total - 1, total}), repeat=n):
@@ -139,16 +139,16 @@ def _apart(found: tuple[float, float], truth: Interval) -> float:
 
 
 def _clusters(draws: int) -> Iterator[Finding]:
-    """Units in clusters, of which many are recognised wholly or not at all.
+    """Units in clusters, many of which are recognised either wholly or not at all.
 
-    Relative roundings of 2^-53: those of the design effect, in which counts are exact, are 4 of the prior, 2 of the
-    quotient, 2 of the weight and 7 that average both, of n one more; scipy's t is off by up to 64 (a test of the rates
-    holds it). They move an end by no more than they are, for it lies within 0 to 1; Wilson's own roundings add up.
+    Relative roundings of 2^-53: the design effect, in which counts are exact, has 4 of the prior, 2 of the quotient, 2
+    of the weight, 7 of the average of both, and one more of n; scipy's t is off by up to 64 (checked by a test of the
+    rates). They change an end by no more than their size, since it lies within 0 to 1; Wilson's roundings add up.
     """
     off = Worst(
         "ends of the interval over clusters", REFERENCE, WILSON_BOUND + (4 + 2 + 2 + 7 + 1 + 64) * ROUNDING, "rate"
     )
-    outside = Worst("intervals over clusters that leave 0 to 1, or their mean", "the rule itself", 0, "rates")
+    outside = Worst("intervals over clusters that leave 0 to 1 or exclude their mean", "the rule itself", 0, "rates")
     random = np.random.default_rng(10)
     for number in range(draws):
         sizes = random.integers(1, [3, 13, 500][number % 3], random.integers(2, 40))
@@ -166,7 +166,7 @@ def _clusters(draws: int) -> Iterator[Finding]:
 
 @precisely()
 def _over_clusters(recognised: list[int], sizes: list[int], unit: Unit) -> Interval:
-    """Wilson's interval of as many units as the clusters' are worth; the variance by its definition."""
+    """Return Wilson's interval for the effective number of units; the variance by its definition."""
     k, total = len(sizes), sum(sizes)
     if k == total:
         return wilson(sum(recognised), total)
@@ -182,9 +182,9 @@ def _over_clusters(recognised: list[int], sizes: list[int], unit: Unit) -> Inter
 
 
 def _folds(draws: int) -> Iterator[Finding]:
-    """Classes from one row upwards: every row is tested once and trained where it is not, each class spread evenly."""
-    lost = Worst("rows not tested once, or trained where they are tested", "the rule itself", 0, "rows")
-    uneven = Worst("classes in one fold by two rows more than in another", "the rule itself", 0, "classes")
+    """Classes of one or more rows: each row is tested once and trained on otherwise; each class is spread evenly."""
+    lost = Worst("rows not tested exactly once, or trained and tested in one fold", "the rule itself", 0, "rows")
+    uneven = Worst("classes with two rows more in one fold than in another", "the rule itself", 0, "classes")
     random = np.random.default_rng(11)
     for draw in range(draws):
         labels = np.repeat(np.arange(6), random.integers(1, [1 + 1, 2, 3, 9, 20, 60]))
@@ -207,10 +207,10 @@ def _misused(folds: list[Fold], rows: int) -> int:
 
 
 def _evaluations() -> Iterator[Finding]:
-    """Rows counted once each; a class is never answered by a fold that was not trained on it, and that is said."""
-    miscounted = Worst("confusion matrices whose rows are not those tested", "the set's rows", 0, "matrices")
-    guessed = Worst("rows taken for a class that their fold was not trained on", "the set's rows", 0, "rows")
-    silent = Worst("sets evaluated in silence on types not trained on", "a warning of it", 0, "sets")
+    """Every row is counted once; a fold never predicts a class that it was not trained on, and a warning says so."""
+    miscounted = Worst("confusion matrices that do not match the tested rows", "the set's rows", 0, "matrices")
+    guessed = Worst("rows predicted as a class that their fold was not trained on", "the set's rows", 0, "rows")
+    silent = Worst("sets silently evaluated on untrained types", "a warning", 0, "sets")
     for name, (grasp_set, scheme) in lopsided().items():
         study = evaluate(grasp_set, Options(scheme=scheme, rounds=10, repeats=2, tables=("compositions",)), jobs=1)
         rows = [row.cells for table in study.tables for row in table.rows]

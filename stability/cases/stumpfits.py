@@ -1,4 +1,4 @@
-"""The best stump of a round, its thresholds and answers; and whole trainings, round by round."""
+"""The best stump of a round, its thresholds and outputs; and whole trainings, round by round."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -24,7 +24,7 @@ from ..reference.numbers import precisely
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One class's round: inputs X (n, d), weights w (n,) and weighted responses w z (n,), and what is hard about it."""
+    """One class's round: inputs X (n, d), weights w (n,) and weighted responses w z (n,), and its difficulty."""
 
     name: str
     X: Floats
@@ -43,7 +43,7 @@ def problems(rng: np.random.Generator, n: int, z_max: float) -> Iterator[Problem
 
 
 def neighbours(rng: np.random.Generator, n: int) -> Iterator[list[float]]:
-    """Yield ascending values: next to nothing, the largest, doubles next to each other, 16-bit codes."""
+    """Yield ascending values: tiny, the largest, adjacent doubles, 16-bit codes."""
     largest, least = float(np.finfo(np.float64).max), 5e-324
     yield from ([0.0, least, 2 * least, 3 * least], [-least, least], [-largest, largest])
     yield [float(np.nextafter(largest, 0)), largest]
@@ -54,7 +54,7 @@ def neighbours(rng: np.random.Generator, n: int) -> Iterator[list[float]]:
 
 
 def columns(rng: np.random.Generator, n: int) -> Floats:
-    """Return inputs (n, 6), n >= 2: codes, a switch and its opposite, numbers one double apart, one that is missing."""
+    """Return inputs (n, 6), n >= 2: codes, a switch and its opposite, adjacent doubles, one with missing values."""
     codes, switch = rng.integers(0, 256, n).astype(np.float64), rng.integers(0, 2, n).astype(np.float64)
     codes[:2] = 0, 255
     close = 1.0 + np.spacing(1.0) * rng.integers(0, 3, n)
@@ -63,14 +63,14 @@ def columns(rng: np.random.Generator, n: int) -> Floats:
 
 
 def tied(rng: np.random.Generator, z_max: float) -> Problem:
-    """Return a problem in which the first row has exactly what the next two have together, in columns of all orders."""
+    """Return a problem in which the first row equals the sum of the next two, in columns of all orders."""
     weights, ratios = rng.random(40), np.full(40, -1.7)
     weights[1:3] = weights[0] / 2
     ratios[:3] = rng.choice([1.9, z_max])
     responses = weights * ratios
     responses[1:3] = responses[0] / 2
     one, two = np.arange(40) == 0, np.isin(np.arange(40), (1, 2))
-    either = 1.0 + one - two  # one at 2, two at 0: the first split takes two off, the second one
+    either = 1.0 + one - two  # one at 2, two at 0: the first split separates two, the second one
     inputs = [one, two, 1.0 - one, either, 2.0 - either, rng.integers(0, 2, 40)]
     order = rng.permutation(len(inputs))
     return Problem(f"columns in order {order.tolist()}", np.column_stack(inputs)[:, order], weights, responses)
@@ -81,7 +81,7 @@ def _ratios(rng: np.random.Generator, n: int, z_max: float) -> Floats:
 
 
 def _light_branch(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
-    """Most rows of some 2^-38 of the weight, where a branch is next to being taken for empty, and of opposite sign."""
+    """Return rows mostly of about 2^-38 of the weight, where a branch almost counts as empty, and of opposite sign."""
     light = np.arange(n) >= 3
     return np.where(light, 2.0**-38 * rng.uniform(0.25, 4, n) / n, 1.0), np.where(light, -z_max, 1.0)
 
@@ -126,10 +126,10 @@ class Training:
 
 
 def trainings(full: bool) -> Iterator[Finding]:
-    """Yield errors of rounds given the scores before them, and of scores after all rounds."""
+    """Yield errors of rounds, given the scores before them, and of scores after all rounds."""
     rng, rounds = np.random.default_rng(5), 40 if full else 8
     stumps = Worst("stumps of whole trainings", REFERENCE, 1.0, "x rounding")
-    answers = Worst("answers of a round, from its scores", REFERENCE, 1.0, "x rounding")
+    outputs = Worst("outputs of a round, from its scores", REFERENCE, 1.0, "x rounding")
     scores = Worst("scores after all rounds, from the start", REFERENCE, 1.0, "x growth")
     for training in _sets(rng, 36 if full else 20):
         ours = training.boosted(rounds)
@@ -137,13 +137,13 @@ def trainings(full: bool) -> Iterator[Finding]:
         for number, F in enumerate(stages[:-1]):
             at = f"{training.name}, round {number + 1}"
             for given in class_rounds(F.tolist(), training.labels.tolist(), training.z_max):
-                see_stump(given, training.X, ours, number, training.z_max, at, stumps, answers)
+                see_stump(given, training.X, ours, number, training.z_max, at, stumps, outputs)
         _see_scores(training, stages, scores)
-    yield from (stumps.finding(), answers.finding(), scores.finding())
+    yield from (stumps.finding(), outputs.finding(), scores.finding())
 
 
 def _see_scores(training: Training, stages: Sequence[Floats], scores: Worst) -> None:
-    """Hold the scores of our training against those of the reference's, as long as no choice in it is in doubt."""
+    """Compare the scores of our training with the reference, as long as none of its choices is in doubt."""
     rounds = training.boosted_precisely(len(stages) - 1)
     F = [[mpf(0)] * training.classes for _ in training.labels]
     labels, steps, truth = training.labels.tolist(), list[Step](), F
@@ -169,7 +169,7 @@ def _see_scores(training: Training, stages: Sequence[Floats], scores: Worst) -> 
 
 
 def _in_doubt(training: Training, each: Round, given: Sequence[ClassRound]) -> bool:
-    """Whether rounding may part equal from unequal stumps, or take a branch for empty or not."""
+    """Whether rounding may decide between equal and unequal stumps, or whether a branch is empty."""
     for splits, lead, of in zip(each.splits, each.leads(), given, strict=True):
         best, column, lower, _ = splits[0]
         light = [of.branch(rows).is_light for rows in branches(training.X[:, column], lower) if rows]
@@ -196,18 +196,18 @@ def _sets(rng: np.random.Generator, n: int) -> Iterator[Training]:
 
 CASE = Case(
     title="Stump fits",
-    danger="a branch answers with what rounding left of its weight, and ties between columns go where rounding likes",
+    danger="a branch's output is the residue of rounding its weight, and rounding breaks ties between columns",
 )
 Z_MAX = 3.0
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield errors of thresholds, of the choice of stumps, of their answers, and of whole trainings."""
+    """Yield errors of thresholds, of the choice of stumps, of their outputs, and of whole trainings."""
     rng, more = np.random.default_rng(4), 12 if full else 1
     yield thresholds_of(neighbours(rng, 100 * more))
     fits = [(problem, fit(problem)) for problem in problems(rng, 8 * more, Z_MAX)]
     yield choices_of(fits)
-    yield from answers_of(fits)
+    yield from outputs_of(fits)
     yield ties_of(tied(rng, Z_MAX) for _ in range(40 * more))
     yield from trainings(full)
 
@@ -219,7 +219,7 @@ def fit(problem: Problem) -> FittedStumps:
 
 
 def thresholds_of(sets: Iterable[list[float]]) -> Finding:
-    """Count thresholds that are not the middle of their neighbours, rounded once, or are the upper of both."""
+    """Count thresholds that are not the once-rounded middle of their neighbours, or equal the upper one."""
     worst = Worst("thresholds between neighbours", "fractions", 0.0, "thresholds")
     for values in sets:
         for lower, upper, got in zip(values[:-1], values[1:], midpoints(np.array(values)).tolist(), strict=True):
@@ -231,8 +231,8 @@ def thresholds_of(sets: Iterable[list[float]]) -> Finding:
 
 
 def choices_of(fits: Iterable[tuple[Problem, FittedStumps]]) -> Finding:
-    """How much less the chosen stump explains than the best one."""
-    worst = Worst("what the chosen stump explains", REFERENCE, 1.0, "x rounding")
+    """Return how much less variation the chosen stump explains than the best one."""
+    worst = Worst("variation explained by the chosen stump", REFERENCE, 1.0, "x rounding")
     for problem, fitted in fits:
         given = _given(problem)
         with precisely():
@@ -242,11 +242,11 @@ def choices_of(fits: Iterable[tuple[Problem, FittedStumps]]) -> Finding:
     return worst.finding()
 
 
-def answers_of(fits: Iterable[tuple[Problem, FittedStumps]]) -> Iterator[Finding]:
-    """What branches answer: their mean, or where they are next to empty the mean of all rows."""
-    means = Worst("answers of branches", REFERENCE, 1.0, "x rounding")
-    empty = Worst("answers of branches next to empty", REFERENCE, 1.0, "x rounding")
-    outside = Worst("answers within the clamp", "the rule itself", 0.0, "answers")
+def outputs_of(fits: Iterable[tuple[Problem, FittedStumps]]) -> Iterator[Finding]:
+    """Check the outputs of branches: their mean, or for almost empty ones the mean of all rows."""
+    means = Worst("outputs of branches", REFERENCE, 1.0, "x rounding")
+    empty = Worst("outputs of almost empty branches", REFERENCE, 1.0, "x rounding")
+    outside = Worst("outputs within the clamp", "the rule itself", 0.0, "outputs")
     for problem, fitted in fits:
         given, (column, threshold) = _given(problem), _place(fitted)
         parts = branches(problem.X[:, column], threshold)
@@ -258,7 +258,7 @@ def answers_of(fits: Iterable[tuple[Problem, FittedStumps]]) -> Iterator[Finding
 
 
 def _given(problem: Problem) -> ClassRound:
-    """Return the problem as a round of one class, of weights and responses that are exact."""
+    """Return the problem as a round of one class with exact weights and responses."""
     exact = [mpf(0)] * len(problem.weights)
     return ClassRound(0, [], problem.weights.tolist(), problem.responses.tolist(), exact)
 
@@ -268,7 +268,7 @@ def _place(fitted: FittedStumps) -> tuple[int, float]:
 
 
 def ties_of(sets: Iterable[Problem]) -> Finding:
-    """Count problems with stumps of equal sums in which another than the lowest column and value is chosen."""
+    """Count problems with equal stumps in which the lowest column and value is not chosen."""
     worst = Worst("which of equal stumps is chosen", REFERENCE, 0.0, "stumps")
     for problem in sets:
         fitted, w, r = fit(problem), problem.weights.tolist(), problem.responses.tolist()

@@ -1,4 +1,4 @@
-"""Weights and working responses at every probability, and on the grids on which they are summed."""
+"""Weights and working responses at every probability, and on the grids used to sum them."""
 
 from collections.abc import Iterable, Iterator
 
@@ -18,13 +18,13 @@ from ..reference.numbers import precisely
 
 CASE = Case(
     title="Weights and working responses",
-    danger="1/P where P is 0, weights that underflow or turn negative, responses beyond their clamp",
+    danger="1/P for P = 0, weights that underflow or turn negative, responses beyond their clamp",
 )
 Z_MAXES = (1.5, 2.0, 3.0, 4.0, 10.0, 100.0)
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield errors of weights and responses, given P and given scores, and what grids make of numbers of all sizes."""
+    """Yield errors of weights and responses, given P and given scores, and errors of grids for numbers of all sizes."""
     rng, more = np.random.default_rng(3), 10 if full else 1
     yield from given_probabilities((z_max, probabilities(rng, 30 * more, z_max)) for z_max in Z_MAXES)
     yield given_scores(hard_scores(rng, 6 * more))
@@ -32,16 +32,16 @@ def findings(full: bool) -> Iterator[Finding]:
 
 
 def probabilities(rng: np.random.Generator, n: int, z_max: float) -> Floats:
-    """Return 0, 1, the smallest, those next to 1, to 1/2, to 1/z_max and to 1 - 1/z_max, and n of all magnitudes."""
+    """Return 0, 1, the smallest, those near 1, 1/2, 1/z_max and 1 - 1/z_max, and n of all magnitudes."""
     corners = np.array([0.5, 1 / z_max, 1 - 1 / z_max])
-    beside = np.concatenate([corners + k * np.spacing(corners) for k in range(-2, 3)])
+    near = np.concatenate([corners + k * np.spacing(corners) for k in range(-2, 3)])
     ends = np.array([0.0, 1.0, 5e-324, 1e-323, 2.0**-1022, 1e-17, 2.0**-53, 1 - 2.0**-53, 1 - 2.0**-52])
     small = np.ldexp(rng.uniform(0.5, 1, n), rng.integers(-1073, 0, n))
-    return np.concatenate([ends, beside, small, 1 - small, rng.random(n)])
+    return np.concatenate([ends, near, small, 1 - small, rng.random(n)])
 
 
 def given_probabilities(sets: Iterable[tuple[float, Floats]]) -> Iterator[Finding]:
-    """Hold w and w z of probabilities, under a z_max, against the reference."""
+    """Compare w and w z of probabilities, for a z_max, with the reference."""
     # 1 - P rounds once, and 1/z_max, the product with it and that with the row's weight: 4 roundings of w. The response
     # w z = u (Y - P) has two of them.
     weights = Worst("weights w, given P", REFERENCE, 4.0, "x 2^-53")
@@ -70,7 +70,7 @@ def _ours(p: Floats, is_member: bool, z_max: float, row_weight: float) -> Iterat
 
 @precisely()
 def _roundings(got: mpf, truth: mpf) -> float:
-    """Return |got - truth| in roundings of the truth. Of what is subnormal, any product may lose half a double more."""
+    """Return |got - truth| in roundings of the truth. A subnormal product may lose half of the smallest double more."""
     doubt = max(abs(got - truth) - (2 * SMALLEST if abs(truth) < 2**-1020 else 0), mpf(0))
     return float(doubt / (ROUNDING * abs(truth))) if truth else float(doubt > 0)
 
@@ -83,9 +83,9 @@ def _is_outside(weight: mpf, response: mpf, z_max: float) -> bool:
 
 
 def given_scores(matrices: Iterable[Floats]) -> Finding:
-    """Hold w and w z of scores (K, n) against the reference."""
-    # |d(w z)/dP| = 1 and |dw/dP| <= 1 wherever z is not clamped, 1/z_max where it is: what P is off by, and the 4
-    # roundings from there. So near P = 1 the bound is one of 2^-53, not of the weight.
+    """Compare w and w z of scores (K, n) with the reference."""
+    # |d(w z)/dP| = 1 and |dw/dP| <= 1 if z is not clamped, 1/z_max if it is: the error of P, plus 4 roundings. So near
+    # P = 1 the bound is a multiple of 2^-53, not of the weight.
     worst = Worst("weights and responses, given scores", REFERENCE, 1.0, "x rounding")
     for scores in matrices:
         shares = softmax(scores)
@@ -103,10 +103,10 @@ def given_scores(matrices: Iterable[Floats]) -> Finding:
 
 
 def grids_of(sets: Iterable[Floats]) -> Iterator[Finding]:
-    """Look at the units of rows of numbers (K, n), and at what both grids together leave of each."""
+    """Check the units of rows of numbers (K, n), and the loss of both grids together."""
     overfull = Worst("any sum of a row is a whole number below 2^53", "whole numbers", 0.0, "rows")
     # A unit is at most 2^-50 of the row's sum; the second grid is 52 - log2(2 n) bits finer, and rounds by half a unit.
-    lost = Worst("what two grids lose of a number", "60 digits", 1.0, "x rounding")
+    lost = Worst("loss of a number on two grids", "60 digits", 1.0, "x rounding")
     for values in sets:
         coarse, fine = on_grids(values)
         for k, row in enumerate(values.tolist()):

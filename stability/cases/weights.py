@@ -1,7 +1,7 @@
-"""Weights that vanish, one that outweighs all, responses at their clamp everywhere, scores that drift.
+"""Weights that vanish, one that outweighs all others, responses clamped everywhere, drifting scores.
 
-A row weighs u (Y - P)/z with its class's stump. 1 - P is taken as the double 1.0 - P, so that a row whose P rounds to 1
-weighs exactly 0, and weights of rows next to settled are true to a few 2^-53 of u, not of themselves.
+A row has weight u (Y - P)/z for its class's stump. 1 - P is the double 1.0 - P, so a row whose P rounds to 1 has weight
+exactly 0, and weights of almost settled rows are accurate to a few 2^-53 of u, not relative to themselves.
 """
 
 import math
@@ -27,7 +27,7 @@ from ..reference.numbers import precisely
 
 
 def drift(rounds: int) -> Iterator[Finding]:
-    """Yield the drift of scores over so many rounds of sets half of whose labels are noise."""
+    """Yield the drift of scores over `rounds` rounds on sets with half of their labels random."""
     means = Worst("mean over the classes of scores", "zero", 1.0, "x rounding")
     scores = Worst("scores after all rounds", "60 digits", 1.0, "x rounding")
     added = Worst("adding up the steps of all rounds", "60 digits", 1.0, "x rounding")
@@ -48,43 +48,43 @@ def drift(rounds: int) -> Iterator[Finding]:
 
 
 def _steps(stumps: Stumps, X: NDArray[np.int64]) -> Floats:
-    """Return what the stumps answer to rows X (n, d), in every round: (M, K, n)."""
-    answers = []
+    """Return the outputs of the stumps for rows X (n, d), in every round: (M, K, n)."""
+    outputs = []
     for columns, thresholds, values in zip(stumps.columns, stumps.thresholds, stumps.values, strict=True):
         inputs = X[:, columns].T
-        answers.append(np.where(inputs <= thresholds[:, np.newaxis], values[:, :1], values[:, 1:2]))
-    return np.array(answers)
+        outputs.append(np.where(inputs <= thresholds[:, np.newaxis], values[:, :1], values[:, 1:2]))
+    return np.array(outputs)
 
 
-def centred_steps(answers: Floats, shrinkage: float) -> Floats:
-    """Return what every round adds to the scores of one row (M, K), from the answers (M, K) to it."""
-    return np.ascontiguousarray(centred(np.ascontiguousarray(answers.T), shrinkage).T)
+def centred_steps(outputs: Floats, shrinkage: float) -> Floats:
+    """Return the steps of the scores of one row (M, K), from the outputs (M, K) for it."""
+    return np.ascontiguousarray(centred(np.ascontiguousarray(outputs.T), shrinkage).T)
 
 
-def step_rounding(stumps: Stumps, answers: Floats) -> Floats:
-    """Return by how much rounding can move each score (K, n), from what each round really adds up.
+def step_rounding(stumps: Stumps, outputs: Floats) -> Floats:
+    """Return the largest rounding error of each score (K, n), from the actual terms of each round.
 
     A step is (g - sum g / K) (K - 1)/K: g rounds once, each partial sum and the quotient once, the difference once, and
-    the product and its quotient once each. What rounds is known, so 2^-53 of it is the bound; errors of g reach the
-    mean as well. The scores themselves round once, at the end.
+    the product and its quotient once each. The rounded values are known, so 2^-53 of them is the bound; errors of g
+    also affect the mean. The scores themselves round once, at the end.
     """
     k = stumps.n_classes
-    total = np.zeros(answers.shape[1:])
-    for g in answers * stumps.shrinkage:
+    total = np.zeros(outputs.shape[1:])
+    for g in outputs * stumps.shrinkage:
         partial = np.abs(np.cumsum(g, axis=0)[1:]).sum(axis=0) / k
         mean = np.abs(add_up(g)) / k
         multiplied = 0.0 if stumps.shrinkage == 1.0 else np.abs(g) + np.abs(g).mean(axis=0)
         total += multiplied + partial + mean + 3 * np.abs(g - add_up(g) / k)
-    final = np.abs(centred(answers.sum(axis=0), stumps.shrinkage))
+    final = np.abs(centred(outputs.sum(axis=0), stumps.shrinkage))
     bound: Floats = ROUNDING * (total + final)
     return bound
 
 
 @precisely()
 def true_sums(steps: Floats) -> tuple[list[mpf], list[float]]:
-    """Return the sums (K,) of steps (M, K), and by how much a sum with compensation may be off each.
+    """Return the sums (K,) of steps (M, K), and the largest error of each compensated sum.
 
-    One rounding of the sum; and what is carried, M errors of 2^-53 of partial sums, rounds M times itself.
+    The sum rounds once; the carry, M errors of 2^-53 of partial sums, rounds M times itself.
     """
     sums = [mpmath.fsum(column) for column in steps.T.tolist()]
     largest = np.abs(np.cumsum(steps, axis=0)).max(axis=0)
@@ -94,19 +94,19 @@ def true_sums(steps: Floats) -> tuple[list[mpf], list[float]]:
 
 @precisely()
 def worst_share(got: Sequence[float], truth: Sequence[mpf], allowed: Sequence[float]) -> float:
-    """Return the largest error, each as a share of what is allowed."""
+    """Return the largest error as a share of the allowed one."""
     errors = zip(got, truth, allowed, strict=True)
     return float(max(abs(ours - theirs) / bound for ours, theirs, bound in errors))
 
 
 CASE = Case(
     title="Weights",
-    danger="weights underflow, or one holds everything, and answers are made of rounding; scores drift away",
+    danger="weights underflow, or one holds everything, and outputs are rounding residue; scores drift",
 )
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield errors of rounds with extreme weights, what settled rows weigh and do, and drift over 10,000 rounds."""
+    """Yield errors of rounds with extreme weights, the effect of settled rows, and drift over 10,000 rounds."""
     yield from _extreme(60 if full else 6)
     yield from _settled(10_000 if full else 200)
     yield _underflow(5_000 if full else 1_000)
@@ -115,7 +115,7 @@ def findings(full: bool) -> Iterator[Finding]:
 
 
 def extreme_sets() -> Iterator[HardSet]:
-    """Yield sets whose row weights are next to the ends of what a double holds, or of each other."""
+    """Yield sets whose row weights are near the limits of a double, or far from each other."""
     base = noisy(3, 24, 0.3, seed=1)
     rng = np.random.default_rng(2)
     n = len(base.labels)
@@ -133,11 +133,11 @@ def extreme_sets() -> Iterator[HardSet]:
 
 
 def _extreme(rounds: int) -> Iterator[Finding]:
-    """Every round from the scores before it, and that nothing leaves its range."""
+    """Check every round from the scores before it, and that all values stay in range."""
     chosen = Worst("stumps chosen under extreme weights", REFERENCE, 1.0, "x rounding")
-    answers = Worst("answers of branches under extreme weights", REFERENCE, 1.0, "x rounding")
-    outside = Worst("P, scores, losses and answers in range", "the rules themselves", 0.0, "rounds")
-    # An empty class beside two that contradict each other sinks for ever: P falls through the smallest doubles to 0.
+    outputs = Worst("outputs of branches under extreme weights", REFERENCE, 1.0, "x rounding")
+    outside = Worst("P, scores, losses and outputs in range", "the rules themselves", 0.0, "rounds")
+    # The score of an empty class falls forever if two others contradict each other: P underflows to 0.
     sinking = contradictory([[2, 1, 0], [1, 1, 0]])
     for hard, first in [(hard, 0) for hard in extreme_sets()] + [
         (separable(3), 0),
@@ -148,9 +148,9 @@ def _extreme(rounds: int) -> Iterator[Finding]:
         for number, moment in enumerate(moments(hard, stumps)):
             outside.see(float(not _in_range(moment, falling[number])), f"{hard.name}, round {number}")
             if first <= number < stumps.n_rounds and (number < first + 12 or number % 10 == 0):
-                see_round(hard, stumps, number, moment.scores, 3.0, chosen, answers)
+                see_round(hard, stumps, number, moment.scores, 3.0, chosen, outputs)
         outside.see(float(not (np.abs(stumps.values) <= 3.0).all()), hard.name)
-    yield from (worst.finding() for worst in (chosen, answers, outside))
+    yield from (worst.finding() for worst in (chosen, outputs, outside))
 
 
 def _in_range(moment: Moment, loss: float) -> bool:
@@ -160,12 +160,12 @@ def _in_range(moment: Moment, loss: float) -> bool:
 
 
 def _settled(rounds: int) -> Iterator[Finding]:
-    """Rows whose P is 1 weigh exactly 0 with their class; where all are settled, scores stay where they are."""
-    weigh = Worst("settled rows that still weigh something", "zero", 0.0, "rows")
-    # Only the others' z = -1/(1 - P) are left, and where all members' P round to 1, P is below 2^-52: answers lie
-    # between -1 and -1 - 2^-52, but for their 3 roundings, and a step is less than twice what they differ by.
+    """Rows whose P is 1 have weight exactly 0 for their class; once all are settled, scores stay constant."""
+    weigh = Worst("settled rows with a nonzero weight", "zero", 0.0, "rows")
+    # Only the others' z = -1/(1 - P) are left, and if all members' P round to 1, P is below 2^-52: outputs lie between
+    # -1 and -1 - 2^-52, up to 3 roundings, and a step is less than twice their difference.
     moved = Worst(
-        "how far scores move once all rows are settled", "nothing left to learn", 2 * 5 * ROUNDING, "score a round"
+        "change of scores once all rows are settled", "nothing left to learn", 2 * 5 * ROUNDING, "score a round"
     )
     for hard in (separable(2), separable(14), intervals(5)):
         stumps, _ = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds)
@@ -184,10 +184,10 @@ def _settled(rounds: int) -> Iterator[Finding]:
 
 
 def _underflow(rounds: int) -> Finding:
-    """A class whose weights have all underflown answers 0: it neither rises nor disturbs the others any more."""
-    worst = Worst("answers other than 0 of a class without any weight", "nothing left to learn", 0.0, "answers")
+    """A class whose weights have all underflown has output 0: its score is constant, and it does not affect others."""
+    worst = Worst("nonzero outputs of a class without weight", "nothing left to learn", 0.0, "outputs")
     empty_classes = [contradictory(counts) for counts in ([[2, 1, 0], [1, 1, 0]], [[3, 2, 0, 0, 0], [1, 5, 0, 0, 0]])]
-    # Once the two frames' first class is certain, the others' rows are left with it: a third of them rounds to nothing.
+    # Once the first class of both frames is certain, the others' rows remain: a third of their weight rounds to 0.
     heavy = contradictory([[1, 1], [1, 1]])
     left = replace(heavy, name="rows of the smallest doubles", weights=np.array([1.0, 1e-323, 1.0, 5e-324]))
     for hard in (*empty_classes, left):
@@ -195,20 +195,20 @@ def _underflow(rounds: int) -> Finding:
         for number, moment in enumerate(moments(hard, stumps)):
             gone = ~moment.weights.any(axis=1)
             if number < rounds and gone.any():
-                answers = stumps.values[number, gone]
-                worst.see(float(np.count_nonzero(answers)), f"{hard.name}, round {number + 1}", answers.size)
+                outputs = stumps.values[number, gone]
+                worst.see(float(np.count_nonzero(outputs)), f"{hard.name}, round {number + 1}", outputs.size)
     return worst.finding()
 
 
 def _clamped() -> Finding:
-    """Responses at their clamp on every row, of every class or of one: then every pure branch answers the clamp.
+    """Responses clamped on every row, of every class or of one: then every pure branch has the clamp as output.
 
     Before the first round 1/P = K. With two classes and z_max below 2 all rows of both are clamped, with K and below
-    K/(K - 1) those of all; under the usual clamp of 3, those of the class that all rows belong to, of 4 declared. (All
+    K/(K - 1) those of all; with the usual clamp of 3, those of the class that all rows belong to, of 4 declared. (All
     rows of two classes never are: with every P below 1/3 the loss is above ln 3, and it starts at ln 2 and falls.)
     """
-    # The weight |Y - P| / z_max rounds with 1/z_max and the product, and twice more here; so do the answers C/W.
-    worst = Worst("responses at their clamp on every row", "z_max itself", 4 * ROUNDING, "relative")
+    # The weight |Y - P| / z_max rounds with 1/z_max and the product, and twice more here; so do the outputs C/W.
+    worst = Worst("responses clamped on every row", "z_max itself", 4 * ROUNDING, "relative")
     alone = HardSet("one class of 4", np.array([[0], [1], [1], [0]]), np.zeros(4, np.intp), 4, 1)
     for hard, z_max, classes in (
         (separable(2), 1.5, 2),
@@ -219,7 +219,7 @@ def _clamped() -> Finding:
         stumps, _ = boost(hard.X, hard.labels, hard.n_classes, rounds=1, z_max=z_max)
         first = next(moments(hard, stumps, z_max))
         clamps = first.weights[:classes] * z_max / np.abs(first.responses[:classes])
-        answers = np.abs(stumps.values[0][:classes, :2]) / z_max
-        for name, ratios in (("rows", clamps), ("answers", answers)):
+        outputs = np.abs(stumps.values[0][:classes, :2]) / z_max
+        for name, ratios in (("rows", clamps), ("outputs", outputs)):
             worst.see(float(np.abs(ratios - 1.0).max()), f"{hard.name}, z_max {z_max:g}, {name}", ratios.size)
     return worst.finding()

@@ -1,1 +1,1 @@
-"""What cases share: what is computed of hard inputs, the truth of it, and how far rounding may take it."""
+"""Shared by cases: computed values of hard inputs, their exact values, and bounds of rounding errors."""

@@ -1,6 +1,6 @@
-"""What must come out the same on every platform, as digests: a simulated set, and the build that is compiled of it.
+"""Digests of files that must be equal on every platform: a simulated set, and the build compiled from it.
 
-Run as a program in another process or another Python, it prints what it made there and with which libraries.
+Run as a program in another process or another Python, it prints the digests and the versions of the libraries.
 """
 
 import hashlib
@@ -22,16 +22,16 @@ from thenar.simulator.scenes.decode import load_scene
 
 SCENE = "quick"  # 160 switches, 16 joints, 14 grasp types, two hands
 SMALL = 3, 20, 2  # repetitions, rounds, folds: about half a second
-LARGE = 24, 200, 4  # twice what the shipped scene and `thenar compile` take by themselves
+LARGE = 24, 200, 4  # twice the defaults of the shipped scene and `thenar compile`
 
 
 class Built(msgspec.Struct, frozen=True):
-    """What a process made.
+    """The results of a process.
 
     python, numpy  their versions             kernels  the BLAS libraries' kernels and threads: "Haswell x2"
     simd           numpy's instruction sets above its baseline that are in use
     files          (name, SHA-256) of each file made
-    plain          SHA-256 of what plain exp and matrix products answer there: what we may not build on
+    plain          SHA-256 of plain exp and matrix products there, which a build must not depend on
     """
 
     python: str
@@ -51,7 +51,7 @@ def build(*, large: bool) -> Built:
     return Built(
         python=platform.python_version(),
         numpy=np.__version__,
-        # Whoever loads scikit-learn has OpenMP's threads too, which have no kernels.
+        # scikit-learn also loads OpenMP's threads, which have no kernels.
         kernels=tuple(
             f"{blas['architecture']} x{blas['num_threads']}" for blas in threadpool_info() if blas["user_api"] == "blas"
         ),
@@ -72,7 +72,7 @@ def _files(folder: Path, repetitions: int, rounds: int, folds: int) -> tuple[tup
 
 
 def _plain() -> bytes:
-    """Return numbers that numpy, the BLAS and libm compute by the processor: a matrix product, and exp two ways."""
+    """Return processor-dependent results of numpy, the BLAS and libm: a matrix product, and exp by two methods."""
     numbers = (np.arange(300 * 500) % 99_991 / 33_331.0).reshape(300, 500)
     products = numbers @ numbers.T / 10_000
     return np.exp(products).tobytes() + np.array([math.exp(number) for number in numbers.flat]).tobytes()

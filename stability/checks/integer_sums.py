@@ -1,4 +1,4 @@
-"""Sums of int16 rows: how far they get, whether the largest tables add up right, and which of equal scores wins."""
+"""Sums of int16 rows: their extremes, sums of the largest tables, and the winner of equal scores."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -27,7 +27,7 @@ _NO_DIGEST = "0" * 64
 
 
 def bare_build(tables: IntegerTables) -> Build:
-    """Return a build of `tables` whose grasp types, switches and joints are named by their numbers."""
+    """Return a build of `tables`, with numbers as names of grasp types, switches and joints."""
     n_inputs = tables.n_switches + tables.n_joints
     return Build(
         Manifest(
@@ -49,9 +49,9 @@ def bare_build(tables: IntegerTables) -> Build:
 
 
 def largest_sum(inputs: Iterable[Sequence[Sequence[float]]]) -> float:
-    """Return the largest magnitude that rows (K,), at most one of each input, reach in a class, in any order of adding.
+    """Return the largest magnitude of a class's sum of rows (K,), at most one per input, in any order of summation.
 
-    So that is the largest on the way to any sum as well.
+    It therefore also bounds all partial sums.
     """
     reached = 0.0
     for sign in (1, -1):
@@ -61,8 +61,8 @@ def largest_sum(inputs: Iterable[Sequence[Sequence[float]]]) -> float:
 
 
 def furthest_sums(seeds: range) -> Finding:
-    """Is the bound of the sums reached, and by no frame exceeded? All frames, whole and with inputs missing."""
-    worst = Worst("furthest sum, and the frame and order that reach it", "every frame and gap there is", 0, "steps")
+    """Check that the bound of the sums is attained but never exceeded, in all frames, whole and with missing inputs."""
+    worst = Worst("furthest sum, and the frame and order that reach it", "every frame and every loss", 0, "steps")
     for seed in seeds:
         for most in (1, 90, 3000):
             tables = whole_numbers(seed, 3, 3, (3, 2), most)
@@ -82,8 +82,8 @@ def furthest_sums(seeds: range) -> Finding:
 
 
 def largest(full: bool) -> Finding:
-    """Hold the scores of the largest tables against sums of 64 bits."""
-    worst = Worst("scores by the largest tables a file can hold", "sums of 64 bits", 0, "scores")
+    """Compare the scores of the largest tables with 64-bit sums."""
+    worst = Worst("scores by the largest tables that fit in a file", "sums of 64 bits", 0, "scores")
     random = np.random.default_rng(7)
     sizes: list[tuple[int, int, tuple[int, ...]]] = [
         (2, MAX_SWITCHES, ()),
@@ -107,7 +107,7 @@ def largest(full: bool) -> Finding:
 
 
 def _filled(tables: IntegerTables) -> IntegerTables:
-    """Return the tables with a bias that takes the furthest of all sums to 32767."""
+    """Return the tables with a bias for which the furthest of all sums is 32767."""
     silent = replace(tables, bias=0 * tables.bias)
     found = furthest(silent)
     bias = tables.bias * 0
@@ -116,7 +116,7 @@ def _filled(tables: IntegerTables) -> IntegerTables:
 
 
 def _every_sum(tables: IntegerTables) -> int:
-    """Return the furthest that any frame, whole or with inputs missing, gets from zero, in the order that is worst."""
+    """Return the largest magnitude of any frame's partial sums, whole or with missing inputs, in the worst order."""
     choices = [[tables.bias.tolist()]]
     switches = zip(tables.switch_rows.tolist(), tables.switch_means.tolist(), strict=True)
     choices += [[[0] * tables.n_classes, row, mean] for row, mean in switches]
@@ -131,7 +131,7 @@ def _every_sum(tables: IntegerTables) -> int:
 
 
 def ties(full: bool) -> Finding:
-    """Of equal scores the first must win, as it does where C keeps the best so far and takes only what is greater."""
+    """Check that of equal scores the first wins, as in C, which replaces the best only by a greater score."""
     worst = Worst("equal best scores", "the first of them", 0, "frames")
     for seed in range(30 if full else 3):
         tables = whole_numbers(seed, 5, 4, (3, 3), 1)
@@ -149,7 +149,7 @@ def ties(full: bool) -> Finding:
 
 
 def first_best(scores: Sequence[int]) -> int:
-    """Return which score is greatest, of equal ones the first; written as C would have it."""
+    """Return the index of the greatest score, of equal ones the first, written as in C."""
     best = 0
     for k in range(1, len(scores)):
         if scores[k] > scores[best]:

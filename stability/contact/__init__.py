@@ -1,1 +1,1 @@
-"""Grasps that are hard to bring to rest, the truth at 60 digits of where they came to rest, and steps halved."""
+"""Grasps that are hard to bring to rest, checks of their rest at 60 digits, and halved steps."""

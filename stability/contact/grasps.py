@@ -1,6 +1,6 @@
 """Grasps that are hard to bring to rest.
 
-Nothing touches, or all at one point or on one line; sizes, masses and grips are at their ends; hands of 1 % and 99 %.
+No contact, or all contact at one point or on one line; extreme sizes, masses and grips; hands of 1 % and 99 %.
 """
 
 from collections.abc import Iterator
@@ -20,9 +20,9 @@ from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import SURVEYS
 
 HAND = Hand(Size(185.0, 83.0))
-# Deviations of 1 and 99 of 100 from the mean; the smallest hand is a woman's, the largest a man's.
+# The 1st and 99th percentile; the smallest hand is a woman's, the largest a man's.
 _ONE_IN_A_HUNDRED = 2.3263
-_SMALLEST = 5e-324  # the least double there is
+_SMALLEST = 5e-324  # the smallest positive double
 BAR = Cylinder(diameter_mm=40.0, length_mm=120.0)
 # Fingers bent round a bar that lies along the knuckles, the thumb in opposition; the tips press.
 _ROUND_IT_DEG = np.array([40.0, 20.0, 20.0, 20.0] + [0.0, 50.0, 45.0, 30.0] * 4)
@@ -33,14 +33,14 @@ _FLAT = np.zeros(20)
 
 
 class Grasp(NamedTuple):
-    """A load of one repetition, and what is hard about it."""
+    """A load of one repetition, and a description of its difficulty."""
 
     name: str
     load: Load
 
 
 def held(shape: Shape = BAR, mass_kg: float = 0.1, grip_n: float = 15.0, hand: Hand = HAND, **changes: object) -> Grasp:
-    """Return a hand told to hold `shape`; `changes` of posture_deg, pose, pads or down."""
+    """Return a hand that holds `shape`; `changes` of posture_deg, pose, pads or down."""
     usual = {"posture_deg": _ROUND_IT_DEG, "pose": _BESIDE_THE_PALM, "pads": _TIPS}
     holds = Held(grip_n=grip_n, **(usual | changes))  # type: ignore[arg-type]
     condition = Condition("A", hand, "PoS", Thing("thing", shape, mass_kg), holds)
@@ -48,7 +48,7 @@ def held(shape: Shape = BAR, mass_kg: float = 0.1, grip_n: float = 15.0, hand: H
 
 
 def hard(full: bool) -> Iterator[Grasp]:
-    """Yield the hard grasps, those of many hands and objects in full only."""
+    """Yield the hard grasps, with many hands and objects only in the full run."""
     masses, grips = (0.0, _SMALLEST, 1e-9, 5.0, 1e3, 1e12), (0.0, _SMALLEST, 1e-9, 1e3, 1e12)
     of_masses = ((f"{mass:g} kg", held(mass_kg=mass)) for mass in masses)
     of_grips = ((f"a grip of {grip:g} N", held(grip_n=grip)) for grip in grips)
@@ -58,18 +58,18 @@ def hard(full: bool) -> Iterator[Grasp]:
 
 
 def _touching() -> Iterator[tuple[str, Grasp]]:
-    """Yield contacts that leave something free, or fall together."""
+    """Yield contacts that leave a degree of freedom, or coincide."""
     straight = HAND.spheres(HAND.skeleton(np.zeros((20, 1))))[..., 0]
     meeting_deg = _meeting()
     point = HAND.spheres(HAND.skeleton(np.radians(meeting_deg)[:, None]))[_INDEX_TIP, :, 0]
     beyond = straight[_MIDDLE] + [60.0, 0.0, 0.0]
-    # Joints move until they rest, while the object is at rest from the first.
-    yield "nothing touches, nothing weighs", held(pose=_at([900.0, 0.0, 0.0]), mass_kg=0.0, grip_n=40.0)
-    yield "nothing touches", held(pose=_at([900.0, 0.0, 0.0]))
-    yield "nothing touches, nothing presses", held(pose=_at([900.0, 0.0, 0.0]), grip_n=0.0, mass_kg=0.0)
+    # Joints move until they rest, while the object is at rest from the start.
+    yield "no contact, no weight", held(pose=_at([900.0, 0.0, 0.0]), mass_kg=0.0, grip_n=40.0)
+    yield "no contact", held(pose=_at([900.0, 0.0, 0.0]))
+    yield "no contact, no pressure", held(pose=_at([900.0, 0.0, 0.0]), grip_n=0.0, mass_kg=0.0)
     yield "no pads", held(pads=())
     yield "a ball at one fingertip", held(Sphere(60.0), pose=_at(beyond), posture_deg=_FLAT, pads=_TIPS[2:3])
-    for name, off in (("in the middle of a bead", 0.0), ("beside a bead", 7.0)):
+    for name, off in (("in the middle of a bead", 0.0), ("next to a bead", 7.0)):
         pose = _at(point - [0.0, 0.0, off])
         bead = held(Sphere(8.0), pose=pose, posture_deg=meeting_deg, pads=_TIPS[:2])
         yield f"two fingertips at one point {name}", bead
@@ -81,7 +81,7 @@ def _touching() -> Iterator[tuple[str, Grasp]]:
     under = straight[_MIDDLE] - [0.0, 0.0, 11.0]
     needle = np.concatenate([under, [0.0, 0.0, np.pi / 2]])
     yield "all contacts on one line", held(Cylinder(2.0, 200.0), pose=needle, posture_deg=_FLAT)
-    yield "a flat hand on a flat thing", held(Box(200.0, 200.0, 10.0), pose=_at(under), posture_deg=_FLAT)
+    yield "a flat hand on a flat object", held(Box(200.0, 200.0, 10.0), pose=_at(under), posture_deg=_FLAT)
 
 
 def _of_sizes() -> Iterator[tuple[str, Grasp]]:
@@ -92,7 +92,7 @@ def _of_sizes() -> Iterator[tuple[str, Grasp]]:
 
 
 def _of_hands() -> Iterator[tuple[str, Grasp]]:
-    """Yield hands of one hundredth and 99 hundredths of a usual one, their object as much smaller and lighter."""
+    """Yield hands of 1 % and 99 % of the usual size, with objects scaled in size and mass."""
     for scale in (0.01, 0.99):
         hand = Hand(Size(185.0 * scale, 83.0 * scale))
         pose = _BESIDE_THE_PALM * ([scale] * 3 + [1.0] * 3)
@@ -108,20 +108,20 @@ def planned(every: int) -> Iterator[Grasp]:
     for share, hands, normal in ((1, women, -_ONE_IN_A_HUNDRED), (99, men, _ONE_IN_A_HUNDRED)):
         size = Size(hands.length.at(normal, (0.0, 300.0)), hands.breadth.at(normal, (0.0, 300.0)))
         for item in scene.objects[::every]:
-            told = postures.held(Hand(size), item.grasp, item.thing())
-            condition = Condition("A", Hand(size), item.grasp, item.thing(), told)
-            load = Load(condition, told.posture_deg[None], told.pose[None], np.array([told.grip_n]))
+            target = postures.held(Hand(size), item.grasp, item.thing())
+            condition = Condition("A", Hand(size), item.grasp, item.thing(), target)
+            load = Load(condition, target.posture_deg[None], target.pose[None], np.array([target.grip_n]))
             yield Grasp(f"a hand of {share} %, {item.name}", load)
 
 
 def otherwise(load: Load, **changes: object) -> Load:
-    """Return a load whose condition's `Held` differs."""
-    told = replace(load.condition.held, **changes)  # type: ignore[arg-type]
-    return replace(load, condition=replace(load.condition, held=told))
+    """Return a load with changes in its condition's `Held`."""
+    changed = replace(load.condition.held, **changes)  # type: ignore[arg-type]
+    return replace(load, condition=replace(load.condition, held=changed))
 
 
 def case_of(load: Load) -> Case:
-    """Return a load as quasistatic has it."""
+    """Return a load in the form of the quasistatic model."""
     return Case(load.condition, load.posture_deg.T * (np.pi / 180.0), load.pose.T, load.grip_n)
 
 
@@ -130,7 +130,7 @@ def _at(position: Floats | list[float]) -> Floats:
 
 
 def _meeting() -> Floats:
-    """Return joint angles (20,) in degrees at which the tips of thumb and index are at one point: Gauss and Newton."""
+    """Return joint angles (20,) in degrees at which the tips of thumb and index coincide, by Gauss-Newton."""
     angles = np.radians(_ROUND_IT_DEG)
     own = np.arange(8)  # the joints of thumb and index
     for _ in range(40):

@@ -1,9 +1,9 @@
-"""Steps halved: Newton's, what counts as rest, MuJoCo's time step, and the levels of a growing grip.
+"""Halved steps: Newton's, the limits of rest, MuJoCo's time step, and the levels of a growing grip.
 
-A newton more or less matters where it turns a switch. The shipped scenes spread the thresholds of switches about 1 N by
-a standard deviation of 0.15 N (switch.threshold), because nobody knows those of a glove's better: so halved steps may
-change no force on a segment by more than that where they only come nearer to the same rest, and where friction's
-history differs, turn no more switches than thresholds drawn anew would.
+A force matters only if it changes a switch. The shipped scenes spread the thresholds of switches around 1 N with a
+standard deviation of 0.15 N (switch.threshold), because those of a real glove are no better known. So if halved steps
+only get closer to the same rest, they may change no force on a segment by more than this; if the history of friction
+differs, they may change no more switches than newly drawn thresholds would.
 """
 
 from collections.abc import Iterator, Sequence
@@ -37,7 +37,7 @@ _THRESHOLDS_N = np.full(len(murakami160()), THRESHOLD_N)
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield by how much halved steps change forces, and how many switches they turn."""
+    """Yield the changes of forces and of switches by halved steps."""
     loads = list(shipped(4 if full else 1))
     rest = Quasistatic(Parameters()).solve(loads)
     nearer = Quasistatic(Parameters(), Pace(USUAL.rest_n / 2, USUAL.rest_nmm / 2)).solve(loads)
@@ -53,17 +53,17 @@ def findings(full: bool) -> Iterator[Finding]:
 
 
 def shipped(repetitions: int) -> Iterator[Load]:
-    """Yield the grasps of the shipped scene's first subject, varied as its effects vary them."""
+    """Yield the grasps of the shipped scene's first subject, varied by its effects."""
     scene, rng = load_scene("kamakura"), np.random.default_rng(14)
     for condition in conditions_of(scene, scene.subjects[0], Postures.of(scene)):
-        told, n = condition.held, repetitions
-        pose = told.pose + rng.normal(size=(n, 6)) * ([1.5] * 3 + [np.radians(2.5)] * 3)
-        posture_deg = told.posture_deg + 1.5 * rng.normal(size=(n, 20))
-        yield Load(condition, posture_deg, pose, told.grip_n * np.exp(0.25 * rng.normal(size=n)))
+        target, n = condition.held, repetitions
+        pose = target.pose + rng.normal(size=(n, 6)) * ([1.5] * 3 + [np.radians(2.5)] * 3)
+        posture_deg = target.posture_deg + 1.5 * rng.normal(size=(n, 20))
+        yield Load(condition, posture_deg, pose, target.grip_n * np.exp(0.25 * rng.normal(size=n)))
 
 
 def kept(loads: Sequence[Load], *solved: Sequence[Contact]) -> Bits:
-    """Return which repetitions (n,) settled, without dropping their object, in all of `solved`."""
+    """Return the mask (n,) of repetitions that settled, without dropping their object, in all of `solved`."""
     good = np.ones(sum(len(load.grip_n) for load in loads), dtype=bool)
     for contacts in solved:
         shifts = [one.pose[:, :3] - load.pose[:, :3] for one, load in zip(contacts, loads, strict=True)]
@@ -73,8 +73,8 @@ def kept(loads: Sequence[Load], *solved: Sequence[Contact]) -> Bits:
 
 
 def _nearer(loads: Sequence[Load], rest: Sequence[Contact], nearer: Sequence[Contact]) -> Finding:
-    """Return the most that halving what may be left at rest changes the force on a segment; it may be SPREAD_N."""
-    worst = Worst("quasistatic: forces, rest held twice as strictly", "the usual rest", SPREAD_N, "N")
+    """Return the largest change of the force on a segment by halved limits of rest; the bound is SPREAD_N."""
+    worst = Worst("quasistatic: forces, limits of rest halved", "the usual rest", SPREAD_N, "N")
     good = kept(loads, rest, nearer)
     change = np.abs(_capsules(rest) - _capsules(nearer)).max(axis=1)
     for name, here in zip(np.array(_names(loads))[good].tolist(), change[good].tolist(), strict=True):
@@ -83,7 +83,7 @@ def _nearer(loads: Sequence[Load], rest: Sequence[Contact], nearer: Sequence[Con
 
 
 def _turned(check: str, loads: Sequence[Load], one: Sequence[Contact], other: Sequence[Contact]) -> Finding:
-    """Count the switches that differ between two solutions, against what thresholds drawn anew make of the first."""
+    """Count the switches that differ between two solutions; newly drawn thresholds for the first give the bound."""
     good = kept(loads, one, other)
     first, second = (np.concatenate([contact.forces_n for contact in each])[good] for each in (one, other))
     closed = first > THRESHOLD_N
@@ -105,8 +105,10 @@ def _finer_time(loads: Sequence[Load]) -> Finding:
 
 
 def _finer_grip(loads: Sequence[Load]) -> Finding:
-    """Count what differs where a grip grows in twice as many levels: the forces at a level that both have not at all,
-    and the time at which a switch first closes by no more than a coarse level: from below to above its threshold.
+    """Count differences when a grip grows in twice as many levels.
+
+    The forces at a common level must be equal, and the first closing of a switch, from below to above its threshold,
+    may differ by at most a coarse level.
     """
     worst = Worst("ramp: twice as many levels of the grip", "the usual levels", 0.0, "switches")
     model = Quasistatic(Parameters())
@@ -115,13 +117,13 @@ def _finer_grip(loads: Sequence[Load]) -> Finding:
         worst.see(float(np.count_nonzero(fine[::2] != coarse)), load.condition.thing.name, coarse[0].size)
         up, sooner = (crossings(forces, _THRESHOLDS_N, 1e6 / (len(forces) - 1))[0] for forces in (coarse, fine))
         both = np.logical_or.reduce(coarse > _THRESHOLDS_N)
-        # A switch that the finer grip closes sooner, in passing, is no later than the coarse one says.
+        # A switch that the finer grip closes earlier, temporarily, is not late.
         worst.see(float(np.count_nonzero((sooner > up + 1e6 / _LEVELS)[both])), load.condition.thing.name, 0)
     return worst.finding()
 
 
 def _grown(model: Quasistatic, load: Load, levels: int) -> Floats:
-    """Return the forces (levels + 1, n, s) at evenly spaced levels of the grip, none at the first."""
+    """Return the forces (levels + 1, n, s) at evenly spaced levels of the grip, 0 at the first."""
     grips = [load.grip_n * (level / levels) for level in range(1, levels + 1)]
     solved = model.solve([Load(load.condition, load.posture_deg, load.pose, grip_n) for grip_n in grips])
     return np.array([np.zeros_like(solved[0].forces_n), *(contact.forces_n for contact in solved)])

@@ -1,7 +1,7 @@
 """Hand, object, skin and the balance of forces at 60 digits.
 
-From the model's own figures (sizes, the axes of joints at rest) and its formulas; millimetres and radians. Vectors and
-matrices are numpy's, of mpf: their sums and products round as often as numpy adds and multiplies, at 60 digits.
+Based on the model's parameters (sizes, the axes of joints at rest) and its formulas; millimetres and radians. Vectors
+and matrices are numpy arrays of mpf: each of numpy's additions and multiplications rounds to 60 digits.
 """
 
 from collections.abc import Sequence
@@ -41,7 +41,7 @@ _Y, _Z = (0, 1, 0), (0, 0, 1)
 
 
 class Digit(NamedTuple):
-    """What each of a digit's four joints turns on, and a point of it; where its three segments begin and lead to."""
+    """The axes of a digit's four joints, each with a point; the starts and directions of its three segments."""
 
     axes: list[Vector]
     centres: list[Vector]
@@ -73,7 +73,7 @@ def _digit(hand: Hand, number: int, angles: list[mpf]) -> Digit:
 
 @precisely()
 def centres(hand: Hand, posed: Sequence[Digit]) -> list[Vector]:
-    """Return the centres of the spheres of skin (50, 3); the palm does not move, and lies where the hand has it."""
+    """Return the centres of the spheres of skin (50, 3); the palm does not move."""
     palm = hand.skeleton(np.zeros((20, 1)))
     found = []
     for capsule, offset in zip(hand.sphere_capsules.tolist(), hand.sphere_offsets.tolist(), strict=True):
@@ -88,7 +88,7 @@ def centres(hand: Hand, posed: Sequence[Digit]) -> list[Vector]:
 
 @precisely()
 def surface(shape: Shape, point: Sequence[mpf] | Vector) -> tuple[mpf, Vector]:
-    """Return how far outside a point in the object's own axes lies, and which way is out; the first of several."""
+    """Return the signed distance of a point in the object's axes, and the outward normal, the first of several."""
     place = np.array([mpf(part) for part in point])
     ways = np.where(place < 0, -1, 1)
     match shape:
@@ -108,7 +108,7 @@ def surface(shape: Shape, point: Sequence[mpf] | Vector) -> tuple[mpf, Vector]:
 
 
 def _rounded(sides: Vector) -> tuple[mpf, Vector]:
-    """Return distance and its gradient by the sides, of a corner that lies `sides` away."""
+    """Return the distance of a corner at offsets `sides`, and its gradient with respect to them."""
     outside = np.maximum(sides, mpf(0))
     if gap := length(outside):
         return gap, outside / gap
@@ -117,7 +117,7 @@ def _rounded(sides: Vector) -> tuple[mpf, Vector]:
 
 
 class Touch(NamedTuple):
-    """A sphere of skin: how deep it is sunk, its centre, and the way out of the object, all in hand axes."""
+    """A sphere of skin: its penetration depth, its centre, and the outward normal of the object, all in hand axes."""
 
     sphere: int
     sunk: mpf
@@ -126,7 +126,7 @@ class Touch(NamedTuple):
 
 
 def touches_of(case: Case, found: list[Vector], frame: Matrix, position: Vector) -> list[Touch]:
-    """Return every sphere of skin (50,), their centres given, of an object at `frame` and `position`."""
+    """Return all spheres of skin (50,), from their centres, for an object at `frame` and `position`."""
     touches = []
     for sphere, (centre, radius) in enumerate(zip(found, case.condition.hand.sphere_radii.tolist(), strict=True)):
         distance, out = surface(case.condition.thing.shape, frame.T @ (centre - position))
@@ -135,14 +135,14 @@ def touches_of(case: Case, found: list[Vector], frame: Matrix, position: Vector)
 
 
 def point(radii: Sequence[float], touch: Touch) -> Vector:
-    """Return where skin meets the surface, or where it is nearest to it."""
+    """Return the contact point of skin and surface, or the nearest point."""
     radius = mpf(radii[touch.sphere])
     found: Vector = touch.centre - touch.normal * min(radius - touch.sunk, radius)
     return found
 
 
 def press(skin: Skin, sunk: mpf) -> mpf:
-    """Return the integral of a stiffness that grows over the first soft_mm; of what is deeper, it is the last one."""
+    """Return the integral of a stiffness that grows over the first soft_mm and is constant beyond."""
     deep, soft = max(sunk, mpf(0)), min(max(sunk, mpf(0)), mpf(skin.soft_mm))
     return mpf(skin.press_n_per_mm) * soft / mpf(skin.soft_mm) * (deep - soft / 2)
 
@@ -153,8 +153,8 @@ def place_error_mm(case: Case) -> mpf:
 
     Each of a finger's four turns takes sine and cosine of 2 roundings, and rounds two products and their sum: 7.4
     roundings of a frame by the sum of squares of its elements, which later turns keep. The thumb has two more products
-    of 9: 48 roundings of a direction, 2 more with its length, on all of the digit's length. The way into the object's
-    axes and to its surface adds 10 of what place and size add up to.
+    of 9: 48 roundings of a direction, 2 more with its length, on all of the digit's length. The transformation to
+    the object's axes and to its surface adds 10 of the sum of position and size.
     """
     hand, shape = case.condition.hand, case.condition.thing.shape
     digit = float(hand.size.segments_mm().sum(axis=1).max())
@@ -164,7 +164,7 @@ def place_error_mm(case: Case) -> mpf:
 
 @precisely()
 def press_error_n(case: Case, skin: Skin, press: float) -> float:
-    """Bound the error of a pressing force of at most `press` newtons: its depth's, and 6 roundings of its own."""
+    """Bound the error of a pressing force of at most `press` newtons: that of its depth, and 6 roundings."""
     return float(mpf(skin.press_n_per_mm) * place_error_mm(case) + 6 * ROUNDING * mpf(press))
 
 
@@ -172,13 +172,13 @@ _OF_DIGITS, _A_DIGIT = 35, 7
 
 
 class Left(NamedTuple):
-    """What is left of a repetition at rest.
+    """The residuals of a repetition at rest.
 
-    force_n, moment_nmm   on the object, its soft hold included
-    joints_nmm            the most on any joint
-    residual_n            on the object without its hold: what is returned as such
-    press_n               the most by which what is returned of a sphere differs
-    outside               on how many spheres friction leaves its cone, twice what skin slips at, or the surface
+    force_n, moment_nmm   on the object, including its soft hold
+    joints_nmm            the largest on any joint
+    residual_n            on the object without its hold, compared with the returned one
+    press_n               the largest error of the returned force on a sphere
+    outside               number of spheres on which friction leaves its cone, twice the slip limit, or the surface
     """
 
     force_n: float
@@ -191,7 +191,7 @@ class Left(NamedTuple):
 
 @precisely()
 def left_of(case: Case, rest: Rest, skin: Skin, k: int) -> Left:
-    """Return what is left of repetition k. Friction is taken as returned; all else follows from angles and pose."""
+    """Return the residuals of repetition k, with friction as returned, and all else from angles and pose."""
     hand, thing = case.condition.hand, case.condition.thing
     posed = digits(hand, rest.angles[:, k].tolist())
     frame, position = exactly(rest.pose.rotation[..., k]), exactly(rest.pose.position[:, k])
@@ -218,14 +218,16 @@ def _told_frame(case: Case, k: int) -> Matrix:
 
 
 def _turned(case: Case, k: int, frame: Matrix) -> Vector:
-    """Return sin(turn) about its axis, from where the object was put: half the sum of its axes' cross products."""
+    """Return sin(rotation) times its axis, from the object's initial pose: half the sum of its axes' cross products."""
     half: Vector = np.cross(_told_frame(case, k).T, frame.T).sum(axis=0) / 2
     return half
 
 
 def _is_outside(case: Case, skin: Skin, touch: Touch, pressed: mpf, drag: Vector) -> bool:
-    """Limit, length, root, quotient and products round 8 times in all; a normal turns by its place's error over how far
-    it is from the object, which is looked at from 1 mm on.
+    """Return whether friction is outside its limits by more than rounding.
+
+    Limit, length, root, quotient and products round 8 times in all; a normal rotates by its position's error over its
+    distance from the object, which is checked from 1 mm on.
     """
     size = length(drag)
     slips = size > 2 * mpf(skin.friction) * pressed * (1 + 8 * ROUNDING)
@@ -234,18 +236,18 @@ def _is_outside(case: Case, skin: Skin, touch: Touch, pressed: mpf, drag: Vector
 
 
 def _joints(case: Case, rest: Rest, k: int, posed: list[Digit], points: Matrix, forces: Matrix) -> Vector:
-    """Return what is left on each joint: its pads' torque, its spring, its end stop, and what skin bears."""
-    told, now = exactly(case.angles[:, k]), exactly(rest.angles[:, k])
+    """Return the residual torque on each joint: its pads', its spring's, its end stop's, and that of skin."""
+    initial, now = exactly(case.angles[:, k]), exactly(rest.angles[:, k])
     low, high = map(exactly, LIMITS_DEG.T * (np.pi / 180.0))
     over = np.maximum(now - high, mpf(0)) + np.minimum(now - low, mpf(0))
-    found: Vector = _told(case, k) - exactly(STIFFNESS) * (now - told) - mpf(LIMIT_NMM_PER_RAD) * over
+    found: Vector = _grip(case, k) - exactly(STIFFNESS) * (now - initial) - mpf(LIMIT_NMM_PER_RAD) * over
     for sphere in range(_OF_DIGITS):
         _add_moments(found, posed, sphere, points[sphere], forces[sphere])
     return found
 
 
-def _told(case: Case, k: int) -> Vector:
-    """Return the torques of the grip: every pad pushes its share into the surface, where the hand was told to be."""
+def _grip(case: Case, k: int) -> Vector:
+    """Return the torques of the grip: every pad pushes its share into the surface at the target posture."""
     hand, grip = case.condition.hand, mpf(float(case.grip_n[k]))
     posed = digits(hand, case.angles[:, k].tolist())
     found = centres(hand, posed)
@@ -259,8 +261,9 @@ def _told(case: Case, k: int) -> Vector:
 
 
 def _add_moments(moments: Vector, posed: list[Digit], sphere: int, at: Vector, force: Vector) -> None:
-    """Add what a force on a digit's sphere does to the joints (20,) that move it: three spheres lie on its first
-    segment, which two joints move, two on each of the others.
+    """Add the moments of a force on a digit's sphere to the joints (20,) that move it.
+
+    Three spheres are on its first segment, which two joints move, two on each of the others.
     """
     digit, place = divmod(sphere, _A_DIGIT)
     for joint in range(2 + (place >= 3) + (place >= 5)):

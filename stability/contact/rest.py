@@ -1,4 +1,4 @@
-"""What comes of hard grasps, in the quasistatic model and in MuJoCo."""
+"""Results for hard grasps, in the quasistatic model and in MuJoCo."""
 
 from collections.abc import Callable, Iterator, Sequence
 from importlib.util import find_spec
@@ -24,18 +24,18 @@ from .grasps import BAR, HAND, Grasp, case_of, hard, held, otherwise
 from .posed import Vector, digits, exactly, left_of, length, press_error_n
 from .surfaces import MOST_SWITCHES
 
-# MuJoCo takes no friction for less than this (mjMINMU).
+# MuJoCo's smallest friction (mjMINMU).
 _LEAST_FRICTION = 1e-5
 SLIPPERY = Parameters(friction=_LEAST_FRICTION)
 
 
 def timed_findings(make: Callable[..., ContactModel], full: bool) -> Iterator[Finding]:
-    """Hold what is returned as left on balls against what their contacts, weight and weld leave.
+    """Compare the returned residual on balls with the sum of their contacts, weight and weld.
 
-    Skin presses along the line from the nearest point of a capsule's axis to the ball's middle, and drags by at most
-    the least friction there is: by so much of all forces may the two differ, roundings being far less.
+    Skin presses along the line from the nearest point of a capsule's axis to the ball's centre, and drags by at most
+    the smallest friction: the two may differ by this share of all forces; rounding is far less.
     """
-    left = Worst("mujoco: force left on a slippery ball", "60 digits", 1.0, "of the bound")
+    left = Worst("mujoco: residual force on a slippery ball", "60 digits", 1.0, "of the bound")
     for diameter_mm in range(40, 100, 5 if full else 20):
         load = held(Sphere(float(diameter_mm)), pose=np.array([95.0, 5.0, -15.0 - diameter_mm / 2, 0.0, 0.0, 0.0])).load
         (contact,) = make(SLIPPERY).solve([load])
@@ -47,7 +47,7 @@ def timed_findings(make: Callable[..., ContactModel], full: bool) -> Iterator[Fi
 
 @precisely()
 def left_on_ball(load: Load, contact: Contact) -> Vector:
-    """Return the force on a ball that nothing balances: contacts along their normals, weight, the weld's spring."""
+    """Return the unbalanced force on a ball: contacts along their normals, weight, the weld's spring."""
     condition, position = load.condition, exactly(contact.pose[0, :3])
     left: Vector = mpf(condition.thing.mass_kg) * mpf(GRAVITY) * exactly(condition.held.down)
     left = left + (exactly(load.pose[0, :3]) - position) * (mpf(SLIPPERY.weld_n_per_m) / 1000)
@@ -60,7 +60,7 @@ def left_on_ball(load: Load, contact: Contact) -> Vector:
 
 
 def _axes(hand: Hand, angles: list[mpf]) -> Iterator[tuple[Vector, Vector, mpf]]:
-    """Yield every capsule's axis: where it begins, its direction, its length.
+    """Yield every capsule's axis: its start, its direction, its length.
 
     A digit's ends in its last sphere of skin; the palm's run from their first to their last.
     """
@@ -79,11 +79,11 @@ def _axes(hand: Hand, angles: list[mpf]) -> Iterator[tuple[Vector, Vector, mpf]]
 RULE = "the rule itself"
 _STATE = ("posture_deg", "pose", "forces_n", "capsules_n", "between_n")
 _FIELDS = (*_STATE, "residual_n", "residual_nmm")
-# No effect of a scene matters to a contact model.
+# The effects of a scene do not matter to a contact model.
 _SETTING = Setting(1, 1, 1.0, 10_000, 0, 500_000, 0, timed=False, on_wire=False)
 _USUAL, _TIMED = contact_quasistatic.Parameters(), contact_mujoco.Parameters()
 SKIN = Skin(_USUAL.press_n_per_mm, _USUAL.soft_mm, _USUAL.drag_n_per_mm, _USUAL.friction)
-# Skin and friction at the ends of what a scene may ask for.
+# Skin and friction at the limits of a scene.
 _QUASISTATIC = tuple(
     contact_quasistatic.Parameters(press_n_per_mm=press, soft_mm=soft, drag_n_per_mm=drag, friction=friction)
     for press, soft, drag, friction in (
@@ -105,7 +105,7 @@ _MUJOCO = tuple(
 
 
 def models() -> dict[str, Callable[..., ContactModel]]:
-    """Return both contact models' makers by name; MuJoCo's where it is installed."""
+    """Return the constructors of both contact models by name; MuJoCo's only if it is installed."""
     makers: dict[str, Callable[..., ContactModel]] = {
         "quasistatic": lambda given=_USUAL: contact_quasistatic.model(given, _SETTING)
     }
@@ -115,7 +115,7 @@ def models() -> dict[str, Callable[..., ContactModel]]:
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield what is not a number or not honest, what does not balance, and what should not matter and does."""
+    """Yield the checks for finite numbers, truthful reports of rest, balance of forces, and invariances."""
     grasps = list(hard(full))
     for name, make in models().items():
         yield _numbers(name, make, grasps)
@@ -127,8 +127,8 @@ def findings(full: bool) -> Iterator[Finding]:
 
 
 def _numbers(name: str, make: Callable[..., ContactModel], grasps: Sequence[Grasp]) -> Finding:
-    """Count answers that are not finite, or say of what is not that it has settled; with all skins."""
-    wrong = Worst(f"{name}: finite, or not settled", RULE, 0.0, "answers")
+    """Count results that are not finite but reported as settled, with all skins."""
+    wrong = Worst(f"{name}: finite, or not settled", RULE, 0.0, "results")
     ends = {"quasistatic": _QUASISTATIC, "mujoco": _MUJOCO}[name]
     for model, tried in ((make(), grasps), *((make(given), grasps[::8]) for given in ends)):
         for grasp, contact in zip(tried, model.solve([each.load for each in tried]), strict=True):
@@ -137,18 +137,19 @@ def _numbers(name: str, make: Callable[..., ContactModel], grasps: Sequence[Gras
 
 
 def is_honest(contact: Contact) -> bool:
-    """Return whether all that is returned is finite; of what is given up, the residual may be infinite."""
+    """Return whether all results are finite; the residual of an abandoned repetition may be infinite."""
     known = all(np.isfinite(getattr(contact, field)).all() for field in _STATE)
     residuals = np.isfinite(contact.residual_n) & np.isfinite(contact.residual_nmm)
     return bool(known and (residuals | ~contact.settled).all())
 
 
 def _nothing(name: str, model: ContactModel) -> Finding:
-    """Count answers that differ though nothing does: an object of no mass has no weight, whichever way is down (for
-    quasistatic that is all; in MuJoCo the least mass of an object stands for its inertia); nor has one of the smallest
-    mass; no grip is no pads, and the smallest one is next to none.
+    """Count results that differ for equivalent loads.
+
+    An object of zero or the smallest mass has no weight in any direction (for quasistatic that is all; in MuJoCo an
+    object has at least the inertia of the minimal mass); no grip equals no pads, and almost equals the smallest grip.
     """
-    wrong = Worst(f"{name}: no mass, no grip", RULE, 0.0, "answers")
+    wrong = Worst(f"{name}: no mass, no grip", RULE, 0.0, "results")
     grasps = {grasp.name: grasp.load for grasp in hard(full=False)}
     weightless, gripless = grasps["0 kg"], grasps["a grip of 0 N"]
     pairs = (
@@ -166,9 +167,9 @@ def _nothing(name: str, model: ContactModel) -> Finding:
 
 
 def _on_the_surface(name: str, make: Callable[..., ContactModel], full: bool) -> Finding:
-    """Hold what switches bear of what segments do where the glove reaches just as far as a switch is off, or a hair on.
+    """Compare the forces on switches with those on segments if the glove's reach equals a switch's distance, or almost.
 
-    A segment's switches share its force but for k + 1 roundings of it, k the most on one segment (contact_surfaces).
+    A segment's switches share its force up to k + 1 roundings of it, k the most on one segment (contact_surfaces).
     """
     lost = Worst(f"{name}: switches exactly on the surface", "exact sums", MOST_SWITCHES + 1.0, "x 2^-53 of the force")
     grasp = held()
@@ -187,22 +188,22 @@ def _on_the_surface(name: str, make: Callable[..., ContactModel], full: bool) ->
 
 
 def _balanced(grasps: Sequence[Grasp]) -> Iterator[Finding]:
-    """Hold every grasp that quasistatic calls settled against the balance of forces at 60 digits.
+    """Check the balance of forces at 60 digits for every grasp that quasistatic reports as settled.
 
-    At rest less than USUAL.rest_n and rest_nmm may be left. What was computed of it is off by some `press_error_n`,
-    5e-12 N, on each of 50 spheres, at arms of 200 mm: by less than a millionth of either. The residual is off by less
-    than if the errors of all that touch pointed the same way.
+    At rest the residuals must be below USUAL.rest_n and rest_nmm. Their computed values are off by about
+    `press_error_n`, 5e-12 N, on each of 50 spheres, at arms of 200 mm: by less than a millionth of either. The error of
+    the residual is bounded by the sum of the errors of all contacts.
     """
     forces = Worst("quasistatic at rest: force on the object", REFERENCE, USUAL.rest_n * (1 + 1e-6), "N")
     moments = Worst("quasistatic at rest: moment on the object", REFERENCE, USUAL.rest_nmm * (1 + 1e-6), "N mm")
     joints = Worst("quasistatic at rest: moment on a joint", REFERENCE, USUAL.rest_nmm * (1 + 1e-6), "N mm")
-    residuals = Worst("quasistatic: forces that it says are left", REFERENCE, 1.0, "of the bound")
+    residuals = Worst("quasistatic: reported residual forces", REFERENCE, 1.0, "of the bound")
     presses = Worst("quasistatic: force on a sphere of skin", REFERENCE, 1.0, "of the bound")
     cones = Worst("quasistatic: friction outside its cone", REFERENCE, 0.0, "spheres of skin")
     for name, load in grasps:
         case = case_of(load)
         (rest,) = close([case], SKIN, _USUAL.most_steps)
-        if not rest.settled[0] or not _is_told(load):
+        if not rest.settled[0] or not _has_directions(load):
             continue
         left = left_of(case, rest, SKIN, 0)
         forces.see(left.force_n, name)
@@ -216,8 +217,8 @@ def _balanced(grasps: Sequence[Grasp]) -> Iterator[Finding]:
     yield from (worst.finding() for worst in (forces, moments, joints, residuals, presses, cones))
 
 
-def _is_told(load: Load) -> bool:
-    """Return whether every pad is told where to press: in the very middle of an object any way is as good."""
+def _has_directions(load: Load) -> bool:
+    """Return whether every pad has a defined direction; in the exact middle of an object it is arbitrary."""
     hand = load.condition.hand
     pads = [pad.sphere for pad in load.condition.held.pads]
     away = hand.spheres(hand.skeleton(np.radians(load.posture_deg.T)))[pads, :, 0] - load.pose[0, :3]

@@ -1,4 +1,4 @@
-"""Surfaces, turns and the sharing of force where they are hard: at middles, creases, half turns, hairs of depth."""
+"""Surfaces, rotations and the sharing of force in hard cases: middles, creases, half turns, tiny depths."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ from .posed import Matrix, exactly, length, surface
 MOST_SWITCHES = max(Counter(patch.capsule for patch in murakami160()).values())
 _TINY = (5e-324, 1e-200, 1e-155, 1e-149, 1e-15, 1e-12, 1e-9)
 _THIN = 5e-324
-_LOST_MM = mpf(10) ** -150  # of what is smaller, the squares underflow
+_LOST_MM = mpf(10) ** -150  # the squares of smaller lengths underflow
 _BARS = ((_THIN, 1.0, 0.0), (40.0, _THIN, 0.0), (40.0, 120.0, 0.5), (2000.0, 2000.0, 900.0))
 _BOXES = ((80.0, 50.0, _THIN, 0.0), (9.0, 9.0, 9.0, 4.5), (200.0, 200.0, 10.0, 0.0))
 SHAPES: tuple[Shape, ...] = (
@@ -35,7 +35,7 @@ SHAPES: tuple[Shape, ...] = (
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Yield errors of distances and normals, of turns, and of forces shared."""
+    """Yield errors of distances and normals, of rotations, and of shared forces."""
     rng, more = np.random.default_rng(12), 10 if full else 1
     yield from _surfaces(rng, 20 * more)
     yield from _turns(rng, 20 * more)
@@ -43,7 +43,7 @@ def findings(full: bool) -> Iterator[Finding]:
 
 
 def points(shape: Shape, rng: np.random.Generator, n: int) -> Floats:
-    """Return points (m, 3): the middle, faces, edges and corners, each also a hair off, and n around."""
+    """Return points (m, 3): the middle, faces, edges and corners, also with tiny offsets, and n around."""
     half = np.array(shape.extent_mm()) / 2
     corners = np.array(list(product((-1.0, 0.0, 1.0), repeat=3))) * half
     core = corners * (1.0 - getattr(shape, "edge_mm", 0.0) / np.maximum(half, 1e-300))
@@ -55,15 +55,16 @@ def points(shape: Shape, rng: np.random.Generator, n: int) -> Floats:
 
 @precisely()
 def _surfaces(rng: np.random.Generator, n: int) -> list[Finding]:
-    """Hold distances and normals against the truth.
+    """Compare distances and normals with exact values.
 
-    A side's place is halved exactly, rounds once less its edge, and what lies beyond it once more: 2 roundings of the
-    size; so does the last difference. Of a corner, squares, at most two sums and the root round by 3, the radius of a
-    bar by 2.5 before: 9 roundings of what the point's place and the object's size add up to; and less than 1e-150 mm.
+    The size of a side is halved exactly, subtracting its edge rounds once, and the distance beyond it once more: 2
+    roundings of the size; so does the last difference. For a corner, squares, at most two sums and the root round by 3,
+    the radius of a bar by 2.5 before: 9 roundings of the sum of the point's position and the object's size; and less
+    than 1e-150 mm.
 
     A normal is a quotient by such a root, of relative error 2.5 and 1 for itself; that of a bar is the product of two:
-    8 roundings of its length. Its direction is besides off by 4 roundings of that size, of two sides, over how far the
-    place is from the core that the edge is wrapped round.
+    8 roundings of its length. In addition its direction is off by 4 roundings of that size, of two sides,
+    over the distance of the point from the core inside the rounded edge.
     """
     distances = Worst("distance from a surface", REFERENCE, 9.0, "x 2^-53 of the size")
     normals = Worst("length of normals", REFERENCE, 8.0, "x 2^-53")
@@ -86,7 +87,7 @@ def _surfaces(rng: np.random.Generator, n: int) -> list[Finding]:
 
 
 def vectors(rng: np.random.Generator, n: int) -> Floats:
-    """Return rotation vectors (m, 3) up to half a turn: none, hairs, half turns and next to them, and n drawn."""
+    """Return rotation vectors (m, 3) up to half a turn: zero, tiny, half turns and close to them, and n random ones."""
     axes = np.concatenate([np.eye(3), -np.eye(3), rng.normal(size=(max(n // 4, 3), 3))])
     axes /= np.sqrt(np.add.reduce(axes * axes, axis=1))[:, None]
     angles = (0.0, 5e-324, 1e-160, 1e-150, 9.9e-9, 1.01e-8, 1e-4, np.pi / 2, np.pi - 1e-8, np.nextafter(np.pi, 0.0))
@@ -96,19 +97,19 @@ def vectors(rng: np.random.Generator, n: int) -> Floats:
 
 @precisely()
 def _turns(rng: np.random.Generator, n: int) -> list[Finding]:
-    """Hold rotation matrices against the truth, and what their rotation vectors turn by.
+    """Compare rotation matrices, and those of their rotation vectors, with exact values.
 
     The angle a <= pi is off by 2.5 roundings of itself, 8; sine and cosine add 2 ulp, so each is off by 10. The sine's
-    part of an element counts 10 and 4 for its quotient and product. 1 - cos a rounds once: 11; over a^2 and by two
-    parts of the vector that is at most 2, with 6 roundings of its own: 11 + 12. The last sum makes 1 of at most 2 more:
-    40 altogether.
+    part of an element counts 10 and 4 for its quotient and product. 1 - cos a rounds once: 11; over a^2 and times two
+    components of the vector that is at most 2, with 6 roundings: 11 + 12. The last sum adds 1 rounding of at most 2: 40
+    altogether.
 
-    A rotation vector follows from sums of such elements. Of all four ways to its quaternion the one taken has a largest
-    part of at least 1/2, so that with an error of 40 and 4 roundings in each element none of its parts is off by over
-    4 * 44 / (4 * 1/2) = 88; its angle, and so each element turned by it, by twice that, and the 40.
+    A rotation vector follows from sums of such elements. Of the four formulas for its quaternion the chosen one has a
+    largest component of at least 1/2, so with an error of 40 and 4 roundings in each element none of its components is
+    off by over 4 * 44 / (4 * 1/2) = 88; its angle, and so each rotated element, by twice that, plus the 40.
     """
     matrices = Worst("rotation matrices", REFERENCE, 40.0, "x 2^-53")
-    back = Worst("rotation vectors, turned again", REFERENCE, 216.0, "x 2^-53")
+    back = Worst("matrices of rotation vectors", REFERENCE, 216.0, "x 2^-53")
     made = vectors(rng, n)
     found = rotation(made.T)
     again = rotation_vector(found).T
@@ -126,10 +127,10 @@ def _turned(vector: Floats) -> Matrix:
 
 @precisely()
 def _shares(rng: np.random.Generator, n: int) -> Finding:
-    """Hold what a segment's switches bear, and what falls between them, against what it bears.
+    """Compare the forces on a segment's switches and between them with the force on the segment.
 
     With k switches the sum of depths rounds k - 1 times, each quotient and product once: k + 1 roundings of the force,
-    but for halves of the smallest double.
+    plus halves of the smallest double.
     """
     switches = Switches(HAND, murakami160())
     worst = Worst("forces shared by switches", REFERENCE, MOST_SWITCHES + 1.0, "x 2^-53 of the force")

@@ -1,4 +1,4 @@
-"""The Newton system of a hand and its object, 26 unknowns, where it is next to singular."""
+"""The Newton system of a hand and its object, with 26 unknowns, when it is almost singular."""
 
 import math
 from collections.abc import Iterator
@@ -18,12 +18,12 @@ from ..reference.numbers import precisely, solve
 from .grasps import case_of, hard
 
 SIZE = 26
-# The stiffest skin that a scene may ask for: beside it, the soft hold on the object is next to nothing.
+# The stiffest skin of a scene: compared with it, the soft hold on the object is negligible.
 _STIFFEST = Skin(1000.0, 0.5, 1000.0, 0.8)
 
 
 class System(NamedTuple):
-    """The parts that `solve_arrow` takes, of one system: (5, 4, 4, 1), (5, 4, 6, 1), (6, 6, 1), (5, 4, 1), (6, 1)."""
+    """The arguments of `solve_arrow` for one system: (5, 4, 4, 1), (5, 4, 6, 1), (6, 6, 1), (5, 4, 1), (6, 1)."""
 
     limbs: Floats
     coupling: Floats
@@ -32,7 +32,7 @@ class System(NamedTuple):
     on_body: Floats
 
     def whole(self) -> Floats:
-        """Return the matrix (26, 26), as it is stored: the coupling stands on both sides."""
+        """Return the matrix (26, 26), with the coupling on both sides."""
         whole = np.zeros((SIZE, SIZE))
         for limb in range(5):
             own = slice(4 * limb, 4 * limb + 4)
@@ -43,13 +43,13 @@ class System(NamedTuple):
 
 
 def findings(full: bool) -> Iterator[Finding]:
-    """Hold the elimination against 60 digits.
+    """Compare the elimination with 60 digits.
 
-    x of Cholesky's method solves (A + E) x = b exactly, |E| <= c_79 |L||L^T| element by element, whatever the order of
-    its sums (Higham 2002, Theorem 10.4: c_(3n+1), n = 26, c_k = k u / (1 - k u)); and (|L||L^T|)_ij <= sqrt(a_ii a_jj)
-    but for a factor 1 / (1 - c_27), by Cauchy and Schwarz over rows of L. So |b - A x|_i is at most 79 roundings of
-    sqrt(a_ii) sum_j sqrt(a_jj) |x_j|. The error of x_i is what A^-1 makes of such a residual: row i of A^-1, which is
-    another solution, takes it up with |.|.
+    x of Cholesky's method solves (A + E) x = b exactly, |E| <= c_79 |L||L^T| element by element, for any order of its
+    sums (Higham 2002, Theorem 10.4: c_(3n+1), n = 26, c_k = k u / (1 - k u)); and (|L||L^T|)_ij <= sqrt(a_ii a_jj)
+    up to a factor 1 / (1 - c_27), by Cauchy-Schwarz over rows of L. So |b - A x|_i is at most 79 roundings of
+    sqrt(a_ii) sum_j sqrt(a_jj) |x_j|. The error of x_i is A^-1 times such a residual, bounded by the absolute values of
+    row i of A^-1, which is another solution.
     """
     left = Worst("26 x 26 elimination: residual", "60 digits", 79.0, "x 2^-53")
     off = Worst("26 x 26 elimination: solution", "60 digits", 1.0, "of the bound")
@@ -62,8 +62,8 @@ def findings(full: bool) -> Iterator[Finding]:
 
 @precisely()
 def errors(system: System) -> tuple[float, float]:
-    """Return the residual over a rounding of sqrt(a_ii) sum sqrt(a_jj) |x_j|, and the solution's error over its bound;
-    the worst rows. NaN where no solution came out.
+    """Return the residual over a rounding of sqrt(a_ii) sum sqrt(a_jj) |x_j|, and the solution's error over its bound,
+    for the worst rows. NaN if there is no solution.
     """
     found = solve_arrow(*system)[:, 0].tolist()
     if not np.isfinite(found).all():
@@ -82,7 +82,7 @@ def errors(system: System) -> tuple[float, float]:
 
 
 def _made(number: int) -> Iterator[tuple[str, System]]:
-    """Yield sums of products of `rank` rows a limb, fewer than its unknowns, with next to nothing on the diagonal."""
+    """Yield sums of products of `rank` rows per limb, fewer than its unknowns, with an almost zero diagonal."""
     rng = np.random.default_rng(9)
     for rank in (1, 2, 4):
         for power in (0, -6, -11):
@@ -91,7 +91,7 @@ def _made(number: int) -> Iterator[tuple[str, System]]:
 
 
 def near_singular(rng: np.random.Generator, rank: int, spring: float) -> System:
-    """Return a system of `rank` rows a limb, sized from 1e-3 to 1e3 beside one another, with springs of that share."""
+    """Return a system of `rank` rows per limb, with sizes from 1e-3 to 1e3, with springs of that share."""
     rows = rng.normal(size=(5, rank, 10)) * 10.0 ** rng.uniform(-3.0, 3.0, (1, 1, 10))
     gram = np.einsum("dri,drj->dij", rows, rows)
     limbs, coupling, body = gram[:, :4, :4], gram[:, :4, 4:], gram[:, 4:, 4:].sum(axis=0)
@@ -105,9 +105,9 @@ def _asked(rng: np.random.Generator) -> tuple[Floats, Floats]:
 
 
 def _of_grasps(full: bool) -> Iterator[tuple[str, System]]:
-    """Yield the first systems of the hard grasps, with the stiffest skin; what is asked of them is drawn."""
+    """Yield the first systems of the hard grasps, with the stiffest skin and random right-hand sides."""
     rng = np.random.default_rng(10)
     for grasp in list(hard(False))[:: 1 if full else 8]:
-        told = command([case_of(grasp.load)])
-        balance = Balance(told, _STIFFEST, told.angles, told.pose)
+        target = command([case_of(grasp.load)])
+        balance = Balance(target, _STIFFEST, target.angles, target.pose)
         yield grasp.name, System(*stiffness(balance), *_asked(rng))

@@ -1,1 +1,1 @@
-"""Inputs that are hard on the numbers: made by rule, or drawn from a seed."""
+"""Numerically hard inputs: constructed by rule, or random from a seed."""

@@ -1,4 +1,4 @@
-"""Training sets, counts and scores that are hard on the numbers, made by rule or drawn from a seed."""
+"""Numerically hard training sets, counts and scores, constructed by rule or random from a seed."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -39,7 +39,7 @@ class HardSet:
 
     @property
     def scaled_weights(self) -> Floats:
-        """(n,) the row weights as training sees them."""
+        """(n,) the scaled row weights used in training."""
         return (
             np.ones(len(self.labels))
             if self.weights is None
@@ -54,21 +54,21 @@ class HardSet:
 
 
 def separable(classes: int, rows_a_class: int = 2) -> HardSet:
-    """Return a set in which every class closes a switch of its own: one stump parts it from all others."""
+    """Return a set in which every class closes its own switch: one stump separates it from all others."""
     labels = np.arange(classes).repeat(rows_a_class)
     X = (labels[:, np.newaxis] == np.arange(classes)).astype(np.int64)
     return HardSet(f"{classes} classes, a switch each", X, labels, classes, classes)
 
 
 def intervals(classes: int, rows_a_class: int = 2) -> HardSet:
-    """Return a set in which every class has an interval of one joint's codes: two stumps part an inner one."""
+    """Return a set in which every class has an interval of one joint's codes: two stumps separate an inner one."""
     labels = np.arange(classes).repeat(rows_a_class)
     codes = np.linspace(0, HIGHEST_CODE, len(labels)).astype(np.int64)[:, np.newaxis]
     return HardSet(f"{classes} classes along one joint", codes, labels, classes, 0)
 
 
 def words(classes: int, rows_a_class: int = 2) -> HardSet:
-    """Return a set whose switches spell the class's number in binary: many stumps together part a class."""
+    """Return a set whose switches spell the class's number in binary: a class needs many stumps."""
     labels = np.arange(classes).repeat(rows_a_class)
     n_switches = max(1, (classes - 1).bit_length())
     X = labels[:, np.newaxis] >> np.arange(n_switches) & 1
@@ -76,8 +76,8 @@ def words(classes: int, rows_a_class: int = 2) -> HardSet:
 
 
 def noisy(classes: int, rows: int, noise: float, seed: int) -> HardSet:
-    """Return rows of prototypes with a tenth of the switches wrong and joints that overlap; a share `noise` of the
-    labels is drawn anew.
+    """Return rows of prototypes with a tenth of the switches wrong and overlapping joints; a share `noise` of the
+    labels is random.
     """
     rng = np.random.default_rng(seed)
     truth = rng.integers(0, classes, rows)
@@ -86,13 +86,13 @@ def noisy(classes: int, rows: int, noise: float, seed: int) -> HardSet:
     joints = rng.integers(0, 40, (rows, 2)) + 9 * truth[:, np.newaxis]
     labels = np.where(rng.random(rows) < noise, rng.integers(0, classes, rows), truth).astype(np.intp)
     X = np.column_stack([switches, joints]).astype(np.int64)
-    return HardSet(f"{classes} classes, {noise:.0%} of labels drawn anew", X, labels, classes, 6)
+    return HardSet(f"{classes} classes, {noise:.0%} of labels random", X, labels, classes, 6)
 
 
 def contradictory(counts: Sequence[Sequence[int]]) -> HardSet:
     """Return frames, numbered by one switch if there are two, else by one joint, of counts[f][k] rows of class k each.
 
-    A row stands for all that are equal to it, and weighs their number.
+    Equal rows are merged to one, with their number as weight.
     """
     table = np.array(counts)
     frames, labels = np.nonzero(table)
@@ -103,12 +103,12 @@ def contradictory(counts: Sequence[Sequence[int]]) -> HardSet:
 
 
 def imbalanced(ratio: int) -> HardSet:
-    """Return two frames: on one the classes stand `ratio` to 1, on the other 1 to 1."""
+    """Return two frames: on one the ratio of the classes is `ratio` to 1, on the other 1 to 1."""
     return contradictory([[ratio, 1], [1, 1]])
 
 
 def repeated(weighted: HardSet) -> HardSet:
-    """Return the same set with every row there as often as it weighs."""
+    """Return the same set with every row repeated as often as its weight."""
     if weighted.weights is None:
         return weighted
     times = weighted.weights.astype(np.intp)
@@ -127,7 +127,7 @@ BitSet = tuple[NDArray[np.bool_], NDArray[np.intp], int]  # X (n, d), labels (n,
 
 
 def random_table(rng: np.random.Generator) -> Counts:
-    """Return counts of all magnitudes up to 10^9, some of them none."""
+    """Return counts of all magnitudes up to 10^9, some of them 0."""
     shape = int(rng.integers(2, 15)), int(rng.integers(2, 5))
     counts = np.floor(10.0 ** rng.uniform(-1, 9, shape)).astype(np.int64)
     counts[0, 0] += 1
@@ -142,7 +142,7 @@ def node_of(*tables: Counts) -> NodeCounts:
 
 
 def hand_made() -> Iterator[Counts]:
-    """Yield tables next to independence, next to certainty, and of one row in 10^9."""
+    """Yield tables close to independence, close to certainty, and with one row in 10^9."""
     for m in (1, 10, 10**3, 10**6, 10**9):
         yield np.array([[m + 1, m - 1], [m, m]])
         yield np.array([[m, 0], [0, m]])
@@ -152,7 +152,7 @@ def hand_made() -> Iterator[Counts]:
 
 
 def equal_pairs() -> Iterator[tuple[Counts, Counts]]:
-    """Yield tables of equal gains, whose terms differ."""
+    """Yield tables of equal gains with different terms."""
     for one, other in (
         ([[8, 0], [4, 4]], [[7, 1], [2, 6]]),
         ([[6, 0], [3, 3], [3, 3]], [[5, 1], [4, 2], [1, 5]]),
@@ -163,7 +163,7 @@ def equal_pairs() -> Iterator[tuple[Counts, Counts]]:
 
 
 def close_pairs(rng: np.random.Generator, n: int) -> Iterator[tuple[Counts, Counts]]:
-    """Yield tables of up to 10^9 rows a cell and the same class counts, of which one row lies elsewhere."""
+    """Yield tables of up to 10^9 rows a cell and the same class counts that differ by the cell of one row."""
     for _ in range(n):
         one = rng.integers(1, 10 ** int(rng.integers(1, 10)) + 1, (3, 2))
         other = one[:, ::-1].copy()
@@ -175,7 +175,7 @@ def close_pairs(rng: np.random.Generator, n: int) -> Iterator[tuple[Counts, Coun
 
 
 def bit_set(rng: np.random.Generator) -> BitSet:
-    """Return 7 bits, some of them equal, opposite, constant and next to constant, of 2 to 8 classes."""
+    """Return 7 bits, some of them equal, opposite, constant and almost constant, of 2 to 8 classes."""
     n, classes = int(rng.integers(30, 3000)), int(rng.integers(2, 9))
     labels = rng.integers(0, classes, n)
     one, other = rng.random(n) < 0.3 + 0.1 * labels % 0.7, rng.random(n) < 0.5
@@ -184,7 +184,7 @@ def bit_set(rng: np.random.Generator) -> BitSet:
 
 
 def hard_scores(rng: np.random.Generator, n: int) -> Iterator[Floats]:
-    """Yield scores (K, columns) of 2 to 33 classes: equal, a hair apart, 1e4 apart, and of every size between."""
+    """Yield scores (K, columns) of 2 to 33 classes: equal, almost equal, 1e4 apart, and of every size between."""
     for number in range(n):
         classes = int(rng.choice([2, 3, 5, 14, 33]))
         size = 10.0 ** float(rng.uniform(-16, 4))

@@ -1,4 +1,4 @@
-"""Score tables that are hard to make integers of, and all the frames there are for small ones."""
+"""Score tables that are hard to quantise, and all possible frames of small ones."""
 
 from collections.abc import Iterator
 from itertools import product
@@ -16,14 +16,14 @@ Codes = NDArray[np.uint16]
 
 
 class Frame(NamedTuple):
-    """Bits (s,) and codes (j,) that tell a frame from every other which scores differently."""
+    """Bits (s,) and codes (j,) that represent all frames with the same scores."""
 
     bits: tuple[bool, ...]
     codes: tuple[int, ...]
 
 
 class Quantised(NamedTuple):
-    """Score tables and the integers that the compiler makes of them."""
+    """Score tables and the integers that the compiler derives from them."""
 
     name: str
     tables: ScoreTables
@@ -31,9 +31,7 @@ class Quantised(NamedTuple):
 
 
 def drawn(seed: int, classes: int, switches: int, bins: tuple[int, ...], decades: float = 1.0) -> ScoreTables:
-    """Return tables of normal deviates, row by row up to `decades` powers of ten larger or smaller; a joint a number
-    of bins.
-    """
+    """Return tables of normal deviates, with rows up to `decades` powers of ten larger or smaller; `bins` per joint."""
     random = np.random.default_rng(seed)
 
     def rows(n: int) -> Floats:
@@ -53,7 +51,7 @@ def dominated(seed: int, classes: int, switches: int, bins: tuple[int, ...], fac
 
 
 def sized(tables: ScoreTables, sizes: float | Floats) -> ScoreTables:
-    """Return tables of which every row, or each class (K,), is so many times as large."""
+    """Return tables with every row multiplied by `sizes`, a number or one per class (K,)."""
     rows = tuple(rows * sizes for rows in tables.joint_rows)
     return ScoreTables(tables.bias * sizes, tables.switch_rows * sizes, tables.thresholds, rows)
 
@@ -62,8 +60,8 @@ def half_a_step_off(switches: int, limit: int) -> ScoreTables:
     """Return tables of two classes whose finest scale is 1, where bias and all rows lie half way between two steps.
 
     Those of class 0 lie above an even step, those of class 1 below one: rounded half to even, one loses half a step in
-    each, the other gains it. A scale above 1 would round class 0 up instead, in each, and leave `limit`, which must
-    be at least 2 for every switch and the bias.
+    each row, the other gains it. A scale above 1 would round class 0 up in each row and exceed `limit`, which must be
+    at least 2 for every switch and the bias.
     """
     even = 2 * (limit // 2 // switches)
     first = np.full(switches, float(even))
@@ -73,7 +71,7 @@ def half_a_step_off(switches: int, limit: int) -> ScoreTables:
 
 
 def whole_numbers(seed: int, classes: int, switches: int, bins: tuple[int, ...], most: int) -> IntegerTables:
-    """Return integer tables of random numbers up to `most`, in which a mean may well lie beyond all of its rows."""
+    """Return integer tables of random numbers up to `most`, in which a mean may lie outside its rows."""
     random = np.random.default_rng(seed)
 
     def rows(*shape: int) -> NDArray[np.int16]:
@@ -86,7 +84,7 @@ def whole_numbers(seed: int, classes: int, switches: int, bins: tuple[int, ...],
 
 
 def quantised(name: str, tables: ScoreTables, width: int = 16, seed: int = 0) -> Quantised:
-    """Return `tables` as the compiler quantises them, with 50 random rows as those trained on."""
+    """Return `tables` quantised by the compiler, with 50 random training rows."""
     random = np.random.default_rng(seed)
     bits = random.random((50, len(tables.switch_rows))) < 0.5
     codes = random.integers(0, 256, (50, len(tables.thresholds))).astype(np.uint16)
@@ -94,7 +92,7 @@ def quantised(name: str, tables: ScoreTables, width: int = 16, seed: int = 0) ->
 
 
 def rows_of(tables: ScoreTables | IntegerTables) -> list[list[list[float]]]:
-    """Return the rows (K,) that bias, switches and joints have to add, input by input; a switch's one is of closed."""
+    """Return the rows (K,) of bias, switches and joints, input by input; a switch has the row for closed."""
     inputs = [[tables.bias.tolist()], *([row] for row in tables.switch_rows.tolist())]
     return [*inputs, *(rows.tolist() for rows in tables.joint_rows)]
 
@@ -108,6 +106,6 @@ def every_frame(tables: ScoreTables | IntegerTables) -> Iterator[Frame]:
 
 
 def ends_of_bins(thresholds: Codes) -> list[int]:
-    """Return the lowest and the highest code of every bin that a joint's thresholds (T,) make."""
+    """Return the lowest and the highest code of every bin of a joint with thresholds (T,)."""
     below = [int(code) for code in thresholds]
     return sorted({0, *below, *(code + 1 for code in below if code < HIGHEST_CODE), HIGHEST_CODE})

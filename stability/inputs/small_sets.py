@@ -26,7 +26,7 @@ def make_set(
 ) -> GraspSet:
     """Return the set of these rows: switches (n, s) of 0 and 1, codes (n, j); without `subjects` all are A's.
 
-    `types` may name grasp types that no row has. Trials are numbered from 0.
+    `types` may include grasp types without rows. Trials are numbered from 0.
     """
     rows = len(grasps)
     bits = np.array(switches, bool).reshape(rows, -1 if switches else 0)
@@ -45,19 +45,19 @@ def make_set(
 
 
 def one_hot(rows: int) -> GraspSet:
-    """Return as many grasp types as rows: each closes one switch of its own."""
+    """Return as many grasp types as rows: each closes its own switch."""
     return make_set([f"type {row:02}" for row in range(rows)], np.eye(rows, dtype=int).tolist())
 
 
 def parity(inputs: int) -> GraspSet:
-    """Return every frame of that many switches, of type odd or even by the number that is closed: their XOR."""
+    """Return every frame of `inputs` switches, of type odd or even by the number of closed ones: their XOR."""
     frames = [[number >> bit & 1 for bit in range(inputs)] for number in range(1 << inputs)]
     return make_set(["odd" if sum(frame) % 2 else "even" for frame in frames], frames)
 
 
 class SmallBuild(NamedTuple):
-    """A build, the score tables it was quantised from, and the kept switches (n, s), codes (n, j) and classes (n,)
-    trained on.
+    """A build, the score tables it was quantised from, and its training rows: kept switches (n, s), codes (n, j),
+    classes (n,).
     """
 
     build: Build
@@ -68,7 +68,7 @@ class SmallBuild(NamedTuple):
 
 
 def small_set(seed: int, rows: int, switches: int, joints: int, types: int, noise: float) -> GraspSet:
-    """Return recordings in which a share `noise` of the switches' bits is flipped and joints overlap as much."""
+    """Return recordings in which a share `noise` of the switches' bits is flipped, with overlapping joints."""
     ideal = np.random.default_rng(99)
     closed, centres = ideal.random((types, switches)) < 0.5, ideal.integers(40, 216, (types, joints))
     random, labels = np.random.default_rng(seed), np.arange(rows) % types

@@ -1,1 +1,1 @@
-"""The truth at 60 digits: the formulas once more, with mpmath, independent of thenar and importing none of it."""
+"""Reference values at 60 digits: the formulas again, with mpmath, independent of thenar's code."""

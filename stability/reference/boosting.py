@@ -3,10 +3,10 @@
 Friedman, Hastie and Tibshirani, Annals of Statistics 28 (2000), algorithm 6, with the clamp of the working response
 that they recommend in section 5 and that Weka 3.6 has.
 
-A stump parts the rows into left (x <= threshold), right and missing (NaN); a branch answers with its mean C/W, where
+A stump splits the rows into left (x <= threshold), right and missing (NaN); a branch has as output its mean C/W, where
 W = sum w and C = sum w z, and so explains C^2/W. All `weights` here are w, all `responses` w z, floats or mpf (n,).
 
-A round adds to F_k  f_k = (K-1)/K (g_k - mean_j g_j)  with g_k = shrinkage * answer of class k's stump (Friedman,
+A round adds to F_k  f_k = (K-1)/K (g_k - mean_j g_j)  with g_k = shrinkage * output of class k's stump (Friedman,
 Hastie and Tibshirani 2000, algorithm 6, step 2b).
 """
 
@@ -34,7 +34,7 @@ def softmax(scores: Sequence[float]) -> list[mpf]:
 
 @precisely()
 def loss(scores: Sequence[float], label: int) -> mpf:
-    """Return -ln P of class `label`, = ln(1 + sum over the others of e^(F_k - F_label)), however small."""
+    """Return -ln P of class `label`, = ln(1 + sum over the others of e^(F_k - F_label)), even if tiny."""
     own = mpf(scores[label])
     others = (mpmath.exp(mpf(score) - own) for k, score in enumerate(scores) if k != label)
     return mpmath.log1p(mpmath.fsum(others))
@@ -61,7 +61,7 @@ Numbers = Sequence[float]
 Sums = tuple[mpf, mpf]  # W, C
 Split = tuple[mpf, int, float, float]  # explained, column, the values on both sides of the threshold
 
-# What is equal comes out within a few 10^-60 of equal, whatever the order of its sums.
+# Equal values differ by at most a few 10^-60, in any order of summation.
 EQUAL = mpf(10) ** (10 - DIGITS)
 
 
@@ -75,7 +75,7 @@ def explained(x: Numbers, weights: Numbers, responses: Numbers, threshold: float
 def branch_values(
     x: Numbers, weights: Numbers, responses: Numbers, threshold: float, z_max: float
 ) -> tuple[mpf, mpf, mpf]:
-    """Return what left, right and missing answer: C/W within +-z_max; without weight, the mean of all rows."""
+    """Return the outputs of left, right and missing: C/W within +-z_max; without weight, the mean of all rows."""
     branches = _branches(x, weights, responses, threshold)
     total = mpmath.fsum(weight for weight, _ in branches), mpmath.fsum(response for _, response in branches)
     filled = [branch if branch[0] else total for branch in branches]
@@ -130,7 +130,7 @@ Rows = Sequence[Sequence[float]]
 
 
 class Round(NamedTuple):
-    """One round: each class's splits, best first, what its best stump answers, and F (n, K) and the loss after it."""
+    """One round: each class's splits, best first, the outputs of its best stump, and F (n, K) and the loss after it."""
 
     splits: list[list[Split]]
     values: list[tuple[mpf, mpf, mpf]]
@@ -138,14 +138,14 @@ class Round(NamedTuple):
     loss: mpf
 
     def leads(self) -> list[mpf]:
-        """Return by which share of itself each class's best stump explains more than any unequal one; 1: none."""
+        """Return the relative lead in explained variation of each class's best stump over unequal ones; 1: no other."""
         return [_lead(splits) for splits in self.splits]
 
 
 @precisely()
-def step(answers: Sequence[float], shrinkage: float) -> list[mpf]:
-    """Return what a round adds to the K scores of a row."""
-    g = [mpf(answer) * shrinkage for answer in answers]
+def step(outputs: Sequence[float], shrinkage: float) -> list[mpf]:
+    """Return the step of a round for the K scores of a row."""
+    g = [mpf(output) * shrinkage for output in outputs]
     mean = mpmath.fsum(g) / len(g)
     return [(each - mean) * (len(g) - 1) / len(g) for each in g]
 
@@ -159,15 +159,15 @@ def scores(
     row: Sequence[float],
 ) -> list[mpf]:
     """Return F (K,) of one row; columns and thresholds (M, K), values (M, K, 3). A step is linear: one of all sums."""
-    answers = [
-        [answer(row[column], threshold, branches) for column, threshold, branches in zip(*stumps, strict=True)]
+    outputs = [
+        [output(row[column], threshold, branches) for column, threshold, branches in zip(*stumps, strict=True)]
         for stumps in zip(columns, thresholds, values, strict=True)
     ]
-    return step([added(own) for own in zip(*answers, strict=True)], shrinkage)
+    return step([added(own) for own in zip(*outputs, strict=True)], shrinkage)
 
 
-def answer(x: float, threshold: float, branches: Sequence[float]) -> float:
-    """Return what a stump answers to x: its value left, right, or where x is missing."""
+def output(x: float, threshold: float, branches: Sequence[float]) -> float:
+    """Return the output of a stump for x: its value left, right, or for missing x."""
     if math.isnan(x):
         return branches[2]
     return branches[0] if x <= threshold else branches[1]
@@ -182,7 +182,7 @@ def boost_rounds(
     z_max: float = 3,
     weights: Sequence[float] | None = None,
 ) -> list[Round]:
-    """Train on X (n, d) of which at least one column varies; equal stumps: lowest column, lowest threshold."""
+    """Train on X (n, d), in which at least one column varies; of equal stumps the lowest column and threshold wins."""
     F = [[mpf(0)] * n_classes for _ in labels]
     done: list[Round] = []
     for _ in range(rounds):
@@ -202,15 +202,15 @@ def _round(
 ) -> Round:
     row_weights = [1] * len(labels) if weights is None else weights
     P = [softmax(row) for row in F]
-    splits, values, answers = [], [], []
+    splits, values, outputs = [], [], []
     for k in range(len(F[0])):
         targets = [target(P[i][k], label == k, z_max, row_weights[i]) for i, label in enumerate(labels)]
         w, r = [w for w, _ in targets], [w * z for w, z in targets]
         splits.append(best_splits(columns, w, r))
         _, column, lower, _ = splits[-1][0]
         values.append(branch_values(columns[column], w, r, lower, z_max))
-        answers.append([answer(x, lower, values[-1]) for x in columns[column]])
-    steps = [step(row, shrinkage) for row in zip(*answers, strict=True)]
+        outputs.append([output(x, lower, values[-1]) for x in columns[column]])
+    steps = [step(row, shrinkage) for row in zip(*outputs, strict=True)]
     F = [[f + s for f, s in zip(*both, strict=True)] for both in zip(F, steps, strict=True)]
     return Round(splits, values, F, mean_loss(F, labels, weights))
 

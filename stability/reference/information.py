@@ -1,6 +1,6 @@
-"""Entropy and information gain of whole counts; which of two gains is the greater, without doubt.
+"""Entropy and information gain of integer counts; exact comparison of two gains.
 
-H(C) = -sum_c p_c lg p_c and I(C; V) = sum_cv p_cv lg (p_cv / (p_c p_v)), of which a term is exactly 0 where class and
+H(C) = -sum_c p_c lg p_c and I(C; V) = sum_cv p_cv lg (p_cv / (p_c p_v)), in which a term is exactly 0 if class and
 value are independent (Shannon 1948).
 """
 
@@ -18,7 +18,7 @@ Table = Sequence[Sequence[int]]  # rows: classes, columns: values
 
 @precisely()
 def entropy_bits(counts: Sequence[int]) -> mpf:
-    """Return H, in bits, of what occurs `counts` times."""
+    """Return H, in bits, of the distribution given by `counts`."""
     n = sum(counts)
     return mpmath.fsum(-mpf(m) / n * mpmath.log(mpf(m) / n, 2) for m in counts if m)
 
@@ -37,7 +37,7 @@ def gain_bits(table: Table) -> mpf:
 
 
 def conditional_gain_bits(tables: Sequence[Table]) -> mpf:
-    """Return I(class; value | given), in bits, of a table for every value of what is given."""
+    """Return I(class; value | given), in bits, of one table for every given value."""
     sizes = [sum(map(sum, table)) for table in tables]
     gains = [(size, gain_bits(table)) for size, table in zip(sizes, tables, strict=True) if size]
     with precisely():
@@ -50,7 +50,7 @@ def compare_gains(one: Table, other: Table) -> int:
 
 
 def compare_conditional_gains(one: Sequence[Table], other: Sequence[Table]) -> int:
-    """Return the sign of the difference of two gains given something, a table for each of its values."""
+    """Return the sign of the difference of two conditional gains, of one table for every given value."""
     sizes = [sum(m for table in tables for row in table for m in row) for tables in (one, other)]
     multiples: Counter[int] = Counter()
     for tables, times in ((one, sizes[1]), (other, -sizes[0])):
@@ -68,7 +68,7 @@ def _terms(table: Table) -> Iterator[tuple[int, int]]:
 
 
 def sign_of_log_sum(multiples: Mapping[int, int]) -> int:
-    """Return the sign of the sum over m of multiples[m] ln m: 0 if no prime is left over, else at digits enough."""
+    """Return the sign of the sum over m of multiples[m] ln m: 0 if no prime is left, else with sufficient digits."""
     primes: Counter[int] = Counter()
     for m, times in multiples.items():
         for prime, power in factors(m) if m > 1 and times else ():

@@ -1,4 +1,4 @@
-"""Intervals of rates: Wilson's of one proportion, Student's of several; and the quantiles that they take."""
+"""Intervals of rates: Wilson's of one proportion, Student's of several; and their quantiles."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -15,7 +15,7 @@ Interval = tuple[mpf, mpf]
 def wilson(correct: float, total: int, level: float = 0.95) -> Interval:
     """Return the two p with (correct/total - p)^2 = z^2 p (1 - p) / total: E. B. Wilson 1927. `correct` may be a mean.
 
-    A rate's complement has the complement of its interval: the upper end is 1 less the lower one of what is wrong.
+    A rate's complement has the complement of its interval: the upper end is 1 minus the lower end for the errors.
     """
     z = normal_quantile((1 + mpf(str(level))) / 2)
     return wilson_of(mpf(correct) / total, z**2 / total)

@@ -16,7 +16,7 @@ Rows = Sequence[Sequence[float]]
 
 
 class Column(NamedTuple):
-    """The row that each frame adds (n,), -1: none; rows (r, K), what pulls each (r,), and some of them together."""
+    """The row of each frame (n,), -1: none; rows (r, K), the penalty of each (r,), and their smoothness."""
 
     added: Sequence[int]
     rows: Rows
@@ -26,7 +26,7 @@ class Column(NamedTuple):
 
 @precisely()
 def largest_derivative(columns: Sequence[Column], labels: Sequence[int], weights: Sequence[float]) -> mpf:
-    """Return the largest derivative by any entry of any column's rows; one column may be the bias."""
+    """Return the largest derivative with respect to any entry of any column's rows; one column may be the bias."""
     n_classes = len(columns[0].rows[0])
     residuals: list[list[mpf]] = []
     known: dict[tuple[int, ...], list[mpf]] = {}
@@ -47,7 +47,7 @@ def largest_derivative(columns: Sequence[Column], labels: Sequence[int], weights
 
 
 def _held(column: Column, sums: list[list[mpf]]) -> list[list[mpf]]:
-    """Return the sums with what the penalties add."""
+    """Return the sums plus the derivatives of the penalties."""
     rows = [[mpf(entry) for entry in row] for row in column.rows]
     for row, pull, own in zip(rows, column.pulls, sums, strict=True):
         own[:] = [total + mpf(pull) * entry for total, entry in zip(own, row, strict=True)]

@@ -1,4 +1,4 @@
-"""Doubles as exact numbers of 60 digits, how far another double is from the truth, and linear equations and turns."""
+"""Doubles as exact numbers of 60 digits, errors of doubles, linear equations and rotations."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -15,8 +15,8 @@ DIGITS = 60
 def precisely() -> Iterator[None]:
     """Compute at 60 digits, in a block or in a whole function that it decorates.
 
-    Outside of it mpmath rounds every result to a double's 53 bits, whatever the digits of what went in.
-    Not for generators: the body of one runs when the block is long left.
+    Outside of it mpmath rounds every result to a double's 53 bits, for any precision of the operands.
+    Not for generators: their body runs after the block has ended.
     """
     with mpmath.workdps(DIGITS):
         yield
@@ -24,13 +24,13 @@ def precisely() -> Iterator[None]:
 
 @precisely()
 def exact(x: float) -> mpf:
-    """Return the number that the double `x` is, every bit of it."""
+    """Return the exact value of the double `x`."""
     return mpf(float(x))
 
 
 @precisely()
 def ratio(of: Fraction) -> mpf:
-    """Return a fraction; exact, where the denominator is a power of two and the numerator below 2^199."""
+    """Return a fraction; exact if the denominator is a power of two and the numerator below 2^199."""
     return mpf(of.numerator) / of.denominator
 
 
@@ -48,9 +48,9 @@ def distance(got: float, truth: mpf) -> float:
 
 @precisely()
 def added(doubles: Sequence[float]) -> mpf:
-    """Return the sum of doubles: every bit of it, as far as 60 digits go.
+    """Return the sum of doubles to 60 digits.
 
-    fsum rounds once; what that leaves out is another sum of doubles, until nothing is left out.
+    fsum rounds once; the remainder is another sum of doubles, until nothing remains.
     """
     parts: list[float] = []
     while rest := math.fsum([*doubles, *parts]):
@@ -69,18 +69,18 @@ sin, cos = precisely()(mpmath.sin), precisely()(mpmath.cos)
 
 @precisely()
 def solve(matrix: Sequence[Vector], right: Vector) -> list[mpf]:
-    """Return x with matrix (n, n) x = right (n,), by elimination, as many digits short of 60 as its condition has.
+    """Return x with matrix (n, n) x = right (n,), by elimination, to 60 digits minus those of its condition number.
 
-    Raises ZeroDivisionError where nothing is left of a column.
+    Raises ZeroDivisionError if the matrix is singular.
     """
-    # Lists, and rows only as long as what is left of them: mpmath's own matrices take four times as long.
+    # Lists, with rows only of the remaining length: mpmath's matrices take four times as long.
     rows = [[mpf(a) for a in (*row, b)] for row, b in zip(matrix, right, strict=True)]
     nothing = max(mpmath.fsum(map(abs, row[:-1])) for row in rows) * mpmath.eps
     done: list[list[mpf]] = []
     while rows:
         pivot = rows.pop(max(range(len(rows)), key=lambda row: abs(rows[row][0])))
         if abs(pivot[0]) <= nothing:
-            raise ZeroDivisionError("nothing is left of a column of the matrix")
+            raise ZeroDivisionError("the matrix is singular")
         done.append([each / pivot[0] for each in pivot[1:]])
         rows = [[a - row[0] * b for a, b in zip(row[1:], done[-1], strict=True)] if row[0] else row[1:] for row in rows]
     x: list[mpf] = []

@@ -1,13 +1,13 @@
-"""What stands in for the lost inputs of a kind, fitted in whole steps at 60 digits.
+"""Replacement rows of the lost inputs of a kind, fitted in whole steps at 60 digits.
 
-From the mean rows on, 20 times, each class of each row gains scale * ln(wanted / given) steps, rounded to whole ones:
-wanted is the number of rows of the class and 1/2, given the sum of its probabilities over all rows without the input
-and 1/2. Where a further set of scores says what the rows have without all inputs of the kind, the sum of their rows
-gains as much; what it lacks beyond the sum of the single gains is shared out among the inputs and itself. No entry
-leaves the ends of its input; an input whose ends are equal stays as it is and takes no share.
+Starting from the mean rows, 20 times, each class of each row gains scale * ln(wanted / given) steps, rounded to whole
+ones: wanted is the number of rows of the class plus 1/2, given the sum of its probabilities over all rows without the
+input, plus 1/2. If a further set of scores gives the rows without all inputs of the kind, their sum gains as much;
+what it lacks beyond the sum of the single gains is divided among the inputs and itself. No entry leaves the range
+of its input; an input with an empty range stays constant and takes no share.
 
-Doubles compute the same up to a last bit, and a whole number of steps hangs on that bit only next to a half. What they
-may lose is worked out at every step; where a half lies within, both whole numbers are followed.
+Doubles compute the same up to the last bit, and an integer number of steps depends on that bit only close to a half.
+The error of doubles is computed at every step; if a half lies within it, both integers are followed.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -25,17 +25,17 @@ DOUBT = mpf(1) / 2
 Row = tuple[int, ...]
 Rows = tuple[Row, ...]
 _U = mpf(2) ** -53
-# Sums of probabilities, of fewer than 2^20 rows, are taken in whole parts of this; each is at most half a part off.
+# Sums of probabilities, of fewer than 2^20 rows, are in integer multiples of this; each is off by at most half of it.
 _PART = mpf(2) ** -32
 
 
 class Kind(NamedTuple):
-    """The switches, or the joints, of tables in whole steps, and n rows that were trained on.
+    """The switches, or the joints, of tables in whole steps, and n training rows.
 
-    without  per input, the scores (n, K) of the rows but for what the input adds, and perhaps, as one more than there
-             are inputs, those but for what all of the kind add
+    without  per input, the scores (n, K) of the rows without the input's row, and optionally, as one more entry, those
+             without the rows of all inputs of the kind
     labels   the class of each row, (n,)
-    ends     per input, the least (K,) and the most (K,) that it adds
+    ends     per input, its least (K,) and greatest (K,) row entries
     scale    steps per unit of score
     """
 
@@ -47,14 +47,14 @@ class Kind(NamedTuple):
 
 @precisely()
 def whole(rows: Sequence[Sequence[mpf]], doubt: float, ends: Sequence[tuple[Row, Row]]) -> set[Rows]:
-    """Return all whole numbers, between the ends, that `rows` may be rounded to if each is at most `doubt` off."""
+    """Return all integer roundings of `rows`, between the ends, if each entry is off by at most `doubt`."""
     none = [[0] * len(row) for row in rows]
     return set(_rounded(none, rows, [[mpf(doubt)] * len(row) for row in rows], ends))
 
 
 @precisely()
 def stand_ins(kind: Kind, means: Iterable[Rows]) -> set[Rows]:
-    """Return what the rows of each input may be in the end, if they begin as one of the `means`: all but always one."""
+    """Return the possible final rows of each input, starting from one of the `means`: almost always one."""
     powers: dict[int, mpf] = {}
     for score in {score for rows in kind.without for row in rows for score in row}:
         powers[score] = mpmath.exp(mpf(score) / mpf(kind.scale))
@@ -75,7 +75,7 @@ def _step(kind: Kind, shares: Sequence[Sequence[Sequence[mpf]]], rows: Rows) -> 
     if len(lacks) > n:
         beyond = [(lacks[n][k] - mpmath.fsum(lack[k] for lack in gains)) / (1 + n) for k in classes]
         gains = [[lack[k] + beyond[k] for k in classes] for lack in gains]
-    # A gain is off by what its own lack is, and by a (1 + n)-th of what all are; n + 4 roundings add and divide them.
+    # The error of a gain is that of its lack plus a (1 + n)-th of all; n + 4 roundings add and divide them.
     most = [2 * (max(of[k] for of in doubts) + (n + 4) * _U * max(abs(of[k]) for of in lacks)) for k in classes]
     moves = iter(gains)
     all_gains = [next(moves) if counts else [mpf(0)] * len(sums) for counts in says]
@@ -85,12 +85,12 @@ def _step(kind: Kind, shares: Sequence[Sequence[Sequence[mpf]]], rows: Rows) -> 
 def _lack(
     kind: Kind, scores: Sequence[Sequence[int]], shares: Sequence[Sequence[mpf]], row: Row
 ) -> tuple[list[mpf], list[mpf]]:
-    """Return the steps (K,) that each class lacks where all `scores` gain this row, and by how much doubles are off.
+    """Return the steps (K,) that each class lacks if all `scores` gain this row, and the error bound of doubles.
 
     With u = 2^-53 and B the largest of the scores in units: an exponent is off by 4 B u, from two divisions and a
-    difference; a power by as much and 2 u; a probability by twice that and K u for the sum and the quotient. A part
-    that a row has in a sum is off by half of 2^-32, and the sum itself by nothing. Adding 1/2, the quotient, the
-    product with the scale: 3 u; the logarithm 2 ulp, 4 u of itself, and 2 u more for all products of u.
+    difference; a power by as much and 2 u; a probability by twice that and K u for the sum and the quotient. Each row's
+    term of a sum is off by half of 2^-32, and the sum itself is exact. Adding 1/2, the quotient, the product with the
+    scale: 3 u; the logarithm 2 ulp, 4 u of itself, and 2 u more for all products of u.
     """
     scale, powers = mpf(kind.scale), [mpmath.exp(mpf(step) / mpf(kind.scale)) for step in row]
     inverse = [1 / mpmath.fdot(of, powers) for of in shares]
@@ -111,7 +111,7 @@ def _rounded(
     doubts: Sequence[Sequence[mpf]],
     ends: Sequence[tuple[Row, Row]],
 ) -> Iterator[Rows]:
-    """Yield the rows after their gains in whole steps, half to even, for every way in which doubt may round them."""
+    """Yield the rows after their gains in whole steps, half to even, for every rounding that the doubt allows."""
     choices = [
         sorted({min(max(x + int(mpmath.nint(gain + off)), low), high) for off in (-doubt, doubt)})
         for row, of, more, (least, most) in zip(rows, gains, doubts, ends, strict=True)

@@ -1,4 +1,4 @@
-"""Score tables of an ensemble, and what becomes of them on the way to whole steps.
+"""Score tables of an ensemble, and their conversion to whole steps.
 
 F_k = bias_k + sum of switch_rows[s][k] over the closed switches s + sum over joints of the row of the code's bin, where
 a code's bin is the number of thresholds below it.
@@ -11,7 +11,7 @@ from fractions import Fraction
 import mpmath
 from mpmath import mpf
 
-from .boosting import answer, step
+from .boosting import output, step
 from .numbers import added, precisely
 
 HIGHEST_CODE = 65535
@@ -46,8 +46,8 @@ def score_tables(
 ) -> tuple[list[mpf], list[list[mpf]], list[Joint]]:
     """Return (bias, switch rows, joints) of an ensemble over [switches | joint codes 0..65535].
 
-    An input's part of F is a function of that input alone: what it adds where it is 0 and where it is 1, or code by
-    code; it can change only where the code passes a threshold.
+    An input's part of F is a function of that input alone: its values at 0 and 1, or code by code; it can change only
+    at a threshold.
     """
     n_classes = len(columns[0])
     stumps: list[list[tuple[int, float, Row]]] = [[] for _ in range(n_inputs)]
@@ -66,9 +66,9 @@ def score_tables(
 
 @precisely()
 def balanced(bias: Row, joint_rows: Sequence[Sequence[Row]]) -> tuple[list[mpf], list[list[list[mpf]]]]:
-    """Return bias and joint rows after every joint gave up its lowest row and one share, 0 to 1, of its span.
+    """Return bias and joint rows after subtracting from every joint its lowest row and a share, 0 to 1, of its span.
 
-    With one share for all joints of a class, that which leaves the least bias.
+    The share is common to all joints of a class, and minimises the bias.
     """
     bias, joints = [mpf(b) for b in bias], [[[mpf(x) for x in row] for row in rows] for rows in joint_rows]
     for k in range(len(bias)) if joints else ():
@@ -86,32 +86,32 @@ def balanced(bias: Row, joint_rows: Sequence[Sequence[Row]]) -> tuple[list[mpf],
 
 @precisely()
 def mean_row(thresholds: Sequence[int], rows: Sequence[Row], codes: Sequence[int]) -> list[mpf]:
-    """Return the mean (K,) of the rows that a joint's `codes` (n,) call for; it stands in for a missing joint."""
+    """Return the mean (K,) of the rows selected by a joint's `codes` (n,), the replacement of a missing joint."""
     total = _added([rows[_bin(thresholds, code)] for code in codes])
     return [each / len(codes) for each in total]
 
 
 @precisely()
 def mean_switch(row: Row, bits: Sequence[bool]) -> list[mpf]:
-    """Return a switch's `row` (K,) times the share of `bits` (n,) that are 1; it stands in for a missing switch."""
+    """Return a switch's `row` (K,) times the share of `bits` (n,) that are 1, the replacement of a missing switch."""
     return [mpf(x) * sum(bits) / len(bits) for x in row]
 
 
 def steps(value: float, scale: float) -> int:
-    """Return the whole number next to value * scale; half way between two, the even one."""
+    """Return value * scale rounded to an integer, half to even."""
     return round(Fraction(value) * Fraction(scale))
 
 
 def _parts(
     stumps: Sequence[tuple[int, float, Row]], n_classes: int, shrinkage: float, inputs: Sequence[int]
 ) -> list[list[mpf]]:
-    """Return what the stumps of one input add to F (K,) at each of `inputs`."""
+    """Return the contribution of one input's stumps to F (K,) at each of `inputs`."""
     parts = []
     for x in inputs:
-        answers: list[list[float]] = [[] for _ in range(n_classes)]
+        outputs: list[list[float]] = [[] for _ in range(n_classes)]
         for k, threshold, branches in stumps:
-            answers[k].append(answer(x, threshold, branches))
-        parts.append(step([added(own) for own in answers], shrinkage))
+            outputs[k].append(output(x, threshold, branches))
+        parts.append(step([added(own) for own in outputs], shrinkage))
     return parts
 
 

@@ -1,1 +1,1 @@
-"""What people are shown: the page, its pictures, and what these are measured from."""
+"""The page, its pictures, and their measurements."""

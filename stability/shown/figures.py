@@ -1,4 +1,4 @@
-"""What the page shows in pictures: measured on all cores, drawn, and with how to read it."""
+"""The pictures of the page, with captions, from measurements on all cores."""
 
 import itertools
 import math
@@ -25,9 +25,9 @@ from ..checks.integer_sums import first_best
 from ..checks.rounds import mean_score, moments
 from ..inputs.hard_data import HardSet, noisy, separable
 from ..inputs.small_sets import small_set
-from ..report import besides
 from ..report import figure as worded
-from ..weka import PARTED, Beside, NotRun
+from ..report import weka_lines
+from ..weka import DIVERGED, Comparison, NotRun
 from .page import Picture
 
 if TYPE_CHECKING:
@@ -36,11 +36,11 @@ if TYPE_CHECKING:
 
 FONT = 9.5
 
-# Okabe and Ito's colours, which the colour-blind tell apart too.
+# Okabe and Ito's colour-blind safe colours.
 BLUE, ORANGE, RED, GREEN, GREY = "#0072B2", "#E69F00", "#D55E00", "#009E73", "#666666"
 
 _WIDTH = 8.6  # inches
-_APART = 1.03  # of two rounds on a logarithmic axis, as a ratio
+_APART = 1.03  # smallest ratio of two rounds on a logarithmic axis
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -53,12 +53,12 @@ def sheet(rows: int, columns: int, height: float) -> tuple["Figure", list[list["
 
 
 def head(axes: "Axes", title: str) -> None:
-    """Say over the axes what they show, and in which unit."""
+    """Set a title above the axes: quantity and unit."""
     axes.set_title(title, fontsize=FONT, loc="left")
 
 
 def band(axes: "Axes", least: Sequence[float], greatest: Sequence[float], colour: str) -> None:
-    """Draw what lies between two curves."""
+    """Fill the area between two curves."""
     rounds, low = curve(axes, least, colour, pick=min)
     _, high = curve(axes, greatest, colour)
     axes.fill_between(rounds, low, high, color=colour, alpha=0.15, lw=0)
@@ -71,9 +71,9 @@ def curve(
     label: str | None = None,
     pick: Callable[[Sequence[float]], float] = max,
 ) -> tuple[list[int], list[float]]:
-    """Draw those heights after each round that are above 0, and return rounds and heights drawn.
+    """Draw the positive heights after each round, and return the drawn rounds and heights.
 
-    Rounds too near to be told apart on a logarithmic axis are one point, the height that `pick` chooses.
+    Rounds too close on a logarithmic axis are merged to one point, with the height chosen by `pick`.
     """
     last, rounds = len(heights), [1]
     while rounds[-1] <= last:
@@ -88,7 +88,7 @@ def curve(
 
 
 def exponents(axes: "Axes") -> range:
-    """Return the exponents of at most seven powers of ten between which all that is drawn above 0 lies."""
+    """Return the exponents of at most seven powers of ten that enclose all drawn positive values."""
     heights = [height for line in axes.lines for height in np.asarray(line.get_ydata(), np.float64).tolist()]
     parts = [f"{height:e}".split("e") for height in heights if height > 0] or [["1", "0"]]
     low = min(int(power) for _, power in parts)
@@ -109,17 +109,17 @@ def powers(axes: "Axes", ticks: range) -> None:
 
 
 def rule(axes: "Axes", height: float, right: float, text: str) -> None:
-    """Draw a dotted line across, with what it means under its right end."""
+    """Draw a dotted horizontal line, with its meaning under its right end."""
     axes.axhline(height, color=GREY, lw=1, ls=":")
     note = axes.annotate(text, (right, height), (0, -3), textcoords="offset points", ha="right", va="top", color=GREY)
     note.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 1})
 
 
-_NOTHING = 1e-17  # where a difference of exactly 0 stands on a logarithmic axis
+_NOTHING = 1e-17  # the position of a difference of exactly 0 on a logarithmic axis
 
 
 def draw_ranges(trainings: Sequence["Ranges"], kind: str = "svg") -> bytes:
-    """Return for one or two trainings least and greatest probability and weight, loss, and drift of the scores."""
+    """Draw for one or two trainings least and greatest probability and weight, loss, and drift of the scores."""
     with painting(FONT):
         figure, ((shares, weights), (losses, drifts)) = sheet(2, 2, 5.6)
         for ranges, colour in zip(trainings, (BLUE, RED), strict=False):
@@ -138,24 +138,24 @@ def draw_ranges(trainings: Sequence["Ranges"], kind: str = "svg") -> bytes:
         return rendered(figure, kind)
 
 
-def draw_beside(beside: Beside, kind: str = "svg") -> bytes:
-    """Return how far apart the held-out distributions of thenar and of Weka under two exp() are, after each round."""
+def draw_weka(weka: Comparison, kind: str = "svg") -> bytes:
+    """Draw the differences of the held-out distributions of thenar and of Weka with two exp(), after each round."""
     with painting(FONT):
         figure, ((axes,),) = sheet(1, 1, 4.1)
         lines = (
-            (beside.weka_itself, RED, "-", "Weka and itself, under the JVM's two exp() settings"),
-            (beside.ours_processor, ORANGE, "--", "thenar and Weka under the processor's exp(), the default"),
-            (beside.ours_java, BLUE, "-", "thenar and Weka under the exp() written in Java"),
+            (weka.weka_itself, RED, "-", "Weka with the JVM's two exp() settings"),
+            (weka.ours_processor, ORANGE, "--", "thenar and Weka with the processor's exp(), the default"),
+            (weka.ours_java, BLUE, "-", "thenar and Weka with Java's portable exp()"),
         )
         for differences, colour, style, label in lines:
             heights = [max(height, _NOTHING) for height in differences.largest]
-            axes.plot(range(1, beside.rounds + 1), heights, color=colour, ls=style, lw=1.8, label=label)
-        rule(axes, PARTED, beside.rounds, "below this, the same answer")
-        if beside.weka_itself.parts is not None:
-            axes.axvline(beside.weka_itself.parts, color=RED, lw=1)
-            said = f"round {beside.weka_itself.parts}:\nWeka parts from itself"
-            axes.annotate(said, (beside.weka_itself.parts, 1e-5), (6, 0), textcoords="offset points", color=RED)
-        axes.set(xlim=(0, beside.rounds), xlabel="round of boosting", ylabel="largest difference of a probability")
+            axes.plot(range(1, weka.rounds + 1), heights, color=colour, ls=style, lw=1.8, label=label)
+        rule(axes, DIVERGED, weka.rounds, "below this, equal models")
+        if weka.weka_itself.parts is not None:
+            axes.axvline(weka.weka_itself.parts, color=RED, lw=1)
+            said = f"round {weka.weka_itself.parts}:\nthe Weka runs diverge"
+            axes.annotate(said, (weka.weka_itself.parts, 1e-5), (6, 0), textcoords="offset points", color=RED)
+        axes.set(xlim=(0, weka.rounds), xlabel="round of boosting", ylabel="largest difference of a probability")
         powers(axes, range(-16, 1, 4))
         axes.set_ylim(_NOTHING, 30)
         figure.legend(frameon=False, loc="outside upper left")
@@ -163,15 +163,15 @@ def draw_beside(beside: Beside, kind: str = "svg") -> bytes:
 
 
 def draw_widths(widths: Sequence["Width"], kind: str = "svg") -> bytes:
-    """Return what a lead loses at worst and the recognition rate kept, by the width of the tables' integers."""
+    """Draw the worst loss of a lead and the remaining accuracy, by the width of the tables' integers."""
     with painting(FONT):
         figure, ((losses, rates),) = sheet(1, 2, 3.4)
         bits, rows = [width.bits for width in widths], widths[0].total
         losses.plot(bits, [each.bound for each in widths], color=GREY, ls=":", label="bound: inputs + 1 steps")
         _dots(losses, bits, [each.worst for each in widths], BLUE, "the worst of all frames")
         _dots(rates, bits, [100 * each.correct / rows for each in widths], GREEN, "")
-        head(losses, "what a lead loses at worst, units of score")
-        head(rates, f"recognition rate, % of {rows} unseen rows")
+        head(losses, "worst loss of a lead, units of score")
+        head(rates, f"accuracy, % of {rows} unseen rows")
         powers(losses, exponents(losses))
         losses.legend(frameon=False)
         rule(rates, 100 * widths[0].correct_ensemble / rows, bits[-1], "the ensemble, in doubles")
@@ -186,9 +186,9 @@ def _dots(axes: "Axes", bits: list[int], heights: list[float], colour: str, labe
 
 
 class Ranges(msgspec.Struct, frozen=True):
-    """The state after every round, lists of as many numbers as there are rounds.
+    """The state after every round: lists with one number per round.
 
-    Least and greatest of what is above 0, NaN where nothing is; mean_scores are the largest |mean over the classes of
+    Least and greatest of positive values, NaN if there are none; mean_scores are the largest |mean over the classes of
     F| of any row.
     """
 
@@ -220,11 +220,11 @@ WIDTHS = range(4, 17)
 
 
 class Width(msgspec.Struct, frozen=True):
-    """Integers of `bits` bits beside the ensemble they were made of, on `total` rows that neither has seen.
+    """Integers of `bits` bits compared with their ensemble, on `total` unseen rows.
 
-    scale is in steps per unit of score. worst_steps is the most that any frame's lead over another grasp type loses,
-    exactly; worst and bound are that and (inputs + 1) steps in units of score. correct and correct_ensemble count rows
-    recognised, kept those that have the ensemble's answer.
+    scale is in steps per unit of score. worst_steps is the largest exact loss of any frame's lead over another grasp
+    type; worst and bound are that and (inputs + 1) steps in units of score. correct and correct_ensemble count correct
+    predictions, kept those equal to the ensemble's.
     """
 
     bits: int
@@ -239,12 +239,12 @@ class Width(msgspec.Struct, frozen=True):
 
     @property
     def rate(self) -> float:
-        """The recognition rate with these integers."""
+        """The accuracy with these integers."""
         return self.correct / self.total
 
 
 def widths(full: bool) -> list[Width]:
-    """Return what each width costs, on a set in which a fifth of the switches read wrongly."""
+    """Return the cost of each width, on a set in which a fifth of the switches read wrongly."""
     rows, rounds = (600, 100) if full else (300, 60)
     trained, unseen = (small_set(seed, rows, switches=24, joints=4, types=8, noise=0.2) for seed in (1, 2))
     stumps, _ = boost(_inputs(trained), trained.labels, 8, rounds=rounds)
@@ -254,7 +254,7 @@ def widths(full: bool) -> list[Width]:
         integers = quantise(tables, trained.switches, trained.codes, bits)
         worst = Rounding(tables, integers).worst_of_all().loss
         scorer, frames = Scorer(integers), zip(unseen.switches, unseen.codes, strict=True)
-        answers = np.array([first_best(scorer.lanes(*frame)) for frame in frames])
+        predicted = np.array([first_best(scorer.lanes(*frame)) for frame in frames])
         found.append(
             Width(
                 bits=bits,
@@ -263,9 +263,9 @@ def widths(full: bool) -> list[Width]:
                 worst=float(worst) / integers.scale,
                 bound=(tables.n_inputs + 1) / integers.scale,
                 total=rows,
-                correct=int(np.count_nonzero(answers == unseen.labels)),
+                correct=int(np.count_nonzero(predicted == unseen.labels)),
                 correct_ensemble=int(np.count_nonzero(expected == unseen.labels)),
-                kept=int(np.count_nonzero(answers == expected)),
+                kept=int(np.count_nonzero(predicted == expected)),
             )
         )
     return found
@@ -282,14 +282,14 @@ _TRAININGS = (separable(33), noisy(14, 140, 1 / 3, seed=1))
 
 
 class Measured(msgspec.Struct, frozen=True):
-    """The numbers behind the pictures that need no Weka."""
+    """The numbers of the pictures, except for Weka's."""
 
     trainings: tuple[Ranges, ...]
     widths: tuple[Width, ...]
 
 
 def measure(*, full: bool, jobs: int = -1, rounds: int = ROUNDS, progress: Progress | None = None) -> Measured:
-    """Return the numbers. Raises BrokenExecutor if a worker is killed."""
+    """Measure the numbers. Raises BrokenExecutor if a worker is killed."""
     progress = progress or (lambda done, total: None)
     numbers = range(len(_TRAININGS))
     progress(0, len(numbers))
@@ -300,9 +300,9 @@ def measure(*, full: bool, jobs: int = -1, rounds: int = ROUNDS, progress: Progr
     return Measured(tuple(found[number] for number in numbers), tuple(widths(full)))
 
 
-def figures(measured: Measured, beside: Beside | NotRun | None) -> tuple[Picture, ...]:
-    """Return the pictures of the page in their order; without Weka's where it was not asked for."""
-    return (_ranges(measured), *(() if beside is None else (_beside(beside),)), _widths(measured))
+def figures(measured: Measured, weka: Comparison | NotRun | None) -> tuple[Picture, ...]:
+    """Return the pictures of the page in order, without Weka's if it was not requested."""
+    return (_ranges(measured), *(() if weka is None else (_weka(weka),)), _widths(measured))
 
 
 def _training(number: int, rounds: int) -> tuple[int, Ranges]:
@@ -315,37 +315,35 @@ def _ranges(measured: Measured) -> Picture:
     return Picture(
         "ranges",
         f"Probabilities, weights, loss and drift over {rounds:,} rounds.",
-        "One set that a switch a class parts at once, and one with noise in its labels that is learned by heart in the "
-        "end. What is learned has next to no loss and rows of next to no weight: from there on a round has nothing "
-        "left to learn, and must leave things as they are. The scores of a row have the mean 0; what rounding "
-        f"leaves of that is at most {worded(drift)} after any round: a settled training rounds the same step in the "
-        "same way for ever.",
+        "One set that one switch per class separates at once, and one with noisy labels that is overfitted in the end. "
+        "After that the loss and the weights of rows are almost 0: further rounds have nothing to learn, and must "
+        "change nothing. The scores of a row have the mean 0; rounding changes it by at most "
+        f"{worded(drift)} after any round: a settled training rounds the same step in the same way in every round.",
         draw_ranges(measured.trainings),
     )
 
 
-def _beside(beside: Beside | NotRun) -> Picture:
-    title = "Ours beside Weka's, under two exp() settings of its JVM."
-    if isinstance(beside, NotRun):
-        return Picture("beside", title, besides(beside)[0], None)
+def _weka(weka: Comparison | NotRun) -> Picture:
+    title = "thenar and Weka, with two exp() settings of the JVM."
+    if isinstance(weka, NotRun):
+        return Picture("weka", title, weka_lines(weka)[0], None)
     return Picture(
-        "beside",
+        "weka",
         title,
-        f"Trained on {beside.rows} rows of {beside.classes} classes; shown is the largest difference between the "
-        f"probabilities that two answers give to {beside.held_out} other rows. The two settings differ in the last bit "
-        "of some exponentials, and in nothing else. No branch of a stump should answer with more than 3: Weka's go up "
-        f"to {worded(beside.weka_value)}, which is residue of rounding over residue; thenar's up to "
-        f"{worded(beside.our_value)}.",
-        draw_beside(beside),
+        f"Trained on {weka.rows} rows of {weka.classes} classes; shown is the largest difference between the "
+        f"probabilities of two models for {weka.held_out} other rows. The two settings differ only in the last bit of "
+        "some exponentials. No branch of a stump should have an output above 3: Weka's reach "
+        f"{worded(weka.weka_value)}, a quotient of rounding residues; thenar's reach {worded(weka.our_value)}.",
+        draw_weka(weka),
     )
 
 
 def _widths(measured: Measured) -> Picture:
     return Picture(
         "widths",
-        "What narrower integers cost.",
-        "Left: the most by which rounding the tables can shift the lead of one grasp type over another, found exactly "
-        "over all frames that there can be, beside its bound. Right: what that does to the recognition rate, on rows "
-        "that neither the ensemble nor its tables have seen.",
+        "The cost of narrower integers.",
+        "Left: the largest change that rounding the tables can make to the lead of one grasp type over another, "
+        "computed exactly over all possible frames, and its bound. Right: the accuracy on rows that neither the "
+        "ensemble nor its tables have seen.",
         draw_widths(measured.widths),
     )

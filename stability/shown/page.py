@@ -1,4 +1,4 @@
-"""The report as one HTML file that needs no other: table, pictures, and no date."""
+"""The report as one self-contained HTML file: table and pictures, without a date."""
 
 import re
 from dataclasses import dataclass
@@ -7,12 +7,12 @@ from importlib.resources import files
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
-from ..report import Report, besides, bound_of, error_of, failures, legend, summary, verdict
+from ..report import Report, bound_of, error_of, failures, legend, summary, verdict, weka_lines
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture (SVG as bytes, or nothing where there is none) with what it is and how to read it."""
+    """A picture (SVG as bytes, or None) with title and caption."""
 
     name: str
     title: str
@@ -23,7 +23,7 @@ class Picture:
 def page(report: Report, pictures: tuple[Picture, ...]) -> str:
     """Return the page. The same report and pictures give the same text."""
     environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
-    filters = (summary, besides, failures, legend, error_of, bound_of, verdict)
+    filters = (summary, weka_lines, failures, legend, error_of, bound_of, verdict)
     environment.filters |= {each.__name__: each for each in filters}
     template = environment.from_string(files(__package__).joinpath("page.html.j2").read_text("utf-8"))
     inline = [(picture, _inline(picture)) for picture in pictures]
@@ -31,13 +31,13 @@ def page(report: Report, pictures: tuple[Picture, ...]) -> str:
 
 
 def _inline(picture: Picture) -> Markup:
-    """Return the picture as an element of the page, its names its own and nothing in it that points elsewhere."""
+    """Return the picture as an element of the page, with unique ids and no external links."""
     if picture.svg is None:
         return Markup("")
     svg = picture.svg.decode()
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>\s*", "", svg, flags=re.S)
-    # Two pictures both have an axes_1; within the page a name must be one thing's.
+    # Two pictures both have an axes_1; within the page an id must be unique.
     svg = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{picture.name}-", svg)
     label = Markup.escape(picture.title)
     return Markup(svg.replace("<svg ", f'<svg role="img" aria-label="{label}" ', 1))

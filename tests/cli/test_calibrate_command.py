@@ -193,7 +193,7 @@ def test_an_unplugged_glove_is_not_calibrated(line: PtyLine, tmp_path: Path) -> 
         glove.state.plugged = False
         code, _, said = converse(process, lambda _: None)
     assert code == 2
-    assert "?G says 1, not 3" in said
+    assert "?G returns 1, not 3" in said
     assert "the glove is not plugged into its box" in said.splitlines()[-1]
 
 

@@ -57,7 +57,7 @@ def test_a_box_without_a_mask_is_found(thenar: Thenar, harness: Path, glove: Emu
     glove.box.doubts = Doubts(mask="ignored")
     done = thenar("doctor", harness)
     assert done.returncode == 0, done.stderr
-    assert "it takes no sensor mask" in " ".join(done.stdout.split())
+    assert "it accepts no sensor mask" in " ".join(done.stdout.split())
 
 
 def test_a_port_that_is_not_there_is_exit_code_1(thenar: Thenar, tmp_path: Path) -> None:

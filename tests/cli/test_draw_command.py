@@ -148,7 +148,7 @@ def test_a_folder_that_is_no_build_is_refused(tmp_path: Path, capsys: pytest.Cap
         (["GRASPS", "--kept", "GRASPS"], "leave GRASPS out"),
         (["--numbers", "--kept", "GRASPS"], "leave out --numbers"),
         (["GRASPS", "--place", "--per-grasp"], "give one of them"),
-        (["-o", "glove.pdf"], "ends in .svg or .png"),
+        (["-o", "glove.pdf"], "must end in .svg or .png"),
         (["-o", "no/such/glove.svg"], "There is no folder 'no/such'"),
     ],
 )

@@ -64,7 +64,7 @@ def test_the_papers_tables_are_printed_with_both_protocols_explained(
         "Tables II and V): paper protocol",
         "Tables III and VI): nested protocol",
         "Tables IV and VII): paper protocol",
-        "ID3 beside other placements of as many switches, selected switches: nested protocol",
+        "ID3 compared with other placements of as many switches, selected switches: nested protocol",
         "Angle + NoSel-Co",
         "placement of subject [b]Bob",
         "48 trials, 3 grasp types; 4 stratified folds of whole trials, 1 repeat",

@@ -222,5 +222,5 @@ def test_a_port_on_the_command_line_is_held_to_the_rule_for_those_in_files(thena
     victim = tmp_path / "victim"
     victim.write_text("kept")
     said = _one_sentence(thenar("calibrate", f"spy:///dev/null?file={victim}", "-o", tmp_path / "anna.toml"))
-    assert "is no port that is opened: a port is a device such as /dev/ttyUSB0" in said
+    assert "is not a supported port: a port is a device such as /dev/ttyUSB0" in said
     assert victim.read_text() == "kept"

@@ -53,7 +53,7 @@ def test_a_folder_is_written_and_the_layout_told_with_its_reason_and_what_to_do_
         rf"^expected: {'at most' if target.startswith('a') else 'about'} \d+ (cycles|instructions) a frame "
         r"\(\d+ by update\(\)\), "
         r"\d+ bytes of flash "
-        r"\(\d+ where only classify\(\) is called\), \d+ of RAM$",
+        r"\(\d+ if only classify\(\) is called\), \d+ of RAM$",
         done.stdout,
         re.MULTILINE,
     )

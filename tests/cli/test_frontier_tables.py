@@ -26,7 +26,7 @@ def test_errors_of_models_what_was_skipped_and_the_sentence_follow(
 ) -> None:
     told = "\n".join(_printed(examples.example_frontier(), capsys))
     assert "classify on the AVR, simulated: 36 times" in told
-    assert "off by 1.1% in the mean, 3.4% at worst" in told
+    assert "mean error 1.1%, worst 3.4%" in told
     assert "qemu-system-arm is missing" in told
     assert "Point 5: 33 of 160 switches" in told
 

@@ -150,7 +150,7 @@ def test_a_table_is_imported_without_a_columns_toml(glove: Path, capsys: pytest.
         "a semicolon",
         "decimal sign: a comma",
         "Versuch │ trial",
-        "columns.toml: what was",
+        "columns.toml: the detected columns",
     ):
         assert words in said.out
     assert "numbered as trials in natural order: 'T1' is 1, 'T2' is 2, 'T10' is 3" in said.out

@@ -144,7 +144,7 @@ def test_a_standard_placement_is_printed_stored_and_drawn(
         (["--population", "--keep", "3"], "the set has 1 subject(s)"),
         (["--joints"], "--joints is for methods other"),
         (["--glove", "GLOVE"], "--glove gives the scan costs"),
-        (["--method", "elimination", "--keep", "3", "--glove", "GLOVE"], "weighs that: elimination-cost, id3-cost"),
+        (["--method", "elimination", "--keep", "3", "--glove", "GLOVE"], "weighs them: elimination-cost, id3-cost"),
         (["--population", "--method", "id3-cost", "--keep", "3", "--glove", "GLOVE"], "--glove gives the scan costs"),
     ],
 )

@@ -81,7 +81,7 @@ def test_whole_movements_may_have_a_rest_between_them_and_the_summary_says_how_m
     scene = load_scene("continuous-rest").varied(repetitions=1, subjects=["C"], rest="flat")
     again = simulate(msgspec.structs.replace(scene, name="continuous"), jobs=1).grasp_set
     assert made.fingerprint() == again.fingerprint()
-    assert f"{path}: {len(made)} rows (in {made.is_none.sum()} nothing is held), simulated" in capsys.readouterr().out
+    assert f"{path}: {len(made)} rows ({made.is_none.sum()} with nothing held), simulated" in capsys.readouterr().out
 
 
 def test_fresh_grasps_are_asked_for_with_more_and_the_help_says_what_a_seed_draws(
@@ -115,7 +115,7 @@ def test_what_did_not_settle_is_warned_of_by_name(hasty: Path, tmp_path: Path, c
     unsettled = json.loads(capsys.readouterr().out)["unsettled"]
     assert run(["simulate", str(hasty), *SMALL, "-o", str(path), "--overwrite"]) == 0
     warning = capsys.readouterr().err
-    assert warning.startswith(f"warning: {len(unsettled)} of 28 grasps cannot be trusted, and are left out of the set")
+    assert warning.startswith(f"warning: {len(unsettled)} of 28 grasps did not settle, and are left out of the set")
     for one in unsettled[:10]:
         place = f"subject {one['subject']}, {one['grasp']} with {one['object']}, repetition {one['repetition']}"
         assert f"{place}: {one['why']}" in warning
@@ -177,7 +177,7 @@ def test_shipped_scenes_are_listed_with_what_they_are(capsys: Captured) -> None:
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["quick"], "say one of --output, --explain, --ablate, --list"),
+        (["quick"], "choose one mode: --output, --explain, --ablate, --list"),
         (["quick", "--explain", "--ablate"], "choose one mode:"),
         (["--explain"], "name a scene"),
         (["quick", "--list"], "leave out quick"),

@@ -66,7 +66,7 @@ def test_a_case_of_another_name_is_refused_with_the_nearest(thenar: Thenar) -> N
 def test_a_page_into_a_folder_that_is_not_there_is_refused_before_any_work(thenar: Thenar, tmp_path: Path) -> None:
     done = thenar("stability", "-o", tmp_path / "no" / "page.html")
     assert done.returncode == 2
-    assert "make it first" in done.stderr
+    assert "create it first" in done.stderr
 
 
 def test_listing_runs_nothing(thenar: Thenar, tmp_path: Path) -> None:
@@ -103,7 +103,7 @@ def test_a_case_that_raises_is_a_line_and_hides_no_other(here: Thenar) -> None:
 def test_json_holds_every_number_and_the_verdicts(here: Thenar) -> None:
     done = here("exceeding", "sound", "--json")
     report = json.loads(done.stdout)
-    assert (done.returncode, report["holds"], report["full"], report["beside"]) == (1, False, False, None)
+    assert (done.returncode, report["holds"], report["full"], report["weka"]) == (1, False, False, None)
     assert [(case["name"], case["holds"]) for case in report["cases"]] == [("sound", True), ("exceeding", False)]
     assert report["cases"][1]["checks"][0]["finding"]["error"] == 1.5
 
@@ -120,7 +120,7 @@ def test_no_word_no_number_and_no_verdict_is_cut_on_a_narrow_terminal(
     assert max(map(len, plain.splitlines())) <= 60
     words = {word for line in plain.splitlines() for word in line.split()}
     assert "\u2026" not in plain
-    assert words >= {*check.split(), "against", "numbers", "235,929", "2.44e-16", "2.22e-15", "rounding", "verdict"}
+    assert words >= {*check.split(), "reference", "numbers", "235,929", "2.44e-16", "2.22e-15", "rounding", "verdict"}
 
 
 def test_without_java_the_table_says_what_was_not_run(

@@ -124,9 +124,9 @@ def test_names_that_the_sender_gives_say_what_columns_are(thenar: Thenar, tmp_pa
 
 def test_a_line_where_nothing_comes_or_nothing_can_is_said(thenar: Thenar, tmp_path: Path) -> None:
     for port, said in (
-        ("spy://x", "is no port that is opened"),
+        ("spy://x", "is not a supported port"),
         ("/dev/none", "there is no such port"),
-        (f"unix:{tmp_path}/none", "is the sender there"),
+        (f"unix:{tmp_path}/none", "is the sender running"),
     ):
         done = thenar("doctor", "--line", port)
         assert done.returncode == 2

@@ -191,7 +191,7 @@ def test_what_teaches_nothing_is_refused(thenar: Thenar, build: Path, set_file: 
     for asked, reason in (
         (("teach", empty, *task), "empty.mcap shows no grasp"),
         (("teach", set_file, *task), "each row of the set is a separate trial"),
-        (("run", build, "--replay", set_file, "--task", set_file), "--task changes nothing for a set of grasps"),
+        (("run", build, "--replay", set_file, "--task", set_file), "--task has no effect for a set of grasps"),
         (("run", build, "--replay", empty, "--task", empty), "is not a task of `thenar teach`"),
     ):
         done = thenar(*asked)

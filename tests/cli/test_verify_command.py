@@ -43,8 +43,8 @@ def test_the_worst_of_all_frames_is_printed_beside_its_bounds(
     worst = json.loads(thenar("verify", build_folder, set_file, "--json").stdout)["worst"]
     codes = " ".join(map(str, worst["codes"]))
     assert (
-        f"worst possible frame: {worst['leader']} loses {worst['loss']:.3f} steps of its lead over {worst['competitor']}, "
-        f"allowed {worst['bound']:.3f} ({len(worst['closed'])} switches closed, codes {codes})"
+        f"worst possible frame: {worst['leader']} loses {worst['loss']:.3f} steps of its lead over "
+        f"{worst['competitor']}, allowed {worst['bound']:.3f} ({len(worst['closed'])} switches closed, codes {codes})"
     ) in lines
     assert (
         f"margin above {worst['safe_margin']:.3f} steps, which covers the worst frames: "

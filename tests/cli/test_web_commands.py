@@ -178,7 +178,7 @@ def test_the_token_is_said_once_and_asked_for(start: Callable[..., Command], bui
             ("--web", "nowhere"),
             "--web nowhere is not an address: write it as 127.0.0.1:8080, with a port from 0 to 65535",
         ),
-        (("--web", ""), "is no address"),
+        (("--web", ""), "is not an address"),
         (("--web", "no.such.host.invalid:80"), "there is no host no.such.host.invalid"),
         (("--web-token",), "--web-token has no effect without --web: leave it out"),
         (("--recordings", "folder"), "--recordings has no effect without --web: leave it out"),

@@ -71,7 +71,7 @@ def test_a_sensor_at_the_end_of_its_range_is_a_problem(raw: int) -> None:
 
 def test_a_hand_that_is_not_still_is_a_problem() -> None:
     restless = Held(with_bytes().raw, tuple(9 if name == "wrist_yaw" else 8 for name in SENSORS_18))
-    assert problems(SENSORS_18, None, FLAT, restless) == ["wrist_yaw wandered by 9 counts: hold still"]
+    assert problems(SENSORS_18, None, FLAT, restless) == ["wrist_yaw drifted by 9 counts: hold still"]
 
 
 @pytest.mark.parametrize("names", [SENSORS_18, SENSORS_22])

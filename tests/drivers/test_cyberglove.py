@@ -175,7 +175,7 @@ def test_a_rate_that_is_too_fast_is_noted_and_tried(line: PtyLine) -> None:
     with EmulatedCyberGlove(line):
         glove = CyberGlove(str(line.link), rate_hz=400)
         (note,) = glove.open().notes
-        assert "400 records a second are asked for, and box and line should manage 158" in note
+        assert "400 records a second are requested, and box and line should manage 158" in note
         assert read(glove).fault == "too fast"
         assert glove.counts.too_fast >= 1
         glove.close()
@@ -199,7 +199,7 @@ def test_a_box_that_never_is_ready_is_read_with_a_note(line: PtyLine) -> None:
         emulated.state.plugged = False
         glove = CyberGlove(str(line.link))
         (note,) = glove.open().notes
-        assert "?G says 1, not 3" in note
+        assert "?G returns 1, not 3" in note
         assert read(glove).fault == "unplugged"
         emulated.state.plugged = True
         assert read(glove, lambda record: record.fault is None)
@@ -384,9 +384,9 @@ def test_a_glove_of_which_only_noise_comes_is_taken_for_dead_after_a_second(line
 
 
 def test_nobody_there_is_told_with_what_to_check(line: PtyLine) -> None:
-    with pytest.raises(DeviceError, match=r"no CyberGlove answers \?G at 115200 baud: check its power"):
+    with pytest.raises(DeviceError, match=r"no CyberGlove replies to \?G at 115200 baud: check its power"):
         CyberGlove(str(line.link)).open()
-    with pytest.raises(DeviceError, match="no CyberGlove answers at 115200, 38400, 19200, 9600 baud"):
+    with pytest.raises(DeviceError, match="no CyberGlove replies at 115200, 38400, 19200, 9600 baud"):
         CyberGlove(str(line.link), baud=None).open()
 
 
@@ -485,7 +485,7 @@ def test_a_box_that_does_not_say_that_it_took_the_mask_sends_all_and_this_is_sai
         glove = CyberGlove(str(line.link), only=(4, 5))
         info = glove.open()
         assert info.places == tuple(range(18))
-        assert info.unmasked == "it takes no sensor mask: all 18 sensors are read, though 2 are asked for"
+        assert info.unmasked == "it accepts no sensor mask: all 18 sensors are read, though 2 are requested"
         assert info.unmasked in caplog.text
         assert read(glove).sensors == VALUES[18]
         glove.close()
@@ -499,7 +499,7 @@ def test_a_box_that_says_it_took_the_mask_and_did_not_is_read_whole_the_next_tim
         with pytest.raises(DeviceError, match="has sent no record"):
             read(glove)
         info = glove.open()
-        assert info.unmasked == "its records are not what its sensor mask says: all 18 sensors are read"
+        assert info.unmasked == "its records do not match its sensor mask: all 18 sensors are read"
         assert read(glove).sensors == VALUES[18]
         glove.close()
 
@@ -531,14 +531,14 @@ def test_an_old_box_of_few_commands_is_read_without_its_status(line: PtyLine) ->
     assert read(glove) == Record(VALUES[18])
     glove.close()
     answering(line, {b"?G": b"?G\3\0", **period})
-    with pytest.raises(DeviceError, match="does not say how many sensors"):
+    with pytest.raises(DeviceError, match="does not report its number of sensors"):
         glove.open()
     assert CyberGlove(str(line.link), sensors=22).open().names == SENSORS_22
 
 
 def test_a_box_that_is_neither_initialised_nor_has_a_glove_is_refused(line: PtyLine) -> None:
     answering(line, {b"?G": b"?G\0\0"})
-    with pytest.raises(DeviceError, match="neither initialised nor has it a glove"):
+    with pytest.raises(DeviceError, match="is not initialised and has no glove"):
         CyberGlove(str(line.link)).open()
 
 

@@ -85,12 +85,9 @@ def test_a_name_that_there_is_not_is_answered_with_all_that_there_are(members: C
     ("value", "said"),
     [
         ("other_bad:ONE", "two packages define the sort 'one': uninstall one of them"),
-        ("no_such_module:ONE", "cannot be loaded: No module named 'no_such_module'; mend or uninstall it"),
-        ("other_bad:THREE", "cannot be loaded: module 'other_bad' has no attribute 'THREE'; mend or uninstall it"),
-        (
-            "other_bad:NONE",
-            r"the sort 'b' \(other_bad:NONE\) of another package is no Sort: docs/how-to/extend.md says",
-        ),
+        ("no_such_module:ONE", "cannot be loaded: No module named 'no_such_module'; fix or uninstall it"),
+        ("other_bad:THREE", "cannot be loaded: module 'other_bad' has no attribute 'THREE'; fix or uninstall it"),
+        ("other_bad:NONE", r"the sort 'b' \(other_bad:NONE\) of another package is not a Sort: docs/how-to/extend.md"),
     ],
 )
 def test_a_member_of_another_package_that_cannot_be_one_is_refused_in_a_sentence(
@@ -133,7 +130,7 @@ def test_names_are_listed_without_an_import_and_a_member_is_imported_alone(
     assert imported() == {"sort_object_pose"}
     assert by_name.named("joint.offset") == Sort("joint.offset")
     assert imported() == {"sort_object_pose", "other_joint"}
-    with pytest.raises(MemberError, match=r"'joint.lost' .* cannot be loaded: No module named 'no_such_module'; mend"):
+    with pytest.raises(MemberError, match=r"'joint.lost' .* cannot be loaded: No module named 'no_such_module'; fix"):
         by_name["joint.lost"]
 
 
@@ -142,7 +139,7 @@ def test_a_name_that_is_taken_or_that_the_entry_point_does_not_have_is_refused(
 ) -> None:
     (site / "other_misnamed.py").write_text(OTHER)
     write_distribution(site, "somebody", **{"joint.one": "other_misnamed:ONE"})
-    with pytest.raises(MemberError, match=r"'joint.one' .* has another name, 'one': give its entry point that name"):
+    with pytest.raises(MemberError, match=r"'joint.one' .* has a different name, 'one': give its entry point"):
         by_name["joint.one"]
     write_distribution(site, "another", **{"sort.grip": "other_misnamed:ONE"})
     taken = MembersByName("sort", Sort, by_name.package, "thenar.sorts")

@@ -119,5 +119,5 @@ def test_ports_of_boards(port: str) -> None:
 )
 def test_texts_that_are_no_ports_of_boards(port: str) -> None:
     assert scanner_port_fault(port)
-    with pytest.raises(SettingError, match="is no address: a board in a Wi-Fi is at udp://HOST:PORT"):
+    with pytest.raises(SettingError, match="is not an address: a board on Wi-Fi is at udp://HOST:PORT"):
         Scanner(port).open()

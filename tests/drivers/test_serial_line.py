@@ -79,7 +79,7 @@ def test_a_folder_and_a_file_are_no_ports_and_stay_as_they_are(tmp_path: Path) -
     with file.open("r+b") as held:
         fcntl.flock(held, fcntl.LOCK_EX)  # opening it to try would find it in use
         for path in (file, tmp_path):
-            with pytest.raises(DeviceError, match=rf"{path.name} is a (file|folder), no device"):
+            with pytest.raises(DeviceError, match=rf"{path.name} is a (file|folder), not a device"):
                 SerialLine(str(path), 115_200)
     assert file.read_bytes() == EVERY_BYTE
     assert (file.stat().st_mtime_ns, file.stat().st_ctime_ns) == (before.st_mtime_ns, before.st_ctime_ns)
@@ -90,7 +90,7 @@ def test_a_url_of_any_other_kind_is_refused_and_touches_no_file(tmp_path: Path, 
     victim = tmp_path / "victim"
     victim.write_bytes(b"kept")
     for url in (f"{scheme}://{os.devnull}?file={victim}", f"{scheme}://{victim}", f"{scheme}://?file={victim}"):
-        with pytest.raises(SettingError, match="is no port that is opened: a port is a device such as"):
+        with pytest.raises(SettingError, match="is not a supported port: a port is a device such as"):
             SerialLine(url, 115_200)
     assert victim.read_bytes() == b"kept"
 

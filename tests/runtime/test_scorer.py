@@ -111,8 +111,8 @@ def test_masks_that_do_not_fit_are_refused(make_tables: MakeTables) -> None:
 @pytest.mark.parametrize(
     ("lost_bits", "lost_codes", "reason"),
     [
-        (np.zeros(8, bool), np.zeros(3, bool), r"^a frame with lost switches of shape \(8,\), but the build has 9$"),
-        (np.zeros(9, bool), np.zeros(4, bool), r"^a frame with lost joints of shape \(4,\), but the build has 3$"),
+        (np.zeros(8, bool), np.zeros(3, bool), r"^a frame has lost switches of shape \(8,\), but the build has 9$"),
+        (np.zeros(9, bool), np.zeros(4, bool), r"^a frame has lost joints of shape \(4,\), but the build has 3$"),
         ([3] + [0] * 8, np.zeros(3, bool), "^lost switches must be 0 or 1, but this frame has 3$"),
     ],
 )

@@ -76,7 +76,7 @@ def test_codes_that_are_no_counts_need_a_calibration() -> None:
         count_limit(threshold, None)
     with pytest.raises(SettingError, match="calibration lacks it"):
         count_limit(threshold, TaxelCalibration(unit="N", taxels=(TaxelLine("other", 1, 2),)))
-    with pytest.raises(SettingError, match="calibrated in 'press', 'pad' of the build in 'N'"):
+    with pytest.raises(SettingError, match="calibrated in 'press', but 'pad' of the build is in 'N'"):
         count_limit(threshold, TaxelCalibration(taxels=(RISING,)))
 
 

@@ -175,7 +175,7 @@ def test_one_host_is_heard_and_the_next_once_it_has_gone(
     with Scanner(one.url) as host:
         with monkeypatch.context() as patch:
             patch.setattr(scanner, "_BOOT_S", 0.3)
-            with pytest.raises(DeviceError, match="it hears one at a time"):
+            with pytest.raises(DeviceError, match="the board serves one at a time"):
                 Scanner(other.url).open()
         until(host, lambda reading: reading.known == EVERY)
     with Scanner(other.url) as host:
@@ -188,7 +188,7 @@ def test_a_board_that_falls_silent_is_gone(start: Start, connect: Connect, monke
     with Scanner(network.url) as host:
         until(host, lambda reading: reading.known == EVERY)
         network.weather.dropped = 1.0
-        with pytest.raises(DeviceError, match=r"has said nothing for 0\.3 s"):
+        with pytest.raises(DeviceError, match=r"has sent nothing for 0\.3 s"):
             until(host, lambda _: False)
 
 

@@ -96,7 +96,7 @@ def test_cases_that_a_killed_worker_left_unfinished_have_failed_and_the_finished
     found = run(["sound", "exceeds"], full=False)
     assert [case.holds for case in found] == [True, False]
     assert found[1].failure is not None
-    assert "a worker process ended before its work was done" in found[1].failure
+    assert "a worker process ended early" in found[1].failure
 
 
 def test_the_filter_of_warnings_is_put_back(folder: Path) -> None:
@@ -145,7 +145,7 @@ def test_all_that_fails_is_told_with_the_case_the_check_by_how_much_how_often_an
         "case: steps: nothing was tried",
         "case: ValueError in case.py, line 3: no",
     )
-    assert failures(reported()) == ("case: it finds nothing",)
+    assert failures(reported()) == ("case: it has no findings",)
 
 
 def test_the_legend_explains_each_unit_that_occurs_and_no_other() -> None:

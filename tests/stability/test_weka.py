@@ -12,15 +12,15 @@ from thenar.compiler.elementary import softmax
 from thenar.stability import weka as module
 from thenar.stability.weka import (
     CLASSES,
+    DIVERGED,
     EXP_IN_JAVA,
     EXP_OF_THE_PROCESSOR,
-    PARTED,
     ROUNDS,
     ROWS_A_CLASS,
-    Beside,
+    Comparison,
     NotRun,
     WekaError,
-    beside_weka,
+    compare_with_weka,
     read_stumps,
     separable_set,
     weka_stumps,
@@ -43,10 +43,10 @@ x0 is missing : 0.0
 
 
 @pytest.fixture(scope="module")
-def compared(weka: Callable[..., str]) -> Beside:
+def compared(weka: Callable[..., str]) -> Comparison:
     """What came of it where Weka is installed."""
-    found = beside_weka()
-    assert isinstance(found, Beside), found
+    found = compare_with_weka()
+    assert isinstance(found, Comparison), found
     return found
 
 
@@ -70,12 +70,12 @@ def test_a_model_of_another_set_is_refused() -> None:
 
 def test_without_java_it_is_not_run_and_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert beside_weka() == NotRun("java or Weka is not installed")
+    assert compare_with_weka() == NotRun("java or Weka is not installed")
 
 
 def test_without_weka_it_is_not_run_and_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(module, "JAR", tmp_path / "weka.jar")
-    assert beside_weka() == NotRun("java or Weka is not installed")
+    assert compare_with_weka() == NotRun("java or Weka is not installed")
 
 
 def test_a_jvm_that_refuses_is_quoted(weka: Callable[..., str]) -> None:
@@ -101,7 +101,7 @@ def test_the_stumps_read_give_wekas_own_probabilities(weka: Callable[..., str], 
     assert (ours.argmax(axis=1) == theirs.argmax(axis=1)).all()
 
 
-def test_the_set_is_learned_by_heart(compared: Beside) -> None:
+def test_the_set_is_learned_by_heart(compared: Comparison) -> None:
     assert compared.learned is not None
     assert compared.learned < compared.rounds // 2
     assert (compared.rows, compared.held_out, compared.rounds) == (
@@ -111,17 +111,17 @@ def test_the_set_is_learned_by_heart(compared: Beside) -> None:
     )
 
 
-def test_weka_parts_from_itself_and_thenar_from_weka_not_before(compared: Beside) -> None:
+def test_weka_parts_from_itself_and_thenar_from_weka_not_before(compared: Comparison) -> None:
     parts = compared.weka_itself.parts
     assert parts is not None
-    assert max(compared.weka_itself.largest[: parts - 1]) < PARTED < compared.weka_itself.largest[parts - 1]
+    assert max(compared.weka_itself.largest[: parts - 1]) < DIVERGED < compared.weka_itself.largest[parts - 1]
     for ours in (compared.ours_processor, compared.ours_java):
-        assert max(ours.largest[: parts - 1]) < PARTED
+        assert max(ours.largest[: parts - 1]) < DIVERGED
     assert compared.weka_changed > 0
     assert compared.weka_value > 3 >= compared.our_value
 
 
-def test_thenar_trained_in_any_order_of_rows_answers_the_same_to_the_last_bit(compared: Beside) -> None:
+def test_thenar_trained_in_any_order_of_rows_answers_the_same_to_the_last_bit(compared: Comparison) -> None:
     assert compared.our_shuffled == 0
     assert compared.shuffles > 1
 

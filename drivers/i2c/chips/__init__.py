@@ -1,4 +1,4 @@
-"""The port expanders and converters: one file a chip, which holds everything that is true of it."""
+"""The port expanders and converters: one file per chip, with all its data."""
 
 from ...members import Members
 from .base import Chip, Conversion, Converter, Device, Package, Reading, Write, byte_pins, port_pins
@@ -21,5 +21,5 @@ CHIPS = Members("I2C chip", Chip, __name__, "thenar.chips")  # type: ignore[type
 
 
 def expanders() -> dict[str, Chip]:
-    """Return the kinds that read switches, by name."""
+    """Return the chips that read switches, by name."""
     return {name: chip for name, chip in CHIPS.items() if not isinstance(chip, Converter)}

@@ -6,29 +6,29 @@ from collections.abc import Callable
 from .base import Conversion, Converter, ConverterModel, Package, Write
 
 _RESULT, _CONFIG, _LOW, _HIGH = 0, 1, 2, 3
-# One conversion: begin; channel against ground; 4.096 V; power down after it. 860 a second; no comparator.
+# One conversion: start; channel against ground; 4.096 V; power down afterwards. 860 a second; no comparator.
 _START, _FULL_SCALE, _SINGLE, _FASTEST, _NO_COMPARATOR = 0x8000, 0x0200, 0x0100, 0x00E0, 0x0003
 _GROUND_BASED = 4
-# Its oscillator is up to a tenth slow, and it wakes up first.
+# Its oscillator is up to 10 % slow, and it needs time to wake up.
 _RATE, _SLOW, _WAKE_US = 860, 0.9, 25.0
-# The comparator's threshold is unused: what stands in it tells a set-up chip from one that was reset.
+# The comparator's threshold is unused: its value distinguishes a set-up chip from one that was reset.
 _SIGNATURE = b"\x55\xaa"
 _DEFAULTS = (0, 0x8583, 0x8000, 0x7FFF)
 
 
 class Ads1115Model(ConverterModel):
-    """Four registers of 16 bits behind a pointer; a conversion takes its time, and the old result stands until then."""
+    """Four registers of 16 bits behind a pointer; the old result stays until a conversion ends."""
 
     pins = 64
     clock: Callable[[], float] = staticmethod(time.monotonic)
 
     def reset(self) -> None:
-        """Do as after power-on."""
+        """Reset to the state after power-on."""
         self._values: list[int] = list(_DEFAULTS)
         self._pointer, self._ready = 0, 0.0
 
     def write(self, data: bytes) -> None:
-        """Take the bytes of one message that writes."""
+        """Process the bytes of one write message."""
         if data:
             self._pointer = data[0] & 3
         if len(data) > 2 and self._pointer != _RESULT:
@@ -39,7 +39,7 @@ class Ads1115Model(ConverterModel):
                 self._values[self._pointer] = value
 
     def read(self, length: int) -> bytes:
-        """Return the bytes of one message that reads."""
+        """Return the bytes of one read message."""
         value = self._values[self._pointer]
         if self._pointer == _RESULT and self.clock() >= self._ready:
             value = self._values[_RESULT] = self._converted
@@ -48,7 +48,7 @@ class Ads1115Model(ConverterModel):
         return (value.to_bytes(2, "big") * length)[:length]
 
     def poke(self, register: int, value: int) -> None:
-        """Put `value` where nobody wrote it."""
+        """Set a register to `value` without a bus write."""
         self._values[register & 3] = value
 
     _converted = 0
@@ -56,7 +56,7 @@ class Ads1115Model(ConverterModel):
     def _configure(self, value: int) -> None:
         self._values[_CONFIG] = value
         mux = value >> 12 & 7
-        if value & _START and self.clock() >= self._ready and mux >= _GROUND_BASED:  # a new one waits for the old
+        if value & _START and self.clock() >= self._ready and mux >= _GROUND_BASED:  # a new one waits for the old one
             self._converted = min(self.at(mux - _GROUND_BASED), 0x7FFF)
             self._ready = self.clock() + 1 / _RATE
 
@@ -99,7 +99,7 @@ class Ads1115(Converter):
     )
 
     def setup(self, used: frozenset[int]) -> tuple[Write, ...]:
-        """Return the writes after which it sleeps until a conversion begins, its comparator off."""
+        """Return the writes after which it sleeps until the next conversion, with the comparator off."""
         config = int.from_bytes(_start(min(used, default=0))[1:], "big") & ~_START
         kept = config.to_bytes(2, "big")
         return (
@@ -108,9 +108,9 @@ class Ads1115(Converter):
             Write(bytes((_LOW,)) + _SIGNATURE, _SIGNATURE),
         )
 
-    def code(self, answer: bytes) -> int:
-        """Return the code of an answer; a channel a little below ground reads 0."""
-        return max(0, int.from_bytes(answer, "big", signed=True))
+    def code(self, reply: bytes) -> int:
+        """Return the code of a reply; a channel slightly below ground reads 0."""
+        return max(0, int.from_bytes(reply, "big", signed=True))
 
 
 MEMBER = Ads1115()

@@ -2,9 +2,9 @@
 
 from .base import Conversion, Converter, ConverterModel, Package, Write
 
-# Single-ended, converter on between conversions, reference off: it measures against REF, which is the supply.
+# Single-ended, converter on between conversions, internal reference off: REF is the supply.
 _SINGLE, _ON = 0x80, 0x04
-# Bits that it does not look at; an ADS1115 at the same address takes them for its configuration register.
+# Bits that it ignores; an ADS1115 at the same address interprets them as its configuration register.
 _SPARE = 0x01
 
 
@@ -14,28 +14,28 @@ def _command(channel: int) -> int:
 
 
 class Ads7828Model(ConverterModel):
-    """No registers: the last command says which channel every message that reads converts."""
+    """No registers: the last command selects the channel that every read message converts."""
 
     pins = 128
     has_registers = False
 
     def reset(self) -> None:
-        """Do as after power-on."""
+        """Reset to the state after power-on."""
         self._command = 0
 
     def write(self, data: bytes) -> None:
-        """Take the bytes of one message that writes."""
+        """Process the bytes of one write message."""
         if data:
             self._command = data[-1]
 
     def read(self, length: int) -> bytes:
-        """Return the bytes of one message that reads."""
+        """Return the bytes of one read message."""
         channel = self._command >> 6 & 1 | (self._command >> 4 & 3) << 1
         code = min(self.at(channel), 0xFFF) if self._command & _SINGLE else 0
         return (code.to_bytes(2, "big") * length)[:length]
 
     def poke(self, register: int, value: int) -> None:
-        """Put `value` where nobody wrote it."""
+        """Set a register to `value` without a bus write."""
         self._command = value
 
 
@@ -48,7 +48,7 @@ class Ads7828(Converter):
     clock_hz = 400_000
     pins = tuple(f"CH{channel}" for channel in range(8))
     bits = 12
-    # The answer's second byte holds the lower eight bits, its first the upper four.
+    # The second byte of a reply holds the lower eight bits, the first the upper four.
     readings = tuple(
         Conversion(f"CH{channel}", bytes((_command(channel),)), (channel,) * 4 + (-1,) * 4 + (channel,) * 8)
         for channel in range(8)
@@ -67,7 +67,7 @@ class Ads7828(Converter):
     )
 
     def setup(self, used: frozenset[int]) -> tuple[Write, ...]:
-        """Return the write of a command; its answer has four zeros on top, as an ADS1115's configuration has not."""
+        """Return the write of a command; its reply has four zeros on top, unlike an ADS1115's configuration."""
         return (Write(bytes((_command(min(used, default=0)),)), b"\x00\x00", b"\xf0\x00"),)
 
 

@@ -1,6 +1,6 @@
-"""What a port expander and a converter are: to their bus, to the emulated bus, and as parts to solder.
+"""Port expanders and converters: their interface for the bus, their emulation, and their data as parts to solder.
 
-It needs the standard library alone, as every chip's file does: the system's own Python emulates the chips.
+This file and every chip's file need only the standard library: the system's Python emulates the chips.
 """
 
 from abc import ABC, abstractmethod
@@ -21,11 +21,12 @@ _SELECTS = ("A0", "A1", "A2", "ADDR")
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One transaction that reads a port: `command` is written (nothing, where it is empty), then bytes are read.
+    """One transaction that reads a port: `command` is written (unless it is empty), then bytes are read.
 
-    pins holds the chip's pin number for every bit of the answer, the lowest bit of the first byte first; -1 for none.
-    high holds the bits of the answer that the chip itself keeps at 1 as long as it is set up.
-    SCL periods are counted as datasheets draw them: nine a byte, one for a START or repeated START, one for the STOP.
+    pins  the chip's pin number for every bit of the reply, the lowest bit of the first byte first; -1 for none
+    high  the bits of the reply that the chip keeps at 1 while it is set up
+
+    SCL periods follow the datasheets: nine a byte, one for a START or repeated START, one for the STOP.
     """
 
     name: str
@@ -35,12 +36,12 @@ class Reading:
 
     @property
     def length(self) -> int:
-        """Bytes of the answer."""
+        """Bytes of the reply."""
         return len(self.pins) // _BITS
 
     @property
     def wire_bytes(self) -> int:
-        """Bytes on the wire, addresses included."""
+        """Bytes on the wire, including addresses."""
         return (1 + len(self.command) if self.command else 0) + 1 + self.length
 
     @property
@@ -51,10 +52,10 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Conversion(Reading):
-    """One transaction that reads a channel of a converter, whose pin all bits of the answer are of; -1 for no bit.
+    """One transaction that reads a converter channel: `pins` holds its pin for each bit of the reply; -1 for none.
 
-    start  what is written to begin it, in a transfer of its own; empty where reading begins it
-    us     how long after that the answer is there, at the latest; 0 where the wire takes longer
+    start  bytes written in a separate transfer to start it; empty if reading starts it
+    us     the longest time from then to the result; 0 if the transfer takes longer
     """
 
     start: bytes = b""
@@ -62,35 +63,35 @@ class Conversion(Reading):
 
     @property
     def start_periods(self) -> int:
-        """SCL periods of the transfer that begins it."""
+        """SCL periods of the transfer that starts it."""
         return _BITS_A_BYTE * (1 + len(self.start)) + 2 if self.start else 0
 
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """Bytes to write to a chip when it is set up; where `expect` is given, as many bytes read back must hold it.
+    """Bytes to write to a chip at set-up. If `expect` is given, as many bytes are read back and must match it.
 
-    The first byte of `data` is the register, where the chip has registers, and the one read back. Only the bits of
-    `mask` count; all of them, where it is empty.
+    If the chip has registers, the first byte of `data` is the register, which is also the one read back. Only the bits
+    of `mask` count, or all if it is empty.
     """
 
     data: bytes
     expect: bytes = b""
     mask: bytes = b""
 
-    def holds(self, answer: bytes) -> bool:
-        """Tell whether what was read back is what was expected."""
+    def holds(self, reply: bytes) -> bool:
+        """Return whether the bytes read back match the expected ones."""
         masks = self.mask or b"\xff" * len(self.expect)
-        return len(answer) == len(self.expect) and not any(
-            (byte ^ wanted) & bits for byte, wanted, bits in zip(answer, self.expect, masks, strict=True)
+        return len(reply) == len(self.expect) and not any(
+            (byte ^ wanted) & bits for byte, wanted, bits in zip(reply, self.expect, masks, strict=True)
         )
 
 
 class Device(ABC):
-    """Something with an address on an emulated bus, written from the data sheet and from nothing of its driver.
+    """A device with an address on an emulated bus, written from the data sheet, independently of its driver.
 
-    Subclasses say how many pins they have, and whether registers. `levels` are the pins as the world drives them: bit p
-    is pin p, 1 is high or open. A message is what lies between two STARTs; its address is not part of it.
+    Subclasses define the number of pins, and whether there are registers. `levels` are the externally driven levels of
+    the pins: bit p is pin p, 1 is high or open. A message is the bytes between two STARTs, without the address.
     """
 
     pins: ClassVar[int]
@@ -102,18 +103,18 @@ class Device(ABC):
 
     @abstractmethod
     def reset(self) -> None:
-        """Do as after power-on."""
+        """Reset to the state after power-on."""
 
     @abstractmethod
     def write(self, data: bytes) -> None:
-        """Take the bytes of one message that writes."""
+        """Process the bytes of one write message."""
 
     @abstractmethod
     def read(self, length: int) -> bytes:
-        """Return the bytes of one message that reads."""
+        """Return the bytes of one read message."""
 
     def poke(self, register: int, value: int) -> None:
-        """Put `value` where nobody wrote it, as a crash of the last owner may have left it."""
+        """Set a register to `value` without a bus write, as a crash of the last owner may have left it."""
         self.write(bytes((register, value)))
 
     def port(self, number: int) -> int:
@@ -125,14 +126,13 @@ class Device(ABC):
 class Package:
     """A chip as a part to buy and to solder: part number, maker, KiCad's symbol and footprint.
 
-    pins  the name of pin n of the data sheet's package at pins[n - 1], "NC" where there is nothing inside. Inputs are
-          called as the driver calls them, and the others SDA, SCL, INT, RESET, A0, A1, A2 (or ADDR), on SPI CLK, DIN,
-          DOUT, CS, and by the name of what is tied to the supply (VDD, VCC, VCCI, VCCP, REF, VREF) or to ground (VSS,
-          GND, EP, COM, AGND, DGND).
+    pins  the name of pin n of the data sheet's package at pins[n - 1], "NC" if unconnected. Inputs have the driver's
+          names; the others are SDA, SCL, INT, RESET, A0, A1, A2 (or ADDR), on SPI CLK, DIN, DOUT, CS, and the names of
+          pins tied to the supply (VDD, VCC, VCCI, VCCP, REF, VREF) or to ground (VSS, GND, EP, COM, AGND, DGND)
     sure  whether part number, pins and footprint are each confirmed by two sources
-    note  what is not, or what to heed
-    straps    where one pin, ADDR, selects among more than two addresses: what it is tied to, from the lowest on
-    library   KiCad's, of the symbol
+    note  unconfirmed data, or advice
+    straps    if one pin, ADDR, selects among more than two addresses: its connections, in order of the addresses
+    library   KiCad's library of the symbol
     """
 
     part: str
@@ -150,8 +150,9 @@ class Package:
         return str(self.pins.index(name) + 1)
 
     def selects(self, offset: int) -> tuple[tuple[str, str], ...]:
-        """Return the address pins, and what each is tied to for the address so far above the chip's lowest: "low",
-        "high", "SDA" or "SCL".
+        """Return each address pin and its connection ("low", "high", "SDA" or "SCL") for an address.
+
+        offset  of the address from the chip's lowest
         """
         if self.straps:
             return (("ADDR", self.straps[offset]),)
@@ -162,22 +163,22 @@ class Package:
 class Chip(ABC):
     """A kind of port expander. Its file defines `MEMBER`, one instance, or a tuple of them.
 
-    Whoever adds one supplies `setup` and these class attributes; nothing else in thenar names a chip.
+    A new chip supplies `setup` and these class attributes; no other code in thenar names a chip.
 
-    name        what glove.toml and the command line call it
-    rank        its place in lists, and when an unknown chip is compared with what there is
+    name        its name in glove.toml and on the command line
+    rank        its place in lists, and in the identification of an unknown chip
     addresses   that its address pins can select, in ascending order
     clock_hz    the highest SCL
-    pins        their names, in the order of their numbers
+    pins        names of its pins, in the order of their numbers
     not_inputs  names of pins that must not be inputs, and why
-    readings    every transaction that reads some of its pins; of those that read the same, the cheapest first
-    registers   False for a chip whose written bytes are the latch of its outputs: an input is a latch that was written
-                high, so that switches must pull down; the generated firmware reads none of these
-    pulls_up    whether its inputs are pulled up inside, by the chip itself or once it is set up; where they are not,
-                the netlist has a resistor for each
-    tried       whether a frontier tries a new glove with it: not where another chip's port is read as fast
-    package     as a part to solder
-    model       the class that emulates it, in a module that imports nothing but the standard library and thenar.drivers
+    readings    every transaction that reads some of its pins; of equivalent ones, the cheapest first
+    registers   False for a chip whose written bytes are the latch of its outputs: an input is a latch written high, so
+                switches must pull down; the generated firmware does not read such chips
+    pulls_up    whether the chip pulls up its inputs, always or once it is set up; if not, the netlist has a resistor
+                for each
+    tried       whether a frontier considers it for a new glove: not if another chip's port is read as fast
+    package     its data as a part to solder
+    model       the class that emulates it, in a module that imports only the standard library and thenar.drivers
     """
 
     name: ClassVar[str]
@@ -195,14 +196,14 @@ class Chip(ABC):
 
     @abstractmethod
     def setup(self, used: frozenset[int]) -> tuple[Write, ...]:
-        """Return what makes inputs of the pins with the numbers `used`, with pull-ups where the chip has them.
+        """Return the writes that make the pins with the numbers `used` inputs, with pull-ups if the chip has them.
 
-        What is read back on the way tells the chip from every other that may have its address. What the last of them
-        expects, if anything, is what a reset would lose: it is read again while the chip is in use.
+        The bytes read back distinguish the chip from every other that may have its address. The value that the last
+        write expects, if any, would be lost at a reset: it is read again while the chip is in use.
         """
 
     def watched(self, used: frozenset[int]) -> Write | None:
-        """Return what a reset of the chip would lose, if it would lose anything."""
+        """Return the write that a reset of the chip would lose, if any."""
         last = self.setup(used)[-1]
         return last if last.expect else None
 
@@ -210,14 +211,14 @@ class Chip(ABC):
         """Raise SettingError if such a chip cannot have this address."""
         if address not in self.addresses:
             lowest, highest = min(self.addresses), max(self.addresses)
-            raise SettingError(f"a {self.name} answers at 0x{lowest:02X} to 0x{highest:02X}, not at 0x{address:02X}")
+            raise SettingError(f"a {self.name} is at 0x{lowest:02X} to 0x{highest:02X}, not at 0x{address:02X}")
 
 
 class Converter(Chip):
     """A kind of analog-to-digital converter: its pins are the channels, its readings a `Conversion` of each, in order.
 
     bits   of a code; code 0 is 0 V
-    volts  of the code 2 ** bits; None: of the supply, against which it measures
+    volts  at the code 2 ** bits; None: the supply voltage
     """
 
     pulls_up = False
@@ -228,12 +229,12 @@ class Converter(Chip):
 
     @property
     def highest(self) -> int:
-        """The code of the supply, 3.3 V, where a channel is saturated."""
+        """The code of the supply, 3.3 V, at which a channel is saturated."""
         return (1 << self.bits) - 1 if self.volts is None else int(SUPPLY_V / self.volts * (1 << self.bits))
 
-    def code(self, answer: bytes) -> int:
-        """Return the code of an answer: high byte first, the unused bits on top."""
-        return int.from_bytes(answer, "big") & (1 << self.bits) - 1
+    def code(self, reply: bytes) -> int:
+        """Return the code of a reply: high byte first, the unused bits on top."""
+        return int.from_bytes(reply, "big") & (1 << self.bits) - 1
 
 
 class ConverterModel(Device):
@@ -249,7 +250,7 @@ class ConverterModel(Device):
 
 
 def byte_pins(*ports: int) -> tuple[int, ...]:
-    """Return the pin numbers of an answer that holds these ports of eight pins, in this order."""
+    """Return the pin numbers of a reply that holds these ports of eight pins, in this order."""
     return tuple(_BITS * port + bit for port in ports for bit in range(_BITS))
 
 
@@ -259,5 +260,5 @@ def port_pins(*ports: int) -> tuple[str, ...]:
 
 
 def pins_of_24(ground: str, supply: str) -> tuple[str, ...]:
-    """Return the pins of a package of 24, as every expander of 16 inputs has them, with the names of its supply."""
+    """Return the pins of a 24-pin package, common to all expanders of 16 inputs, with the names of its supply pins."""
     return ("INT", "A1", "A2", *port_pins(0), ground, *port_pins(1), "A0", "SCL", "SDA", supply)

@@ -17,7 +17,7 @@ class Mcp23008(Chip):
 
     name = "mcp23008"
     rank = 2
-    tried = False  # it reads as half an mcp23017 does
+    tried = False  # it is read like half an mcp23017
     addresses = range(0x20, 0x28)
     clock_hz = 1_700_000
     pins = tuple(f"GP{bit}" for bit in range(8))
@@ -34,7 +34,7 @@ class Mcp23008(Chip):
             *(f"GP{bit}" for bit in range(8)),
             "VDD",
         ),
-        note="GP7 stays empty: since 2022 it is an output only",
+        note="GP7 stays unconnected: since 2022 it is only an output",
     )
 
     def setup(self, used: frozenset[int]) -> tuple[Write, ...]:

@@ -5,29 +5,29 @@ from .base import Chip, Device, Package, Reading, Write, byte_pins
 _IODIRA, _IOCON, _GPIOA, _GPIOB = 0x00, 0x0A, 0x12, 0x13
 _IOCON_OF_BANK_1 = 0x05
 
-# Open-drain INT pins, which nothing here uses: a value that no reset leaves, and that harms nobody on a shared line.
+# Open-drain INT pins, unused here: a value that no reset leaves, and that is harmless on a shared line.
 OPEN_DRAIN = 0x04
 
 NOT_AN_INPUT = (
-    "since revision D of its data sheet (2022) it is an output only: a level that changes during a read can corrupt SDA"
+    "since revision D of its data sheet (2022) it is only an output: a level that changes during a read can corrupt SDA"
 )
 
 
 class Mcp230xxModel(Device):
-    """Registers with a pointer that goes on by itself; pins without pull-up float, and then read 0 here."""
+    """Registers with an automatically incremented pointer; pins without pull-up float, and read 0 here."""
 
     _INPUTS, _POLARITY, _CONTROL, _PULL_UPS, _FLAGS, _CAPTURE, _PINS, _LATCH = 0, 1, 5, 6, 7, 8, 9, 10
     _REGISTERS = 11
 
     def reset(self) -> None:
-        """Do as after power-on."""
+        """Reset to the state after power-on."""
         self._values = [[0] * self._REGISTERS for _ in range(self.pins // 8)]
         for values in self._values:
             values[self._INPUTS] = 0xFF
         self._pointer = 0
 
     def write(self, data: bytes) -> None:
-        """Take the bytes of one message that writes."""
+        """Process the bytes of one write message."""
         if data:
             self._pointer = data[0] & 0x1F
         for byte in data[1:]:
@@ -35,15 +35,15 @@ class Mcp230xxModel(Device):
             self._advance()
 
     def read(self, length: int) -> bytes:
-        """Return the bytes of one message that reads."""
-        answer = bytearray()
+        """Return the bytes of one read message."""
+        reply = bytearray()
         for _ in range(length):
-            answer.append(self._load(*self._decode(self._pointer)))
+            reply.append(self._load(*self._decode(self._pointer)))
             self._advance()
-        return bytes(answer)
+        return bytes(reply)
 
     def _decode(self, address: int) -> tuple[int, int]:
-        """Return port and register; a register that is none, where there is nothing."""
+        """Return port and register; an invalid register for an unused address."""
         return 0, address
 
     def _advance(self) -> None:
@@ -114,22 +114,22 @@ class Mcp23017(Chip):
             *("VDD", "VSS", "NC", "SCL", "SDA", "NC", "A0", "A1", "A2", "RESET", "INTB", "INTA"),
             *(f"GPA{bit}" for bit in range(8)),
         ),
-        note="GPA7 and GPB7 stay empty: since 2022 they are outputs only",
+        note="GPA7 and GPB7 stay unconnected: since 2022 they are only outputs",
     )
 
     def setup(self, used: frozenset[int]) -> tuple[Write, ...]:
-        """Return the writes that lead from any state, BANK = 1 included, to inputs with pull-ups on the used pins.
+        """Return the writes that lead from any state, including BANK = 1, to inputs with pull-ups on the used pins.
 
         A crash may have left BANK = 1, where 05 is IOCON; in BANK = 0 it is GPINTENB, to be 0 anyway. GPA7 and GPB7
-        are pulled up too: a pin that must not change its level must not float; and as nothing hangs on them, a 0 there
-        tells in every answer that the pull-ups are gone.
+        are pulled up too, because a pin that must not change its level must not float. They are unconnected, so a 0
+        there shows in every reply that the pull-ups are gone.
         """
         pulled = sum(1 << pin for pin in used | {7, 15}).to_bytes(2, "little")
         control = bytes((OPEN_DRAIN, OPEN_DRAIN))
         unmasked = b"\xff\xff" + bytes(4)  # IODIR all inputs, IPOL as read, GPINTEN off
         return (
             Write(bytes((_IOCON_OF_BANK_1, 0))),
-            Write(bytes((_IOCON, OPEN_DRAIN)), control),  # one register at two addresses: only this chip has that
+            Write(bytes((_IOCON, OPEN_DRAIN)), control),  # one register at two addresses, which is unique to this chip
             Write(bytes((_IODIRA,)) + unmasked, unmasked),
             Write(bytes((_IOCON,)) + control + pulled, control + pulled),  # GPPU follows IOCON
         )

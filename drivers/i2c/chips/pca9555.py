@@ -7,18 +7,18 @@ from .base import TSSOP24, Chip, Device, Package, Reading, Write, byte_pins, pin
 
 _INPUT_0, _INPUT_1, _OUTPUT, _POLARITY, _CONFIGURATION = 0, 1, 2, 4, 6
 
-# The outputs are unused while all pins are inputs: what stands in them tells a set-up chip from one that was reset.
+# The outputs are unused while all pins are inputs: their values distinguish a set-up chip from one that was reset.
 _SIGNATURE = b"\xaa\x55"
 
 
 class BankedModel(Device):
-    """Banks of inputs, outputs, polarities and configurations, `stride` registers apart; pins as the world has them."""
+    """Banks of inputs, outputs, polarities and configurations, `stride` registers apart; pins as driven externally."""
 
     _ports: ClassVar[int]
     _stride: ClassVar[int]
 
     def reset(self) -> None:
-        """Do as after power-on."""
+        """Reset to the state after power-on."""
         self._outputs = [0xFF] * self._ports
         self._polarities = [0x00] * self._ports
         self._inputs = [0xFF] * self._ports
@@ -26,15 +26,15 @@ class BankedModel(Device):
         self._moves = True
 
     def read(self, length: int) -> bytes:
-        """Return the bytes of one message that reads."""
-        answer = bytearray()
+        """Return the bytes of one read message."""
+        reply = bytearray()
         for _ in range(length):
-            answer.append(self._load())
+            reply.append(self._load())
             self._advance()
-        return bytes(answer)
+        return bytes(reply)
 
     def write(self, data: bytes) -> None:
-        """Take the bytes of one message that writes."""
+        """Process the bytes of one write message."""
         if data:
             self._command(data[0])
         for byte in data[1:]:
@@ -45,7 +45,7 @@ class BankedModel(Device):
 
     @abstractmethod
     def _command(self, byte: int) -> None:
-        """Take the byte of a message that says where to write, or to read from."""
+        """Process the byte of a message that selects the register to write or read."""
 
     def _advance(self) -> None:
         if self._moves:
@@ -63,7 +63,7 @@ class BankedModel(Device):
 
 
 class Pca9555Model(BankedModel):
-    """Pairs of registers 0 to 7; the byte after a register's is the other's of its pair."""
+    """Pairs of registers 0 to 7; the next byte belongs to the other register of the pair."""
 
     pins, _ports, _stride = 16, 2, 2
 
@@ -72,7 +72,7 @@ class Pca9555Model(BankedModel):
 
 
 class Pca9555(Chip):
-    """Pins P00 to P07 and P10 to P17. SCL up to 400 kHz. The byte after a port's is the other port's, always."""
+    """Pins P00 to P07 and P10 to P17. SCL up to 400 kHz. Bytes alternate between the two ports."""
 
     name = "pca9555"
     rank = 6
@@ -90,7 +90,7 @@ class Pca9555(Chip):
     def setup(self, used: frozenset[int]) -> tuple[Write, ...]:
         """Return the writes that make all pins inputs, read as they are.
 
-        The first pair is read back twice over: a chip whose pointer goes on would show other registers then.
+        The first pair is read back twice: a chip with an incrementing pointer would return other registers.
         """
         return (
             Write(bytes((_CONFIGURATION,)) + b"\xff\xff", b"\xff\xff" * 2),
@@ -100,7 +100,7 @@ class Pca9555(Chip):
 
 
 class Tca9555(Pca9555):
-    """TI's chip of the same registers and addresses."""
+    """TI's chip with the same registers and addresses."""
 
     name = "tca9555"
     rank = 7

@@ -1,4 +1,4 @@
-"""NXP and TI PCF8574 and PCF8574A: eight quasi-bidirectional pins and no registers. They differ in their addresses."""
+"""NXP and TI PCF8574 and PCF8574A: eight quasi-bidirectional pins, no registers, different addresses."""
 
 from .base import Chip, Device, Package, Reading, Write, byte_pins
 
@@ -8,38 +8,38 @@ _DOUBT = "the body's width (7.5 mm) is not confirmed: some sellers' parts have 3
 
 
 class Pcf8574Model(Device):
-    """No registers: what is written is the latch, and a pin is high where latch and world are."""
+    """No registers: written bytes are the latch, and a pin is high if both its latch and its external level are."""
 
     pins = 8
     has_registers = False
 
     def reset(self) -> None:
-        """Do as after power-on."""
+        """Reset to the state after power-on."""
         self._latch = 0xFF
 
     def write(self, data: bytes) -> None:
-        """Take the bytes of one message that writes."""
+        """Process the bytes of one write message."""
         if data:
             self._latch = data[-1]
 
     def read(self, length: int) -> bytes:
-        """Return the bytes of one message that reads."""
+        """Return the bytes of one read message."""
         return bytes((self._latch & self.levels,)) * length
 
     def poke(self, register: int, value: int) -> None:
-        """Put `value` where nobody wrote it."""
+        """Set a register to `value` without a bus write."""
         self._latch = value
 
 
 class Pcf8574(Chip):
     """Eight pins, P0 to P7, each with a current source of about 100 uA to the supply. SCL up to 100 kHz.
 
-    What is written is the latch of the outputs; a pin is an input while its latch is 1, as it is after power-on.
+    Written bytes are the latch of the outputs; a pin is an input while its latch is 1, as after power-on.
     """
 
     name = "pcf8574"
     rank = 4
-    tried = False  # eight pins, at 100 kHz, take longer than the sixteen of a pcf8575
+    tried = False  # its eight pins, at 100 kHz, take longer than the sixteen of a pcf8575
     addresses = range(0x20, 0x28)
     clock_hz = 100_000
     pins = tuple(f"P{bit}" for bit in range(8))
@@ -51,16 +51,16 @@ class Pcf8574(Chip):
     def setup(self, used: frozenset[int]) -> tuple[Write, ...]:
         """Return the writes that release all pins.
 
-        Without registers there is only one way to tell the chip from others: all pins are driven low for two reads,
-        and must then be low. That harms no switch to ground; a switch to the supply does not belong on this chip.
-        A PCF8575 would have the first of two bytes on the port that is read; a chip with registers takes it for one
-        that is read-only or none.
+        Without registers only one test identifies the chip: all pins are driven low for two reads, and must read low.
+        That is harmless for switches to ground; a switch to the supply must not be on this chip. A PCF8575 would put
+        the first of the two bytes on the port that is read; a chip with registers takes it as the number of a
+        read-only or missing register.
         """
         return (Write(b"\xf9\x00", b"\x00"), Write(b"\x00", b"\x00"), Write(b"\xff"))
 
 
 class Pcf8574a(Pcf8574):
-    """The same at other addresses."""
+    """The same chip at other addresses."""
 
     name = "pcf8574a"
     rank = 5

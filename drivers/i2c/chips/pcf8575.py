@@ -4,34 +4,34 @@ from .base import TSSOP24, Chip, Device, Package, Reading, Write, byte_pins, pin
 
 
 class Pcf8575Model(Device):
-    """Two latches of eight pins and no registers, whose bytes take turns from every START on."""
+    """Two latches of eight pins and no registers; bytes alternate between them after every START."""
 
     pins = 16
     has_registers = False
 
     def reset(self) -> None:
-        """Do as after power-on."""
+        """Reset to the state after power-on."""
         self._latches = [0xFF, 0xFF]
 
     def write(self, data: bytes) -> None:
-        """Take the bytes of one message that writes."""
+        """Process the bytes of one write message."""
         for number, byte in enumerate(data):
             self._latches[number % 2] = byte
 
     def read(self, length: int) -> bytes:
-        """Return the bytes of one message that reads."""
+        """Return the bytes of one read message."""
         return bytes(self._latches[number % 2] & self.port(number % 2) for number in range(length))
 
     def poke(self, register: int, value: int) -> None:
-        """Put `value` where nobody wrote it."""
+        """Set a register to `value` without a bus write."""
         self._latches[register & 1] = value
 
 
 class Pcf8575(Chip):
     """Pins P00 to P07 and P10 to P17, each with a current source of about 100 uA. SCL up to 400 kHz.
 
-    Bytes go in pairs, P0 then P1, always: an odd number of them would swap the ports of what follows. A PCF8575C has
-    no current sources: it needs resistors to the supply.
+    Bytes always come in pairs, P0 then P1: an odd number would swap the ports afterwards. A PCF8575C has no current
+    sources: it needs resistors to the supply.
     """
 
     name = "pcf8575"
@@ -52,9 +52,9 @@ class Pcf8575(Chip):
     )
 
     def setup(self, used: frozenset[int]) -> tuple[Write, ...]:
-        """Return the writes that release all pins; before, each port is driven low for one read, and must be low.
+        """Return the writes that release all pins, after each port was driven low for one read and must read low.
 
-        See `Pcf8574.setup` for why. A PCF8574 has the last byte of a pair on all its pins, and fails.
+        See `Pcf8574.setup` for the reason. A PCF8574 has the last byte of a pair on all its pins, and fails.
         """
         return (
             Write(b"\x00\xff", b"\x00\x00", b"\xff\x00"),

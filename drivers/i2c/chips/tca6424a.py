@@ -6,12 +6,12 @@ from .pca9555 import BankedModel
 _INPUT, _OUTPUT, _POLARITY, _CONFIGURATION = 0x00, 0x04, 0x08, 0x0C
 _ALL_THREE = 0x80  # automatic increment, within the group
 
-# As for the PCA9555: the outputs are unused, and a reset would not leave this in them.
+# As for the PCA9555: the outputs are unused, and a reset would not leave this value in them.
 _SIGNATURE = b"\xaa\x55\x33"
 
 
 class Tca6424aModel(BankedModel):
-    """Groups of three registers, four apart; bit 7 of the command lets the pointer go round its group."""
+    """Groups of three registers, four apart; with bit 7 of the command the pointer wraps within its group."""
 
     pins, _ports, _stride = 24, 3, 4
 
@@ -20,7 +20,7 @@ class Tca6424aModel(BankedModel):
 
 
 class Tca6424a(Chip):
-    """Pins P00 to P07, P10 to P17, P20 to P27, which need resistors outside. SCL up to 400 kHz."""
+    """Pins P00 to P07, P10 to P17, P20 to P27, which need external resistors. SCL up to 400 kHz."""
 
     name = "tca6424a"
     rank = 8

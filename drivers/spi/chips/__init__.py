@@ -1,4 +1,4 @@
-"""The converters on SPI: one file a chip, which holds everything that is true of it."""
+"""The converters on SPI: one file per chip, with all its data."""
 
 from ...members import Members
 from .base import SELECT_US, SpiChip, SpiModel, Transfer

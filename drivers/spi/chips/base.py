@@ -1,6 +1,6 @@
-"""What a converter on SPI is: to its driver, to the emulated device, and as a part to solder.
+"""Converters on SPI: their interface for the driver, their emulation, and their data as parts to solder.
 
-It needs the standard library alone, as every chip's file does: the system's own Python emulates the chips.
+This file and every chip's file need only the standard library: the system's Python emulates the chips.
 """
 
 from abc import ABC, abstractmethod
@@ -10,7 +10,7 @@ from typing import ClassVar
 from ...i2c.chips.base import Package, Reading
 
 _BITS = 8
-# For so long chip select must be high between two transfers (MCP3208: 500 ns, MCP3008: 270 ns).
+# The time that chip select must be high between two transfers (MCP3208: 500 ns, MCP3008: 270 ns).
 SELECT_US = 0.5
 
 
@@ -25,7 +25,7 @@ class Transfer(Reading):
 
     @property
     def scl_periods(self) -> int:
-        """SCLK periods, of which a byte has no ninth."""
+        """SCLK periods, eight a byte."""
         return _BITS * self.wire_bytes
 
 
@@ -37,7 +37,7 @@ class SpiModel(ABC):
 
     @abstractmethod
     def transfer(self, sent: bytes) -> bytes:
-        """Return what comes in while `sent` goes out, from chip select low to high."""
+        """Return the bytes received while `sent` goes out, from chip select low to high."""
 
     def at(self, channel: int) -> int:
         """Return the code at a channel."""
@@ -47,12 +47,12 @@ class SpiModel(ABC):
 class SpiChip(ABC):
     """A kind of converter on SPI, mode 0. Its file defines `MEMBER`, one instance, or a tuple of them.
 
-    name      what glove.toml calls it
+    name      its name in glove.toml
     rank      its place in lists
     clock_hz  the highest SCLK at 3.3 V; most_hz, at 5 V
     pins      the names of its channels, in the order of their numbers
-    bits      of a code: code 0 is 0 V, and 2 ** bits is the supply, against which it measures
-    package   as a part to solder
+    bits      of a code: code 0 is 0 V, and 2 ** bits is the supply voltage
+    package   its data as a part to solder
     model     the class that emulates it
     """
 
@@ -67,11 +67,11 @@ class SpiChip(ABC):
 
     @abstractmethod
     def sent(self, channel: int) -> bytes:
-        """Return the bytes that convert a channel, channel by channel of the same length."""
+        """Return the bytes that convert a channel, of the same length for every channel."""
 
     @property
     def readings(self) -> tuple[Transfer, ...]:
-        """What reads each channel, in their order."""
+        """The transfer that reads each channel, in order."""
         sent = (self.sent(channel) for channel in range(len(self.pins)))
         return tuple(
             Transfer(name, command, (channel,) * _BITS * len(command))
@@ -80,10 +80,10 @@ class SpiChip(ABC):
 
     @property
     def highest(self) -> int:
-        """The code of the supply, where a channel is saturated."""
+        """The code of the supply, at which a channel is saturated."""
         return (1 << self.bits) - 1
 
-    def code(self, answer: bytes) -> int | None:
-        """Return the code of an answer, whose last bits it is; None where the null bit before it is none."""
-        code = int.from_bytes(answer, "big") & (2 << self.bits) - 1
+    def code(self, reply: bytes) -> int | None:
+        """Return the code, the last bits of a reply; None if the null bit before it is not 0."""
+        code = int.from_bytes(reply, "big") & (2 << self.bits) - 1
         return None if code >> self.bits else code

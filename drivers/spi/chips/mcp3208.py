@@ -1,4 +1,4 @@
-"""Microchip MCP3208 and MCP3204: eight or four channels of 12 bits, converted while the transfer goes on (DS21298)."""
+"""Microchip MCP3208 and MCP3204: eight or four channels of 12 bits, converted during the transfer (DS21298)."""
 
 from typing import ClassVar
 
@@ -16,7 +16,7 @@ class Mcp3208Model(SpiModel):
     channels, bits = 8, 12
 
     def transfer(self, sent: bytes) -> bytes:
-        """Return what comes in while `sent` goes out: zeros before the code, and after it zeros again."""
+        """Return the bytes received while `sent` goes out: zeros, the code, and zeros again."""
         length = 8 * len(sent)
         word = int.from_bytes(sent, "big")
         start = word.bit_length()
@@ -29,7 +29,7 @@ class Mcp3208Model(SpiModel):
 
 
 class Mcp3204Model(Mcp3208Model):
-    """Four channels: the first bit of a channel means nothing."""
+    """Four channels: the first bit of a channel number is ignored."""
 
     channels = 4
 

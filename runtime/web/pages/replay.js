@@ -27,9 +27,9 @@ const send = connect({
   refused: ({ why }) => say($("refused"), why),
 });
 
-function show(told) {
-  state = told;
-  const { at_us, first_us, last_us, playing, speed, share, truth, faults } = told;
+function show(received) {
+  state = received;
+  const { at_us, first_us, last_us, playing, speed, share, truth, faults } = received;
   const slider = $("at"), length = (last_us - first_us) / 1e6;
   slider.max = String(length);
   if (!held) slider.value = String((at_us - first_us) / 1e6);

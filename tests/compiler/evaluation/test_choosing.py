@@ -145,7 +145,7 @@ def test_the_best_is_chosen_where_others_are_clearly_behind(monkeypatch: pytest.
     samples = _samples([*range(9)], [0, 1], [0, 1, 2, 3, 4, 5])
     fitting = choose_training(samples, candidates)
     assert fitting.settings["switch"] == 1
-    assert fitting.why == "it recognises the most, 96.7 % of 60 trials in inner folds"
+    assert fitting.why == "it has the highest accuracy, 96.7 % of 60 trials in inner folds"
     (shown,) = fitting.compared
     assert (shown.correct, shown.total, shown.behind, shown.rows) == (58, 60, 0.0, 1.0)
 
@@ -160,7 +160,7 @@ def test_within_one_standard_error_small_tables_win_and_of_these_the_lowest_loss
     fitting = choose_training(samples, candidates)
     assert fitting.settings == {"switch": 1.0, "idle": 0.0, "faith": 1.0}
     assert fitting.why.startswith(
-        "it recognises 96.7 % of 60 trials in inner folds, within one standard error of the best, "
+        "its accuracy is 96.7 % of 60 trials in inner folds, within one standard error of the best, "
     )
     first, chosen = fitting.compared
     assert (first.correct, first.behind, first.behind_error) == (59, 0.0, 0.0)

@@ -115,7 +115,7 @@ def test_curves_rise_and_say_what_to_expect(make_grasps: Make, tmp_path: Path) -
 
 
 def test_other_cuts_and_single_repetitions_have_no_curve(make_grasps: Make) -> None:
-    with pytest.raises(EvaluationError, match="and no object left out"):
+    with pytest.raises(EvaluationError, match="not objects left out"):
         evaluate(make_grasps(), replace(QUICK, scheme="object"), jobs=1)
     with pytest.raises(EvaluationError, match="needs more than 2 repetitions to train on, and there are 2"):
         evaluate(make_grasps(per_type=3), replace(QUICK, folds=3), jobs=1)
@@ -123,4 +123,4 @@ def test_other_cuts_and_single_repetitions_have_no_curve(make_grasps: Make) -> N
     assert study.learning is not None
     assert len(study.learning.repetitions) < LEAST
     assert study.learning.further == ()
-    assert study.learning.note.startswith("What more repetitions would bring is not extrapolated")
+    assert study.learning.note.startswith("The effect of more repetitions is not extrapolated")

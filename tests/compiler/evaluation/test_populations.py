@@ -145,7 +145,7 @@ def test_a_subject_of_one_grasp_type_is_named(make_grasps: Make) -> None:
     grasps = make_grasps()
     only = grasps.rows(np.flatnonzero((grasps.subjects == "B") | (grasps.grasps == "tip")))
     (text,) = concerns(only, populations(only, "trial", 4, 1, 1), "trial", 4)
-    assert text == "subject A: every row is of tip, nothing is to be told apart"
+    assert text == "subject A: every row is of tip, the only type"
 
 
 def test_rates_of_simulated_grasps_are_called_that(make_grasps: Make) -> None:

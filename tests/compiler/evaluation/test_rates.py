@@ -85,11 +85,11 @@ def test_repeats_of_one_draw_are_no_more_certain_than_its_mean() -> None:
 
 @pytest.mark.parametrize(("correct", "total"), [((), 5), ((6,), 5), ((-1,), 5), ((0,), 0)])
 def test_what_is_no_rate_is_refused(correct: tuple[int, ...], total: int) -> None:
-    with pytest.raises(ValueError, match="no rate"):
+    with pytest.raises(ValueError, match="do not give a rate"):
         counted(correct, total)
-    with pytest.raises(ValueError, match="no rate"):
+    with pytest.raises(ValueError, match="do not give a rate"):
         Rate.predicted([], [], [], of="pooled")
-    with pytest.raises(ValueError, match="no rate"):
+    with pytest.raises(ValueError, match="do not give a rate"):
         Rate.predicted([1, 2], [1, 2], [0], of="pooled")
 
 

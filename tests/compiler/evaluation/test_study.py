@@ -247,7 +247,7 @@ def test_every_trainer_is_compared_on_the_same_folds_and_inputs_with_baselines(s
 def test_trainers_are_not_compared_where_test_rows_choose(make_grasps: Make) -> None:
     study = evaluate(make_grasps(), replace(QUICK, protocols=("paper",), tables=("trainers",)), jobs=1)
     assert study.tables == ()
-    assert [left.reason for left in study.left_out] == ["trainers are compared under the nested protocol alone"]
+    assert [left.reason for left in study.left_out] == ["trainers are compared under the nested protocol only"]
 
 
 def test_an_unknown_subject_is_refused_with_those_there_are(make_grasps: Make) -> None:

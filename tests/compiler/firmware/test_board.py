@@ -99,7 +99,7 @@ def test_what_is_left_out_has_its_default_and_debouncing_is_off() -> None:
         (UNO + MATRIX.replace("PB1", "PD2"), "matrix.columns[1]: PD2 is already the pin of matrix.rows[0]"),
         (UNO + MATRIX.replace("diodes = true\n", ""), "matrix: the key diodes is missing"),
         (UNO + CHIP.replace("GPA0", "GPA7"), "chip[0].pins.GPA7: must not be an input"),
-        (UNO + CHIP.replace("0x20", "0x30"), "chip[0].address: a mcp23017 answers at 0x20 to 0x27"),
+        (UNO + CHIP.replace("0x20", "0x30"), "chip[0].address: a mcp23017 is at 0x20 to 0x27"),
         (UNO + CHIP + CHIP.replace('"a"', '"b"'), "chip[1].address: 0x20 is the address of chip[0] too"),
         (UNO + CHIP + CHIP.replace("0x20", "0x21"), "switch 'a' is already at chip[0].pins.GPA0"),
         (UNO + CHIP.replace("mcp23017", "pcf8574"), "the firmware cannot read a pcf8574: it reads mcp23017"),

@@ -40,7 +40,7 @@ def test_a_gzipped_arff_is_read_by_its_suffix(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("", "t.arff is no ARFF: it has no line @data"),
+        ("", "t.arff is not ARFF: it has no line @data"),
         ("garbage\n", "t.arff line 1: expected @attribute or @data, not 'garbage'"),
         (HEADER.replace("s {", "'my joint' {"), "line 4: attribute 'my joint' occurs twice"),
         (HEADER.replace("NUMERIC", "string"), "line 3: attribute 'my joint' is string; only numeric and nominal"),

@@ -86,7 +86,7 @@ def test_a_newer_file_is_refused_with_the_reason(good: bytes, tmp_path: Path) ->
         ({"objects": [" mug"]}, "begins or ends with a blank"),
         ({"switches": ["a", "b", "c", "c"]}, "occurs twice"),
         ({"joints": []}, r"codes is uint16 \(6, 2\), not <u2 \(6, 0\)"),
-        ({"taxonomy": {"name": "kamakura14", "types": ["PoS"]}}, "14 types of its own"),
+        ({"taxonomy": {"name": "kamakura14", "types": ["PoS"]}}, "14 published types"),
         ({"taxonomy": {"name": "own", "types": ["PoS"]}}, "grasps refers to name 11 of 2"),
     ],
 )

@@ -185,7 +185,7 @@ def test_what_was_simulated_stays_simulated(small: GraspSet, origins: list[str],
 
 def test_a_set_is_parted_by_three_things_only(small: GraspSet) -> None:
     for part in (lambda: split(small, "trial"), lambda: merge({"a": small}, "trial")):  # type: ignore[arg-type]
-        with pytest.raises(RecordingError, match="'trial' is none of subject, object, session"):
+        with pytest.raises(RecordingError, match="'trial' is not one of subject, object, session"):
             part()
 
 

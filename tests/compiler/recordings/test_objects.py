@@ -47,7 +47,7 @@ def test_a_taxonomy_of_ones_own_is_what_the_list_names(file: Path) -> None:
         ),
         ('PoS = ["a", "a"]\nTip = ["a"]\n', r"objects\.toml, line 1: PoS: object 'a' occurs twice"),
         ('PoS = ["a"]\nTip = ["\\u0000"]\n', r"objects\.toml, line 2: Tip: object .* holds a control character"),
-        ('PoS = ["a"]\n1 = ["b"]\n', r"objects\.toml, line 2: 1: is PoS, which is there already"),
+        ('PoS = ["a"]\n1 = ["b"]\n', r"objects\.toml, line 2: 1: is PoS, which is listed already"),
         ('PoS = ["a"]\n', "names 1 grasp types: a collection takes two at least"),
         ("", "names 0 grasp types"),
         ("PoS = [", "is not valid TOML"),

@@ -94,7 +94,7 @@ def test_arrays_of_an_npz_are_columns(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arrays", "reason"),
     [
-        ({"a": np.zeros(2), "b": np.zeros(3)}, "its arrays have 2, 3 rows"),
+        ({"a": np.zeros(2), "b": np.zeros(3)}, "its arrays have unequal lengths, 2, 3"),
         ({"a": np.zeros((2, 2, 2))}, "array a.npy: it has 3 dimensions"),
         ({"a": np.zeros(2, complex)}, "array a.npy: it holds '<c16', neither numbers nor text"),
         ({"a": np.array([{}, {}])}, r"cannot be read as npz: array a\.npy: it holds '\|O', neither"),

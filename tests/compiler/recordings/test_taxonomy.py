@@ -91,7 +91,7 @@ def test_types_that_cannot_be_told_apart_or_read_are_refused() -> None:
         own(["x", "y", "x"])
     with pytest.raises(RecordingError, match="grasp type '' is empty"):
         own([""])
-    with pytest.raises(RecordingError, match="taxonomy feix33 has 33 types of its own"):
+    with pytest.raises(RecordingError, match="taxonomy feix33 has 33 published types"):
         Taxonomy("feix33", ("x",))
     with pytest.raises(RecordingError, match="no taxonomy is called 'feix'"):
         published("feix")

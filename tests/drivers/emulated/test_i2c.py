@@ -116,7 +116,7 @@ def test_nothing_stays_behind_of_a_server_that_was_killed() -> None:
     emulated._server.kill()
     with pytest.raises(DeviceError, match="the emulated I2C buses have ended"):
         emulated.counters(0)
-    with pytest.raises(DeviceError, match="have ended: make new ones"):
+    with pytest.raises(DeviceError, match="have ended: create new ones"):
         emulated.counters(0)
     emulated.close()
     assert not Path(emulated.environment["UMOCKDEV_DIR"]).exists()
@@ -138,7 +138,7 @@ def test_a_machine_without_umockdev_is_told_what_to_install(monkeypatch: pytest.
 
 def test_a_chip_that_cannot_be_emulated_is_refused_by_name() -> None:
     bus = EmulatedBus("/dev/i2c-3", 400_000, "any", (EmulatedChip("mcp23s17", 0x20),))
-    with pytest.raises(SettingError, match="cannot emulate mcp23s17; what can be emulated: mcp23017"):
+    with pytest.raises(SettingError, match="cannot emulate mcp23s17; supported: mcp23017"):
         EmulatedI2c([bus])
 
 

@@ -249,13 +249,13 @@ def test_what_is_no_emulated_port_is_not_replaced(link: Path, kind: str) -> None
         link.write_text("mine")
     else:
         link.symlink_to("/dev/null")
-    with pytest.raises(DeviceError, match="exists and is no emulated port"):
+    with pytest.raises(DeviceError, match="exists and is not an emulated port"):
         PtyLine(link)
     assert link.exists()
 
 
 def test_a_place_where_no_link_can_be_made_is_named(tmp_path: Path) -> None:
-    with pytest.raises(DeviceError, match=r"no/such/port: no port can be linked there: No such file"):
+    with pytest.raises(DeviceError, match=r"no/such/port: cannot link a port there: No such file"):
         PtyLine(tmp_path / "no" / "such" / "port")
 
 

@@ -63,11 +63,11 @@ PORTS = [(0, "A"), (0, "B"), (1, "AB"), (2, "B"), (3, "AB"), (4, "01")]
 @pytest.mark.parametrize(
     ("adapter", "way", "transfers"),
     [
-        ("any", "all ports that no mux is switched between, in one transfer", 1 + 2 + 2),
-        ("i2c-gpio", "all ports that no mux is switched between, in one transfer", 1 + 2 + 2),
+        ("any", "all ports between two mux switches in one transfer", 1 + 2 + 2),
+        ("i2c-gpio", "all ports between two mux switches in one transfer", 1 + 2 + 2),
         ("designware", "all ports of a chip in one transfer", 3 + 2 + 2),
-        ("bcm2835", "a transfer for every port", 4 + 2 + 2),
-        ("smbus-only", "an SMBus transfer for every port", 4 + 2 + 2),
+        ("bcm2835", "one transfer per port", 4 + 2 + 2),
+        ("smbus-only", "one SMBus transfer per port", 4 + 2 + 2),
     ],
 )
 def test_the_best_batch_that_the_adapter_takes_is_found_and_used(
@@ -149,7 +149,7 @@ def test_two_chips_that_would_answer_at_one_address_are_refused() -> None:
         return ChipAt(CHIPS["mcp23017"], 0x20, frozenset({0}), mux, channel)
 
     for chips in ([at(), at()], [at(), at(0x70, 1)], [at(0x70, 1), at(0x70, 1)]):
-        with pytest.raises(SettingError, match="two chips would answer at 0x20"):
+        with pytest.raises(SettingError, match="two chips would respond at 0x20"):
             I2cBus("/dev/i2c-7", chips)
     for place in ((0x60, 1), (0x70, 8), (0x70, None), (None, 1)):
         with pytest.raises(SettingError, match="a tca9548a is at 0x70 to 0x77"):
@@ -161,7 +161,7 @@ def test_a_bus_that_is_not_there_or_is_no_bus_says_what_to_check(tmp_path: Any) 
         I2cBus("/dev/i2c-99", []).open()
     with pytest.raises(DeviceError, match="is it an I2C device"):
         I2cBus("/dev/null", []).open()
-    with pytest.raises(SettingError, match="is no path of a device"):
+    with pytest.raises(SettingError, match="is not the path of a device"):
         I2cBus("spy:///dev/i2c-1", [])
 
 
@@ -170,7 +170,7 @@ def test_a_file_is_no_bus_and_is_not_even_opened(tmp_path: Path) -> None:
     file.write_bytes(b"kept")
     file.chmod(0)  # opening it would be refused, but for root
     before = file.stat()
-    with pytest.raises(DeviceError, match="file is a file, no device: it was left as it is"):
+    with pytest.raises(DeviceError, match="file is a file, not a device: it was left as it is"):
         I2cBus(str(file), []).open()
     assert file.stat() == before
 

@@ -81,7 +81,7 @@ def test_an_address_that_such_a_chip_cannot_have_is_refused(kind: str) -> None:
         if address in chip.addresses:
             chip.check_address(address)
         else:
-            with pytest.raises(SettingError, match=f"{kind} answers at 0x.*not at 0x{address:02X}"):
+            with pytest.raises(SettingError, match=f"{kind} is at 0x.*not at 0x{address:02X}"):
                 chip.check_address(address)
 
 

@@ -41,7 +41,7 @@ def test_a_chip_that_stops_acknowledging_is_lost_alone_and_comes_back(rig: MakeR
     assert glove.client.ask("read") == [None, LEVELS[1]]
     gone, other = glove.client.state().chips
     assert (gone.present, other.present) == (False, True)
-    assert "/dev/i2c-7: the mcp23017 at 0x20 does not answer: check its supply, its wires" in gone.last_error
+    assert "/dev/i2c-7: the mcp23017 at 0x20 does not reply: check its supply, its wires" in gone.last_error
     assert not other.errors
     glove.emulated.heal(0)
     recovers(glove, LEVELS, by_way_of=[[None, LEVELS[1]]])
@@ -55,7 +55,7 @@ def test_a_nak_is_known_by_every_errno_that_adapters_give_it(rig: MakeRig) -> No
         glove.emulated.fail(0, code, address=0x20 + number)
     assert glove.client.ask("read") == [None, None, None, 0xFF]
     for code, chip in zip(codes, glove.client.state().chips, strict=False):
-        assert f"does not answer: check its supply, its wires and its address pins (errno {code})" in chip.last_error
+        assert f"does not reply: check its supply, its wires and its address pins (errno {code})" in chip.last_error
 
 
 @pytest.mark.parametrize("code", [errno.EIO, errno.ETIMEDOUT, errno.EAGAIN, errno.EREMOTEIO, errno.EBUSY])
@@ -86,7 +86,7 @@ def test_a_chip_that_goes_on_failing_is_given_up_after_three_tries_and_tried_onc
 @pytest.mark.parametrize("code", [errno.EOPNOTSUPP, errno.EINVAL])
 def test_an_adapter_that_refuses_batches_while_running_is_asked_for_less(rig: MakeRig, code: int) -> None:
     glove = running(rig)
-    assert glove.client.state().way.startswith("all ports that no mux")
+    assert glove.client.state().way.startswith("all ports between")
     glove.emulated.fail(0, code, batches=True)
     assert [glove.client.ask("read") for _ in range(3)] == [LEVELS] * 3
     state = glove.client.state()
@@ -101,7 +101,7 @@ def test_an_address_that_a_driver_of_the_kernel_has_is_left_to_it_and_said(rig: 
     glove.client.ask("open")
     glove.client.ask("prepare", BOTH)
     assert glove.client.ask("read") == [None, LEVELS[1]]
-    assert "a driver of the kernel has the address" in glove.client.state().chips[0].last_error
+    assert "a kernel driver has the address" in glove.client.state().chips[0].last_error
     assert not any(place[0] == 0x20 for place in glove.traffic())
     glove.emulated.heal(0)
     recovers(glove, LEVELS, by_way_of=[[None, LEVELS[1]]])

@@ -141,7 +141,7 @@ def test_a_device_that_goes_is_told_and_opened_again(rig: Rig) -> None:
 
 def test_a_path_that_is_no_device_is_refused_and_one_that_is_missing_is_told() -> None:
     chip = SPI_CHIPS["mcp3208"]
-    with pytest.raises(SettingError, match="is no path of a device"):
+    with pytest.raises(SettingError, match="is not the path of a device"):
         SpiDevice("socket://x:1", chip, 1)
     device = SpiDevice("/dev/spidev99.9", chip, 1_000_000)
     with pytest.raises(DeviceError, match="is SPI switched on"):

@@ -72,18 +72,18 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
         ("[cyberglove]\nport = ''", "line 2: cyberglove.port: must be text of length >= 1"),
         (
             "[cyberglove]\nport = 'spy:///dev/null?file=a'",
-            "line 2: cyberglove.port: 'spy:///dev/null?file=a' is no port that is opened: a port is a device such as",
+            "line 2: cyberglove.port: 'spy:///dev/null?file=a' is not a supported port: a port is a device such as",
         ),
         (
             "[[scanner]]\nswitches = []\nport = 'loop://'",
-            "line 3: scanner[0].port: 'loop://' is no port that is opened",
+            "line 3: scanner[0].port: 'loop://' is not a supported port",
         ),
         (
             "[[scanner]]\nport = 'socket://a:1?x'\nswitches = []",
-            "port: 'socket://a:1?x' has the option 'x', which is not",
+            "port: 'socket://a:1?x' has the option 'x', which it does not support",
         ),
-        ("[[bus]]\ndevice = 'spy://a'", "line 2: bus[0].device: 'spy://a' is no path of a device, such as"),
-        ("[[bus]]\ndevice = 'a\\u001bb'".replace("'", '"'), "bus[0].device: 'a\\x1bb' is no path of a device"),
+        ("[[bus]]\ndevice = 'spy://a'", "line 2: bus[0].device: 'spy://a' is not the path of a device, such as"),
+        ("[[bus]]\ndevice = 'a\\u001bb'".replace("'", '"'), "bus[0].device: 'a\\x1bb' is not the path of a device"),
         ("[cyberglove]\nport = 'x'\nbaud = 'fast'", "line 3: cyberglove.baud: 'fast' is not among its values (did"),
         ("[cyberglove]\nport = 'x'\nbaud = 0", "line 3: cyberglove.baud: must be at least 1, not 0"),
         ("[cyberglove]\nport = 'x'\nsensors = 20", "line 3: cyberglove.sensors: 20 is not among its values"),
@@ -99,13 +99,13 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
         ),
         (
             f"[cyberglove]\nport = 'x'\njoints = {['', 'a'] * 9}",
-            "line 3: cyberglove.joints[3]: sensor 'a' is cyberglove.joints[1] already",
+            "line 3: cyberglove.joints[3]: sensor 'a' is already cyberglove.joints[1]",
         ),
         ("[[scaner]]", "line 1: scaner: this key is unknown (did you mean 'scanner'?)"),
         ("[[scanner]]\nport = 'x'", "line 1: scanner[0]: the key switches is missing"),
         (
             "[[scanner]]\nport = 'x'\nswitches = ['a', '', '', 'a']",
-            "line 3: scanner[0].switches[3]: switch 'a' is scanner[0].switches[0] already: a switch has one place",
+            "line 3: scanner[0].switches[3]: switch 'a' is already scanner[0].switches[0]: wire it in one place",
         ),
         (
             "[[scanner]]\nport = 'x'\nswitches = [' a']",
@@ -115,7 +115,7 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
             "[cyberglove]\nport = 'x'\n[[scanner]]\nport = 'x'\nswitches = []",
             "line 4: scanner[0].port: x is already cyberglove.port: name each device in one entry only",
         ),
-        (BUS + BUS, "line 4: bus[1].device: /dev/i2c-1 is bus[0].device already"),
+        (BUS + BUS, "line 4: bus[1].device: /dev/i2c-1 is already bus[0].device"),
         (BUS + "clock_hz = 5", "line 3: bus[0].clock_hz: must be at least 1000, not 5"),
         ("bus = 3", "line 1: bus: must be a list, not 3"),
         ("[bus]", "line 1: bus: must be a list, not a table"),
@@ -131,9 +131,9 @@ def test_what_is_wrong_with_a_line_or_bus_is_told_with_its_place(load: Load, tex
         ("kind = 'mcp23018'", "line 4: bus[0].chip[0].kind: there is no chip 'mcp23018' (did you mean 'mcp23017'"),
         (
             "kind = 'mcp23017'\naddress = 0x28",
-            "line 5: bus[0].chip[0].address: a mcp23017 answers at 0x20 to 0x27, not",
+            "line 5: bus[0].chip[0].address: a mcp23017 is at 0x20 to 0x27, not",
         ),
-        ("kind = 'mcp23017'\naddress = -1", "line 5: bus[0].chip[0].address: a mcp23017 answers at 0x20 to 0x27, not"),
+        ("kind = 'mcp23017'\naddress = -1", "line 5: bus[0].chip[0].address: a mcp23017 is at 0x20 to 0x27, not"),
         (
             "pins = { GPA8 = 's' }",
             "bus[0].chip[0].pins.GPA8: a mcp23017 has no pin 'GPA8' (did you mean 'GPA6' or 'GPA5' or 'GPA4'?)",
@@ -146,7 +146,7 @@ def test_what_is_wrong_with_a_line_or_bus_is_told_with_its_place(load: Load, tex
         ("pins = { GPA0 = 'a', GPA0 = 'b' }", "glove.toml is not valid TOML: "),
         (
             "pins = { GPA0 = 'a', GPA1 = 'a' }",
-            "bus[0].chip[0].pins.GPA1: switch 'a' is bus[0].chip[0].pins.GPA0 already: a switch has one place",
+            "bus[0].chip[0].pins.GPA1: switch 'a' is already bus[0].chip[0].pins.GPA0: wire it in one place",
         ),
         ("kind = 'pcf8574'\nclosed = 'high'", "bus[0].chip[0].closed: a pcf8574 pulls its inputs up"),
         ("closed = 'lo'", "bus[0].chip[0].closed: 'lo' is not among its values (did you mean 'low'"),
@@ -222,7 +222,7 @@ def test_a_clock_beyond_what_a_chip_is_made_for_is_refused(
 
 def test_a_switch_on_a_board_and_on_a_chip_is_refused(load: Load) -> None:
     text = "[[scanner]]\nport = 'x'\nswitches = ['s1']\n" + BUS + CHIP + "pins.GPA0 = 's1'"
-    assert "bus[0].chip[0].pins.GPA0: switch 's1' is scanner[0].switches[0] already" in complaint(load, text)
+    assert "bus[0].chip[0].pins.GPA0: switch 's1' is already scanner[0].switches[0]" in complaint(load, text)
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:

@@ -46,12 +46,12 @@ def test_an_open_switch_is_0_a_closed_one_1_and_more_is_not_known() -> None:
 def test_bits_of_switches_that_are_not_recorded_are_refused(field: str, switches: int) -> None:
     masks: dict[str, Any] = {field: 1 << switches}
     frame = replace(SwitchFrame(0, 0), **masks)
-    with pytest.raises(FrameError, match=f"beyond the {switches} switches"):
+    with pytest.raises(FrameError, match=f"beyond the {switches} recorded switches"):
         switch_bytes(frame, switches, 0)
 
 
 def test_a_record_of_another_glove_is_refused_with_advice() -> None:
-    with pytest.raises(FrameError, match=r"22 sensors, 18 are recorded: say under \[cyberglove\]"):
+    with pytest.raises(FrameError, match=r"22 sensors, but 18 are recorded: set the number under \[cyberglove\]"):
         glove_bytes(GloveFrame(0, bytes(22)), 18)
 
 

@@ -285,7 +285,7 @@ def test_who_leaves_is_no_reader_any_more_and_costs_nothing(
 @pytest.mark.parametrize(
     ("where", "said"),
     [
-        ("foxglove:0.0.0.0:8765", r"other machines could read it there .* foxglove:0\.0\.0\.0:8765\?public"),
+        ("foxglove:0.0.0.0:8765", r"other machines could read it there.* foxglove:0\.0\.0\.0:8765\?public"),
         ("foxglove:here", r"write it as foxglove:127\.0\.0\.1:8765"),
         ("foxglove:127.0.0.1:8765?rate=0", "is not possible: use 1 to 1000 a second"),
         ("foxglove:127.0.0.1:8765?rate=fast", "a rate of 'fast'"),

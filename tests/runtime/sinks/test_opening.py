@@ -31,5 +31,5 @@ def test_a_name_that_means_nothing_is_told_how_to_write_it(where: str) -> None:
 
 
 def test_behind_the_name_of_ros_topics_only_public_means_something() -> None:
-    with pytest.raises(SettingError, match=r"'ros:/a\?open': after the question mark only `public` can follow"):
+    with pytest.raises(SettingError, match=r"'ros:/a\?open': after the question mark only `public` or `rate=HZ` can"):
         open_sink("ros:/a?open")

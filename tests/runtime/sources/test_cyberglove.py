@@ -49,7 +49,7 @@ def test_a_box_without_a_mask_delivers_all_and_is_in_trouble(line: PtyLine) -> N
         emulated.set(VALUES)
         device = opened(line)
         assert first(device).sensors == VALUES
-        assert "it takes no sensor mask" in device.trouble()
+        assert "it accepts no sensor mask" in device.trouble()
         device.close()
 
 

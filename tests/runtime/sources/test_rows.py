@@ -204,8 +204,8 @@ def test_what_is_wrong_with_all_rows_is_said(play: Play) -> None:
         (('time = "ms"', 'time = "us"'), "no column 'us'"),
         (('time = "ms"', 'time = "pad"'), "'pad' is the sender's clock"),
         (("[0, 4095]", "[7, 7]"), "a range from 7"),
-        (('"ms", "thumb", ""', '"ms", "thumb", "pad"'), "column 'pad' is stream"),
-        (('switches = ["thumb", "index"]', 'switches = ["thumb", "index", "pad"]'), "'pad' is stream"),
+        (('"ms", "thumb", ""', '"ms", "thumb", "pad"'), "column 'pad' is already stream"),
+        (('switches = ["thumb", "index"]', 'switches = ["thumb", "index", "pad"]'), "'pad' is already stream"),
     ],
 )
 def test_what_cannot_be_is_said_with_its_line(change: tuple[str, str], said: str) -> None:

@@ -53,7 +53,9 @@ def test_the_extra_time_is_on_average_what_was_said(delay: Callable) -> None:
 @pytest.mark.parametrize("parameters", [Parameters(us_per_port=101), Parameters(us_per_port=90, jitter_us=11.0)])
 def test_a_scan_that_lasts_longer_than_a_frame_is_refused(parameters: Parameters, make_setting: Callable) -> None:
     prepare(parameters, make_setting(timed=True, period_us=1010))
-    with pytest.raises(SceneError, match=r"effects\.bus\.latency: 10 ports take 1010 us .* 1009 us from one frame"):
+    with pytest.raises(
+        SceneError, match=r"effects\.bus\.latency: 10 ports take 1010 us .* period of frames is 1009 us"
+    ):
         prepare(parameters, make_setting(timed=True, period_us=1009))
 
 

@@ -146,7 +146,7 @@ def test_counts_that_are_lost_leave_those_of_the_frame_before(make_scene: Any, m
 
 
 def test_a_rate_that_the_line_has_no_time_for_is_refused(make_scene: Callable[..., Scene]) -> None:
-    with pytest.raises(SceneError, match="ask for at most 31"):
+    with pytest.raises(SceneError, match="request at most 31"):
         compile_pipeline(make_scene(["wire.lost_bytes", "frame.jitter"], glove=ALL))
 
 

@@ -239,7 +239,7 @@ def test_a_scene_may_name_the_file_that_is_only_to_be_written(make_scene: MakeSc
 
 def test_a_taxonomy_without_a_table_cannot_be_planned(make_scene: MakeScene) -> None:
     item = thing("bead", "Tip Pinch", BEAD.shape)
-    with pytest.raises(SceneError, match="no table of how the grasp types of 'feix33' hold things: nothing can be pla"):
+    with pytest.raises(SceneError, match="no table of prehensions for the grasp types of 'feix33': nothing can be pla"):
         plan_scene(make_scene(taxonomy="feix33", objects=(item,)), 1)
 
 
@@ -256,7 +256,7 @@ def test_a_taxonomy_without_a_table_needs_none_where_everything_is_planned(
 
 
 def test_a_type_that_its_taxonomys_table_lacks_is_named_with_its_object(make_scene: MakeScene) -> None:
-    with pytest.raises(SceneError, match="kamakura14 has no table of how grasp type 'Hold' holds things: 'pea' cannot"):
+    with pytest.raises(SceneError, match="kamakura14 has no prehension for grasp type 'Hold': 'pea' cannot"):
         plan_scene(make_scene(objects=(thing("pea", "Hold", PEA.shape),)), 1)
 
 

@@ -192,7 +192,7 @@ BROKEN = {
     "19 angles": (broken(posture_deg=[0.0] * 19), "length >= 20 - at `$.entries[0].held[0].posture_deg`"),
     "7 numbers of a pose": (broken(pose=[0.0] * 7), "length <= 6 - at `$.entries[0].held[0].pose`"),
     "a pulling pad": (broken(shares=[1.5, -0.5]), "at `$.entries[0].held[0].shares[0]`"),
-    "a share too few": (broken(shares=[1.0]), "'pin' has 2 spheres, and not a share for each"),
+    "a share too few": (broken(shares=[1.0]), "'pin' has 2 spheres, but not a share for each"),
     "skin that no hand has": (broken(spheres=[3, 50]), "at `$.entries[0].spheres[1]`"),
     "no hands": (broken(held=[]), "at `$.entries[0].held`"),
     "hands in disorder": (broken(length_mm=500.0), "the hands of 'pin' are not in order"),

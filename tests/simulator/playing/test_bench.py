@@ -23,5 +23,5 @@ def test_the_glove_has_as_many_sensors_as_its_harness_says(sensors: int, tmp_pat
             device.close()
         assert frame is not None
         assert frame.sensors == shown
-        with pytest.raises(SettingError, match=f"{sensors} sensors are that many bytes"):
+        with pytest.raises(SettingError, match=f"{sensors} sensors need as many bytes"):
             bench.show([], bytes(range(1, sensors)))

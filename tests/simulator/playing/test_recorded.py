@@ -61,5 +61,5 @@ def test_a_recording_without_frames_cannot_be_played(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with Recorder(path, session()) as recorder:
         recorder.switches(SwitchFrame(0, 0b001))
-    with pytest.raises(SceneError, match=r"run\.mcap: holds no frame of a glove"):
+    with pytest.raises(SceneError, match=r"run\.mcap: holds no glove frames"):
         of_recording(path, 10_000)

@@ -222,7 +222,5 @@ def test_a_scene_that_is_not_shipped_is_told_the_nearest() -> None:
 
 
 def test_a_missing_file_is_told_the_names_of_the_shipped_scenes(tmp_path: Path) -> None:
-    with pytest.raises(
-        SceneError, match=r"there is no file .*quick\.toml; scenes that are shipped go by name: .*quick"
-    ):
+    with pytest.raises(SceneError, match=r"there is no file .*quick\.toml; shipped scenes have the names .*quick"):
         load_scene(tmp_path / "quick.toml")

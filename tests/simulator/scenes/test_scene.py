@@ -98,5 +98,5 @@ def test_a_subject_has_a_hand_of_their_size() -> None:
 
 
 def test_what_is_broader_than_every_hand_on_all_sides_is_no_object() -> None:
-    with pytest.raises(ValueError, match="no hand holds what is more than 200 mm across"):
+    with pytest.raises(ValueError, match="no hand holds an object of more than 200 mm"):
         SceneObject(name="globe", grasp="CMF", shape=Sphere(diameter_mm=300.0), mass_g=500.0)

@@ -111,8 +111,8 @@ def _shifted(rows: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(
     ("spoil", "caught"),
     [
-        (lambda of: replace(of, switch_means=_shifted(of.switch_means)), "what stands in for each input"),
-        (lambda of: replace(of, joint_means=_shifted(of.joint_means)), "what stands in for each input"),
+        (lambda of: replace(of, switch_means=_shifted(of.switch_means)), "the replacement of each input"),
+        (lambda of: replace(of, joint_means=_shifted(of.joint_means)), "the replacement of each input"),
         (lambda of: replace(of, switch_means=0 * of.switch_means), "lost the fit at 60 digits"),
         (lambda of: replace(of, joint_means=0 * of.joint_means), "lost the fit at 60 digits"),
     ],
@@ -138,7 +138,7 @@ def test_a_recogniser_that_tells_nobody_is_caught(monkeypatch: pytest.MonkeyPatc
     def silent(self: Build, *frame: np.ndarray) -> Recognition:
         return replace(right(self, *frame), degraded=False)
 
-    assert _found(monkeypatch, silent)["frames called degraded"].error == 1
+    assert _found(monkeypatch, silent)["frames reported as degraded"].error == 1
 
 
 def test_a_recogniser_that_reads_what_is_lost_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -147,4 +147,4 @@ def test_a_recogniser_that_reads_what_is_lost_is_caught(monkeypatch: pytest.Monk
     def nosy(self: Build, *frame: np.ndarray) -> Recognition:
         return replace(right(self, *frame[:2]), degraded=right(self, *frame).degraded)
 
-    assert _found(monkeypatch, nosy)["answers that hang on what a lost input reads"].error == 1
+    assert _found(monkeypatch, nosy)["outputs that depend on the value of a lost input"].error == 1

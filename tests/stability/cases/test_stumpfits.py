@@ -35,7 +35,7 @@ def test_no_stump_explains_more_and_branches_answer_with_their_means(problem: Pr
     fits = [(problem, stumpfits.fit(problem))]
     assert stumpfits.choices_of(fits).holds
     # Not every problem has a branch that is, or is not, next to empty.
-    assert all(finding.error <= finding.bound for finding in stumpfits.answers_of(fits))
+    assert all(finding.error <= finding.bound for finding in stumpfits.outputs_of(fits))
 
 
 def test_every_finding_notices_a_small_fault(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -45,7 +45,7 @@ def test_the_page_has_its_pictures_in_order_and_says_where_one_was_not_run(measu
     shown = figures(measured, NotRun("java or Weka is not installed"))
     assert [(each.name, each.svg is not None) for each in shown] == [
         ("ranges", True),
-        ("beside", False),
+        ("weka", False),
         ("widths", True),
     ]
     assert shown[1].caption == "not run: java or Weka is not installed"

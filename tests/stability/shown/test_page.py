@@ -8,9 +8,9 @@ import pytest
 
 from thenar.stability.finding import Case, Finding
 from thenar.stability.report import CaseReport, Check, Report
-from thenar.stability.shown.figures import draw_beside
+from thenar.stability.shown.figures import draw_weka
 from thenar.stability.shown.page import Picture, page
-from thenar.stability.weka import Beside, Differences, NotRun
+from thenar.stability.weka import Comparison, Differences, NotRun
 
 VOID = {"meta", "br", "hr", "img", "link"}
 NAMESPACES = {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
@@ -25,14 +25,15 @@ REPORT = Report(
         ),
         CaseReport("bad", Case("A bad case", "all & sundry"), (Check(BAD, False),), "ValueError: 1 < 2", False),
     ),
-    beside=NotRun("java or Weka is not installed"),
+    weka=NotRun("java or Weka is not installed"),
     holds=False,
 )
 APART = Differences((1e-16, 0.0, 1.0), 3)
-BESIDE = Beside(
+COMPARISON = Comparison(
     "3.6.14", 3, 2, 4, 8, 8, 1, APART, APART, Differences((1e-15, 1e-14, 1e-13), None), 2, 193.7, 3.0, 10, 0.0
 )
-FIGURES = tuple(Picture(name, f"Picture {name}.", "How to read <it>.", draw_beside(BESIDE)) for name in ("one", "two"))
+DRAWN = draw_weka(COMPARISON)
+FIGURES = tuple(Picture(name, f"Picture {name}.", "How to read <it>.", DRAWN) for name in ("one", "two"))
 
 
 class Reader(HTMLParser):
@@ -128,10 +129,13 @@ def test_weka_that_is_missing_is_named(text: str) -> None:
 
 
 def test_the_round_in_which_weka_parts_from_itself_is_named_in_words_and_picture() -> None:
-    read = Reader(page(msgspec.structs.replace(REPORT, beside=BESIDE), FIGURES))
-    assert "JVM: at most 1e-16 until they part in round 3, then by up to 1; in the end 2 rows of 8 change" in read.words
-    assert "the processor, the default: at most 1e-16 until they part in round 3, then by up to 1" in read.words
-    assert "the exp() written in Java: at most 1e-13, in all rounds" in read.words
+    read = Reader(page(msgspec.structs.replace(REPORT, weka=COMPARISON), FIGURES))
+    assert (
+        "JVM: at most 1e-16 until they diverge in round 3, then up to 1; after the last round 2 rows of 8 change"
+        in read.words
+    )
+    assert "the processor's exp(), the default: at most 1e-16 until they diverge in round 3, then up to 1" in read.words
+    assert "Java's portable exp(): at most 1e-13, in all rounds" in read.words
     assert "in 10 other orders: the same bits" in read.words
 
 
@@ -144,6 +148,6 @@ def test_a_picture_says_what_it_is_to_those_who_cannot_see_it(text: str) -> None
 
 
 def test_the_same_results_give_the_same_bytes_without_a_date(text: str) -> None:
-    again = tuple(Picture(each.name, each.title, each.caption, draw_beside(BESIDE)) for each in FIGURES)
+    again = tuple(Picture(each.name, each.title, each.caption, draw_weka(COMPARISON)) for each in FIGURES)
     assert page(REPORT, again) == text
     assert not re.search(r"20\d\d-\d\d|20\d\d", re.sub(r"<svg.*?</svg>", "", text, flags=re.S))

@@ -4,7 +4,7 @@
  *
  * Layout for atmega2560: 16-bit entries, up to 6 switches a lookup, codes compared with thresholds, up to 2 joints a
  * lookup, rows added in line: the fastest of 108 layouts in 49152 bytes of flash, at most 143 cycles (314 by
- * update()) and 1772 bytes.
+ * update()) and 1760 bytes.
  *
  * From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.h.j2.
  */

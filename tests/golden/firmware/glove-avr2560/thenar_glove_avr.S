@@ -3,16 +3,16 @@
    From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME_avr.S.j2. */
 #ifdef __AVR__
 
-/* While rows are added, the sums of 3 classes stay in registers; Z, r31:r30, is where a row is read, and r0 and r1
-   hold what is read and multiplied. Y, r29:r28, points at the glove.
-   update() compares the input with what is in the sums, and finds only the rows of what differs. */
+/* The sums of 3 classes stay in registers while rows are added. Z, r31:r30, is the address of a row; r0 and r1 hold
+   entries and products. Y, r29:r28, points at the glove.
+   update() compares the input with that of the previous call, and finds only rows whose input has changed. */
 
 #define STRIDE 6 /* bytes of a row */
-#define STATE 12 /* what of a glove Y points at: whether something is missing, whether update() has begun, the input */
+#define STATE 12 /* offset in a glove of what Y points at: two flags (input missing, update() begun), the input */
 #define START 6
-#define SEEN 7 /* from there on: bytes of the input that are in the sums, by look-ups */
+#define SEEN 7 /* offset from Y of the input bytes of the previous call */
 
-/* Make Z the address of the row whose number is in a register, of those that begin at `rows`. */
+/* Make Z the address of a row: its number is in a register, row 0 is at offset `rows`. */
 .macro to_row rows, number
     ldi   r31, STRIDE
     mul   \number, r31
@@ -49,19 +49,19 @@
     sbci  r29, hi8(-STATE)
 .endm
 
-/* Make Z the address of what lies that many bytes from there. */
+/* Make Z the address at an offset from there. */
 .macro to_state bytes
     movw  r30, r28
     subi  r30, lo8(-(\bytes))
     sbci  r31, hi8(-(\bytes))
 .endm
 
-/* Make Z the address of what lies that many bytes into the glove. */
+/* Make Z the address at an offset in the glove. */
 .macro to_glove bytes
     to_state \bytes - STATE
 .endm
 
-/* Have what is missing left out, and load the sums as they begin then. */
+/* Leave out missing inputs, and load the initial sums. */
 .macro start_without
     lds   r30, thenar_glove_stand_in
     lds   r31, thenar_glove_stand_in + 1
@@ -130,7 +130,7 @@ thenar_glove_classify:
     st    Z+, r26
     st    Z+, r27
 
-/* Return the first class whose score is largest; the sums are still in their registers. */
+/* Return the first class with the highest score; the sums are still in registers. */
 thenar_glove_answer:
     movw  r0, r22
     ldi   r30, 0
@@ -160,7 +160,7 @@ thenar_glove_answer:
 thenar_glove_update:
     keep_registers
     take_glove
-    clt /* T: nothing is in the sums yet */
+    clt /* T: the sums hold no rows yet */
     ldd   r30, Y+0
     ldd   r31, Y+1
     subi  r31, 1
@@ -171,13 +171,13 @@ thenar_glove_update:
 
 changes_0:
     movw  r30, r24
+loads_0:
     ldd   r22, Z+0
     ldd   r23, Z+1
     ldd   r24, Z+2
     ldd   r25, Z+3
     ldd   r26, Z+4
     ldd   r27, Z+5
-groups_0:
 
     /* switches 0 to 5 */
     ldd   r30, Y+2
@@ -211,11 +211,11 @@ changed_0:
     st    Z+, r27
     jmp   thenar_glove_answer
 
-/* Leave out what is missing, or begin: load what sums begin with, and compare nothing. */
+/* Leave out missing inputs, or begin: load the initial sums and compare nothing. */
 thenar_glove_prepare:
     ldd   r30, Y+0
     tst   r30
-    breq  1f /* so it has not begun */
+    breq  1f /* nothing is missing: update() has not begun */
     start_without
     movw  r24, r28
     subi  r24, lo8(STATE)
@@ -233,13 +233,7 @@ thenar_glove_prepare:
 
 begin_0:
     to_state START + 0 - STATE
-    ldd   r22, Z+0
-    ldd   r23, Z+1
-    ldd   r24, Z+2
-    ldd   r25, Z+3
-    ldd   r26, Z+4
-    ldd   r27, Z+5
-    jmp   groups_0
+    jmp   loads_0
 
 all_0:
     rcall change_0_1
@@ -247,7 +241,7 @@ all_0:
 
 change_0_0:
     std   Y+5, r30
-    /* Only what has changed: the rows of switches that have closed, less that of switches that have opened. */
+    /* Add the row of the switches that have closed, subtract the row of those that have opened. */
     mov   r0, r30
     eor   r0, r31
     and   r31, r0
@@ -303,18 +297,7 @@ change_0_1:
     ret
 
 add_0:
-    lpm   r0, Z+
-    add   r22, r0
-    lpm   r0, Z+
-    adc   r23, r0
-    lpm   r0, Z+
-    add   r24, r0
-    lpm   r0, Z+
-    adc   r25, r0
-    lpm   r0, Z+
-    add   r26, r0
-    lpm   r0, Z+
-    adc   r27, r0
+    add_row
     ret
 
 subtract_0:
@@ -331,11 +314,12 @@ subtract_0:
     lpm   r0, Z+
     sbc   r27, r0
     ret
+thenar_glove_update_near:
     .size thenar_glove_update, . - thenar_glove_update
 
     .section .text.thenar_glove_start_without, "ax", @progbits
 
-/* Leave out what is missing, and load the sums. */
+/* Leave out missing inputs, and load the initial sums. */
     .global thenar_glove_start_without
     .type thenar_glove_start_without, @function
 thenar_glove_start_without:
