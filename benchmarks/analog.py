@@ -1,6 +1,6 @@
 """The gain of pads with levels over switches: the scenes `kamakura-analog` and `initial-contact`, simulated.
 
-`python benchmarks/analog.py [--quick]` prints tables of docs/project/results.md: accuracy with the 33 pads that ID3
+`python benchmarks/analog.py [--quick]` prints what docs/project/results.md reports: accuracy with the 33 pads that ID3
 chooses inside each fold as switches, read as switches that close at 1 N (the paper's), as three levels each, and as
 codes; and the accuracy by the force on the hardest pressed pad. Folds of trials, additive logit.
 """

@@ -1,4 +1,4 @@
-"""Coverage of the 95 % intervals of accuracies, by simulation: the tables of docs/explanation/evaluation.md.
+"""Coverage of the 95 % intervals of accuracies, by simulation; docs/explanation/evaluation.md sums it up.
 
 Frames: trials of 1 to 50 frames, whose design effect is 1 (frames as different as trials), 2 or 5 (as real frames). A
 trial's own accuracy is drawn from a beta distribution. New subjects: 5 to 30 people with accuracies from one. Each

@@ -15,7 +15,7 @@ follow are described in [the command line](commands.md).
 
 
 def help_of(name: str) -> str:
-    """Return what `thenar NAME --help` prints, 88 columns wide."""
+    """Return the output of `thenar NAME --help`, 88 columns wide."""
     command = thenar.get_command(click.Context(thenar), name)
     assert command is not None
     context = click.Context(command, info_name=f"thenar {name}", terminal_width=88, max_content_width=88)

@@ -25,13 +25,13 @@ from .cyberglove_protocol import (
     SENSORS_22,
     STOP,
     STREAM,
-    Answer,
     Command,
     Record,
     RecordCounts,
     RecordDecoder,
+    Reply,
     Words,
-    find_answer,
+    find_reply,
     mask_of,
     masked_sensors,
     period_words,
@@ -104,18 +104,18 @@ class Dialogue:
                 return reply.values
         raise DeviceError(f"{self._line.url}: {_complaint(command, reply, self._line.baud)}")
 
-    def _asked_once(self, command: Command) -> Answer | None:
+    def _asked_once(self, command: Command) -> Reply | None:
         self._line.write(command.request)
         received, end = b"", monotonic() + _LONGEST_S
         while monotonic() < end and len(received) < _LONGEST and (more := self._line.read(_REPLY_S)):
             received += more
-            reply = find_answer(command, received)
+            reply = find_reply(command, received)
             if reply is not None:
                 return reply
-        return find_answer(command, received, last=True)
+        return find_reply(command, received, last=True)
 
 
-def _complaint(command: Command, reply: Answer | None, baud: int) -> str:
+def _complaint(command: Command, reply: Reply | None, baud: int) -> str:
     if reply is not None:
         return f"the CyberGlove replies to {command.name} with an error: {reply.error}"
     return f"no CyberGlove replies to {command.name} at {baud} baud: check its power, the cable and the baud rate"

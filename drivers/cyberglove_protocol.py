@@ -65,7 +65,7 @@ _ERRORS = {
     b"s": "sampling too fast",
 }
 # Bytes in the reply to ?X, by X; below, bytes after X as a setting. docs/reference/devices.md explains each letter.
-ANSWERED: Mapping[str, int] = (
+REPLY_BYTES: Mapping[str, int] = (
     dict.fromkeys("BDFGJLNQRSUWY", 1) | dict.fromkeys("KMP", 3) | dict.fromkeys("TV", 4) | {"A": 6}
 )
 SET: Mapping[str, int] = dict.fromkeys("BDFJLNQUWY", 1) | {"M": 3, "T": 4}
@@ -121,7 +121,7 @@ class Command:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class Reply:
     """A reply of the box: values (or text), or an error."""
 
     values: bytes
@@ -133,10 +133,10 @@ INFORMATION = Command(b"?i", b"?i", None)
 
 def query(letter: str) -> Command:
     """Return the query ?X of a letter X. Raises SettingError if the box has none."""
-    if letter not in ANSWERED:
-        raise SettingError(f"a CyberGlove has no query ?{letter}: it has ?{', ?'.join(sorted(ANSWERED))}")
+    if letter not in REPLY_BYTES:
+        raise SettingError(f"a CyberGlove has no query ?{letter}: it has ?{', ?'.join(sorted(REPLY_BYTES))}")
     echo = b"?" + letter.encode("ascii")
-    return Command(echo, echo, ANSWERED[letter])
+    return Command(echo, echo, REPLY_BYTES[letter])
 
 
 def setting(letter: str, values: bytes) -> Command:
@@ -150,7 +150,7 @@ def setting(letter: str, values: bytes) -> Command:
     return Command(echo + values, echo, 0)
 
 
-def find_answer(command: Command, received: bytes, *, last: bool = False) -> Answer | None:
+def find_reply(command: Command, received: bytes, *, last: bool = False) -> Reply | None:
     """Return the reply among the bytes received since the command, or None if it is not complete yet.
 
     Bytes before it are skipped, NUL by NUL: remains of a stream, the echo of a Ctrl-C. `last` means that nothing more
@@ -166,16 +166,16 @@ def find_answer(command: Command, received: bytes, *, last: bool = False) -> Ans
     return None
 
 
-def _at_start(command: Command, received: bytes, last: bool) -> Answer | None:
+def _at_start(command: Command, received: bytes, last: bool) -> Reply | None:
     begin, values = len(command.echo), command.values
     end = received.find(_TEXT_END) if values is None else begin + values
     if received.startswith(command.echo) and end >= 0 and (values is None or received[end : end + 1] == b"\0"):
-        return Answer(received[begin:end])
+        return Reply(received[begin:end])
     found = re.match(rb"(%b)?e([?nygs])(\r\n)?\0" % re.escape(command.echo), received)
     # After the echo, apparent error bytes may be the beginning of values.
     if found is None or (found[1] and not last and values is not None and found.end() <= begin + values):
         return None
-    return Answer(b"", _ERRORS[found[2]])
+    return Reply(b"", _ERRORS[found[2]])
 
 
 def period_words(rate_hz: float | None) -> Words:

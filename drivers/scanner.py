@@ -257,7 +257,7 @@ class Scanner(Closing):
                 came_us, received = self._waiting.popleft()
                 if isinstance(received, Frame) and received.kind == Hello.KIND:
                     hello = self._meet(received, came_us)
-                    if self.times.answered:
+                    if self.times.replied:
                         return hello
         wireless = is_datagram_port(self.url)
         at, check = ("", "address, Wi-Fi") if wireless else (f" at {self.baud} baud", "port, baud rate")

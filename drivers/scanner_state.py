@@ -157,7 +157,7 @@ class BoardTimes:
     clock     bounds the delay common to all messages (`trip_us`)
     late_us   delay of the last message with a time; messages without one are assumed to share it
     pings     how often the board's time was requested
-    answered  whether a reply ever came
+    replied   whether a reply ever came
     """
 
     def __init__(self) -> None:
@@ -166,7 +166,7 @@ class BoardTimes:
         self._time_us = self._asked_us = 0
         self._asked: dict[int, int] = {}
         self.pings = 0
-        self.answered = False
+        self.replied = False
 
     def ping(self) -> Ping:
         """Return a message that requests the time."""
@@ -186,7 +186,7 @@ class BoardTimes:
         """Return the time of a message. One without a time is assumed to be as late as the last that had one."""
         if message is not None and not isinstance(message, State | Lost | Channels):
             asked_us = self._asked.get(message.token) if isinstance(message, Hello) else None
-            self.answered |= asked_us is not None
+            self.replied |= asked_us is not None
             self.late_us = came_us - self.clock.host_us(message.time_us, came_us, asked_us)
         self._time_us = max(self._time_us, came_us - self.late_us)
         return self._time_us

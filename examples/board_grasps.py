@@ -9,7 +9,7 @@ import sys
 from thenar.drivers.scanner import Scanner
 from thenar.runtime import Build
 
-grasps = Build.load(sys.argv[1]).manifest.answers  # codespell:ignore answers
+grasps = Build.load(sys.argv[1]).manifest.classes
 with Scanner(sys.argv[2]) as board:
     shown, segment = None, ()
     while True:

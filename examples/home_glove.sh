@@ -1,5 +1,5 @@
 #!/bin/sh -e
-# From the table of a glove built at home to firmware, in nine commands. docs/tutorials/home-glove.md explains each.
+# From the table of a glove built at home to firmware, in nine commands. docs/tutorials/your-own-table.md explains them.
 #
 #     sh home_glove.sh            makes everything in the folder home_glove/
 #

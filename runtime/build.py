@@ -104,7 +104,7 @@ class Build:
     def classify(self, bits: ArrayLike, codes: ArrayLike) -> str:
         """Return the grasp type of one frame, "none" if nothing is held. Raises FrameError."""
         lanes = self._all_scores(self.scorer.lanes(bits, codes), bits, codes)
-        return self.manifest.answers[lanes.index(max(lanes))]
+        return self.manifest.classes[lanes.index(max(lanes))]
 
     def _all_scores(
         self,
@@ -159,7 +159,7 @@ class Build:
         second, best = sorted(lanes)[-2:]
         winner = lanes.index(best)
         probability = softmax(lanes, winner, self.tables.scale)
-        return Recognition(self.manifest.answers[winner], probability, best - second, degraded)
+        return Recognition(self.manifest.classes[winner], probability, best - second, degraded)
 
 
 def _mask(flags: ArrayLike) -> Mask:

@@ -424,7 +424,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     hand_sha256: Digest | None = None
 
     @property
-    def answers(self) -> tuple[str, ...]:
+    def classes(self) -> tuple[str, ...]:
         """The possible predictions for a frame: the grasps, and NONE if that is possible and not among them."""
         return self.grasps if self.rejection is None else (*self.grasps, NONE)
 

@@ -3,12 +3,14 @@
 import ast
 import csv
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
+import nbformat
 import numpy as np
 import pytest
 from sklearn.model_selection import GroupKFold, StratifiedKFold, cross_val_score
@@ -23,7 +25,8 @@ from thenar.runtime import Build
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 TABLE = EXAMPLES / "home_glove.csv"
-NAMES = sorted(path.name for path in EXAMPLES.glob("*.py") if path.stem != TABLE.stem)
+NOTEBOOK = EXAMPLES / "your_own_table.py"
+NAMES = sorted(path.name for path in EXAMPLES.glob("*.py") if path.stem not in {TABLE.stem, NOTEBOOK.stem})
 MOST_LINES = 25
 THENAR = [sys.executable, "-m", "thenar.cli"]
 HARNESS = """\
@@ -166,15 +169,33 @@ def test_the_sample_table_is_what_its_script_makes(tmp_path: Path) -> None:
     assert TABLE.stat().st_size < 400_000
 
 
+def test_the_notebook_runs_and_prints_the_accuracies_of_the_tutorial(tmp_path: Path) -> None:
+    page = (EXAMPLES.parent / "docs" / "tutorials" / "your-own-table.md").read_text(encoding="utf-8")
+    printed = run(tmp_path, sys.executable, str(NOTEBOOK))
+    for composition in ("I", "IV"):
+        (rate,) = re.findall(rf"^{composition} +(\S+)%$", printed, re.MULTILINE)
+        assert f"{rate} %" in page
+    assert "Medium Wrap predicted, Medium Wrap recorded" in printed
+
+
+def test_jupytext_makes_a_valid_notebook_of_it(tmp_path: Path) -> None:
+    made = tmp_path / "made.ipynb"
+    run(tmp_path, sys.executable, "-m", "jupytext", "--to", "ipynb", "-o", str(made), str(NOTEBOOK))
+    notebook = nbformat.read(made, as_version=4)
+    nbformat.validate(notebook)
+    code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
+    for source in code:
+        compile(source, made.name, "exec")
+    assert len(code) > 4
+    text = NOTEBOOK.read_text(encoding="utf-8")
+    assert all(source in text for source in code)
+
+
 @slow
 def test_the_home_made_glove_goes_from_its_table_to_firmware_in_at_most_ten_commands(tmp_path: Path) -> None:
     script = (EXAMPLES / "home_glove.sh").read_text()
     commands = [line for line in script.splitlines() if line.startswith("thenar ")]
     assert len(commands) <= 10
-    page = (EXAMPLES.parent / "docs" / "tutorials" / "home-glove.md").read_text()
-    for command in commands:
-        shown = command.replace('"$TABLE"', "table.csv").replace(" --overwrite", "")
-        assert f"    {shown}\n" in page
     # Of the table three people's first two trials, three frames each.
     folder = tmp_path / "home_glove"
     folder.mkdir()

@@ -157,7 +157,7 @@ class TargetCheck(Struct, frozen=True, kw_only=True):
     part: str
     layout: str
     # "classify": every frame from scratch; "update": from the changes since the previous frame.
-    answer: Function  # codespell:ignore answer
+    function: Function
     missing: bool
     shares: bool
     frames: int
@@ -201,7 +201,7 @@ class FirmwareTrial:
         return TargetCheck(
             part=fit.target.part,
             layout=fit.choice.why,
-            answer=function,  # codespell:ignore answer
+            function=function,
             missing=missing,
             shares=said is not None,
             frames=len(wrong),

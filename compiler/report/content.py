@@ -70,7 +70,7 @@ class ReportContent:
     has_page: bool = False
 
     def __post_init__(self) -> None:
-        grasps, classes = len(self.manifest.grasps), len(self.manifest.answers)
+        grasps, classes = len(self.manifest.grasps), len(self.manifest.classes)
         if self.tables.n_classes != grasps or self.tables.n_switches != len(self.manifest.switches):
             raise ReportError("the tables do not match build.json: compile the build again")
         if self.confusion is not None and self.confusion.shape not in ((grasps, grasps), (classes, classes)):

@@ -88,7 +88,7 @@ def confusions(content: ReportContent) -> Iterator[ConfusionView]:
         rate = content.manifest.headline
         folds = "" if rate is None else f", {rate.title}, {counted(rate.folds, 'nested fold')}"
         yield confusion_view(
-            f"This build's recipe{folds}", content.manifest.answers[: len(content.confusion)], content.confusion
+            f"This build's recipe{folds}", content.manifest.classes[: len(content.confusion)], content.confusion
         )
     if content.study is None:
         return

@@ -54,7 +54,7 @@ def try_html(
     """
     bits, codes, labels = rows
     data = {
-        "classes": manifest.answers,
+        "classes": manifest.classes,
         "tables": base64.b64encode(tables).decode(),
         "refusal": _refusal(manifest),
         "switches": [_switch(switch.name, switch.threshold) for switch in manifest.switches],
@@ -184,7 +184,7 @@ def _rendered(manifest: Manifest, data: Json) -> bytes:
             style_sha256=_sha256(style),
             script=Markup(script),
             script_sha256=_sha256(script),
-            sentence=f"It distinguishes {len(manifest.answers)} classes by {listed(read)}.",
+            sentence=f"It distinguishes {len(manifest.classes)} classes by {listed(read)}.",
             levels=levels,
             checksum=manifest.checksum[:16],
             version=manifest.thenar,

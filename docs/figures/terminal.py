@@ -32,7 +32,7 @@ def theme() -> TerminalTheme:
 
 
 def main() -> None:
-    """Run the commands in a scratch folder and write the drawing beside this file."""
+    """Run the commands in a scratch folder and write the drawing next to this file."""
     console = Console(record=True, width=WIDTH, file=sys.stderr, force_terminal=True)
     with tempfile.TemporaryDirectory() as folder:
         for command, starts in SHOWN:

@@ -6,13 +6,13 @@ from typing import Literal
 
 from ..cyberglove_protocol import (
     ALWAYS,
-    ANSWERED,
     LIGHT,
     MASK_18,
     MASK_22,
     PLUGGED,
     POLL,
     READY,
+    REPLY_BYTES,
     RESTART,
     SET,
     STOP,
@@ -86,9 +86,9 @@ class GloveState:
             self.turn_switch(values != b"\0")
         return True
 
-    def answer(self, letter: str) -> bytes | None:
+    def reply(self, letter: str) -> bytes | None:
         """Return the values in the reply to the query of this letter, None if there is no such query."""
-        if letter not in ANSWERED and letter != "C":
+        if letter not in REPLY_BYTES and letter != "C":
             return None
         computed = {"G": self._readiness, "P": self._flags, "C": self._calibration}
         constant = {"S": bytes([self.sensors]), "K": MASKS[self.sensors], "R": b"\1", "V": VERSIONS, "A": bytes(6)}
@@ -222,7 +222,7 @@ class CyberGloveBox:
         if len(echo) < 2:
             return 0
         letter = echo[1:].decode("latin-1")
-        values = self.state.answer(letter.upper())
+        values = self.state.reply(letter.upper())
         if letter == "i":
             self._say_text(echo + self.text.encode("ascii"), out)
         elif values is None:

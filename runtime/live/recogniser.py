@@ -72,7 +72,7 @@ class LiveRecognizer:
 
         Raises SettingError if the CyberGlove cannot serve the build.
         """
-        self._policy, self._scorer, self._grasps = policy or Policy(), build.scorer, build.manifest.answers
+        self._policy, self._scorer, self._grasps = policy or Policy(), build.scorer, build.manifest.classes
         tables = build.tables
         self._scale, self._all_switches = tables.scale, (1 << tables.n_switches) - 1
         self._reads_switches = switch_period_us is not None and tables.n_switches > 0
@@ -254,7 +254,7 @@ def _decider(build: Build, policy: Policy) -> Decision | SequentialTest:
     scale = build.tables.scale
     if policy.error_rate is None:
         return Decision(policy.lead_steps(scale), policy.dwell_us, policy.hold_us)
-    return SequentialTest(len(build.manifest.answers), scale, policy.error_rate, policy.hold_us, policy.spacing_us)
+    return SequentialTest(len(build.manifest.classes), scale, policy.error_rate, policy.hold_us, policy.spacing_us)
 
 
 @dataclass(frozen=True, slots=True)

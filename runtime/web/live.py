@@ -68,7 +68,7 @@ class LivePage:
             message(
                 "build",
                 name=glove.system.harness.name,
-                grasps=build.manifest.answers,
+                grasps=build.manifest.classes,
                 switches=[switch.name for switch in build.manifest.switches],
                 joints=[joint.name for joint in build.manifest.joints],
                 taxels=glove.system.harness.taxel_names,

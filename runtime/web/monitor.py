@@ -149,7 +149,7 @@ def _first(where: str, folder: Path | None) -> tuple[str, tuple[bytes, ...]]:
         return "", (message("build", known, grasps=(), switches=(), joints=(), partial=True),)
     manifest = load_manifest(folder)
     names = {"switches": [each.name for each in manifest.switches], "joints": [each.name for each in manifest.joints]}
-    build = message("build", known, grasps=manifest.answers, partial=False, **names)
+    build = message("build", known, grasps=manifest.classes, partial=False, **names)
     return manifest.checksum, (build, message("hand", load_hand(folder, manifest)))
 
 

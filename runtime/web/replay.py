@@ -203,7 +203,7 @@ class ReplayPage:
         described = message(
             "build",
             name=name,
-            grasps=build.manifest.answers,
+            grasps=build.manifest.classes,
             switches=names,
             joints=joints,
             preshapes=False,

@@ -58,7 +58,7 @@ class Ray:
         """Return half the breadth (n,) at positions along the digit, without the rounding of its tip."""
         return np.interp(along, self.middles, self.halves)
 
-    def beside(self, along: Places) -> Floats:
+    def strip_offset(self, along: Places) -> Floats:
         """Return the distance of the middle of a strip from the digit's middle (n,)."""
         return self.half(along) + _GAP_MM + _STRIP_MM / 2
 
@@ -66,7 +66,7 @@ class Ray:
         """Return the outline (k, 2) of the unfolded side from `first` to `last`; `side`: -1 left, 1 right."""
         along = np.linspace(first, last, 16)
         bend = half_circle(_STRIP_MM / 2)
-        middle, reach = self.beside(along), _STRIP_MM / 2
+        middle, reach = self.strip_offset(along), _STRIP_MM / 2
         over = self.at(last + bend[::-1, 1], side * (middle[-1] + bend[::-1, 0]))
         under = self.at(first - bend[:, 1], side * (middle[0] + bend[:, 0]))
         edges = self.at(along, side * (middle - reach)), self.at(along[::-1], side * (middle + reach)[::-1])
@@ -263,7 +263,7 @@ def _flat(switches: Switches, mine: NDArray[np.bool_], sides: NDArray[np.intp]) 
 
 
 def _on_digit(ray: Ray, along: Floats, flat: Floats, sides: NDArray[np.intp]) -> Floats:
-    return ray.at(along, np.where(sides == 0, flat, sides * ray.beside(along)))
+    return ray.at(along, np.where(sides == 0, flat, sides * ray.strip_offset(along)))
 
 
 def _strip(ray: Ray, along: Floats, side: int) -> Floats:

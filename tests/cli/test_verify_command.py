@@ -84,7 +84,7 @@ def test_firmware_is_compiled_and_held_against_python(
     assert "the build carries the firmware that thenar makes of it now" in done.stdout
     found = json.loads(thenar("verify", build_folder, set_file, "--firmware", "host", "--json").stdout)
     checks = found["firmware"]["checks"]
-    assert [(check["answer"], check["differing"]) for check in checks] == [("classify", 0), ("update", 0)] * 2
+    assert [(check["function"], check["differing"]) for check in checks] == [("classify", 0), ("update", 0)] * 2
     assert found["holds"] is True
 
 

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from thenar.drivers import cyberglove_protocol, scanner_protocol
 from thenar.drivers.cyberglove_protocol import (
-    ANSWERED,
     INFORMATION,
+    REPLY_BYTES,
     SET,
-    Answer,
     Command,
     Record,
-    find_answer,
+    Reply,
+    find_reply,
     query,
     setting,
 )
@@ -150,7 +150,7 @@ def test_a_megabyte_of_one_byte_holds_no_memory_and_makes_no_more_calls_than_one
 
 
 COMMANDS = st.sampled_from(
-    [query(letter) for letter in ANSWERED]
+    [query(letter) for letter in REPLY_BYTES]
     + [setting(letter, bytes(size)) for letter, size in SET.items()]
     + [INFORMATION]
 )
@@ -165,7 +165,7 @@ REPLIES = st.lists(
 def test_an_answer_has_the_length_it_must_have_and_stands_in_what_came(
     command: Command, received: bytes, last: bool
 ) -> None:
-    answer = find_answer(command, received, last=last)
+    answer = find_reply(command, received, last=last)
     if answer is None or answer.error is not None:
         return
     assert command.values is None or len(answer.values) == command.values
@@ -176,12 +176,12 @@ def test_an_answer_has_the_length_it_must_have_and_stands_in_what_came(
 def test_an_answer_that_is_whole_is_not_changed_by_what_follows(
     command: Command, received: bytes, following: bytes
 ) -> None:
-    answer = find_answer(command, received)
+    answer = find_reply(command, received)
     if answer is not None:
-        assert find_answer(command, received + following) == answer
+        assert find_reply(command, received + following) == answer
 
 
-@given(st.sampled_from(sorted(ANSWERED)), st.binary(min_size=6, max_size=6), st.lists(st.binary(max_size=40)))
+@given(st.sampled_from(sorted(REPLY_BYTES)), st.binary(min_size=6, max_size=6), st.lists(st.binary(max_size=40)))
 def test_an_answer_is_found_behind_any_frames_that_are_not_its_own(
     letter: str, values: bytes, rests: list[bytes]
 ) -> None:
@@ -189,7 +189,7 @@ def test_an_answer_is_found_behind_any_frames_that_are_not_its_own(
     command = query(letter)
     clean = b"".join(rest.replace(b"?", b"!").replace(b"e", b"f") + b"\0" for rest in rests)
     sound = command.echo + values[: command.values] + b"\0"
-    assert find_answer(command, clean + sound) == Answer(values[: command.values])
+    assert find_reply(command, clean + sound) == Reply(values[: command.values])
 
 
 @given(st.lists(st.binary(max_size=200) | REPLIES, max_size=20), st.builds(Doubts, st.booleans(), st.booleans()))

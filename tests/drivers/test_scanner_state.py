@@ -259,14 +259,14 @@ def test_a_board_that_starts_again_is_followed_at_once() -> None:
 
 
 # How much later than the one before, how long on its way, and whether it answers a question asked so much before it.
-ANSWERED = st.lists(
+REPLY_BYTES = st.lists(
     st.tuples(st.integers(0, 200_000), st.integers(0, 30_000), st.none() | st.integers(0, 30_000)),
     min_size=1,
     max_size=60,
 )
 
 
-@given(ANSWERED, st.integers(0, WRAP - 1), st.integers(0, 1_000_000), st.integers(-5000, 5000))
+@given(REPLY_BYTES, st.integers(0, WRAP - 1), st.integers(0, 1_000_000), st.integers(-5000, 5000))
 @example([(0, 0, 0), (100_000, 0, None)], WRAP - 1, 400_000, 0)
 def test_once_a_frame_was_asked_for_the_truth_lies_within_the_trip_whatever_delay_all_frames_share(
     sent: list[tuple[int, int, int | None]], board_at_start: int, shared_us: int, millionths: int

@@ -37,7 +37,7 @@ def test_a_chip_of_another_package_is_proposed_specified_emulated_and_read(
     (tmp_path / "scene.toml").write_text(SCENE)
     package.thenar("simulate", str(tmp_path / "scene.toml"), "-o", grasps)
     chosen = ("--inputs", "switches", "--prune", "5", "--no-report")
-    assert "tca6424a, tca9534; or board" in " ".join(package.thenar("compile", "--help").split())
+    assert "tca6424a, tca9534; board" in " ".join(package.thenar("compile", "--help").split())
     package.thenar("compile", grasps, "-o", build, *chosen, "--propose", glove, "--chip", "tca9534")
     assert 'kind = "tca9534"' in Path(glove).read_text()
 

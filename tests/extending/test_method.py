@@ -59,7 +59,7 @@ def test_a_method_of_another_package_is_listed_chosen_by_and_compared(
             *settled,
         )
     )
-    assert {point["setting"]["way"]["method"] for point in found["points"]} == {"chi2"}
+    assert {point["setting"]["placement"]["method"] for point in found["points"]} == {"chi2"}
     assert [curve["method"] for curve in found["curves"]] == ["chi2"]
 
     study = json.loads(

@@ -113,7 +113,7 @@ def test_a_setting_names_the_trainer_that_takes_it_and_of_another_it_is_refused(
     installed: Any, recordings: Path, tmp_path: Path
 ) -> None:
     given = ("compile", str(recordings), "-o", str(tmp_path / "build"), "--no-report", "--folds", "0")
-    assert "--rounds is no setting" in installed.thenar(*given, "--trainer", "naive-bayes", "--rounds", "5", code=2)
+    assert "--rounds is not a setting" in installed.thenar(*given, "--trainer", "naive-bayes", "--rounds", "5", code=2)
     assert "no trainer has all of rounds, smoothing" in installed.thenar(
         *given, "--smoothing", "2", "--rounds", "5", code=2
     )

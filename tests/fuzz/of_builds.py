@@ -262,19 +262,19 @@ def _store() -> bytes:
 
 
 def _changed_store(data: bytes, random: Random) -> bytes:
-    """Change an answer and work out its checksum; or lines, or bytes."""
+    """Change a result and work out its checksum; or lines, or bytes."""
     lines = data.removeprefix(HEADER).splitlines(keepends=True)
     if not lines or random.random() < 0.3:
         return altered(data, random)
     at = random.randrange(len(lines))
     try:
         line = json.loads(lines[at])
-        answer = json_file(json.dumps(line["answer"]).encode(), random)
+        result = json_file(json.dumps(line["result"]).encode(), random)
         from zlib import crc32
 
         key = str(line["key"])
-        crc = crc32(answer, crc32(key.encode()))
-        lines[at] = b'{"key":"%s","crc":%d,"answer":%s}\n' % (key.encode(), crc, answer.replace(b"\n", b" "))
+        crc = crc32(result, crc32(key.encode()))
+        lines[at] = b'{"key":"%s","crc":%d,"result":%s}\n' % (key.encode(), crc, result.replace(b"\n", b" "))
     except (ValueError, RecursionError, KeyError, TypeError):
         lines[at] = json_file(lines[at], random) + b"\n"
     return HEADER + b"".join(lines)

@@ -34,7 +34,7 @@ _KEYS = 40
 _RECORD = cyberglove_protocol.Record(b"S" * 18)
 _STATE = scanner_protocol.Frame(scanner_protocol.STATE, 0, bytes(5))
 _COMMANDS = [
-    *map(cyberglove_protocol.query, cyberglove_protocol.ANSWERED),
+    *map(cyberglove_protocol.query, cyberglove_protocol.REPLY_BYTES),
     *(cyberglove_protocol.setting(letter, bytes(size)) for letter, size in cyberglove_protocol.SET.items()),
     cyberglove_protocol.INFORMATION,
 ]
@@ -72,7 +72,7 @@ def _answer(data: bytes) -> None:
     """Look for the answer to a command, which the first byte chooses."""
     command = _COMMANDS[data[0] % len(_COMMANDS)] if data else _COMMANDS[0]
     for last in (False, True):
-        answer = cyberglove_protocol.find_answer(command, data[1:], last=last)
+        answer = cyberglove_protocol.find_reply(command, data[1:], last=last)
         assert answer is None or answer.error or answer.values in data
 
 

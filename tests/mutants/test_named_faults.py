@@ -84,8 +84,8 @@ FAULTS = (
     Fault(
         "of tied classes the build takes the last",
         "runtime/build.py",
-        "self.manifest.answers[lanes.index(max(lanes))]",
-        "self.manifest.answers[len(lanes) - 1 - lanes[::-1].index(max(lanes))]",
+        "self.manifest.classes[lanes.index(max(lanes))]",
+        "self.manifest.classes[len(lanes) - 1 - lanes[::-1].index(max(lanes))]",
         "tests/runtime/test_build.py",
     ),
     Fault(

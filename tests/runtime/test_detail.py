@@ -45,8 +45,8 @@ def test_probabilities_are_those_of_the_build_and_joints_are_in_their_unit(
         assert detail.unread == "001000"
         found = build.recognise(bits, codes)
         assert detail.probabilities is not None
-        assert len(detail.probabilities) == len(build.manifest.answers)
-        at = build.manifest.answers.index(found.grasp)
+        assert len(detail.probabilities) == len(build.manifest.classes)
+        at = build.manifest.classes.index(found.grasp)
         assert detail.probabilities[at] == max(detail.probabilities) == pytest.approx(found.probability, abs=6e-5)
         assert detail.joints is not None
         expected = codes if build is made else -5.0 + (codes - 10) / 2

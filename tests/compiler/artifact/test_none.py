@@ -122,7 +122,7 @@ def test_a_build_without_such_rows_refuses_the_share_that_it_was_asked_for(moved
     assert found is not None
     assert found.none is None
     assert found.held.rate >= 0.95
-    assert made.manifest.answers == (*TYPES, "none")
+    assert made.manifest.classes == (*TYPES, "none")
     bits, codes = select_inputs(moved, made.manifest)
     scores = integer_scores(build.tables, bits, codes)
     gone = refused(made.manifest.rejection, scores, bits, codes)

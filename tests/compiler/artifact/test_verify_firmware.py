@@ -42,7 +42,7 @@ def test_every_score_and_type_of_every_frame_is_pythons(
     found = verify_firmware(build, grasp_set, (kind,))
     assert found.holds
     assert [check.part for check in found.checks[::4]] == PARTS[kind]
-    assert [(check.answer, check.missing) for check in found.checks[:4]] == [
+    assert [(check.function, check.missing) for check in found.checks[:4]] == [
         ("classify", False),
         ("update", False),
         ("classify", True),

@@ -384,7 +384,7 @@ def test_rows_are_replayed_and_the_bars_show_all_answers(opened: Trier, folder: 
     assert gloved.grasps[at[0]] in opened.text("truth")
     assert (opened.text("grasp"), opened.text("margin")) == said_of(build, bits, codes)
     rows = [row.text for row in opened.driver.find_elements(By.CSS_SELECTOR, "#bars tr")]
-    assert [row.removeprefix("▶ ").split()[0] for row in rows] == list(build.manifest.answers)
+    assert [row.removeprefix("▶ ").split()[0] for row in rows] == list(build.manifest.classes)
     (best,) = [row for row in rows if row.startswith("▶")]
     assert best.split()[1] == opened.text("grasp")
     opened.one("#play").click()

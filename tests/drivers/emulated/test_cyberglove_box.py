@@ -5,12 +5,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.drivers.cyberglove_protocol import (
-    ANSWERED,
     MASK_18,
     MASK_22,
+    REPLY_BYTES,
     SET,
     RecordDecoder,
-    find_answer,
+    find_reply,
     query,
     setting,
 )
@@ -82,13 +82,13 @@ def test_a_glove_of_22_sensors_says_so() -> None:
         box(20)
 
 
-@given(st.sampled_from(sorted(ANSWERED)))
+@given(st.sampled_from(sorted(REPLY_BYTES)))
 def test_every_query_has_the_length_that_the_driver_counts_on(letter: str) -> None:
     (answered,) = box().feed(b"?" + letter.encode())
     assert isinstance(answered, bytes)
-    answer = find_answer(query(letter), answered)
+    answer = find_reply(query(letter), answered)
     assert answer is not None
-    assert len(answer.values) == ANSWERED[letter]
+    assert len(answer.values) == REPLY_BYTES[letter]
 
 
 @given(st.sampled_from("BDFJLQUWY"), st.integers(0, 1))

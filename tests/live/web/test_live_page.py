@@ -47,7 +47,7 @@ def test_the_page_shows_what_is_published(run: Callable[[], Any], browser: Any) 
         browser.wait(lambda: bars_are(browser, scene))
         assert browser.driver.title == f"{browser.text('grasp')} · thenar"
     assert len(answers) > 5
-    assert browser.texts("#types .name") == list(truth.build.manifest.answers)
+    assert browser.texts("#types .name") == list(truth.build.manifest.classes)
     assert browser.text("health") == "ok"
     browser.wait(lambda: len(browser.texts("#devices tr")) == 2)
     assert browser.texts("#devices td:nth-child(2)") == ["connected", "connected"]
@@ -77,7 +77,7 @@ def test_the_page_of_a_run_elsewhere_shows_the_same(run: Callable[[], Any], brow
             browser.wait(lambda: len(browser.texts("#devices tr")) == 2)
             assert not browser.driver.find_element("id", "record-panel").is_displayed()
             assert not browser.driver.find_element("id", "types-say").is_displayed()
-            assert browser.texts("#types .name") == list(truth.build.manifest.answers)
+            assert browser.texts("#types .name") == list(truth.build.manifest.classes)
             browser.driver.get("about:blank")
         finally:
             stop.set()
