@@ -29,9 +29,8 @@ TOUCH_PX = 0.5  # rectangles that share less than this do not overlap
 # Shows the root at a width, and returns its height.
 SHOW = """const root = document.documentElement, box = root.viewBox.baseVal, height = arguments[0] * box.height / box.width;
     root.setAttribute('width', arguments[0]); root.setAttribute('height', height); return Math.ceil(height);"""
-# Letters are text, or the groups in which matplotlib keeps the outlines of a line: their units are hundredths of the
-# font size, and a line with an outline around its letters is drawn twice, the letters last.
-TEXTS = """return [...document.querySelectorAll("text, g[id^='text_']")].map((one) => {
+# Letters are text, or outlines in matplotlib's groups, in hundredths of the font size.
+TEXTS = """return [...document.querySelectorAll("text, g[id^='text_'], g[id^='mark-']")].map((one) => {
     const box = one.getBoundingClientRect(), path = one.tagName === 'text' ? null : [...one.querySelectorAll('use')].pop();
     const style = getComputedStyle(path ?? one), scale = (path?.parentNode ?? one).getScreenCTM();
     const size = Math.hypot(scale.a, scale.b) * (path ? 100 : parseFloat(style.fontSize));
@@ -39,7 +38,7 @@ TEXTS = """return [...document.querySelectorAll("text, g[id^='text_']")].map((on
     return { words: (words ?? '').trim(), fill: style.fill, size, box: [box.left, box.top, box.right, box.bottom] };
 }).filter((one) => one.words)"""
 HIDE = """const style = document.createElementNS('http://www.w3.org/2000/svg', 'style');
-    style.textContent = "text, g[id^='text_'] { visibility: hidden }"; document.documentElement.append(style);"""
+    style.textContent = "text, g[id^='text_'], g[id^='mark-'] { visibility: hidden }"; document.documentElement.append(style);"""
 
 pytestmark = pytest.mark.slow
 
