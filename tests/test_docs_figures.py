@@ -36,7 +36,8 @@ TEXTS = """return [...document.querySelectorAll("text, g[id^='text_'], g[id^='ma
     const style = getComputedStyle(path ?? one), scale = (path?.parentNode ?? one).getScreenCTM();
     const size = Math.hypot(scale.a, scale.b) * (path ? 100 : parseFloat(style.fontSize));
     const comment = [...one.childNodes].find((node) => node.nodeType === Node.COMMENT_NODE);
-    return { words: ((path ? comment : one)?.textContent ?? '').trim(), fill: style.fill, size, box: [box.left, box.top, box.right, box.bottom] };
+    const words = ((path ? comment : one)?.textContent ?? '').trim();
+    return { words, fill: style.fill, size, box: [box.left, box.top, box.right, box.bottom] };
 }).filter((one) => one.words)"""
 HIDE = """const style = document.createElementNS('http://www.w3.org/2000/svg', 'style');
     style.textContent = "text, g[id^='text_'], g[id^='mark-'] { visibility: hidden }";
