@@ -2,7 +2,7 @@
 
 import io
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import chdir, contextmanager
 from importlib import import_module
 from importlib.util import find_spec
@@ -28,6 +28,15 @@ PALETTE: Mapping[str, tuple[str, str]] = MappingProxyType(
             "baseline-2": ("#a3457c", "#ec9bc6"),
             "baseline-3": ("#6b6b6b", "#a9a9a9"),
         },
+        # The same nearer to the ink, for letters.
+        **{
+            "switches-text": ("#0e486b", "#aacef8"),
+            "joints-text": ("#0e5e4c", "#9ad7bd"),
+            "both-text": ("#783e12", "#f3c4a6"),
+            "baseline-1-text": ("#624712", "#e4ce9e"),
+            "baseline-2-text": ("#5f3250", "#eac3db"),
+            "baseline-3-text": ("#434548", "#c8cacc"),
+        },
         **{"picked": ("#d1242f", "#ff6b74"), "hit": ("#1f5fa8", "#4b93dd"), "miss": ("#c2410c", "#e8743b")},
         **{"leaf": ("#cfe6d4", "#23482f"), "decision": ("#d3e0f2", "#24405f")},
         **{"skin": ("#f9f1e9", "#2a2622"), "side": ("#eee3d8", "#221f1c"), "outline": ("#57493e", "#b8a594")},
@@ -39,6 +48,18 @@ PALETTE: Mapping[str, tuple[str, str]] = MappingProxyType(
 def on_paper(name: str) -> str:
     """Return a colour of PALETTE for files."""
     return PALETTE[name][0]
+
+
+def for_letters(colour: str) -> str:
+    """Return the colour of letters that belong to something drawn in a light colour of PALETTE."""
+    names = [name for name, (light, _) in PALETTE.items() if light == colour and f"{name}-text" in PALETTE]
+    return on_paper(f"{names[0]}-text") if names else colour
+
+
+def colour_variables(names: Collection[str] = PALETTE) -> str:
+    """Return colours of PALETTE as variables of a style sheet, for light screens and paper, and for dark screens."""
+    light, dark = ("".join(f" --{name}: {PALETTE[name][side]};" for name in names) for side in (0, 1))
+    return f":root {{{light} }}\n@media screen and (prefers-color-scheme: dark) {{ :root {{{dark} }} }}\n"
 
 
 class PictureError(ThenarError, ValueError):

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..pictures import for_letters
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.backend_bases import RendererBase
@@ -102,7 +104,7 @@ class Labels:
 
     def _write(self, label: Label, text: str, anchors: Floats, radii: Sequence[float], dearest: float) -> bool:
         style: dict[str, Any] = {
-            **{"ha": "center", "va": "center", "ma": "center", "color": label.colour, "fontsize": label.size},
+            **{"ha": "center", "va": "center", "ma": "center", "color": for_letters(label.colour), "fontsize": label.size},
             **{"fontweight": "bold" if label.bold else "normal", "zorder": 6},
         }
         probe = self.axes.text(0, 0, text, **style)

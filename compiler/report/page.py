@@ -9,7 +9,7 @@ import msgspec
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from ..pictures import PALETTE
+from ..pictures import colour_variables
 from ..segmenting.transitions import graph_of
 from ..text import sentence
 from . import results, sections
@@ -40,7 +40,7 @@ def report_html(content: ReportContent) -> bytes:
         confusions=tuple(results.confusions(content)),
         frontier=frontier,
         graph=None if content.transitions is None else graph_of(content.transitions),
-        style=_colours() + _file(environment, "report.css"),
+        style=Markup(colour_variables()) + _file(environment, "report.css"),
         script=script,
         script_sha256=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
         points=_json(() if frontier is None else frontier.details),
@@ -66,12 +66,6 @@ def _file(environment: Environment, name: str) -> Markup:
     """Return a file of the templates' folder verbatim."""
     assert environment.loader is not None
     return Markup(environment.loader.get_source(environment, name)[0])
-
-
-def _colours() -> Markup:
-    """Return the palette as variables of the style sheet, for light screens and paper, and for dark screens."""
-    light, dark = ("".join(f" --{name}: {pair[side]};" for name, pair in PALETTE.items()) for side in (0, 1))
-    return Markup(f":root {{{light} }}\n@media screen and (prefers-color-scheme: dark) {{ :root {{{dark} }} }}\n")
 
 
 def _json(details: Iterable[Detail]) -> Markup:

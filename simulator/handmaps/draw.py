@@ -227,7 +227,7 @@ def paint_dot(
     if not dot.mark:
         return
     ink = "white" if dot.shade is not None else INK
-    size = 2.0 * radius * points * (0.49 if len(dot.mark) > 2 else 0.62)
+    size = 2.0 * radius * points * (0.49 if len(dot.mark) > 2 else 0.71)
     text = axes.text(x, y, dot.mark, fontsize=size, color=ink, ha="center", va="center_baseline", zorder=4)
     text.set_gid(f"mark-{identity}" if identity else None)
 
