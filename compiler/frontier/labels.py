@@ -104,7 +104,13 @@ class Labels:
 
     def _write(self, label: Label, text: str, anchors: Floats, radii: Sequence[float], dearest: float) -> bool:
         style: dict[str, Any] = {
-            **{"ha": "center", "va": "center", "ma": "center", "color": for_letters(label.colour), "fontsize": label.size},
+            **{
+                "ha": "center",
+                "va": "center",
+                "ma": "center",
+                "color": for_letters(label.colour),
+                "fontsize": label.size,
+            },
             **{"fontweight": "bold" if label.bold else "normal", "zorder": 6},
         }
         probe = self.axes.text(0, 0, text, **style)
