@@ -30,12 +30,12 @@ PALETTE: Mapping[str, tuple[str, str]] = MappingProxyType(
         },
         # The same nearer to the ink, for letters.
         **{
-            "switches-text": ("#0e486b", "#aacef8"),
-            "joints-text": ("#0e5e4c", "#9ad7bd"),
-            "both-text": ("#783e12", "#f3c4a6"),
-            "baseline-1-text": ("#624712", "#e4ce9e"),
-            "baseline-2-text": ("#5f3250", "#eac3db"),
-            "baseline-3-text": ("#434548", "#c8cacc"),
+            "switches-text": ("#10405d", "#b6d3f6"),
+            "joints-text": ("#105244", "#a9dbc7"),
+            "both-text": ("#653816", "#f1ccb5"),
+            "baseline-1-text": ("#533f16", "#e4d3ae"),
+            "baseline-2-text": ("#512e47", "#e9cbdf"),
+            "baseline-3-text": ("#3b3d40", "#ced1d4"),
         },
         **{"picked": ("#d1242f", "#ff6b74"), "hit": ("#1f5fa8", "#4b93dd"), "miss": ("#c2410c", "#e8743b")},
         **{"leaf": ("#cfe6d4", "#23482f"), "decision": ("#d3e0f2", "#24405f")},
