@@ -27,18 +27,22 @@ WIDTH_PX, LEAST_PX, LEAST_CONTRAST = 688, 8, 4.5
 TOUCH_PX = 0.5  # rectangles that share less than this do not overlap
 
 # Shows the root at a width, and returns its height.
-SHOW = """const root = document.documentElement, box = root.viewBox.baseVal, height = arguments[0] * box.height / box.width;
+SHOW = """const root = document.documentElement, box = root.viewBox.baseVal;
+    const height = arguments[0] * box.height / box.width;
     root.setAttribute('width', arguments[0]); root.setAttribute('height', height); return Math.ceil(height);"""
 # Letters are text, or outlines in matplotlib's groups, in hundredths of the font size.
-TEXTS = """return [...document.querySelectorAll("text, g[id^='text_'], g[id^='mark-']")].map((one) => {
+TEXTS = """const letters = document.querySelectorAll("text, g[id^='text_'], g[id^='mark-']");
+return [...letters].map((one) => {
     const box = one.getBoundingClientRect(), path = one.tagName === 'text' ? null : [...one.querySelectorAll('use')].pop();
     const style = getComputedStyle(path ?? one), scale = (path?.parentNode ?? one).getScreenCTM();
     const size = Math.hypot(scale.a, scale.b) * (path ? 100 : parseFloat(style.fontSize));
-    const words = path ? [...one.childNodes].find((node) => node.nodeType === Node.COMMENT_NODE)?.data : one.textContent;
+    const comment = [...one.childNodes].find((node) => node.nodeType === Node.COMMENT_NODE);
+    const words = path ? comment?.data : one.textContent;
     return { words: (words ?? '').trim(), fill: style.fill, size, box: [box.left, box.top, box.right, box.bottom] };
 }).filter((one) => one.words)"""
 HIDE = """const style = document.createElementNS('http://www.w3.org/2000/svg', 'style');
-    style.textContent = "text, g[id^='text_'], g[id^='mark-'] { visibility: hidden }"; document.documentElement.append(style);"""
+    style.textContent = "text, g[id^='text_'], g[id^='mark-'] { visibility: hidden }";
+    document.documentElement.append(style);"""
 
 pytestmark = pytest.mark.slow
 
