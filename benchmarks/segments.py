@@ -179,8 +179,8 @@ def run_avr(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> Run:
             printed = call([str(program), "atmega328p", "16000000", "program.elf", *places, span, span], folder, given)
             parts = [path for path in _compiled(files) if path != "main.c"]
             call([*command, "-c", *parts], folder)
-            given = call(["avr-size", *(path.rsplit(".", 1)[0] + ".o" for path in parts)], folder)
-            flash = sum(int(line.split()[0]) + int(line.split()[1]) for line in given.decode().splitlines()[1:])
+            sizes = call(["avr-size", *(path.rsplit(".", 1)[0] + ".o" for path in parts)], folder)
+            flash = sum(int(line.split()[0]) + int(line.split()[1]) for line in sizes.decode().splitlines()[1:])
             ram = int(words["stream"][3], 16)
         shape = np.dtype([("record", "u1", size), ("state", "u1"), ("r25", "u1"), ("cycles", "<u4"), ("stack", "<u2")])
         runs.append(np.frombuffer(printed, shape))

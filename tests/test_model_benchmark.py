@@ -47,7 +47,7 @@ def test_our_trainers_their_integers_and_weka_recognise_most_grasps(grasps: Path
 
     cut = next(cuts(load(str(grasps), Path())))
     for model in (each for each in OURS + PEERS if each.there and (each.ours or each.needs == "java")):
-        answers, integers = model.answered(cut)
+        answers, integers = model.predicted(cut)
         assert recognised(answers, cut.test).mean() > 0.8, model.name
         assert (integers is not None) == model.ours
         assert integers is None or np.mean(answers == integers) > 0.98, model.name

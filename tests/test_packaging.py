@@ -62,7 +62,7 @@ def distributions(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("pyproject.toml", "README.md", "LICENSE", "MANIFEST.in"):
         shutil.copy(ROOT / name, source / name)
     # No isolation: that would fetch setuptools.
-    build = [sys.executable, "-m", "build", "--no-isolation", "--outdir", folder / "dist", source]
+    build = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(folder / "dist"), str(source)]
     done = subprocess.run(build, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return folder / "dist"
@@ -75,7 +75,7 @@ def test_the_metadata_of_both_distributions_passes_a_strict_check(distributions:
         "-py3-none-any.whl",
         ".tar.gz",
     ]
-    check = [sys.executable, "-m", "twine", "check", "--strict", *files]
+    check = [sys.executable, "-m", "twine", "check", "--strict", *map(str, files)]
     done = subprocess.run(check, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.count("PASSED") == 2

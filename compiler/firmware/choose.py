@@ -167,7 +167,7 @@ def features(layout: Layout, target: Target) -> str:
     halves = ", the upper halves of steps" if layout.entry_shift else ""
     parts = [f"{layout.entry_bits}-bit entries{' and sums' if layout.sum_bits == 8 else halves}"]
     if layout.groups:
-        parts.append(f"up to {max(map(len, layout.groups))} switches a lookup")
+        parts.append(f"up to {max(map(len, layout.groups))} switches per lookup")
     if layout.joints:
         parts.append(
             {
@@ -177,7 +177,7 @@ def features(layout: Layout, target: Target) -> str:
             }[layout.bins]
         )
         if (most := max((len(lookup.joints) for lookup in layout.lookups), default=0)) > 1:
-            parts.append(f"up to {most} joints a lookup")
+            parts.append(f"up to {most} joints per lookup")
     if layout.tables.slopes:
         parts.append("codes multiplied")
     if target.avr:

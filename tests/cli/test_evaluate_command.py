@@ -124,7 +124,7 @@ def test_other_cuts_say_what_they_are(grasps: str, by: str, said: str, capsys: p
 def test_a_composition_without_inputs_is_marked_and_explained(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["evaluate", grasps, *QUICK, "--prune", "1000", "--tables", "compositions"]) == 0
     printed = capsys.readouterr().out
-    assert "the most frequent grasp type is answered" in printed
+    assert "the most frequent grasp type is predicted" in printed
     assert any("VI " in line and "]*" in line for line in printed.splitlines())
 
 

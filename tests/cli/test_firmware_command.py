@@ -219,7 +219,7 @@ def test_a_glove_s_ranges_are_what_its_pins_read_and_boards_that_fit_are_told(
         (("--target", "avr328p", "--board", "{board}", "-o", "made"), "the mode classify reads no board"),
         (
             ("--target", "avr2560", "--mode", "scan", "--board", "{board}", "-o", "made"),
-            "the board has an atmega328p, the target avr2560 is an atmega2560",
+            "the board has an atmega328p, but the target avr2560 is an atmega2560",
         ),
         (("--target", "avr328p", "--flash-limit", "32769", "-o", "made"), "an atmega328p has 32768 bytes"),
         (("--target", "avr328p", "--name", "../x", "-o", "made"), "'../x' cannot be the name: use lower-case"),

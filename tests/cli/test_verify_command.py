@@ -115,7 +115,7 @@ def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[s
     check = TargetCheck(
         part="cortex-m4",
         layout="",
-        answer="update",
+        function="update",
         missing=False,
         shares=True,
         frames=10,

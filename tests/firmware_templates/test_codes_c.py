@@ -265,7 +265,7 @@ def test_what_a_glove_does_not_know_is_said() -> None:
     with pytest.raises(SettingError, match="no sensor of that name"):
         sensors_of(names_of([joint("d", "ohm")]), harness)
     fine = parse_harness(STREAM.replace("[800, 2800]", "[0.0, 3.3]"), "glove.toml")
-    with pytest.raises(FirmwareError, match=r"range of 'a' in glove.toml, 0 to 3.3, is not of whole numbers"):
+    with pytest.raises(FirmwareError, match=r"range of 'a' in glove.toml, 0 to 3.3, must be whole numbers"):
         sensors_of(names_of([joint("a", "raw", (1, 1.0, 255, 255.0))]), fine)
     with pytest.raises(SettingError, match="not in the glove's bytes"):
         sensors_of(names_of([joint("index_mpj")]), parse_harness('name = "g"\n[cyberglove]\nport = "x"\n', "g"))

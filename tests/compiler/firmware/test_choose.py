@@ -166,7 +166,7 @@ def test_builds_of_both_widths_share_a_frontier(
 def test_why_is_said_in_a_sentence(tables: IntegerTables, small: Choice) -> None:
     found = small
     assert found.why.startswith("8-bit entries, up to ")
-    assert " switches a lookup, codes " in found.why
+    assert " switches per lookup, codes " in found.why
     times = f"{found.cost.cycles} cycles ({found.cost.update_cycles} by update())"
     assert found.why.endswith(f"bytes of flash, at most {times} and {found.cost.flash} bytes")
     found = choose(tables, TARGETS["cortex-m4"])

@@ -189,7 +189,7 @@ def test_less_flash_is_a_smaller_layout_and_too_little_is_refused(build: Build, 
             "the mode glove is available for avr328p, avr2560, esp32 and rp2040, not for arduino",
         ),
         ("avr328p", "scan", None, r"the mode scan needs a board\.toml"),
-        ("avr2560", "scan", "scan pins", "the board has an atmega328p, the target avr2560 is an atmega2560"),
+        ("avr2560", "scan", "scan pins", "the board has an atmega328p, but the target avr2560 is an atmega2560"),
     ],
 )
 def test_what_does_not_go_together_is_refused(

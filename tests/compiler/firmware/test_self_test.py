@@ -138,7 +138,7 @@ def test_flash_runs_the_command_that_it_is_given_and_asks_for_one_otherwise(
     files = files_for("cortex-m0plus", arrange(tables), describe(tables))
     asked = make("cortex-m0plus", files, "flash")
     assert asked.returncode != 0
-    assert asked.stdout == "name the command that programs your part: see the top of the Makefile\n"
+    assert asked.stdout == "set FLASH_WITH to the command that programs your part: see the top of the Makefile\n"
     done = make("cortex-m0plus", {}, "flash", "FLASH_WITH=@echo programming $<")
     assert (done.returncode, done.stdout) == (0, "programming thenar_hand.elf\n")
 

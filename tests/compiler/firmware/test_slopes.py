@@ -204,6 +204,6 @@ def test_a_glove_s_bytes_keep_a_slope_where_they_are_codes_and_have_a_row_each_e
 def test_a_layout_says_that_codes_are_multiplied() -> None:
     layout = arrange(_tables(1, SHAPES["switches, upper halves"]), entry_bits=8)
     assert features(layout, TARGETS["avr328p"]) == (
-        "8-bit entries, the upper halves of steps, up to 5 switches a lookup, codes multiplied, "
+        "8-bit entries, the upper halves of steps, up to 5 switches per lookup, codes multiplied, "
         "rows added by one routine"
     )

@@ -261,8 +261,8 @@ def without_a_joint(stream: Stream) -> Stream:
         ((5, 0, 3, 7), None, 1_000.0, "7 switches"),
         ((5, 0, 3, -1), None, 1_000.0, "7 switches"),
         (KEPT, wrong_class, 1_000.0, "and 4 types"),
-        (KEPT, None, 0.0, "takes some time"),
-        (KEPT, None, math.nan, "takes some time"),
+        (KEPT, None, 0.0, "must take some time"),
+        (KEPT, None, math.nan, "must take some time"),
         (KEPT, without_grasps, 1_000.0, "no grasp"),
     ],
 )

@@ -286,7 +286,7 @@ def test_a_calibration_that_lacks_a_sensor_is_named(write: Write) -> None:
 def test_what_is_no_recording_is_named(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     path.write_bytes(b"cbuiltins\neval\n")
-    with pytest.raises(McapError, match=r"a\.mcap does not begin as"):
+    with pytest.raises(McapError, match=r"a\.mcap does not begin like"):
         import_recordings([path])
 
 

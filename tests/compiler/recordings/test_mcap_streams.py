@@ -198,7 +198,7 @@ def test_a_stream_longer_than_its_file_can_have_recorded_is_refused(
     recorded: tuple[Path, Wearer], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("thenar.runtime.recording.reader._LARGEST_MADE", -recorded[0].stat().st_size)
-    with pytest.raises(McapError, match="its stream would fill"):
+    with pytest.raises(McapError, match="its stream would take"):
         import_recordings([recorded[0]], stream=True)
 
 

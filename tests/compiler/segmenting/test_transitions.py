@@ -86,7 +86,7 @@ def test_a_report_has_the_graph_where_the_recordings_are_whole_movements(
     for number, (rows, drawn) in enumerate(((grasp_set.without_none(), False), (apart, False), (grasp_set, True))):
         folder = compile_build(rows, tmp_path / f"{number}", rounds=3, folds=0, documents=Documents()).folder
         page = (folder / "report.html").read_text()
-        assert ('<svg class="changes"' in page) == ("Which grasp follows which" in page) == drawn
+        assert ('<svg class="changes"' in page) == ("Transitions between grasp types" in page) == drawn
     found = Transitions.of_set(grasp_set)
     assert page.count("stroke-width") >= np.count_nonzero(found.counts)
     for name in found.types:

@@ -210,7 +210,7 @@ def test_every_package_says_how_each_ecosystem_takes_it_and_under_which_licence(
 
 def test_the_program_in_the_readme_compiles(tool: Tool, written: Written, tmp_path: Path) -> None:
     made = written("generic")
-    lines = re.findall(r"^    (.*)$", (made / "README.md").read_text().partition("## How")[0], re.MULTILINE)
+    lines = re.findall(r"^    (.*)$", (made / "README.md").read_text().partition("## Use in each")[0], re.MULTILINE)
     included, shown = ([line for line in lines if line.startswith("#") == is_one] for is_one in (True, False))
     given = "unsigned f(thenar_hand_switch number, bool closed, uint16_t sensor, int32_t reading)"
     (tmp_path / "f.c").write_text("\n".join([*included, f"{given};", given, "{", *shown, "return grasp;", "}", ""]))
