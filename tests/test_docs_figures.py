@@ -33,8 +33,10 @@ SHOW = """const root = document.documentElement, box = root.viewBox.baseVal;
 # Letters are text, or outlines in matplotlib's groups, in hundredths of the font size.
 TEXTS = """const letters = document.querySelectorAll("text, g[id^='text_'], g[id^='mark-']");
 return [...letters].map((one) => {
-    const box = one.getBoundingClientRect(), path = one.tagName === 'text' ? null : [...one.querySelectorAll('use')].pop();
-    const style = getComputedStyle(path ?? one), scale = (path?.parentNode ?? one).getScreenCTM();
+    const box = one.getBoundingClientRect();
+    const path = one.tagName === 'text' ? null : [...one.querySelectorAll('use')].pop();
+    const style = getComputedStyle(path ?? one);
+    const scale = (path?.parentNode ?? one).getScreenCTM();
     const size = Math.hypot(scale.a, scale.b) * (path ? 100 : parseFloat(style.fontSize));
     const comment = [...one.childNodes].find((node) => node.nodeType === Node.COMMENT_NODE);
     const words = path ? comment?.data : one.textContent;
