@@ -23,7 +23,7 @@ FIGURES = DOCS / "figures"
 DRAWINGS = sorted(FIGURES.glob("*.svg"))
 EACH = pytest.mark.parametrize("path", DRAWINGS, ids=lambda path: path.stem)
 FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars")
-WIDTH_PX, LEAST_PX, LEAST_CONTRAST = 688, 8, 4.5
+WIDTH_PX, LEAST_PX, OF_DIAGRAMS_PX, LEAST_CONTRAST = 688, 8, 12, 4.5
 TOUCH_PX = 0.5  # rectangles that share less than this do not overlap
 
 # Shows the root at a width, and returns its height.
@@ -31,22 +31,17 @@ SHOW = """const root = document.documentElement, box = root.viewBox.baseVal;
     const height = arguments[0] * box.height / box.width;
     root.setAttribute('width', arguments[0]); root.setAttribute('height', height); return Math.ceil(height);"""
 # Letters are text, or outlines in matplotlib's groups, in hundredths of the font size.
-TEXTS = """const letters = document.querySelectorAll("text, g[id^='text_'], g[id^='mark-']");
-return [...letters].map((one) => {
-    const box = one.getBoundingClientRect();
-    const path = one.tagName === 'text' ? null : [...one.querySelectorAll('use')].pop();
-    const style = getComputedStyle(path ?? one);
-    const scale = (path?.parentNode ?? one).getScreenCTM();
+TEXTS = """return [...document.querySelectorAll("text, g[id^='text_'], g[id^='mark-']")].map((one) => {
+    const box = one.getBoundingClientRect(), path = one.tagName === 'text' ? null : one.querySelector('use');
+    const style = getComputedStyle(path ?? one), scale = (path?.parentNode ?? one).getScreenCTM();
     const size = Math.hypot(scale.a, scale.b) * (path ? 100 : parseFloat(style.fontSize));
     const comment = [...one.childNodes].find((node) => node.nodeType === Node.COMMENT_NODE);
-    const words = path ? comment?.data : one.textContent;
-    return { words: (words ?? '').trim(), fill: style.fill, size, box: [box.left, box.top, box.right, box.bottom] };
+    const words = ((path ? comment : one)?.textContent ?? '').trim();
+    return { words, fill: style.fill, size, box: [box.left, box.top, box.right, box.bottom] };
 }).filter((one) => one.words)"""
 HIDE = """const style = document.createElementNS('http://www.w3.org/2000/svg', 'style');
     style.textContent = "text, g[id^='text_'], g[id^='mark-'] { visibility: hidden }";
     document.documentElement.append(style);"""
-
-pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
@@ -93,18 +88,28 @@ def overlap(one: list[float], other: list[float]) -> bool:
     return all(min(one[n + 2], other[n + 2]) - max(one[n], other[n]) > TOUCH_PX for n in (0, 1))
 
 
+@pytest.fixture
+def script(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Return the names of docs/figures/diagrams.py."""
+    monkeypatch.syspath_prepend(str(FIGURES))
+    return runpy.run_path(str(FIGURES / "diagrams.py"))
+
+
+@pytest.mark.slow
 @EACH
 def test_labels_are_large_enough_and_neither_overlap_nor_leave_the_picture(
-    driver: webdriver.Chrome, path: Path
+    driver: webdriver.Chrome, path: Path, script: dict[str, Any]
 ) -> None:
     height, found = shown(driver, path, "light"), texts(driver)
     assert found
-    assert not [one for one in found if one["size"] < LEAST_PX]
+    least = OF_DIAGRAMS_PX if path.stem in script["DIAGRAMS"] else LEAST_PX
+    assert not [one for one in found if one["size"] < least]
     edges = (WIDTH_PX, height)
     assert not [one for one in found if min(one["box"][:2]) < 0 or one["box"][2] > edges[0] or one["box"][3] > edges[1]]
     assert not [(a["words"], b["words"]) for a, b in combinations(found, 2) if overlap(a["box"], b["box"])]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @EACH
 def test_letters_contrast_with_what_is_behind_them(driver: webdriver.Chrome, path: Path, scheme: str) -> None:
@@ -135,14 +140,12 @@ def test_the_diagrams_are_what_their_script_draws() -> None:
     subprocess.run([sys.executable, str(FIGURES / "diagrams.py"), "--check"], check=True)
 
 
-def test_the_diagram_of_folders_shows_the_imports_that_are_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(FIGURES))
-    shown = runpy.run_path(str(FIGURES / "diagrams.py"))
+def test_the_diagram_of_folders_shows_the_imports_that_are_allowed(script: dict[str, Any]) -> None:
     allowed: dict[str, set[str]] = {folder: set() for folder in PACKAGES}
     for room, imported in ALLOWED.items():
         folder = room.split(".")[0]
         allowed[folder] |= {name.split(".")[0] for name in imported} - {folder}
-    assert {folder: set(shown["IMPORTS"].get(folder, ())) for folder in shown["FOLDERS"]} == allowed
+    assert {folder: set(script["IMPORTS"].get(folder, ())) for folder in script["FOLDERS"]} == allowed
 
 
 def test_every_figure_is_on_a_page() -> None:

@@ -104,14 +104,8 @@ class Labels:
 
     def _write(self, label: Label, text: str, anchors: Floats, radii: Sequence[float], dearest: float) -> bool:
         style: dict[str, Any] = {
-            **{
-                "ha": "center",
-                "va": "center",
-                "ma": "center",
-                "color": for_letters(label.colour),
-                "fontsize": label.size,
-            },
-            **{"fontweight": "bold" if label.bold else "normal", "zorder": 6},
+            **{"ha": "center", "va": "center", "ma": "center", "zorder": 6, "color": for_letters(label.colour)},
+            **{"fontsize": label.size, "fontweight": "bold" if label.bold else "normal"},
         }
         probe = self.axes.text(0, 0, text, **style)
         extent = probe.get_window_extent(self._renderer)
