@@ -285,7 +285,7 @@ def test_a_trial_is_undone_another_skipped_and_a_pause_is_one(
     again.press(b"\r")
     again.until(rb"p: pause")
     again.press(b"p")
-    again.until(rb"paused; nothing is recorded meanwhile.*?Enter: go on")
+    again.until(rb"paused; nothing is recorded meanwhile.*?Enter: continue")
     again.press(b"q")
     code, said = again.finish()
     assert code == 0, said

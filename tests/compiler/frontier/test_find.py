@@ -302,7 +302,7 @@ def test_another_stream_is_another_question(tmp_path: Path, make_set: Make) -> N
 
 def test_recordings_that_are_trained_on_are_no_stream(tmp_path: Path, make_set: Make) -> None:
     request = asked(tmp_path, make_set())
-    with pytest.raises(FrontierError, match="is what is trained on"):
+    with pytest.raises(FrontierError, match="equals the training set"):
         found_of({**request, "stream": make_set()})
 
 

@@ -234,7 +234,7 @@ def test_a_mux_that_is_gone_is_named_and_comes_back(rig: MakeRig) -> None:
     glove = running(rig, [*MUXED, ("mcp23017", 0x21)], [*MUXED_LEVELS, 0xFFF0])
     glove.emulated.remove_mux(0, 0x70)
     assert glove.client.ask("read") == [None, None, 0xFFF0]
-    assert "the tca9548a at 0x70 does not answer" in glove.client.state().chips[0].last_error
+    assert "the tca9548a at 0x70 does not reply" in glove.client.state().chips[0].last_error
     glove.emulated.heal(0)
     recovers(
         glove,

@@ -124,7 +124,7 @@ def test_record_mark_and_stop_write_what_the_command_writes(run: Callable[[], An
         browser.click("mark")
     browser.wait(lambda: "2 marks" in browser.text("recording"))
     browser.click("stop")
-    browser.wait(lambda: "is whole" in browser.text("recording"))
+    browser.wait(lambda: "is complete" in browser.text("recording"))
     written = browser.text("recording")
     browser.driver.get("about:blank")
     running.end()
@@ -168,7 +168,7 @@ def test_a_keyboard_is_enough(run: Callable[[], Any], browser: Any) -> None:
     press(Keys.TAB)
     assert focused() == "stop"
     press(Keys.ENTER)
-    browser.wait(lambda: "is whole" in browser.text("recording"))
+    browser.wait(lambda: "is complete" in browser.text("recording"))
     browser.wait(lambda: focused() == "record")
 
 
