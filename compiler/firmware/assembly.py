@@ -16,6 +16,8 @@ _FREE, _KEPT = (22, 24, 26, 18, 20), (16, 14, 12, 10, 8, 6, 4, 2, 28)
 _POINTER, _ZERO, _COMPARED = 28, 18, 20
 _IMMEDIATE = 16  # registers from here on can be loaded with a constant
 _LPM_REACH = 65536
+_TEMPLATES = "classifier/avr/"
+_SIZES = {8: "bytes", 16: "words"}
 FLAGS = 2  # bytes between the address in Y and the glove's input
 MOST_DISTANCE = 255  # the largest distance that fits in a byte
 _REACH = 63  # of ldd, and of adiw
@@ -36,17 +38,21 @@ def check_size(layout: Layout) -> None:
 def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> dict[str, object]:
     """Return the values for the assembly template; if `near`, calls are relative."""
     parts = layout.parts
-    stride = parts.width * layout.entry_bits // 8
+    stride, call = parts.width * layout.entry_bits // 8, "rcall" if near else "call"
     passes = [_pass(names, layout, number) for number in range(len(parts.firsts))]
     bins = sum(len(joint.bins) for joint in layout.joints)
     return {
         "byte_sums": layout.sum_bits == 8,
-        "wide": layout.code_bits == 16,
+        "way": f"{_TEMPLATES}{'found_first' if finds_first(layout) else 'at_once'}",
+        "entries": _entries(layout),
+        "sum_macros": f"{_TEMPLATES}sums_{_SIZES[layout.sum_bits]}.j2",
+        "code_macros": f"{_TEMPLATES}codes_{_SIZES[layout.code_bits]}.j2",
         "zeros": _ZERO in _spare(layout),
         "unrolled": layout.adding == "unrolled",
         "finds_first": finds_first(layout),
         "compares": compares_input(layout),
-        "call": "rcall" if near else "call",
+        "add_row": "add_row" if layout.adding == "unrolled" else f"{call} add_row_at_z",
+        "call": call,
         "jump": "rjmp" if near else "jmp",
         "passes": passes,
         "sums": passes[0]["sums"],
@@ -56,13 +62,19 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
         "last": last_size(layout),
         "seen": seen_size(layout),
         "sources": FLAGS + layout.frame_size + _n_found(layout),
-        "halves": layout.entry_shift == 8,
         "clean": layout.biased and not layout.entry_shift,  # r1 is zero between lookups
         "tables": [
             *([(f"thenar_{name}_rows", layout.n_rows * len(parts.firsts) * stride)] if layout.n_rows else []),
             *([(f"thenar_{name}_bins", bins)] if bins else []),
         ],
     }
+
+
+def _entries(layout: Layout) -> str:
+    """Return the macro of entries.j2 that adds and subtracts the layout's rows."""
+    if layout.biased:
+        return "halves" if layout.entry_shift else "offsets"
+    return _SIZES[layout.entry_bits]
 
 
 def finds_first(layout: Layout) -> bool:
