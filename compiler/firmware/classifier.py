@@ -59,7 +59,7 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
         "batches": layout.batches,
         "began": [f"start[{lane}]" if _started(lane, biased, layout.entry_shift) else "0u" for lane in range(n_lanes)],
         "finishing": _finishing(n_lanes, biased, layout.entry_shift),
-        "replacing": _replacing(n_lanes, layout.entry_shift) if biased else [],
+        "entry_shift": layout.entry_shift,
     }
 
 
@@ -129,18 +129,6 @@ def _start_lines(starts: Sequence[Sequence[int]], lanes: Sequence[tuple[int, int
         held = [", ".join(words[at : at + _STARTS_PER_LINE]) for at in range(0, len(words), _STARTS_PER_LINE)]
         lines += ["{", *(f"    {line}," for line in held), "},"]
     return lines
-
-
-def _replacing(lanes: int, shift: int) -> list[str]:
-    """Return the statements that replace a row of offsets in sum[]."""
-    replacing = []
-    for lane in range(lanes):
-        halves = (f"({each}[{lane // 2}] & 0x00FF00FFu)" for each in ("after", "before"))
-        if lane % 2:
-            halves = (f"(({each}[{lane // 2}] >> 8) & 0x00FF00FFu)" for each in ("after", "before"))
-        change = " - ".join(halves)
-        replacing.append(f"sum[{lane}] += {f'({change}) << {shift}' if shift else change};")
-    return replacing
 
 
 def _started(lane: int, biased: bool, shift: int) -> bool:
