@@ -50,15 +50,13 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
         "sum_bits": bits,
         "adding": _adding(layout),
         "passes": _passes(layout),
-        "ones": "FFFFFF" if bits == 8 else "FFFF",
         "stores": [(lane, shift, k) for k, (lane, shift) in enumerate(lanes)],
+        "held": [[k for k, (each, _) in enumerate(lanes) if each == lane] for lane in range(n_lanes)],
         "takes": [(lane, 32 - bits - shift, k) for k, (lane, shift) in enumerate(lanes)],
         "word_macros": _narrow_macros(parts.width) if biased else _sum_macros(parts.width, bits),
         "start": _start_lines(_in_parts(layout.start, parts), lanes),
         "finds": [_find(name, layout, lookup) for lookup in layout.lookups],
         "batches": layout.batches,
-        "began": [f"start[{lane}]" if _started(lane, biased, layout.entry_shift) else "0u" for lane in range(n_lanes)],
-        "finishing": _finishing(n_lanes, biased, layout.entry_shift),
         "entry_shift": layout.entry_shift,
     }
 
@@ -129,26 +127,6 @@ def _start_lines(starts: Sequence[Sequence[int]], lanes: Sequence[tuple[int, int
         held = [", ".join(words[at : at + _STARTS_PER_LINE]) for at in range(0, len(words), _STARTS_PER_LINE)]
         lines += ["{", *(f"    {line}," for line in held), "},"]
     return lines
-
-
-def _started(lane: int, biased: bool, shift: int) -> bool:
-    """Return whether a sum is initialised with its start value; otherwise the start value is added at the end."""
-    # An even sum that corrects the odd one after it starts from zero, and so does a sum that is shifted.
-    return biased and lane % 2 == 1 and not shift
-
-
-def _finishing(lanes: int, biased: bool, shift: int) -> list[str]:
-    """Return the statements that make the words of two sums s0, s1... after all rows have been added."""
-    if not biased:
-        return [f"s{lane} += start[{lane}];" for lane in range(lanes)]
-    finished = []
-    for lane in reversed(range(lanes)):  # an odd one before the even one that precedes it
-        text = f"s{lane} - ((s{lane - 1} >> 16) << 8)" if lane % 2 else f"s{lane}"
-        if _started(lane, biased, shift):
-            finished.append(f"s{lane} = {text};")
-        else:
-            finished.append(f"s{lane} = start[{lane}] + {f'(({text}) << {shift})' if shift else text};")
-    return finished
 
 
 def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
