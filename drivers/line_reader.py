@@ -65,7 +65,7 @@ class RowReader(Closing, ABC):
 
 
 class LineReader(RowReader):
-    """Rows of the lines from `port`, of so many `columns`; 0: it is unknown. The constructor does not open it."""
+    """Rows of the lines from `port`, of `columns` columns; 0: unknown. The constructor does not open it."""
 
     def __init__(self, port: str, baud: int = 115_200, columns: int = 0) -> None:
         self.port, self._baud = port, baud

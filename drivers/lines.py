@@ -72,7 +72,7 @@ class Splitter:
 
 
 def parsed(line: bytes, columns: int = 0) -> Row | Header | None:
-    """Parse a line; None for a misfit. Rows are known to have so many columns; 0: their number is unknown."""
+    """Parse a line; None for a misfit. `columns` is the known number of columns; 0: unknown."""
     try:
         text = line.decode("utf-8")
     except UnicodeDecodeError:
@@ -182,9 +182,11 @@ class LineParser:
         rows = []
         before = self._splitter.overlong
         for line in self._splitter.feed(chunk):
-            found = parsed(line, self._columns if self._names is None else len(self._names))
+            named = len(self._names or ())
+            found = parsed(line, named if named > 1 else self._columns)
             if isinstance(found, Header):
-                self._names = found.names
+                if len(found.names) > 1 or named < 2:  # a word alone is a message
+                    self._names = found.names
             elif found is None:
                 self.counts.misfits += 1
                 self.odd = shortened(repr(line[: LONGEST_SHOWN + 1].decode("utf-8", "replace")))

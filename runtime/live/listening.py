@@ -86,7 +86,7 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
 
 
 def _no_rows(port: str, baud: int, odd: str) -> str:
-    """Return what to do about lines none of which is a row."""
+    """Return the advice for lines none of which is a row."""
     if not odd:
         return "its lines are longer than any row: end each row with a line feed"
     serial = port.startswith("rfc2217:") or not (port == "-" or re.match("[a-z0-9]+:", port))
@@ -211,7 +211,7 @@ def _kind(name: str, numbers: Sequence[float]) -> str:
     if _rises(numbers):
         return "nothing: it only rises, as a count does"
     if _TIME.search(name) and not {0.0, 1.0} >= set(numbers) and sorted(numbers) == list(numbers):
-        return "nothing: a clock that stands still from row to row"
+        return "nothing: a clock that does not change from row to row"
     if _JOINT.search(name):
         return "joint"
     if _TAXEL.search(name):

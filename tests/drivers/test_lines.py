@@ -104,6 +104,8 @@ def test_a_text_in_a_row_of_known_width_is_a_missing_value() -> None:
     assert (parser.counts.misfits, parser.odd) == (2, "'5,1,2,fist'")
     assert LineParser(3).feed(row) == [Row(None, (5, 1, None))]
     assert LineParser().feed(row) == []
+    assert LineParser(3).feed(b"booting\n" + row) == [Row(None, (5, 1, None))]
+    assert parser.feed(b"ready\n" + row) == [Row(("ms", "flex [deg]", "label"), (5, 1, None))]
 
 
 @given(st.binary(max_size=200), st.integers(0, 9))
