@@ -194,7 +194,7 @@ class RowSource(Source):
 
     def _begin(self) -> None:
         self._clock = SenderClock(self.wiring.period_us)
-        # When a row came last; when the sender's clock changed last; until when it counts as one that stands still.
+        # When a row came last; when the sender's clock changed last; until when it counts as stopped.
         self._came_us = self._ticked_us = now_us()
         self._still_until_us = -1
         self._last: tuple[float, Sequence[float | None]] | None = None

@@ -308,6 +308,17 @@ def test_joints_alone_of_bytes_are_recognised_as_they_were_recorded(thenar: Then
     assert right(log, out) == 1.0
 
 
+@pytest.mark.parametrize("options", [(), ("--taxels",)])
+def test_calibrate_refuses_rows_from_stdin_where_the_user_types(
+    thenar: Thenar, tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    path = tmp_path / "glove.toml"
+    path.write_text('[[stream]]\nport = "-"\njoints = { flex = [0, 9] }\ntaxels = { pad = [0, 9] }\n')
+    done = thenar("calibrate", path, "-o", tmp_path / "anna.toml", *options)
+    assert done.returncode == 2
+    assert "the keys that lead a calibration come from stdin: send rows by udp: instead" in done.stderr
+
+
 @pytest.mark.slow
 def test_calibrate_asks_for_the_joints_of_a_stream(tmp_path: Path) -> None:
     path, out = tmp_path / "glove.toml", tmp_path / "anna.toml"
