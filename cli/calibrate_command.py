@@ -104,6 +104,8 @@ def command(
     glove: CyberGlove | StreamedJoints
     if port.endswith(".toml"):
         glove = StreamedJoints(Path(port), output)
+        if web is None:
+            _keep_stdin([glove.url])
     else:
         glove = CyberGlove(port, baud=baud, sensors=int(sensors) if sensors else None)
 
@@ -144,12 +146,19 @@ def _calibrate_taxels(glove: Path, output: Path, wearer: str, newtons: float | N
     harness = replace(load_harness(glove), taxel_settings=TaxelSettings())  # it may name the file to be written
     if not harness.taxel_names:
         raise click.UsageError(f"{glove.name} names no taxels: add `taxels` to a [[scanner]], or add a converter")
+    _keep_stdin([stream.port for stream in harness.streams])
     with Sources(harness, (), whole_scan(harness, (), every_taxel=True)) as sources:
         calibrated = TaxelGuide(harness, sources, hold).calibration(wearer, newtons)
     if not calibrated.taxels:
         raise click.ClickException(f"no taxel moved, so nothing can be calibrated: {output} is not written")
     write_atomically(output, calibrated.to_toml().encode("utf-8"))
     echo(f"{output}: {len(calibrated.taxels)} taxels of {calibrated.subject}; name it under [taxels] of {glove.name}")
+
+
+def _keep_stdin(ports: list[str]) -> None:
+    """Raise UsageError if rows come from stdin, too, where the user types."""
+    if "-" in ports:
+        raise click.UsageError("the keys that lead a calibration come from stdin: send rows by udp: instead")
 
 
 class Guide:
