@@ -130,14 +130,7 @@ def command(
     full_scan: bool,
     status: bool,
     frames: int | None,
-    lead: float | None,
-    dwell_ms: float | None,
-    max_lost: float | None,
-    grace_ms: float | None,
-    no_quarantine: bool,
-    error_rate: float | None,
-    spacing_ms: float | None,
-    lag_ms: float | None,
+    **deciding: Any,
 ) -> None:
     """Recognise grasps: live on the glove that --glove describes, or in the recorded frames of --replay.
 
@@ -161,22 +154,9 @@ def command(
 
     _refuse_idle(glove, replay)
     loaded = Build.load(build)
-    policy = _policy(
-        {
-            "lead": lead,
-            "dwell_us": _us(dwell_ms),
-            "max_lost": max_lost,
-            "grace_us": _us(grace_ms),
-            "quarantine": False if no_quarantine else None,
-            "error_rate": error_rate,
-            "spacing_us": _us(spacing_ms),
-            "lag_us": _us(lag_ms),
-        }
-    )
+    policy = _policy(**deciding)
     if replay is None:
-        if sys.stdout is None and not sinks:
-            raise click.UsageError("stdout is closed: name a --sink to send grasps to")
-        viewed = sys.stdout is not None and sys.stdout.isatty() and "jsonl:-" not in sinks
+        viewed = _is_viewed(sinks)
         asked: dict[str, Any] = {"preshapes": preshape, "record": record, "full_scan": full_scan, "status": status}
         asked |= {"change_while_held": change_while_held, "task": task}
         asked |= {"sinks": sinks or (() if viewed else ("jsonl:-",)), "policy": policy, "recordable": web is not None}
@@ -223,15 +203,42 @@ def _refuse(where: str, *names: str) -> None:
             raise click.UsageError(f"{option.opts[0]} has no effect {where}: leave it out")
 
 
+def _is_viewed(sinks: Sequence[str]) -> bool:
+    """Return whether the terminal shows the grasps. Raises UsageError if nothing receives them."""
+    if sys.stdout is None and not sinks:
+        raise click.UsageError("stdout is closed: name a --sink to send grasps to")
+    return sys.stdout is not None and sys.stdout.isatty() and "jsonl:-" not in sinks
+
+
 def _us(ms: float | None) -> int | None:
     return None if ms is None else round(1000 * ms)
 
 
-def _policy(asked: dict[str, Any]) -> "Policy | None":
-    """Return the usual policy with the `asked` values in it, or None if there are none."""
+def _policy(
+    *,
+    lead: float | None,
+    dwell_ms: float | None,
+    max_lost: float | None,
+    grace_ms: float | None,
+    no_quarantine: bool,
+    error_rate: float | None,
+    spacing_ms: float | None,
+    lag_ms: float | None,
+) -> "Policy | None":
+    """Return the usual policy with the given values in it, or None if there are none."""
     from thenar.runtime.policy import Policy
 
-    given = {name: value for name, value in asked.items() if value is not None}
+    asked = {
+        "lead": lead,
+        "dwell_us": _us(dwell_ms),
+        "max_lost": max_lost,
+        "grace_us": _us(grace_ms),
+        "quarantine": False if no_quarantine else None,
+        "error_rate": error_rate,
+        "spacing_us": _us(spacing_ms),
+        "lag_us": _us(lag_ms),
+    }
+    given: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
     if not given:
         return None
     usual = Policy()
