@@ -31,7 +31,6 @@ from .lines import echo
 from .web_options import say_page, token_for, web_options
 
 if TYPE_CHECKING:
-    from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime import Build, Glove
     from thenar.runtime.live.recogniser import Moment
     from thenar.runtime.policy import Policy
@@ -399,6 +398,7 @@ def _replay_set(
     """
     import msgspec
 
+    from thenar.compiler.artifact.replay import replayed, trials_recognised
     from thenar.compiler.recordings.graspset import GraspSet
 
     whole, found = GraspSet.load(replay), list[str]()
@@ -416,48 +416,15 @@ def _replay_set(
         return msgspec.json.encode(shown if selector is None else shown | {"preshape": shape}) + b"\n"
 
     with _published(build, sinks, selector, line) as publish:
-        for grasp in _rows(build, grasp_set, period_us):
+        for grasp in replayed(build, grasp_set, period_us):
             found.append(grasp.grasp)
             publish(grasp, None)
     rows = len(grasp_set)
     correct = sum(map(eq, found, grasp_set.grasps.tolist()))
     echo(f"{correct} of {rows} frames predicted correctly ({correct / max(rows, 1):.1%})", err=True)
     if (trials := len(set(grasp_set.trial_ids.tolist()))) < rows:
-        correct = _trials_recognised(grasp_set, found)
+        correct = trials_recognised(grasp_set, found)
         echo(f"{correct} of {trials} trials by majority of their frames ({correct / trials:.1%})", err=True)
-
-
-def _trials_recognised(grasp_set: "GraspSet", found: list[str]) -> int:
-    import numpy as np
-
-    from thenar.compiler.samples import decided
-
-    _, first, trial = np.unique(grasp_set.trial_ids, return_index=True, return_inverse=True)
-    names, predicted = np.unique(found, return_inverse=True)
-    return int(np.count_nonzero(names[decided(predicted[np.newaxis], trial)[0]] == grasp_set.grasps[first]))
-
-
-def _rows(build: "Build", grasp_set: "GraspSet", period_us: int) -> "Iterator[LiveGrasp]":
-    """Yield the prediction for each row. Both clocks begin with the set."""
-    from thenar.compiler.artifact.verify_firmware import select_inputs
-    from thenar.runtime.published import LiveGrasp
-
-    bits, codes = select_inputs(grasp_set, build.manifest)
-    for row, (switches, joints) in enumerate(zip(bits, codes, strict=True)):
-        found = build.recognise(switches, joints)
-        yield LiveGrasp(
-            time_us=row * period_us,
-            unix_us=row * period_us,
-            number=row,
-            grasp=found.grasp,
-            candidate=found.grasp,
-            probability=found.probability,
-            margin=found.margin,
-            health="degraded" if found.degraded else "ok",
-            switch_age_us=None,
-            glove_age_us=None,
-            latency_us=0,
-        )
 
 
 @contextmanager
