@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def selecting(build: "Build", preshape: str | None, **how: bool) -> "PreshapeSelector | None":
-    """Return what selects the preshapes of the grasps, if some were requested."""
+    """Return the selector of preshapes, if one was requested."""
     if preshape is None:
         return None
     from thenar.runtime.preshape import preshape_selector
