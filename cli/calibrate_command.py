@@ -88,7 +88,6 @@ def command(
         thenar calibrate /dev/ttyUSB0 -o anna.toml --web
     """
     from thenar.drivers.cyberglove import CyberGlove
-    from thenar.runtime.files import write_atomically
     from thenar.runtime.names import fault, shortened
 
     wearer = subject or output.stem
@@ -109,17 +108,7 @@ def command(
     else:
         glove = CyberGlove(port, baud=baud, sensors=int(sensors) if sensors else None)
 
-    def written(guide: "PoseGuide") -> str:
-        """Write the calibration of the poses and return the line to print."""
-        calibrated = guide.calibration(wearer)
-        found = {sensor.name for sensor in calibrated.sensors}
-        if not found:
-            raise click.ClickException(f"no sensor moved, so nothing can be calibrated: {output} is not written")
-        if left_out := [name for name in guide.names if name not in found]:
-            err().print(f"Not calibrated, because they did not move: {', '.join(left_out)}", soft_wrap=True)
-        write_atomically(output, calibrated.to_toml().encode("utf-8"))
-        return f"{output}: {len(found)} sensors of {calibrated.subject}"
-
+    written = partial(_written, output, wearer)
     try:
         info = glove.open()
         if web is None:
@@ -131,6 +120,20 @@ def command(
     finally:
         glove.close()
     echo(said)
+
+
+def _written(output: Path, wearer: str, guide: "PoseGuide") -> str:
+    """Write the calibration of the poses and return the line to print."""
+    from thenar.runtime.files import write_atomically
+
+    calibrated = guide.calibration(wearer)
+    found = {sensor.name for sensor in calibrated.sensors}
+    if not found:
+        raise click.ClickException(f"no sensor moved, so nothing can be calibrated: {output} is not written")
+    if left_out := [name for name in guide.names if name not in found]:
+        err().print(f"Not calibrated, because they did not move: {', '.join(left_out)}", soft_wrap=True)
+    write_atomically(output, calibrated.to_toml().encode("utf-8"))
+    return f"{output}: {len(found)} sensors of {calibrated.subject}"
 
 
 def _calibrate_taxels(glove: Path, output: Path, wearer: str, newtons: float | None, hold: float) -> None:
