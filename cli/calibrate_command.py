@@ -88,7 +88,6 @@ def command(
         thenar calibrate /dev/ttyUSB0 -o anna.toml --web
     """
     from thenar.drivers.cyberglove import CyberGlove
-    from thenar.runtime.files import write_atomically
     from thenar.runtime.names import fault, shortened
 
     wearer = subject or output.stem
@@ -104,20 +103,12 @@ def command(
     glove: CyberGlove | StreamedJoints
     if port.endswith(".toml"):
         glove = StreamedJoints(Path(port), output)
+        if web is None:
+            _keep_stdin([glove.url])
     else:
         glove = CyberGlove(port, baud=baud, sensors=int(sensors) if sensors else None)
 
-    def written(guide: "PoseGuide") -> str:
-        """Write the calibration of the poses and return the line to print."""
-        calibrated = guide.calibration(wearer)
-        found = {sensor.name for sensor in calibrated.sensors}
-        if not found:
-            raise click.ClickException(f"no sensor moved, so nothing can be calibrated: {output} is not written")
-        if left_out := [name for name in guide.names if name not in found]:
-            err().print(f"Not calibrated, because they did not move: {', '.join(left_out)}", soft_wrap=True)
-        write_atomically(output, calibrated.to_toml().encode("utf-8"))
-        return f"{output}: {len(found)} sensors of {calibrated.subject}"
-
+    written = partial(_written, output, wearer)
     try:
         info = glove.open()
         if web is None:
@@ -129,6 +120,20 @@ def command(
     finally:
         glove.close()
     echo(said)
+
+
+def _written(output: Path, wearer: str, guide: "PoseGuide") -> str:
+    """Write the calibration of the poses and return the line to print."""
+    from thenar.runtime.files import write_atomically
+
+    calibrated = guide.calibration(wearer)
+    found = {sensor.name for sensor in calibrated.sensors}
+    if not found:
+        raise click.ClickException(f"no sensor moved, so nothing can be calibrated: {output} is not written")
+    if left_out := [name for name in guide.names if name not in found]:
+        err().print(f"Not calibrated, because they did not move: {', '.join(left_out)}", soft_wrap=True)
+    write_atomically(output, calibrated.to_toml().encode("utf-8"))
+    return f"{output}: {len(found)} sensors of {calibrated.subject}"
 
 
 def _calibrate_taxels(glove: Path, output: Path, wearer: str, newtons: float | None, hold: float) -> None:
@@ -144,12 +149,19 @@ def _calibrate_taxels(glove: Path, output: Path, wearer: str, newtons: float | N
     harness = replace(load_harness(glove), taxel_settings=TaxelSettings())  # it may name the file to be written
     if not harness.taxel_names:
         raise click.UsageError(f"{glove.name} names no taxels: add `taxels` to a [[scanner]], or add a converter")
+    _keep_stdin([stream.port for stream in harness.streams])
     with Sources(harness, (), whole_scan(harness, (), every_taxel=True)) as sources:
         calibrated = TaxelGuide(harness, sources, hold).calibration(wearer, newtons)
     if not calibrated.taxels:
         raise click.ClickException(f"no taxel moved, so nothing can be calibrated: {output} is not written")
     write_atomically(output, calibrated.to_toml().encode("utf-8"))
     echo(f"{output}: {len(calibrated.taxels)} taxels of {calibrated.subject}; name it under [taxels] of {glove.name}")
+
+
+def _keep_stdin(ports: list[str]) -> None:
+    """Raise UsageError if rows come from stdin, too, where the user types."""
+    if "-" in ports:
+        raise click.UsageError("the keys that lead a calibration come from stdin: send rows by udp: instead")
 
 
 class Guide:

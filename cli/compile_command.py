@@ -1,7 +1,6 @@
 """`thenar compile`: recordings in, a build folder out."""
 
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +44,9 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from thenar.compiler.artifact.documents import BuildReport
+    from thenar.compiler.artifact.documents import BuildReport, Documents
+    from thenar.compiler.frontier.picked import Picked
+    from thenar.compiler.hand import HandShape
     from thenar.runtime.harness.wiring import Harness
     from thenar.runtime.manifest import Manifest
     from thenar.runtime.scanning.scanmap import ScanMap
@@ -218,7 +219,6 @@ def command(
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
     from thenar.compiler.artifact.compile import compile_build
-    from thenar.compiler.artifact.documents import Documents
     from thenar.compiler.frontier.picked import picked
     from thenar.compiler.placement.ports import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
@@ -226,21 +226,14 @@ def command(
 
     _check_proposal(propose, chip, glove)
     _check_point(context, from_frontier, point)
-    if hand_length is not None and not report:
-        raise click.UsageError("--hand-length sizes the hand in spec/, which --no-report omits: give one of them.")
+    _check_hand_length(hand_length, report)
     keep_apart(recordings, layout, glove, propose, from_frontier)
     options = asked_settings(context, asked) | _placed(context, asked)
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
-    hand = fitted_hand(layout, grasp_set.element_names, None)
-    if hand_length is not None:
-        fitted_hand(layout, grasp_set.element_names, hand_length)
+    hand = _hand(layout, grasp_set.element_names, hand_length)
     chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)
-    options["at_most_taxels"] = options.pop("at_most")
-    documents = Documents(hand, hand_length) if report else None
-    if chosen is not None:
-        options |= chosen.options
-        documents = documents and replace(documents, frontier=chosen.frontier, point=chosen.point.number)
+    options |= {} if chosen is None else chosen.options
     with progress("compiling, then the paper's tables" if report and asked["folds"] else "compiling") as report_done:
         made = compile_build(
             grasp_set,
@@ -248,24 +241,14 @@ def command(
             harness=given if chosen is None else chosen.wired(given),
             ports=ports_of_whole_glove(given, grasp_set.element_names, len(grasp_set.taxel_columns)),
             hand=hand,
-            documents=documents,
+            documents=_documents(hand, hand_length, chosen) if report else None,
             jobs=jobs,
             progress=report_done,
             **options,
         )
     warn_of_budget(asked["budget_us"], grasp_set.joint_names, None if given is None else given.cyberglove)
-    if made.only_answer is not None:
-        warning(
-            f"the build predicts {made.only_answer} for every row: no single input distinguishes grasp types, and the "
-            "model looks at one input at a time"
-        )
-    if chosen is not None and given is not None and made.harness != given:
-        warning(
-            f"the scan map uses the wiring that point {chosen.point.number} was found with, not {glove}: to run on "
-            "that glove, build a point that is read as wired, or compile without --from"
-        )
-    if propose is not None:
-        _propose(made.manifest, propose, chip or next(iter(_chips())))
+    _warn(made, chosen, given, glove)
+    _propose(made.manifest, propose, chip)
     show(made.manifest, lambda _: _print(made, output, propose))
 
 
@@ -276,7 +259,36 @@ def _placed(context: click.Context, asked: dict[str, Any]) -> dict[str, Any]:
     method = asked.pop("method") or PAPERS
     if context.get_parameter_source("keep") is ParameterSource.DEFAULT_MAP and not METHODS[method].by_number:
         asked["keep"] = None
-    return asked | {"placement": method}
+    return asked | {"placement": method, "at_most_taxels": asked.pop("at_most")}
+
+
+def _documents(hand: "HandShape | None", hand_length: float | None, chosen: "Picked | None") -> "Documents":
+    """Return the report and the spec to write, with the frontier of a chosen point."""
+    from thenar.compiler.artifact.documents import Documents
+
+    if chosen is None:
+        return Documents(hand, hand_length)
+    return Documents(hand, hand_length, frontier=chosen.frontier, point=chosen.point.number)
+
+
+def _warn(made: "BuildReport", chosen: "Picked | None", given: "Harness | None", glove: Path | None) -> None:
+    """Warn of a build that always predicts the same, and of one that is not wired as `glove`, the file of `given`."""
+    if made.only_answer is not None:
+        warning(
+            f"the build predicts {made.only_answer} for every row: no single input distinguishes grasp types, and the "
+            "model looks at one input at a time"
+        )
+    if chosen is not None and given is not None and made.harness != given:
+        warning(
+            f"the scan map uses the wiring that point {chosen.point.number} was found with, not {glove}: to run on "
+            "that glove, build a point that is read as wired, or compile without --from"
+        )
+
+
+def _check_hand_length(hand_length: float | None, report: bool) -> None:
+    """Raise UsageError for a length of a hand that is not drawn."""
+    if hand_length is not None and not report:
+        raise click.UsageError("--hand-length sizes the hand in spec/, which --no-report omits: give one of them.")
 
 
 def _check_proposal(propose: Path | None, chip: str | None, glove: Path | None) -> None:
@@ -303,12 +315,24 @@ def _check_point(context: click.Context, from_frontier: Path | None, point: int 
             raise click.UsageError(f"{option} is set by the point that --from names: leave it out.")
 
 
-def _propose(manifest: "Manifest", path: Path, chip: str) -> None:
+def _hand(layout: Path | None, names: Sequence[str], hand_length: float | None) -> "HandShape | None":
+    """Return the recorded glove's hand, whose spec can be made for `hand_length`."""
+    hand = fitted_hand(layout, names, None)
+    if hand_length is not None:
+        fitted_hand(layout, names, hand_length)
+    return hand
+
+
+def _propose(manifest: "Manifest", path: Path | None, chip: str | None) -> None:
+    """Write a harness for the kept switches, if that was requested."""
     from thenar.runtime.files import write_atomically
     from thenar.runtime.harness.writing import harness_to_toml
     from thenar.runtime.names import sound_name
     from thenar.runtime.scanning.propose import propose_board, propose_cyberglove, propose_harness
 
+    if path is None:
+        return
+    chip = chip or next(iter(_chips()))
     names = [switch.name for switch in manifest.switches]
     called = sound_name(path.stem, "proposed")
     glove = propose_cyberglove([joint.name for joint in manifest.joints])

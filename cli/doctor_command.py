@@ -72,7 +72,7 @@ def command(
     if line is not None:
         if build is not None or write:
             raise click.UsageError("--build and --write need a glove.toml: leave out --line and name one")
-        _listen(line, baud, seconds, [] if names is None else names.split(","), propose)
+        _listen(line, baud, seconds, [] if names is None else [name.strip() for name in names.split(",")], propose)
         return
     assert glove is not None
     if propose is not None or names is not None:
@@ -121,10 +121,12 @@ def _listen(port: str, baud: int, seconds: float, columns: "Sequence[str]", prop
         err().print(heard)
         for remark in found.remarks:
             err().print(of_device(port, remark))
-        if propose is None:
+        if propose is None and found.stream.used:
             echo(text.rstrip("\n"))
 
     show(found, show_heard)
+    if not found.stream.used:
+        raise click.ClickException(f"{port}: no column is a switch, a joint or a taxel, so no glove.toml is proposed")
     for _, reason in faults(harness):
         err().print(f"fix this before using it: {reason}", highlight=False)
     if propose is not None:

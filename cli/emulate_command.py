@@ -34,6 +34,7 @@ from .lines import echo
 from .options import scene_name
 
 if TYPE_CHECKING:
+    from thenar.runtime.harness.wiring import Harness
     from thenar.simulator.playing.bench import Bench, Cable
     from thenar.simulator.playing.performance import Log, Performance
 
@@ -114,26 +115,17 @@ def command(
         thenar emulate continuous-rest --glove glove.toml -- thenar run build/ --glove {glove} --sink jsonl:-
     """
     from thenar.runtime.harness.loading import load_harness
-    from thenar.runtime.names import list_names
     from thenar.simulator.playing.bench import Bench
 
     harness = load_harness(glove)
     check_devices(harness, glove)
-    worn = harness.cyberglove
     calibration = None if harness.calibration is None else Path(harness.calibration)
-    ours = (folder / name for name in (_HARNESS, _CALIBRATION, _TAXELS))
-    keep_apart(glove, Path(source), calibration, *ours, log)
+    keep_apart(glove, Path(source), calibration, *(folder / name for name in (_HARNESS, _CALIBRATION, _TAXELS)), log)
     _check_folder(folder)
     if client and shutil.which(client[0]) is None:
         raise click.UsageError(f"{client[0]} cannot be run: no such command is installed")
-    performance, cable = _performance(source, subject, period_ms, rest_ms, cyberglove=worn is not None)
-    if missing := [name for name in harness.switches if name not in performance.switch_names]:
-        warning(f"{source} has no switch {list_names(missing)}: always open")
-    if missing := [name for name in harness.taxel_names if name not in performance.taxel_names]:
-        warning(f"{source} has no taxel {list_names(missing)}: always 0 counts")
-    streamed = [name for stream in harness.streams for name in stream.joints]
-    if missing := [name for name in streamed if name not in performance.joint_names]:
-        warning(f"{source} has no joint {list_names(missing)}: always 0")
+    performance, cable = _performance(source, subject, period_ms, rest_ms, cyberglove=harness.cyberglove is not None)
+    _warn_of_missing(source, harness, performance)
     with ExitStack() as stack:
         stop = stack.enter_context(ended_by_signals())
         folder.mkdir(parents=True, exist_ok=True)
@@ -205,6 +197,19 @@ def _performance(
     with progress("simulating") as report:
         played = performance.of_scene(scene, subject, progress=report, period_us=given_us, rest_us=rest_us)
     return played, lambda line: cable_of(scene, line)
+
+
+def _warn_of_missing(source: str, harness: "Harness", performance: "Performance") -> None:
+    """Warn of inputs of the harness that the source does not have."""
+    from thenar.runtime.names import list_names
+
+    if missing := [name for name in harness.switches if name not in performance.switch_names]:
+        warning(f"{source} has no switch {list_names(missing)}: always open")
+    if missing := [name for name in harness.taxel_names if name not in performance.taxel_names]:
+        warning(f"{source} has no taxel {list_names(missing)}: always 0 counts")
+    streamed = [name for stream in harness.streams for name in stream.joints]
+    if missing := [name for name in streamed if name not in performance.joint_names]:
+        warning(f"{source} has no joint {list_names(missing)}: always 0")
 
 
 def _write_harness(bench: "Bench", performance: "Performance", folder: Path) -> Path:

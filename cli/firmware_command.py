@@ -23,9 +23,12 @@ from .common import (
 
 if TYPE_CHECKING:
     from thenar.compiler.firmware.choose import Fit
+    from thenar.compiler.firmware.generate import Firmware
     from thenar.compiler.firmware.measuring import Measured
+    from thenar.compiler.firmware.sensors import Sensors
     from thenar.compiler.firmware.targets import Target
     from thenar.compiler.firmware.targets.base import Mode
+    from thenar.runtime.build import Build
 
 
 def _targets() -> Iterable[str]:
@@ -130,22 +133,12 @@ def command(
     from thenar.compiler.firmware.board import load_board
     from thenar.compiler.firmware.generate import Firmware, write_folder
     from thenar.compiler.firmware.measuring import measure as measured_of
-    from thenar.compiler.firmware.one_hand import for_one_hand
-    from thenar.compiler.firmware.sensors import sensors_of
     from thenar.compiler.firmware.targets import TARGETS
     from thenar.runtime.build import Build
-    from thenar.runtime.calibration import load_calibration
-    from thenar.runtime.harness.loading import load_harness
 
     _check(TARGETS[target], mode, writes=output is not None, counts=measure or frontier)
     _check_calibrated(mode, calibration, glove)
-    loaded = Build.load(build)
-    hand = None if calibration is None else load_calibration(calibration)
-    sensors = None
-    if mode == "classify" and (hand or glove):
-        sensors = sensors_of(loaded.manifest, None if glove is None else load_harness(glove), hand)
-    elif hand is not None:
-        loaded = for_one_hand(loaded, hand)
+    loaded, sensors = _converting(Build.load(build), mode, calibration, glove)
     wiring = None if board is None else load_board(board)
     firmware = Firmware(loaded.tables, loaded.manifest, target, mode, name, wiring, flash_limit, loaded.scan, sensors)
     with progress("choosing a layout"):
@@ -162,14 +155,25 @@ def command(
     else:
         if mode != "scan":
             _print(fit, measured, frontier=frontier, updates=mode == "glove")
-        if firmware.segments:
-            out().print(f"{firmware.segments}.", soft_wrap=True)
-        if output is not None and mode == "classify" and (said := TARGETS[target].said(firmware.library())):
-            out().print(f"{said}.", soft_wrap=True)
-        if output is not None:
-            next_step = TARGETS[target].next_step.format(folder=shlex.quote(str(output)))
-            out().print(f"{output}: firmware for {target}; {next_step}", soft_wrap=True)
+        _print_firmware(firmware, target, output)
     return 0 if measured is None or measured.holds else 1
+
+
+def _converting(
+    build: "Build", mode: "Mode", calibration: Path | None, glove: Path | None
+) -> "tuple[Build, Sensors | None]":
+    """Return the build, and how a library converts raw readings to its codes, if a calibration is known. A glove's
+    firmware takes no conversion: its build is for the bytes of the calibrated hand.
+    """
+    from thenar.compiler.firmware.one_hand import for_one_hand
+    from thenar.compiler.firmware.sensors import sensors_of
+    from thenar.runtime.calibration import load_calibration
+    from thenar.runtime.harness.loading import load_harness
+
+    hand = None if calibration is None else load_calibration(calibration)
+    if mode == "classify" and (hand or glove):
+        return build, sensors_of(build.manifest, None if glove is None else load_harness(glove), hand)
+    return build if hand is None else for_one_hand(build, hand), None
 
 
 def _check_calibrated(mode: "Mode", calibration: Path | None, glove: Path | None) -> None:
@@ -205,6 +209,20 @@ def _print(fit: "Fit", measured: "Measured | None", *, frontier: bool, updates: 
         console.print(measured.note, soft_wrap=True)
         if not measured.rough:
             console.print("within the bounds" if measured.holds else "BEYOND THE BOUNDS")
+
+
+def _print_firmware(firmware: "Firmware", target: str, output: Path | None) -> None:
+    """Print what the firmware does with segments and, if it was written, what to do with it."""
+    from thenar.compiler.firmware.targets import TARGETS
+
+    if firmware.segments:
+        out().print(f"{firmware.segments}.", soft_wrap=True)
+    if output is None:
+        return
+    if firmware.mode == "classify" and (said := TARGETS[target].said(firmware.library())):
+        out().print(f"{said}.", soft_wrap=True)
+    next_step = TARGETS[target].next_step.format(folder=shlex.quote(str(output)))
+    out().print(f"{output}: firmware for {target}; {next_step}", soft_wrap=True)
 
 
 def _expected(fit: "Fit", updates: bool) -> str:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from thenar.compiler.frontier.points import Check, Frontier, Point
+    from thenar.compiler.frontier.search import Search
 
 
 _SEARCHED = ("repeats", "finalists", "seed", "by")
@@ -134,7 +135,6 @@ def command(
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
     from thenar.compiler.frontier.find import Wanted, find_frontier
-    from thenar.compiler.frontier.search import Search
     from thenar.compiler.placement.methods.base import usual
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
@@ -143,16 +143,8 @@ def command(
         raise click.UsageError("--budget-us and --rate each pick a point: give one of them.")
     wanted, harness = Wanted(budget_us, rate), None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
-    rounds = asked["rounds"]
-    training = asked_settings(context, asked)
-    search = Search(
-        methods=methods or usual(ours=True, wired=harness is not None or bool(grasp_set.taxel_columns)),
-        baselines=usual(ours=False) if baselines is None else baselines,
-        rounds=rounds,
-        trainer=training.pop("trainer"),
-        settings={name: value for name, value in training.items() if name != "rounds"},
-        **{name: asked.pop(name) for name in _SEARCHED},
-    )
+    methods = methods or usual(ours=True, wired=harness is not None or bool(grasp_set.taxel_columns))
+    search = _search(context, methods, usual(ours=False) if baselines is None else baselines, asked)
     with progress("frontier") as report:
         found = find_frontier(
             grasp_set,
@@ -170,6 +162,24 @@ def command(
         err().print(f"no point qualifies: {wanted.words} is beyond this frontier; relax it, or leave it out")
         return 1
     return 0
+
+
+def _search(
+    context: click.Context, methods: tuple[str, ...], baselines: tuple[str, ...], asked: dict[str, Any]
+) -> "Search":
+    """Return the search that is `asked` for, whose options are removed from it."""
+    from thenar.compiler.frontier.search import Search
+
+    rounds = asked["rounds"]
+    training = asked_settings(context, asked)
+    return Search(
+        methods=methods,
+        baselines=baselines,
+        rounds=rounds,
+        trainer=training.pop("trainer"),
+        settings={name: value for name, value in training.items() if name != "rounds"},
+        **{name: asked.pop(name) for name in _SEARCHED},
+    )
 
 
 def _print(found: "Frontier", output: Path) -> None:

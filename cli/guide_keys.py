@@ -5,7 +5,6 @@ import re
 import select
 import termios
 import tty
-from types import TracebackType
 from typing import Self
 
 from thenar.runtime.recording.guide import Key
@@ -34,9 +33,7 @@ class GuideKeys:
             tty.setcbreak(self._descriptor, termios.TCSADRAIN)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._before is not None:
             termios.tcsetattr(self._descriptor, termios.TCSADRAIN, self._before)
 

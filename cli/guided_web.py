@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from msgspec import to_builtins
 
 from thenar.compiler.evaluation.sofar import SoFar, recording_so_far
 from thenar.compiler.recordings.taxonomy import ANY, MOVEMENTS, Taxonomy
 from thenar.compiler.workers import Aside
+from thenar.drivers.closing import Closing
 from thenar.runtime.hand import DrawnSwitch, DrawnTaxel, HandDrawing, Spot, drawn_joints
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.published import NONE
@@ -144,7 +144,7 @@ class PageAt:
         return StudiedPage(page, recording, len(session.collection.tasks))
 
 
-class StudiedPage:
+class StudiedPage(Closing):
     """The page of a collection, with the accuracy so far: computed after each round, in another process."""
 
     def __init__(self, page: GuidePage, recording: Path, round_trials: int) -> None:
@@ -175,11 +175,7 @@ class StudiedPage:
         if found is not None:
             self._page.tell({"problem": "", **to_builtins(found)})
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Stop computing the accuracy, and close the page."""
         self._aside.close()
         self._page.close()

@@ -96,10 +96,6 @@ class _Asked:
                 "--exact judges one placement and --population looks for one: take one of them",
             ),
             (
-                self.exact and self.population,
-                "--exact judges one placement, --population looks for one: take one of them",
-            ),
-            (
                 self.population and not method.by_number,
                 "--population takes a method that keeps M switches",
             ),

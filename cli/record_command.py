@@ -67,8 +67,7 @@ def command(
     from thenar.compiler.recordings.errors import check_names
     from thenar.compiler.recordings.taxonomy import collected
     from thenar.runtime.harness.loading import load_harness
-    from thenar.runtime.published import NONE
-    from thenar.runtime.recording.guide import planned, read_journal
+    from thenar.runtime.recording.guide import planned
     from thenar.runtime.recording.session import Collection
 
     from .collecting import collect
@@ -82,14 +81,8 @@ def command(
     harness = load_harness(glove)
     check_devices(harness, glove)
     check_names("subject", [subject])
-    journal = None
-    if recording.exists():
-        with progress(f"reading {recording.name}"):
-            journal = read_journal(recording)
-    if none is None:
-        begun = None if journal is None else journal.session.collection
-        none = begun is None or NONE in {task.grasp for task in begun.tasks}
-    types, tasks = collected(taxonomy, objects, none)
+    journal = _begun(recording)
+    types, tasks = collected(taxonomy, objects, _with_none(journal) if none is None else none)
     drawn = secrets.randbits(32) if seed is None else seed
     wanted = Collection(subject, types.name, types.types, tasks, repetitions, drawn)
     if journal is not None:
@@ -104,6 +97,24 @@ def command(
             page = PageAt(web, token_for(web_token))
         accepted = collect(harness, glove, wanted, trials, recording, journal, countdown, page)
     _write(recording, output, accepted, len(trials))
+
+
+def _begun(recording: Path) -> "Journal | None":
+    """Return the journal of the collection that was begun in `recording`, if there is one."""
+    from thenar.runtime.recording.guide import read_journal
+
+    if not recording.exists():
+        return None
+    with progress(f"reading {recording.name}"):
+        return read_journal(recording)
+
+
+def _with_none(journal: "Journal | None") -> bool:
+    """Return whether the empty hand is recorded, unless the user says so: as it was begun, else yes."""
+    from thenar.runtime.published import NONE
+
+    begun = None if journal is None else journal.session.collection
+    return begun is None or NONE in {task.grasp for task in begun.tasks}
 
 
 def _resumed(journal: "Journal", wanted: "Collection", seed: int | None) -> "Collection":

@@ -1,14 +1,11 @@
 """`thenar run`: recognise grasps live on a glove, or in recorded frames."""
 
-import errno
-import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from itertools import islice
-from operator import eq
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,20 +22,15 @@ from .common import (
     of_device,
     out,
     overwrite_flag,
-    warning,
 )
-from .lines import echo
+from .replaying import replay_recording, replay_set, selecting
+from .sinks import nobody_listens, say, say_what_was_lost, spoilt
 from .web_options import say_page, token_for, web_options
 
 if TYPE_CHECKING:
-    from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime import Build, Glove
-    from thenar.runtime.live.recogniser import Moment
     from thenar.runtime.policy import Policy
-    from thenar.runtime.preshape import Preshape, PreshapeSelector
-    from thenar.runtime.published import HealthReport, LiveGrasp
-    from thenar.runtime.sinks import SinkReport
-    from thenar.runtime.task import TaskFollower
+    from thenar.runtime.published import HealthReport
     from thenar.runtime.web.live import LivePage
 
     from .live_view import LiveView
@@ -130,14 +122,7 @@ def command(
     full_scan: bool,
     status: bool,
     frames: int | None,
-    lead: float | None,
-    dwell_ms: float | None,
-    max_lost: float | None,
-    grace_ms: float | None,
-    no_quarantine: bool,
-    error_rate: float | None,
-    spacing_ms: float | None,
-    lag_ms: float | None,
+    **deciding: Any,
 ) -> None:
     """Recognise grasps: live on the glove that --glove describes, or in the recorded frames of --replay.
 
@@ -161,22 +146,9 @@ def command(
 
     _refuse_idle(glove, replay)
     loaded = Build.load(build)
-    policy = _policy(
-        {
-            "lead": lead,
-            "dwell_us": _us(dwell_ms),
-            "max_lost": max_lost,
-            "grace_us": _us(grace_ms),
-            "quarantine": False if no_quarantine else None,
-            "error_rate": error_rate,
-            "spacing_us": _us(spacing_ms),
-            "lag_us": _us(lag_ms),
-        }
-    )
+    policy = _policy(**deciding)
     if replay is None:
-        if sys.stdout is None and not sinks:
-            raise click.UsageError("stdout is closed: name a --sink to send grasps to")
-        viewed = sys.stdout is not None and sys.stdout.isatty() and "jsonl:-" not in sinks
+        viewed = _is_viewed(sinks)
         asked: dict[str, Any] = {"preshapes": preshape, "record": record, "full_scan": full_scan, "status": status}
         asked |= {"change_while_held": change_while_held, "task": task}
         asked |= {"sinks": sinks or (() if viewed else ("jsonl:-",)), "policy": policy, "recordable": web is not None}
@@ -185,11 +157,11 @@ def command(
             page = partial(_page, build, web, token_for(web_token), recordings or Path("recordings"))
         _run_live(loaded, glove, viewed, page, frames, **asked)
     elif replay.suffix == ".mcap":
-        selecting = _selecting(loaded, preshape, segments=True, change_while_held=change_while_held)
+        selector = selecting(loaded, preshape, segments=True, change_while_held=change_while_held)
         follower = None if task is None else TaskFollower.of(task, loaded.grasps)
-        _replay_recording(loaded, replay, sinks, selecting, frames, policy, follower)
+        replay_recording(loaded, replay, sinks, selector, frames, policy, follower)
     else:
-        _replay_set(loaded, replay, sinks, _selecting(loaded, preshape, segments=False), frames, period_us)
+        replay_set(loaded, replay, sinks, selecting(loaded, preshape, segments=False), frames, period_us)
 
 
 _WEB = ("web_token", "recordings")
@@ -223,15 +195,42 @@ def _refuse(where: str, *names: str) -> None:
             raise click.UsageError(f"{option.opts[0]} has no effect {where}: leave it out")
 
 
+def _is_viewed(sinks: Sequence[str]) -> bool:
+    """Return whether the terminal shows the grasps. Raises UsageError if nothing receives them."""
+    if sys.stdout is None and not sinks:
+        raise click.UsageError("stdout is closed: name a --sink to send grasps to")
+    return sys.stdout is not None and sys.stdout.isatty() and "jsonl:-" not in sinks
+
+
 def _us(ms: float | None) -> int | None:
     return None if ms is None else round(1000 * ms)
 
 
-def _policy(asked: dict[str, Any]) -> "Policy | None":
-    """Return the usual policy with the `asked` values in it, or None if there are none."""
+def _policy(
+    *,
+    lead: float | None,
+    dwell_ms: float | None,
+    max_lost: float | None,
+    grace_ms: float | None,
+    no_quarantine: bool,
+    error_rate: float | None,
+    spacing_ms: float | None,
+    lag_ms: float | None,
+) -> "Policy | None":
+    """Return the usual policy with the given values in it, or None if there are none."""
     from thenar.runtime.policy import Policy
 
-    given = {name: value for name, value in asked.items() if value is not None}
+    asked = {
+        "lead": lead,
+        "dwell_us": _us(dwell_ms),
+        "max_lost": max_lost,
+        "grace_us": _us(grace_ms),
+        "quarantine": False if no_quarantine else None,
+        "error_rate": error_rate,
+        "spacing_us": _us(spacing_ms),
+        "lag_us": _us(lag_ms),
+    }
+    given: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
     if not given:
         return None
     usual = Policy()
@@ -273,13 +272,13 @@ def _run_live(
         recorder = glove.recorder
         _look_on(glove, view, page, frames)
     reports = glove.reports()
-    _say(f"{glove.frames} frame{'s' * (glove.frames != 1)}")
-    _say_what_was_lost(reports)
+    say(f"{glove.frames} frame{'s' * (glove.frames != 1)}")
+    say_what_was_lost(reports)
     recorders = [*([] if recorder is None else [recorder]), *([] if page is None else page.recorded)]
     for each in recorders:
         failed = f"; {each.failure}" if each.failure else ""
-        _say(f"{each.path}: {each.messages} messages{failed}")
-    if any(each.failure for each in recorders) or _spoilt(reports):
+        say(f"{each.path}: {each.messages} messages{failed}")
+    if any(each.failure for each in recorders) or spoilt(reports):
         click.get_current_context().exit(1)
 
 
@@ -293,7 +292,7 @@ def _look_on(glove: "Glove", view: "LiveView | None", page: "LivePage | None", f
             health = glove.health
             if view is None:
                 _say_news(glove, health, said)
-                if glove.recorder is None and page is None and _nobody_listens(glove.reports()):
+                if glove.recorder is None and page is None and nobody_listens(glove.reports()):
                     return
         if view is not None:
             view.show(moment.grasp, glove.devices, health, None if glove.follower is None else glove.follower.progress)
@@ -311,186 +310,5 @@ def _say_news(glove: "Glove", health: "HealthReport", said: dict[str, str]) -> N
     news |= {name: "works again" for name in said if name not in news}
     for name, state in news.items():
         if said.get(name) != state and state != NOT_YET:
-            _say(of_device(name, state))
+            say(of_device(name, state))
             said[name] = state
-
-
-def _nobody_listens(reports: "Sequence[SinkReport]") -> bool:
-    """Return whether every reader has gone for good (`| head`)."""
-    return bool(reports) and all(report.over for report in reports)
-
-
-def _say_what_was_lost(reports: "Sequence[SinkReport]") -> None:
-    for report in reports:
-        if report.lost or report.error:
-            why = f": {report.error}" if report.error else ""
-            dropped = f", {report.dropped} readers dropped" if report.dropped else ""
-            _say(f"{report.where}: {report.sent} frames sent, {report.lost} lost{dropped}{why}")
-
-
-def _spoilt(reports: "Sequence[SinkReport]") -> bool:
-    """Return whether a sink failed, other than by a reader's leaving."""
-    gone = os.strerror(errno.EPIPE)
-    return any(report.over and report.error != gone for report in reports)
-
-
-def _say(line: str) -> None:
-    """Print a line on stderr, if that is still open: the terminal may have been closed."""
-    with suppress(OSError):
-        echo(line, err=True)
-
-
-def _selecting(build: "Build", preshape: str | None, **how: bool) -> "PreshapeSelector | None":
-    if preshape is None:
-        return None
-    from thenar.runtime.preshape import preshape_selector
-
-    selector, lacking = preshape_selector(preshape, build, **how)
-    if lacking:
-        err().print(f"thenar: {lacking}")
-    return selector
-
-
-def _replay_recording(
-    build: "Build",
-    replay: Path,
-    sinks: Sequence[str],
-    selector: "PreshapeSelector | None",
-    frames: int | None,
-    policy: "Policy | None",
-    follower: "TaskFollower | None",
-) -> None:
-    """Recognise the frames of a live recording again, at their original times.
-
-    Send them to the sinks as the live run did, or as JSON lines to stdout if there are none; on stderr, print how many
-    match the recording.
-    """
-    from thenar.runtime.live.replay import moments
-    from thenar.runtime.sinks.jsonl import encode
-
-    same = count = 0
-    with _published(build, sinks, selector, lambda grasp, shape: encode(grasp, shape, None), follower) as publish:
-        for then, now in islice(moments(build, replay, policy, warning), frames):
-            same += then == now.grasp
-            count += 1
-            publish(now.grasp, now)
-    echo(f"{same} of {count} frames recognised as they were recorded", err=True)
-    if follower is not None:
-        echo(follower.progress.text, err=True)
-
-
-def _replay_set(
-    build: "Build",
-    replay: Path,
-    sinks: Sequence[str],
-    selector: "PreshapeSelector | None",
-    frames: int | None,
-    period_us: int,
-) -> None:
-    """Classify every row of a set of grasps alone and send it to each sink, or as a JSON line to stdout if there is
-    none; on stderr, print the accuracy.
-    """
-    import msgspec
-
-    from thenar.compiler.recordings.graspset import GraspSet
-
-    whole, found = GraspSet.load(replay), list[str]()
-    grasp_set = whole.rows(range(len(whole))[:frames])
-
-    def line(grasp: "LiveGrasp", shape: "Preshape | None") -> bytes:
-        shown = {
-            "time_us": grasp.time_us,
-            "grasp": grasp.grasp,
-            "probability": round(grasp.probability, 6),
-            "margin": grasp.margin,
-            "degraded": grasp.health == "degraded",
-            "recorded": str(grasp_set.grasps[grasp.number]),
-        }
-        return msgspec.json.encode(shown if selector is None else shown | {"preshape": shape}) + b"\n"
-
-    with _published(build, sinks, selector, line) as publish:
-        for grasp in _rows(build, grasp_set, period_us):
-            found.append(grasp.grasp)
-            publish(grasp, None)
-    rows = len(grasp_set)
-    correct = sum(map(eq, found, grasp_set.grasps.tolist()))
-    echo(f"{correct} of {rows} frames predicted correctly ({correct / max(rows, 1):.1%})", err=True)
-    if (trials := len(set(grasp_set.trial_ids.tolist()))) < rows:
-        correct = _trials_recognised(grasp_set, found)
-        echo(f"{correct} of {trials} trials by majority of their frames ({correct / trials:.1%})", err=True)
-
-
-def _trials_recognised(grasp_set: "GraspSet", found: list[str]) -> int:
-    import numpy as np
-
-    from thenar.compiler.samples import decided
-
-    _, first, trial = np.unique(grasp_set.trial_ids, return_index=True, return_inverse=True)
-    names, predicted = np.unique(found, return_inverse=True)
-    return int(np.count_nonzero(names[decided(predicted[np.newaxis], trial)[0]] == grasp_set.grasps[first]))
-
-
-def _rows(build: "Build", grasp_set: "GraspSet", period_us: int) -> "Iterator[LiveGrasp]":
-    """Yield the prediction for each row. Both clocks begin with the set."""
-    from thenar.compiler.artifact.verify_firmware import select_inputs
-    from thenar.runtime.published import LiveGrasp
-
-    bits, codes = select_inputs(grasp_set, build.manifest)
-    for row, (switches, joints) in enumerate(zip(bits, codes, strict=True)):
-        found = build.recognise(switches, joints)
-        yield LiveGrasp(
-            time_us=row * period_us,
-            unix_us=row * period_us,
-            number=row,
-            grasp=found.grasp,
-            candidate=found.grasp,
-            probability=found.probability,
-            margin=found.margin,
-            health="degraded" if found.degraded else "ok",
-            switch_age_us=None,
-            glove_age_us=None,
-            latency_us=0,
-        )
-
-
-@contextmanager
-def _published(
-    build: "Build",
-    sinks: Sequence[str],
-    selector: "PreshapeSelector | None",
-    line: "Callable[[LiveGrasp, Preshape | None], bytes]",
-    follower: "TaskFollower | None" = None,
-) -> "Iterator[Callable[[LiveGrasp, Moment | None], None]]":
-    """Yield a function that publishes a replayed grasp with its preshape, and news of a task: to sinks, which wait for
-    their readers, or without any as a `line` on stdout. At the end report losses, with exit code 1.
-    """
-    from thenar.runtime.sinks import Fanout, open_sink
-    from thenar.runtime.sinks.jsonl import encode_task
-
-    with ExitStack() as stack:
-        opened = []
-        for name in sinks:
-            opened.append(open_sink(name, wait=True))
-            stack.callback(opened[-1].close)
-        fanout = Fanout(opened)
-        fanout.begin(build)
-
-        def publish(grasp: "LiveGrasp", moment: "Moment | None") -> None:
-            shape = None if selector is None else selector.update(grasp)
-            if opened:
-                fanout.publish(grasp, shape, None)
-                if moment is not None:
-                    fanout.moment(moment)
-            else:
-                sys.stdout.buffer.write(line(grasp, shape))
-            progress = None if follower is None else follower.update(grasp)
-            if progress is not None and opened:
-                fanout.task(progress)
-            elif progress is not None:
-                sys.stdout.buffer.write(encode_task(progress))
-
-        yield publish
-    sys.stdout.flush()
-    _say_what_was_lost(fanout.reports())
-    if _spoilt(fanout.reports()):
-        click.get_current_context().exit(1)

@@ -9,6 +9,7 @@ ws://HOST:PORT/PATH   a WebSocket, also wss://; needs the extra `ws`
 -                     standard input
 """
 
+import errno
 import os
 import re
 import select
@@ -17,6 +18,7 @@ import sys
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from contextlib import ExitStack
+from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
@@ -32,7 +34,9 @@ if TYPE_CHECKING:
 
 _CHUNK = 65_536
 _CONNECT_S = 2.0
-_NET = re.compile(r"(tcp|udp)://(\[[0-9A-Fa-f:.%]+\]|[A-Za-z0-9._-]+):(\d{1,5})/?")
+# Labels of a host's name are not empty, and at most 63 characters long: getaddrinfo raises UnicodeError for others.
+_HOST = r"[A-Za-z0-9_-]{1,63}(?:\.[A-Za-z0-9_-]{1,63})*\.?"
+_NET = re.compile(rf"(tcp|udp)://(\[[0-9A-Fa-f:.%]+\]|{_HOST}):(\d{{1,5}})/?")
 _WAYS = (
     "lines come from a serial port such as /dev/ttyUSB0, tcp://HOST:PORT, udp://HOST:PORT, unix:PATH, "
     "ws://HOST:PORT/PATH or - (standard input)"
@@ -61,12 +65,12 @@ class RowReader(Closing, ABC):
 
 
 class LineReader(RowReader):
-    """Rows of the lines from `port`. The constructor does not open it."""
+    """Rows of the lines from `port`, of `columns` columns; 0: unknown. The constructor does not open it."""
 
-    def __init__(self, port: str, baud: int = 115_200) -> None:
+    def __init__(self, port: str, baud: int = 115_200, columns: int = 0) -> None:
         self.port, self._baud = port, baud
         self._line: Closing | None = None
-        self._parser = LineParser()
+        self._parser = LineParser(columns)
 
     def open(self) -> None:
         """Open the port."""
@@ -138,6 +142,11 @@ def _opened(port: str, baud: int) -> "SerialLine | _Descriptor | _WebSocket":
 
 def _advice(port: str, reason: OSError) -> str:
     said = reason.strerror or str(reason)
+    # Of a Unix socket: the path exists.
+    if reason.errno == errno.ECONNREFUSED and port.startswith("unix:") and not Path(port[5:]).is_socket():
+        return "it is not a socket: name the one on which the sender listens"
+    if reason.errno == errno.EACCES:
+        return f"{said}: set the permissions of the socket, or use a port above 1023"
     if port.startswith("udp:"):
         return f"{said}: use an address of this computer as host, and close other programs that have the port"
     return f"{said}: is the sender running, and does it listen?"

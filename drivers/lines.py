@@ -5,7 +5,8 @@
     ms:12,thumb:0,flex:1023              names with their values, as the Arduino IDE's plotter reads them
     {"ms": 12, "thumb": 0, "flex": 1023} a JSON object, or a JSON list of numbers in the order of the columns
 
-Any other line is a misfit. A value that is not a finite number, such as nan, is None; the rest of its line counts.
+Any other line is a misfit. A value that is not a finite number, such as nan, is None; the rest of its line counts. So
+is a text, such as a label, in a row whose number of columns is known.
 """
 
 import json
@@ -21,7 +22,7 @@ from .names import LONGEST_SHOWN, shortened
 LONGEST = 16_384
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 _NO_NUMBER = re.compile(r"|[+-]?nan|[+-]?inf(inity)?|null|none|na|-", re.IGNORECASE)
-_NAME = re.compile(r"[^\W\d][^,;:\t\"{}\[\]]*")
+_NAME = re.compile(r"[^\W\d][^,;:\t\"{}]*")
 _DIGITS = 400
 
 
@@ -70,8 +71,8 @@ class Splitter:
         return [line for line in lines if line]
 
 
-def parsed(line: bytes) -> Row | Header | None:
-    """Parse a line; None for a misfit."""
+def parsed(line: bytes, columns: int = 0) -> Row | Header | None:
+    """Parse a line; None for a misfit. `columns` is the known number of columns; 0: unknown."""
     try:
         text = line.decode("utf-8")
     except UnicodeDecodeError:
@@ -86,7 +87,7 @@ def parsed(line: bytes) -> Row | Header | None:
     worded = len(fields) == 1 or len(text.split()) < len(fields) or not set(text).isdisjoint(",;\t")
     if worded and all(map(_NAME.fullmatch, fields)) and not all(map(_NO_NUMBER.fullmatch, fields)):
         return Header(tuple(fields)) if _sound(fields) else None
-    return _row(None, fields)
+    return _row(None, fields, columns)
 
 
 def _fields(text: str) -> list[str]:
@@ -102,9 +103,12 @@ def _of_pairs(fields: Sequence[str]) -> Row | None:
     return _row(tuple(name.strip() for name, _, _ in pairs), [value.strip() for _, _, value in pairs])
 
 
-def _row(names: tuple[str, ...] | None, fields: Sequence[str]) -> Row | None:
-    """Return the row of these texts; None if one is neither a number nor a spelling of a missing value."""
-    if not fields or not all(_NUMBER.fullmatch(field) or _NO_NUMBER.fullmatch(field) for field in fields):
+def _row(names: tuple[str, ...] | None, fields: Sequence[str], columns: int = 0) -> Row | None:
+    """Return the row of these texts; None if one is neither a number nor a spelling of a missing value, unless there
+    are as many as `columns`, and most are numbers.
+    """
+    known = sum(bool(_NUMBER.fullmatch(field) or _NO_NUMBER.fullmatch(field)) for field in fields)
+    if not fields or (known < len(fields) and (len(fields) != columns or 2 * known <= columns)):
         return None
     if names is not None and not _sound(names):
         return None
@@ -131,6 +135,8 @@ def _of_json(text: str) -> Row | None:
 
 
 def _of_value(value: Any) -> float | None:
+    if isinstance(value, str):
+        return _number(value.strip())
     if not isinstance(value, int | float):  # a bool is an int
         return None
     try:
@@ -157,10 +163,13 @@ class LineCounts:
 
 
 class LineParser:
-    """Parses rows from chunks of bytes; odd is the last misfit, for display."""
+    """Parses rows from chunks of bytes; odd is the last misfit, for display.
 
-    def __init__(self) -> None:
-        self.counts, self.odd = LineCounts(), ""
+    columns  how many columns rows have until a header says otherwise; 0: unknown
+    """
+
+    def __init__(self, columns: int = 0) -> None:
+        self.counts, self.odd, self._columns = LineCounts(), "", columns
         self.begin()
 
     def begin(self) -> None:
@@ -173,9 +182,11 @@ class LineParser:
         rows = []
         before = self._splitter.overlong
         for line in self._splitter.feed(chunk):
-            found = parsed(line)
+            named = len(self._names or ())
+            found = parsed(line, named if named > 1 else self._columns)
             if isinstance(found, Header):
-                self._names = found.names
+                if len(found.names) > 1 or named < 2:  # a word alone is a message
+                    self._names = found.names
             elif found is None:
                 self.counts.misfits += 1
                 self.odd = shortened(repr(line[: LONGEST_SHOWN + 1].decode("utf-8", "replace")))

@@ -9,12 +9,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import manifest as manifest_file
+from . import manifest_file
 from . import tables as tables_file
 from .errors import BuildError
 from .files import read_file
 from .frames import Mask
-from .manifest import Manifest, manifest_from_bytes
+from .manifest import Manifest
+from .manifest_file import manifest_from_bytes
 from .published import NONE
 from .rejection import Rejector, none_leads
 from .scanning import scanmap as scan_file

@@ -8,7 +8,6 @@ from os import PathLike
 from pathlib import Path
 from threading import Event
 from time import time_ns
-from types import TracebackType
 from typing import Protocol, Self
 
 from .build import Build
@@ -177,9 +176,7 @@ class Glove:
             self._open = opening.pop_all()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._open.close()
 
     def __iter__(self) -> Iterator[Moment]:

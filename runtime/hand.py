@@ -16,7 +16,8 @@ from msgspec import Meta, Struct
 
 from .build import read_member
 from .errors import BuildError
-from .manifest import Calibration, Code, Count, Manifest, Name, Value, decode_document
+from .json_document import decode_document
+from .manifest import Calibration, Code, Count, Manifest, Name, Value
 from .names import fault, shortened
 
 HAND_NAME = "hand.json"

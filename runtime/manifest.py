@@ -1,24 +1,18 @@
-"""`build.json`: the content of a build, its sources, its options and its verified bounds.
+"""The record of a build: its sources, its options, its model, its accuracies and its verified bounds.
 
-Its bytes are canonical: fields in the order of the structs below, indented by two, one newline at the end; no date, no
-path, no host. `checksum` is the SHA-256 of those bytes with that field empty.
+`build.json` holds its fields in the order of the structs below: see manifest_file.py.
 """
 
-import hashlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Literal, TypeVar
 
-import msgspec
 from msgspec import Meta, Struct, field
-from msgspec.structs import replace
 
-from .errors import BuildError
-from .names import LONGEST_NAME, fault, list_names, shortened
+from .names import list_names
 from .published import NONE
 from .segmenting.model import SegmentModel
 
 SCHEMA = 1
-MAX_BYTES = 16 << 20
 
 AUTO, PAPERS_TRAINER = "auto", "logitboost"  # trainers: automatic choice, and the paper's
 
@@ -471,145 +465,3 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     def detected(self) -> Detected | None:
         """How well it detects on new grasps whether something is held; None if that was not measured."""
         return next((each for each in self.detection if each.held.protocol != "training"), None)
-
-
-class _SchemaVersion(Struct, frozen=True):
-    """The first part read from a JSON file: whether the rest can be understood."""
-
-    schema: int
-
-
-def manifest_to_bytes(manifest: Manifest) -> bytes:
-    """Return the content of `build.json`, its checksum filled in."""
-    return encode_document(replace(manifest, checksum=_checksum(manifest)))
-
-
-def manifest_from_bytes(data: bytes, what: str = "build.json") -> Manifest:
-    """Return the manifest in a `build.json`, whose name in messages is `what`.
-
-    Raises BuildError if it is oversized, no such document, of a newer schema, or altered.
-    """
-    manifest = decode_document(data, Manifest, what, "a build", MAX_BYTES, SCHEMA)
-    if data != encode_document(manifest) or manifest.checksum != _checksum(manifest):
-        raise BuildError(f"{what} is altered: its checksum does not match; compile the build again")
-    for wrong in _contradictions(manifest):
-        raise BuildError(f"{what} {wrong}: compile the build again")
-    return manifest
-
-
-def _contradictions(manifest: Manifest) -> Iterator[str]:
-    """Yield the contradictions within the manifest."""
-    for kind, names in (
-        ("grasp types", manifest.grasps),
-        ("switches", tuple(switch.name for switch in manifest.switches)),
-        ("joints", tuple(joint.name for joint in manifest.joints)),
-    ):
-        if len(set(names)) < len(names):
-            yield f"names two {kind} alike"
-        yield from _wrong_names(kind, names)
-    source = manifest.source
-    taxels = [switch.threshold.taxel for switch in manifest.switches if switch.threshold is not None]
-    yield from _wrong_names("units", (each.unit for each in (*manifest.joints, *taxels)))
-    yield from _wrong_names("taxels", (taxel.name for taxel in taxels))
-    options = manifest.options
-    texts = [manifest.thenar, source.taxonomy, options.placement, options.trainer, *options.settings]
-    texts += [*options.keep_these, *options.never]
-    fit = manifest.fit
-    texts += [fit.trainer, *(value for value in options.settings.values() if isinstance(value, str))]
-    for settings in (fit.settings, *(each.settings for each in fit.compared)):
-        texts += [text for text in (*settings, *settings.values()) if isinstance(text, str)]
-    texts += [each.trainer for each in fit.compared]
-    faults = manifest.faults
-    known = {*(switch.name for switch in manifest.switches), *(joint.name for joint in manifest.joints)}
-    worst = () if faults is None else faults.worst
-    yield from _wrong_names("texts", (each.what for each in worst), 2 * LONGEST_NAME)
-    if not all(known.issuperset(each.elements) for each in worst):
-        yield "counts faults of an input that it does not have"
-    yield from _wrong_names("texts", texts)
-    yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
-    yield from _wrong_columns(manifest)
-    yield from _wrong_rejection(manifest)
-    yield from _wrong_segments(manifest)
-    for joint in (*manifest.joints, *taxels):
-        if joint.code_a == joint.code_b or joint.value_a == joint.value_b:
-            yield "gives a joint two points that make no line"
-    proof = manifest.proof
-    if proof.width != options.width or max(proof.covered, proof.changed) > manifest.source.rows:
-        yield "proves something of other tables than it describes"
-    yield from _wrong_counts(manifest)
-
-
-def _wrong_counts(manifest: Manifest) -> Iterator[str]:
-    fit, faults = manifest.fit, manifest.faults
-    shares = [rate for each in manifest.detection for rate in (each.held, each.none) if rate is not None]
-    counted = [(rate.correct, rate.total) for rate in (*manifest.rates, *shares)]
-    counted += [(each.correct, each.total) for each in fit.compared]
-    if faults is not None:
-        counted += [(count, faults.total) for count in (faults.correct, *(each.correct for each in faults.worst))]
-    if any(correct > total for correct, total in counted) or manifest.stopped_after > fit.number("rounds"):
-        yield "counts more than there is"
-
-
-def _wrong_columns(manifest: Manifest) -> Iterator[str]:
-    shares = {len(text) for switch in manifest.switches for text in (switch.closed_least, switch.closed_most)}
-    if len(shares) > 1 or not shares <= {0, 2 * len(manifest.grasps)}:
-        yield "says of other grasp types how often switches are closed"
-    levels = [(switch.column, switch.threshold and switch.threshold.code) for switch in manifest.switches]
-    for columns in (levels, [joint.column for joint in manifest.joints]):
-        if len(set(columns)) < len(columns):
-            yield "takes two inputs from one column"
-    if max((column for column, _ in levels), default=-1) >= manifest.source.switches:
-        yield "keeps a switch that the recordings do not have"
-    shares = {len(text) for switch in manifest.switches for text in (switch.closed_least, switch.closed_most)}
-    if len(shares) > 1 or not shares <= {0, 2 * len(manifest.grasps)}:
-        yield "says of other grasp types how often switches are closed"
-
-
-def _wrong_segments(manifest: Manifest) -> Iterator[str]:
-    segments, has_none = manifest.segments, manifest.grasps[-1] == NONE
-    if segments and (segments.n_lanes, segments.refusal is None) != (len(manifest.grasps), has_none):
-        yield "has costs of segments of other classes than its tables"
-
-
-def _wrong_rejection(manifest: Manifest) -> Iterator[str]:
-    held = manifest.rejection
-    if held is None:
-        return
-    lists: list[tuple[object, ...]] = [held.least_scores, held.closed, held.ranges]
-    if {*map(len, lists)} != {len(manifest.grasps)} or {*map(len, held.ranges)} != {len(manifest.joints)}:
-        yield "refuses frames of other grasp types or joints than it has"
-    if NONE in manifest.grasps:
-        yield "refuses frames, and has a class for them"
-
-
-def _wrong_names(kind: str, names: Iterable[str], longest: int = LONGEST_NAME) -> Iterator[str]:
-    for name in names:
-        if reason := fault(name, longest):
-            yield f"has {shortened(repr(name))}, one of its {kind}, which {reason}"
-
-
-def decode_document(data: bytes, kind: type[_T], what: str, called: str, largest: int, newest: int) -> _T:
-    """Return a JSON document of a build, whose name in messages is `what`, and whose kind is `called`.
-
-    Raises BuildError if it has more than `largest` bytes, is no such document, or of a schema beyond `newest`.
-    """
-    if len(data) > largest:
-        raise BuildError(f"{what} has {len(data)} bytes, {called} has at most {largest}")
-    try:
-        schema = msgspec.json.decode(data, type=_SchemaVersion).schema
-        if 1 <= schema <= newest:
-            return msgspec.json.decode(data, type=kind)
-    except (ValueError, RecursionError) as wrong:
-        raise BuildError(f"{what} is not a build's: {wrong}") from None
-    if schema > newest:
-        raise BuildError(f"{what} has schema {schema}, this thenar reads up to {newest}: update thenar")
-    raise BuildError(f"{what} has schema {schema}, the first was 1: it is not a build of thenar")
-
-
-def encode_document(document: Struct) -> bytes:
-    """Return the canonical bytes of a JSON document of a build."""
-    return msgspec.json.format(msgspec.json.encode(document), indent=2) + b"\n"
-
-
-def _checksum(manifest: Manifest) -> str:
-    return hashlib.sha256(encode_document(replace(manifest, checksum=""))).hexdigest()

@@ -27,9 +27,8 @@ from thenar.runtime.manifest import (
     Switch,
     TableBits,
     Threshold,
-    manifest_from_bytes,
-    manifest_to_bytes,
 )
+from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 from thenar.runtime.tables import IntegerTables, tables_to_bytes

@@ -73,6 +73,13 @@ def segment(
     if not isinstance(recordings, GraspSet) and Path(recordings).suffix.lower() == MCAP:
         return _of_run(build, Path(recordings), lag_us, warn)
     grasp_set = recordings if isinstance(recordings, GraspSet) else GraspSet.load(recordings)
+    return _of_movements(build, grasp_set, lag_us, progress)
+
+
+def _of_movements(
+    build: Build, grasp_set: GraspSet, lag_us: int | None, progress: Progress | None
+) -> tuple[Timeline, ...]:
+    """Return the timelines of whole movements, with their recorded types as the truth."""
     if not len(grasp_set):
         raise SegmentingError("the set has no rows to find segments in")
     streams = streams_of(grasp_set, build.manifest.segmenting.tick_us)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.runtime.build import ENSEMBLE_NAME, Build, read_member
@@ -150,13 +151,20 @@ def verify(
     True
     """
     build = _build_for(folder, grasp_set)
-    model = _load_ensemble(Path(folder), build)
+    found = _verified(build, _load_ensemble(Path(folder), build), grasp_set, progress)
+    if not firmware:
+        return found
+    tried = verify_firmware(folder, grasp_set, firmware, progress)
+    return replace(found, firmware=tried, holds=found.holds and tried.holds)
+
+
+def _verified(build: Build, model: Model, grasp_set: GraspSet, progress: Progress | None) -> Verification:
+    """Compare the model, its float tables and the integers of a build, without firmware."""
     bits, codes = select_inputs(grasp_set, build.manifest)
     comparison = compare(model, build.tables, bits, codes, progress)
     names = [switch.name for switch in build.manifest.switches]
     worst = worst_case(model, build.tables, comparison, build.grasps, names)
     scan = None if build.scan is None else check_scan(build.scan, build.tables, bits, codes, comparison.deployed)
-    tried = verify_firmware(folder, grasp_set, firmware, progress) if firmware else None
     grasps, empty = np.array(build.grasps), grasp_set.is_none
     predicted = predicted_classes(build.tables, build.manifest.rejection, bits, codes)
     says = build.none if build.rejector is None else len(grasps)
@@ -175,8 +183,7 @@ def verify(
         worst=worst,
         changed=_changed(comparison, grasps, grasp_set),
         scan=scan,
-        holds=comparison.holds and worst.holds and not (scan and scan.changed) and (tried is None or tried.holds),
-        firmware=tried,
+        holds=comparison.holds and worst.holds and not (scan and scan.changed),
         nothing_held=None if says is None else _nothing_held(predicted == says, empty),
     )
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -16,9 +16,22 @@ from ..samples import Samples
 from ..text import counted
 from ..trainers.base import Training, changed
 from .folds import EvaluationError
-from .learning import Learning, plan_learning
+from .learning import Learning, LearningPlan, plan_learning
 from .permutation import Permutations, Permuted
-from .plan import BASELINES, Data, Planner, Progress, TableName, is_blind, run_fits, ways_of
+from .plan import (
+    BASELINES,
+    Data,
+    FoldFit,
+    Labels,
+    Planner,
+    Progress,
+    RowPlan,
+    TableName,
+    Ways,
+    is_blind,
+    run_fits,
+    ways_of,
+)
 from .populations import NESTED, OF, PROTOCOLS, Population, ProtocolName, Scheme, concerns, populations
 from .tables import RateTable, Reader
 
@@ -42,9 +55,9 @@ class Options:
     prune       S of the placements of the compositions, the generality and the baselines
     prune_list  each S of the table of pooled and pruned placements
     baselines   methods to compare with ID3, in addition to random placements
-    trainer     the trainer of every classifier, with its `settings`; rounds are LogitBoost's, None: the paper's
-    hundred.
-                In the table of trainers and the learning curve, what is not given is chosen from the training rows
+    trainer     the trainer of every classifier, with its `settings`; in the table of trainers and the learning curve,
+                what is not given is chosen from the training rows
+    rounds      LogitBoost's; None: the paper's hundred
     levels      the most levels of a taxel to choose from, None: the usual number
     keep_joints the number of joints for classifiers, chosen from the training rows, None: all
     learning    whether to compute learning curves
@@ -156,68 +169,94 @@ def evaluate(
     True
     """
     options = replace(options or Options(), **changes)
+    training, ways = _trainers(options)
+    chosen = _of_subjects(grasp_set.without_none(), options.subjects)
+    planned = _Planned.of(chosen, options)
+    before = None if progress is None else _before(progress, options.permute)
+    predictions = run_fits(planned.data, planned.fits, training, jobs, before, ways)
+    permuted = None
+    if m := options.permute:
+        how = Permutations(planned.parts, options.scheme, options.folds, options.prune, options.seed, training)
+        permuted = how.test(chosen, m, jobs, None if progress is None else _after(progress, len(predictions)))
+    return planned.study(grasp_set.fingerprint(), predictions, permuted)
+
+
+def _trainers(options: Options) -> tuple[Training, Ways]:
+    """Return the training of every classifier, and the candidates of each trainer; check the baselines too."""
     for name in options.baselines:
         if not METHODS.named(name).by_number:
             raise EvaluationError(f"{name} takes S: baselines must be methods that take a number of switches")
     wanted = changed(Manifested(rounds=options.rounds, trainer=options.trainer), options.settings)
-    training, ways = Training.of(wanted), ways_of(wanted)
-    chosen = _of_subjects(grasp_set.without_none(), options.subjects)
-    parts = populations(chosen, options.scheme, options.folds, options.repeats, options.seed)
-    reasons = {name: _why_not(name, chosen, parts, options) for name in options.tables}
-    if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
-        _check_all_switches(chosen, parts)
-    planner = Planner(
-        parts,
-        Samples.of(chosen),
-        options.prune,
-        options.prune_list,
-        options.seed,
-        options.baselines,
-        options.levels,
-        options.keep_joints,
-    )
-    protocols = [protocol for protocol in PROTOCOLS if protocol.name in options.protocols]
-    plans = {
-        (name, each.name): planner.table(name, each)
-        for name, reason in reasons.items()
-        if reason is None
-        for each in protocols
-        if each is NESTED or name not in _NESTED
-    }
-    data, curves = Data.of(chosen, options.scheme), None
-    if options.learning:
-        curves = plan_learning(data, chosen.subjects, planner, options.scheme, options.folds, options.repeats)
-    cells = [cell for rows in plans.values() for row in rows for cell in row.cells]
-    fits = [fit for cell in (*cells, *(curves.every if curves else ())) for fit in cell.fits]
-    further = None if progress is None else _before(progress, options.permute)
-    predictions = run_fits(data, fits, training, jobs, further, ways)
-    test = None
-    if m := options.permute:
-        how = Permutations(parts, options.scheme, options.folds, options.prune, options.seed, training)
-        test = how.test(chosen, m, jobs, None if progress is None else _after(progress, len(predictions)))
-    grasps = tuple(np.unique(chosen.labels).tolist())
-    blind = frozenset(fit for fit in predictions if is_blind(data, fit))
-    reader = Reader(
-        chosen.labels,
-        data.trials,
-        grasps,
-        predictions,
-        blind,
-        OF[options.scheme],
-        data.groups,
-    )
-    return Study(
-        fingerprint=grasp_set.fingerprint(),
-        rows=len(chosen),
-        trials=int(data.trials.max()) + 1,
-        options=options,
-        grasps=tuple(chosen.taxonomy.types[label] for label in grasps),
-        warnings=concerns(chosen, parts, options.scheme, options.folds),
-        left_out=tuple(LeftOut(name, reason) for name, reason in reasons.items() if reason is not None),
-        tables=tuple(reader.table(*which, rows) for which, rows in plans.items()),
-        permuted=test,
-        learning=None if curves is None else curves.read(replace(reader, of=curves.of), data.groups, options.seed),
-    )
+    return Training.of(wanted), ways_of(wanted)
+
+
+@dataclass(frozen=True, slots=True)
+class _Planned:
+    """An evaluation before its fits are run: the tables' rows and the learning curves of `grasp_set`."""
+
+    grasp_set: GraspSet
+    options: Options
+    parts: tuple[Population, ...]
+    data: Data
+    left_out: tuple[LeftOut, ...]
+    tables: Mapping[tuple[TableName, ProtocolName], list[RowPlan]]
+    curves: LearningPlan | None
+
+    @classmethod
+    def of(cls, grasp_set: GraspSet, options: Options) -> Self:
+        """Plan the tables that `options` request and the set has inputs for."""
+        parts = populations(grasp_set, options.scheme, options.folds, options.repeats, options.seed)
+        reasons = {name: _why_not(name, grasp_set, parts, options) for name in options.tables}
+        if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
+            _check_all_switches(grasp_set, parts)
+        planner = Planner(
+            parts,
+            Samples.of(grasp_set),
+            options.prune,
+            options.prune_list,
+            options.seed,
+            options.baselines,
+            options.levels,
+            options.keep_joints,
+        )
+        tables = {
+            (name, each.name): planner.table(name, each)
+            for name, reason in reasons.items()
+            if reason is None
+            for each in PROTOCOLS
+            if each.name in options.protocols and (each is NESTED or name not in _NESTED)
+        }
+        data, curves = Data.of(grasp_set, options.scheme), None
+        if options.learning:
+            curves = plan_learning(data, grasp_set.subjects, planner, options.scheme, options.folds, options.repeats)
+        left_out = tuple(LeftOut(name, reason) for name, reason in reasons.items() if reason is not None)
+        return cls(grasp_set, options, parts, data, left_out, tables, curves)
+
+    @property
+    def fits(self) -> list[FoldFit]:
+        """The fits of all cells."""
+        cells = [cell for rows in self.tables.values() for row in rows for cell in row.cells]
+        return [fit for cell in (*cells, *(self.curves.every if self.curves else ())) for fit in cell.fits]
+
+    def study(self, fingerprint: str, predictions: dict[FoldFit, Labels], permuted: Permuted | None) -> Study:
+        """Read the accuracies off the predictions."""
+        grasp_set, options, data, curves = self.grasp_set, self.options, self.data, self.curves
+        grasps = tuple(np.unique(grasp_set.labels).tolist())
+        blind = frozenset(fit for fit in predictions if is_blind(data, fit))
+        of = OF[options.scheme]
+        reader = Reader(grasp_set.labels, data.trials, grasps, predictions, blind, of, data.groups)
+        return Study(
+            fingerprint=fingerprint,
+            rows=len(grasp_set),
+            trials=int(data.trials.max()) + 1,
+            options=options,
+            grasps=tuple(grasp_set.taxonomy.types[label] for label in grasps),
+            warnings=concerns(grasp_set, self.parts, options.scheme, options.folds),
+            left_out=self.left_out,
+            tables=tuple(reader.table(*which, rows) for which, rows in self.tables.items()),
+            permuted=permuted,
+            learning=None if curves is None else curves.read(replace(reader, of=curves.of), data.groups, options.seed),
+        )
 
 
 def _before(progress: Progress, permutations: int) -> Progress:

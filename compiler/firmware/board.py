@@ -312,9 +312,9 @@ def _of_glove(glove: GloveUart, board: Board) -> Iterator[Fault]:
     if len(part.uarts) == 1:
         yield ("cyberglove",), f"{part.named} has one UART, which the host uses: use an atmega2560, or [analog]"
     elif not 0 < glove.uart < len(part.uarts):
-        *others, last = map(str, range(1, len(part.uarts)))
         which = "UART 0 is the host's" if glove.uart == 0 else f"{part.named} has no UART {glove.uart}"
-        yield ("cyberglove", "uart"), f"{which}: use {', '.join(others)} or {last}"
+        able = ", ".join(map(str, range(1, len(part.uarts))))
+        yield ("cyberglove", "uart"), f"{which}: use {' or '.join(able.rsplit(', ', 1))}"
     if glove.joints and len(glove.joints) != glove.sensors:
         place: Place = ("cyberglove", "joints")
         yield place, f"{len(glove.joints)} names for {glove.sensors} sensors: name every one, in wire order"
@@ -324,9 +324,8 @@ def _of_glove(glove: GloveUart, board: Board) -> Iterator[Fault]:
 def _of_analog(board: Board) -> Iterator[Fault]:
     part, seen = board.microcontroller, dict[str, str]()
     for joint, channel in board.analog.items():
-        if channel not in part.analog:
-            hint = nearest(channel, list(part.analog))
-            yield ("analog", joint), f"{part.named} has no channel {channel!r}{hint}"
+        if reason := _no_channel(part, channel):
+            yield ("analog", joint), reason
         if channel in seen:
             yield (
                 ("analog", joint),
@@ -335,17 +334,26 @@ def _of_analog(board: Board) -> Iterator[Fault]:
         seen[channel] = joint
 
 
+def _no_channel(part: Wired, channel: str) -> str:
+    """Return why a channel cannot be used; "" if it can, or if only its pin cannot."""
+    if channel in part.analog:
+        return ""
+    if channel in part.tied:
+        return f"{channel} of {part.named} cannot be used: {part.tied[channel]}"
+    return f"{part.named} has no channel {channel!r}{nearest(channel, list(part.analog))}"
+
+
 def _of_taxels(board: Board, taxels: TaxelInputs) -> Iterator[Fault]:
     if len(taxels.select) not in (0, SELECT_PINS):
         yield ("taxels", "select"), f"{len(taxels.select)} pins: a CD74HC4067 has {SELECT_PINS} select pins, S0 to S3"
     room = taxels.per_input * len(taxels.inputs)
     if len(taxels.names) > room:
         yield ("taxels", "names"), f"{len(taxels.names)} names for {room} channels"
-    channels, seen = board.microcontroller.analog, {at: f"analog.{name}" for name, at in board.analog.items()}
+    seen = {at: f"analog.{name}" for name, at in board.analog.items()}
     for number, channel in enumerate(taxels.inputs):
         here: Place = ("taxels", "inputs", number)
-        if channel not in channels:
-            yield here, f"{board.microcontroller.named} has no channel {channel!r}{nearest(channel, list(channels))}"
+        if reason := _no_channel(board.microcontroller, channel):
+            yield here, reason
         if channel in seen:
             yield here, f"{channel} is already {seen[channel]}: give each input its own channel"
         seen[channel] = spelled(here)

@@ -38,31 +38,41 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
     parts, biased, bits = layout.parts, layout.biased, layout.sum_bits
     lanes = _lanes(parts.width, biased, bits)
     n_lanes = max(lane for lane, _ in lanes) + 1
-    adding, replacing = _arithmetic(n_lanes, biased, layout.entry_shift)
     slopes = [slope.row.astype(int) for slope in layout.tables.slopes]
     entries = 32 // layout.entry_bits
     return {
-        "slopes": [
-            _lane_words([row[first : first + parts.width].tolist() for row in slopes], lanes) for first in parts.firsts
-        ],
+        "slopes": _slope_lines(slopes, parts, lanes),
         "tabled": _tabled(layout),
         "distances": [_distance(name, layout, at) for at in range(len(slopes))],
         "words": -(-parts.width // entries),
         "lanes": n_lanes,
         "in_words": {2: "two", 4: "four"}[entries],
         "sum_bits": bits,
-        "in_pairs": bits == 16 and not biased and len(parts.firsts) == 1,
+        "adding": _adding(layout),
+        "passes": _passes(layout),
         "stores": [(lane, shift, k) for k, (lane, shift) in enumerate(lanes)],
+        "held": [[k for k, (each, _) in enumerate(lanes) if each == lane] for lane in range(n_lanes)],
         "takes": [(lane, 32 - bits - shift, k) for k, (lane, shift) in enumerate(lanes)],
         "word_macros": _narrow_macros(parts.width) if biased else _sum_macros(parts.width, bits),
         "start": _start_lines(_in_parts(layout.start, parts), lanes),
         "finds": [_find(name, layout, lookup) for lookup in layout.lookups],
         "batches": layout.batches,
-        "taking_apart": adding if biased else [],
-        "began": [f"start[{lane}]" if _started(lane, biased, layout.entry_shift) else "0u" for lane in range(n_lanes)],
-        "finishing": _finishing(n_lanes, biased, layout.entry_shift),
-        "replacing": replacing,
+        "entry_shift": layout.entry_shift,
     }
+
+
+def _passes(layout: Layout) -> str:
+    """Return the name of the template of classify() and update()."""
+    return "one_part" if len(layout.parts.firsts) == 1 else "in_parts"
+
+
+def _adding(layout: Layout) -> str:
+    """Return the name of the template that adds up such entries."""
+    if layout.biased:
+        return "offsets"
+    if layout.sum_bits == 8:
+        return "quads"
+    return "pairs" if len(layout.parts.firsts) == 1 else "pairs_in_parts"
 
 
 def avr_macros(width: int, entry_bits: int) -> list[str]:
@@ -119,43 +129,6 @@ def _start_lines(starts: Sequence[Sequence[int]], lanes: Sequence[tuple[int, int
     return lines
 
 
-def _arithmetic(lanes: int, biased: bool, shift: int) -> tuple[list[str], list[str]]:
-    """Return the statements that add a batch w0, w1... to the sums s0, s1..., and those that replace a row in sum[]."""
-    adding, replacing = [], []
-    for lane in range(lanes):
-        row = f"w{lane // 2}"
-        before, after = (f"{each}[{lane // 2 if biased else lane}]" for each in ("before", "after"))
-        if biased:
-            row = f"{row} >> 8" if lane % 2 else f"{row} & 0x00FF00FFu"
-            before, after = (f"({each}{' >> 8' if lane % 2 else ''} & 0x00FF00FFu)" for each in (before, after))
-            if lane % 2:
-                before, after = (each.replace(" >> 8 &", " >> 8) &").replace("(", "((", 1) for each in (before, after))
-        adding.append(f"s{lane} += {row};")
-        change = f"({after} - {before}) << {shift}" if shift else f"{after} - {before}"
-        replacing.append(f"sum[{lane}] += {change};")
-    return adding, replacing
-
-
-def _started(lane: int, biased: bool, shift: int) -> bool:
-    """Return whether a sum is initialised with its start value; otherwise the start value is added at the end."""
-    # An even sum that corrects the odd one after it starts from zero, and so does a sum that is shifted.
-    return biased and lane % 2 == 1 and not shift
-
-
-def _finishing(lanes: int, biased: bool, shift: int) -> list[str]:
-    """Return the statements that make the words of two sums s0, s1... after all rows have been added."""
-    if not biased:
-        return [f"s{lane} += start[{lane}];" for lane in range(lanes)]
-    finished = []
-    for lane in reversed(range(lanes)):  # an odd one before the even one that precedes it
-        text = f"s{lane} - ((s{lane - 1} >> 16) << 8)" if lane % 2 else f"s{lane}"
-        if _started(lane, biased, shift):
-            finished.append(f"s{lane} = {text};")
-        else:
-            finished.append(f"s{lane} = start[{lane}] + {f'(({text}) << {shift})' if shift else text};")
-    return finished
-
-
 def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
     """Return the expression of the number of one lookup's row, in lines."""
     found = [f"{lookup.first_row}u"] if lookup.first_row else []
@@ -189,15 +162,21 @@ def _field(field: Field) -> str:
     return f"({moved} & 0x{mask:02X}u)"
 
 
-def _lane_words(rows: list[list[int]], lanes: Sequence[tuple[int, int]]) -> list[str]:
-    """Return the rows of slopes, for the classes of a part, as initialisers of words of two sums."""
-    found = []
-    for row in rows:
-        words: dict[int, list[int]] = {}
-        for (lane, _), value in zip(lanes, row, strict=True):
-            words.setdefault(lane, []).append(value)
-        found.append(", ".join(f"SLOPE({words[lane][0]}, {(words[lane] + [0])[1]})" for lane in sorted(words)))
-    return found
+def _slope_lines(rows: Sequence[NDArray[np.int64]], parts: Parts, lanes: Sequence[tuple[int, int]]) -> list[str]:
+    """Return the rows of slopes as initialisers of words of two sums, in braces for each part."""
+    lines = []
+    for first in parts.firsts:
+        words = (_lane_words(row[first : first + parts.width].tolist(), lanes) for row in rows)
+        lines += [f"{_INDENT}{{", *(f"{2 * _INDENT}{{{row}}}," for row in words), f"{_INDENT}}},"]
+    return lines
+
+
+def _lane_words(row: list[int], lanes: Sequence[tuple[int, int]]) -> str:
+    """Return the row of a slope, for the classes of a part, as words of two sums."""
+    words: dict[int, list[int]] = {}
+    for (lane, _), value in zip(lanes, row, strict=True):
+        words.setdefault(lane, []).append(value)
+    return ", ".join(f"SLOPE({words[lane][0]}, {(words[lane] + [0])[1]})" for lane in sorted(words))
 
 
 def _distance(name: str, layout: Layout, at: int) -> str:
@@ -212,11 +191,14 @@ def _distance(name: str, layout: Layout, at: int) -> str:
     return f"(int16_t)(({above}{shift}) - {slope.zero})"
 
 
-def _tabled(layout: Layout) -> list[list[str]]:
-    """Return the lines of the distances of all codes, for each slope, where they are stored."""
+def _tabled(layout: Layout) -> list[str]:
+    """Return the distances of all codes as lines, for each slope, with an empty line between, where they are stored."""
     if not layout.stores_distances:
         return []
-    return [number_lines(slope.distances(np.arange(256)).tolist()) for slope in layout.tables.slopes]
+    lines: list[str] = []
+    for slope in layout.tables.slopes:
+        lines += [""] * bool(lines) + number_lines(slope.distances(np.arange(256)).tolist())
+    return lines
 
 
 def _after(first: int, place: str) -> str:
@@ -470,6 +452,7 @@ def _rejection_lines(rejection: Rejection) -> dict[str, list[str]]:
     )
     return {
         "least_scores": number_lines(rejection.least_scores),
+        "closed": [f"{_INDENT}{{{low}u, {high}u}}," for low, high in rejection.closed],
         "ranges": [line for own in wrapped for line in own],
     }
 

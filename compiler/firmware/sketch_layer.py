@@ -15,39 +15,40 @@ __all__ = ["base_files", "bus_files", "channels_files", "folder", "joints_files"
 
 _CHARGE_US = 100
 _WIRE_MS, _FREEING_US = 2, 110
-# Core-specific calls: pins of the bus and of UARTs, disabling the radio's sleep, a random number.
+# Calls of each core: pins of the bus and of UARTs, disabling the radio's sleep, a random number.
 _BUS = {
-    "esp32": ("(void)Wire.begin((int)SDA_PIN, (int)SCL_PIN);",),
-    "rp2040": ("(void)Wire.setSDA(SDA_PIN);", "(void)Wire.setSCL(SCL_PIN);", "Wire.begin();"),
+    "arduino-esp32": ("(void)Wire.begin((int)SDA_PIN, (int)SCL_PIN);",),
+    "arduino-pico": ("(void)Wire.setSDA(SDA_PIN);", "(void)Wire.setSCL(SCL_PIN);", "Wire.begin();"),
 }
-_BUS_TIMEOUT = {"esp32": f"Wire.setTimeOut({_WIRE_MS}u);", "rp2040": f"Wire.setTimeout({_WIRE_MS}u);"}
+_BUS_TIMEOUT = {"arduino-esp32": f"Wire.setTimeOut({_WIRE_MS}u);", "arduino-pico": f"Wire.setTimeout({_WIRE_MS}u);"}
 _UART = {
-    "esp32": (
+    "arduino-esp32": (
         "(void)Serial{n}.setRxBufferSize(256);",
         "(void)Serial{n}.setTxBufferSize(256);",
         "Serial{n}.begin({baud}, SERIAL_8N1, {rxd}, {txd});",
     ),
-    "rp2040": (
+    "arduino-pico": (
         "(void)Serial{n}.setRX({rxd}u);",
         "(void)Serial{n}.setTX({txd}u);",
         "(void)Serial{n}.setFIFOSize(256);",
         "Serial{n}.begin({baud});",
     ),
 }
-_AWAKE = {"esp32": ("(void)WiFi.setSleep(false);",), "rp2040": ("WiFi.noLowPowerMode();",)}
-_RANDOM = {"esp32": "esp_random()", "rp2040": "rp2040.hwrand32()"}
+_AWAKE = {"arduino-esp32": ("(void)WiFi.setSleep(false);",), "arduino-pico": ("WiFi.noLowPowerMode();",)}
+_RANDOM = {"arduino-esp32": "esp_random()", "arduino-pico": "rp2040.hwrand32()"}
 
 
 def base_files(board: Board, about: str) -> dict[str, str]:
     """Return name -> text of the sketch, the clock, and the host line."""
-    part, wifi = board.part, board.wifi
+    part, wifi = _part(board), board.wifi
     if wifi is None:
         what = "bytes of a serial port"
-        usb = not _part(board).uarts[0]
-        line = {"thenar_line_serial.cpp": _text("thenar_line_serial.cpp", usb=usb, baud=board.baud)}
+        uart, usb = bool(part.uarts[0]), bool(part.usb)
+        line = {"thenar_line_serial.cpp": _text("thenar_line_serial.cpp", uart=uart, usb=usb, baud=board.baud)}
     else:
         what = "datagrams in a Wi-Fi"
-        values = {"port": wifi.port, "host_name": host_name(board), "awake": _AWAKE[part], "random": _RANDOM[part]}
+        core = part.arduino_core
+        values = {"port": wifi.port, "host_name": host_name(board), "awake": _AWAKE[core], "random": _RANDOM[core]}
         line = {"thenar_line_udp.cpp": _text("thenar_line_udp.cpp", **values)}
         line |= {f"thenar_datagram.{end}": portable(f"thenar_datagram.{end}") for end in "hc"}
         line["secrets.example.h"] = _text("secrets.example.h")
@@ -81,11 +82,11 @@ def keys_files(board: Board, switches: Sequence[str]) -> dict[str, str]:
 
 def bus_files(board: Board) -> dict[str, str]:
     """Return name -> text of the I2C bus master."""
-    sda, scl = map(_number, _part(board).twi)
-    hz = board.bus.clock_hz
+    part, hz = _part(board), board.bus.clock_hz
+    sda, scl = map(_number, part.twi)
     # A reading is two transfers, and each may wait.
     header = portable("thenar_twi.h", scl_hz=hz, timeout_us=2000 * _WIRE_MS, freeing_us=_FREEING_US)
-    words = {"begin": _BUS[board.part], "timeout": _BUS_TIMEOUT[board.part]}
+    words = {"begin": _BUS[part.arduino_core], "timeout": _BUS_TIMEOUT[part.arduino_core]}
     return {
         "thenar_twi.h": header,
         "thenar_twi.cpp": _text("thenar_twi.cpp", sda=sda, scl=scl, clock_hz=hz, **words),
@@ -94,8 +95,9 @@ def bus_files(board: Board) -> dict[str, str]:
 
 def uart_files(board: Board, number: int, baud: int) -> dict[str, str]:
     """Return name -> text of UART `number`."""
-    rxd, txd = map(_number, _part(board).uarts[number])
-    begin = [line.format(n=number, baud=baud, rxd=rxd, txd=txd) for line in _UART[board.part]]
+    part = _part(board)
+    rxd, txd = map(_number, part.uarts[number])
+    begin = [line.format(n=number, baud=baud, rxd=rxd, txd=txd) for line in _UART[part.arduino_core]]
     name = f"thenar_uart{number}"
     return {
         f"{name}.h": portable("thenar_uart.h", uart=number, baud=baud, how=""),

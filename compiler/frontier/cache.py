@@ -10,12 +10,13 @@ from functools import update_wrapper
 from hashlib import blake2b
 from inspect import signature
 from pathlib import Path
-from typing import Any, Generic, Literal, ParamSpec, Self, TypeVar, get_type_hints
+from typing import Any, Generic, Literal, ParamSpec, TypeVar, get_type_hints
 from zlib import crc32
 
 import msgspec
 import numpy as np
 
+from thenar.drivers.closing import Closing
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.files import is_special, read_file, sync_folder
 from thenar.runtime.recording.writer import AppendedFile
@@ -123,7 +124,7 @@ class _Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     result: msgspec.Raw
 
 
-class Store:
+class Store(Closing):
     """The results in file `path`, for one run at a time; used as a context manager, or closed.
 
     scope  common dependencies of all results, such as the version of thenar. It is part of each key, so that one file
@@ -153,12 +154,6 @@ class Store:
         except BaseException:
             os.close(self._lock)
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def __len__(self) -> int:
         """Return the number of results, of all scopes."""

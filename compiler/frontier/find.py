@@ -13,17 +13,13 @@ from typing import Literal
 
 import numpy as np
 
-from thenar.runtime.build import Build
 from thenar.runtime.errors import BuildError, HarnessError
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.manifest import PAPERS_TRAINER
 from thenar.runtime.names import list_names
 from thenar.runtime.published import NONE
 
-from ..evaluation.rates import Rate
 from ..limits import check_inputs, check_memory, check_types
-from ..placement.elements import Element, above
-from ..placement.methods.base import BEST, METHODS, PAPERS, usual
+from ..placement.methods.base import METHODS, usual
 from ..placement.ports import ports_of_whole_glove
 from ..publication import check_folder, entries, publish_folder
 from ..recordings.frames import check_trials
@@ -31,19 +27,21 @@ from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..text import INDEPENDENT, sentence
 from .cache import Cache, Report, Store
+from .costs import FEWER, LEARNT_S, WIDER, estimated_costs
 from .designs import Design, Latencies, best_designs, designs, lucks, points_of, with_whole_scans
-from .equipment import Equipment, equipment_for
-from .finalists import OTHERS, PRICE_S, Close, finalists, look_closely, papers_depth, papers_tables
+from .equipment import equipment_for
+from .finalists import Close, finalists, look_closely
 from .latency import Pace, latencies
-from .measure import TRIAL_S, measured
+from .marks import choices_to_mark, marks_of, own_build
+from .measure import measured
 from .moving import Moving
 from .plots import PICTURES, pictures
-from .points import SCHEMA, Frontier, FrontierError, Mark, PlacementChoice, Point, Tried, frontier_to_bytes
-from .screen import FEWER_JOINTS, OTHER_TRAINERS, QUICK_PRICE_S, Screened, screen, screen_fewer, screen_others
-from .search import JOINTS, TAXEL_LEVELS, Candidate, Search, available_inputs, curve_placements, tried_placements
+from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, frontier_to_bytes
+from .screen import Screened, screen, screen_fewer, screen_others
+from .search import TAXEL_LEVELS, Candidate, Search
 from .stream import Stream, stream_of
-from .survey import Cuts, Survey, fit_s, path_s, settle_s
-from .timing.scan_times import Records, records_of, scan_times
+from .survey import Cuts, Survey
+from .timing.scan_times import Records, records_of
 from .timing.wirings import Wiring, reads_by_itself, wirings
 from .words import csv_bytes
 
@@ -59,15 +57,6 @@ _UNTIMED = (
     "the time of reading the joints ({}) is unknown and is left out of every frame time and latency: give it with "
     "--joint-us"
 )
-# Empirical: number of marked placements in addition to the finalists; of designs of a finalist on a front; the share of
-# distinct placements among those tried; of layouts to simulate in addition.
-_MARKED, _DESIGNS, _DIFFERENT, _CHECKED = 3, 2, 0.8, 30
-# Placements to screen with the other trainers, as a multiple of the finalists.
-_WIDER = 3
-# Number of placements to try with fewer joints.
-_FEWER = 5
-# Expected seconds of one core to learn what segments cost, and to play a stream.
-_LEARNT_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -308,53 +297,6 @@ def _stream(survey: Survey, given: GraspSet | None) -> Stream:
     return stream_of(given, labels, seed=seed)
 
 
-def estimated_costs(survey: Survey) -> dict[str, float]:
-    """Estimate each stage's cost in seconds of one core before any has begun, so that the time left never grows."""
-    search, cuts, sizes = survey.search, survey.cuts, [len(survey.elements(most)) for most in survey.levels]
-    rows, simulated = len(survey.samples.labels), survey.equipment.model.part is not None
-    kinds = available_inputs(sizes[-1], survey.n_joints)
-    wired = len(kinds) - ("joints" in kinds)
-    train, more = ([len(fold.train) for fold in folds] for folds in (cuts.screening, cuts.others))
-    # Once, or for each of the inputs if a method uses joints.
-    several = {name: len(sizes) * (wired if METHODS[name].uses_joints else min(wired, 1)) for name in search.methods}
-    methods = [name for name, count in several.items() for _ in range(count)]
-    choices = sum(len(tried_placements(name, size)) for name in search.methods for size in sizes) * wired + (
-        "joints" in kinds
-    )
-    baselines = sum(len(curve_placements(name, sizes[-1])) for name in search.baselines)
-    trainers = [search.alone(name) for name in search.trainers]
-    last, again = min(search.finalists + _MARKED, choices), min(_WIDER * search.finalists, choices)
-    few = papers_depth(search)
-    fewer = min(_FEWER, choices) * sum(size < survey.n_joints for size in JOINTS)
-
-    def settling(some: Sequence[Search], sizes: Sequence[int]) -> float:
-        open_ones = [each for each in some if len(each.candidates) > 1]
-        return len(kinds) * sum(settle_s(each, size) for each in open_ones for size in sizes)
-
-    def screening(some: Sequence[Search]) -> float:
-        return sum(fit_s(each, ((each.screened,), ()), size) for each in some for size in train)
-
-    return {
-        "placements": sum(path_s(name, n) for name in methods for n in (rows, *train)),
-        "baselines": sum(path_s(name, n) for name in search.baselines for n in train) if wired else 0.0,
-        "settings": settling(trainers[:1], (rows, *train)),
-        f"settings{OTHER_TRAINERS}": settling(trainers[1:], (rows, *train)),
-        "finalists' settings": settling(trainers, more),
-        "screening": (_DIFFERENT * choices + baselines) * screening(trainers[:1]),
-        f"screening{FEWER_JOINTS}": fewer * screening(trainers[:1]),
-        f"screening{OTHER_TRAINERS}": again * screening(trainers[1:]),
-        "times": _DIFFERENT * choices * QUICK_PRICE_S,
-        f"times{OTHER_TRAINERS}": again * len(trainers[1:]) * QUICK_PRICE_S,
-        "finalists' placements": sum(path_s(name, n) for name in methods for n in more),
-        "finalists": last * sum(fit_s(search, (search.stages, search.tabled), n) for n in train),
-        OTHERS: last * sum(fit_s(few, (few.stages, few.tabled), n) for n in more),
-        "prices": last * PRICE_S,
-        "simulations": last * _DESIGNS * TRIAL_S * simulated,
-        "checks": _CHECKED * TRIAL_S * simulated,
-        "latencies": last * (2.0 + _DESIGNS * (_LEARNT_S if survey.grasp_set.is_none.any() else 1.0)),
-    }
-
-
 def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...], lacking: tuple[str, ...]) -> Frontier:
     search, n_switches, most = survey.search, survey.samples.n_switches, survey.levels[-1]
     n_elements = len(survey.elements(most))
@@ -364,8 +306,8 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
             f"no placement that was tried can be built for {survey.equipment.model.target}: name other --methods or "
             "another --target"
         )
-    several = finalists(screened, (), _WIDER * search.finalists)
-    screened += screen_fewer(survey, finalists([one for one in screened if one.choice.joints], (), _FEWER))
+    several = finalists(screened, (), WIDER * search.finalists)
+    screened += screen_fewer(survey, finalists([one for one in screened if one.choice.joints], (), FEWER))
     screened += screen_others(survey, several)
     named = choices_to_mark(n_elements, survey.n_joints, search.trainers[0], most)
     closes = look_closely(survey, finalists(screened, list(named), search.finalists))
@@ -416,7 +358,7 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
         grouped.setdefault(design.close.screened.choice, []).append(design)
     calls = [
         latencies.call(
-            2.0 + len(mine) * (_LEARNT_S if moving else 1.0),
+            2.0 + len(mine) * (LEARNT_S if moving else 1.0),
             survey.read(choice, fold),
             fold.train,
             survey.columns(choice, fold),
@@ -461,72 +403,3 @@ def _tried(screened: Sequence[Screened], closes: Sequence[Close], search: Search
 
 def _unheard(_done: int, _total: int) -> None:
     pass
-
-
-# The paper's S.
-_PAPERS = (62.0,)
-
-
-def choices_to_mark(
-    n_switches: int, n_joints: int, trainer: str = PAPERS_TRAINER, levels: int | None = None
-) -> dict[Candidate, str]:
-    """Return the choices to mark, with their names: the paper's placement and all switches, alone and with the joints;
-    with `levels` levels of each taxel.
-    """
-    if not n_switches:
-        return {}
-    marked = {PlacementChoice(PAPERS, prune): f"paper, S = {prune:g}" for prune in _PAPERS}
-    # Keeping all switches is the same by any method.
-    marked[PlacementChoice(BEST, float(n_switches))] = f"all of {n_switches}"
-    alone = {Candidate(choice, "switches", trainer, levels=levels): name for choice, name in marked.items()}
-    with_joints = {replace(one, inputs="both"): f"{name}, joints" for one, name in alone.items()}
-    return alone | (with_joints if n_joints else {})
-
-
-def marks_of(named: dict[Candidate, str], closes: Sequence[Close], survey: Survey) -> tuple[Mark, ...]:
-    """Return the marks of those choices that were fully evaluated, with the paper's rounds and whole scans."""
-    found, tabled = [], papers_tables(survey.search)
-    for close in closes:
-        screened = close.screened
-        if screened.choice in named:
-            priced = next(tables for tables in close.priced if tables.tabled == tabled)
-            us = priced.fastest_us(survey.transfer(screened.choice).us)
-            if us is not None:
-                found.append(Mark(named[screened.choice], len(screened.columns), close.tables[tabled].rate, us))
-    return tuple(found)
-
-
-def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
-    """Return the user's build as a mark: its recorded rate, and its frame in the fastest wiring for its switches.
-
-    Raises FrontierError if it has no rate, or is not for these recordings or this equipment.
-    """
-    build = Build.load(folder)
-    manifest = build.manifest
-    names = [switch.name for switch in manifest.switches]
-    # Comparable with the frontier's rates.
-    pooled = [rate for rate in manifest.rates if rate.protocol != "training" and not rate.of.startswith("new")]
-    if not pooled:
-        raise FrontierError(f"{folder} has no accuracy: compile it with --folds 4, or leave --build out")
-    options, fitting = equipment.model.options(build.tables), equipment.fitting(names)
-    if not options or (names and not fitting):
-        raise FrontierError(f"{folder} cannot be built for {equipment.model.target}: leave --build out, or --target")
-    joints = [joint.name for joint in manifest.joints]
-    sources = _places([switch.source for switch in manifest.switches], grasp_set.element_names, folder)
-    above_codes = [0 if switch.threshold is None else switch.threshold.code for switch in manifest.switches]
-    bits = above(grasp_set.switches, grasp_set.taxels, tuple(map(Element, sources, above_codes)))
-    codes = grasp_set.codes[:, _places(joints, [joint.name for joint in grasp_set.joints], folder)]
-    scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.overhead).full_us for wiring in fitting]
-    frame_us = max(min(scans, default=0.0), equipment.records.of(len(joints)).us) + options[0].us
-    return Mark(
-        f"build {folder.name}", len(names), Rate.counted((pooled[0].correct,), pooled[0].total, of="pooled"), frame_us
-    )
-
-
-def _places(names: Sequence[str], there: Sequence[str], folder: Path) -> list[int]:
-    for name in names:
-        if name not in there:
-            raise FrontierError(
-                f"{folder} reads {name!r}, which the recordings do not hold: it was compiled from others"
-            )
-    return [there.index(name) for name in names]

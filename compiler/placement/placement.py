@@ -314,29 +314,31 @@ def place(
     bound = None if limits is None else limits.on(elements, own)
     chosen = choose(samples, method, parameter, own, bound, robust=robust)
     name = partial(kept_of, grasp_set, elements)
-    kept = name(chosen.columns)
-    if chosen.tree is not None:
-        entropy = entropy_bits(list(chosen.tree.nodes[0].counts))
-        together = accumulate(chosen.gains)
-        kept = tuple(
-            replace(one, gain_bits=gain, cumulative_share=so_far / entropy)
-            for one, gain, so_far in zip(kept, chosen.gains, together, strict=True)
-        )
     return Placement(
         method=method,
         parameter=parameter,
         joints=joints,
-        switches=kept,
+        switches=_with_gains(name(chosen.columns), chosen),
         rows=len(grasp_set),
         fingerprint=fingerprint,
         all_names=names_of(grasp_set, elements),
         n_levels=len(elements) - len(grasp_set.switch_names),
         grasps=samples.grasps,
         tree=chosen.tree,
-        kept_joints=()
-        if keep_joints is None
-        else _joints_kept(grasp_set, read.keeping(chosen.columns), keep_joints, limits),
+        kept_joints=() if keep_joints is None else _joints_kept(grasp_set, read, chosen.columns, keep_joints, limits),
         exact=_exactly(samples, chosen.columns, bound, name, on_round) if exact else None,
+    )
+
+
+def _with_gains(kept: tuple[Kept, ...], chosen: Chosen) -> tuple[Kept, ...]:
+    """Return the kept elements with their gains in the tree, if there is one."""
+    if chosen.tree is None:
+        return kept
+    entropy = entropy_bits(list(chosen.tree.nodes[0].counts))
+    together = accumulate(chosen.gains)
+    return tuple(
+        replace(one, gain_bits=gain, cumulative_share=so_far / entropy)
+        for one, gain, so_far in zip(kept, chosen.gains, together, strict=True)
     )
 
 
@@ -375,10 +377,13 @@ def kept_of(grasp_set: GraspSet, elements: Elements, columns: Columns) -> tuple[
     )
 
 
-def _joints_kept(grasp_set: GraspSet, samples: Samples, most: int, limits: Limits | None) -> tuple[str, ...]:
+def _joints_kept(
+    grasp_set: GraspSet, samples: Samples, columns: Columns, most: int, limits: Limits | None
+) -> tuple[str, ...]:
+    """Return the names of the joints to keep in addition to the switches `columns`."""
     if not grasp_set.joints:
         raise PlacementError("the set has no joints to choose from: leave --keep-joints out")
-    return tuple(grasp_set.joint_names[joint] for joint in kept_joints(samples, most, limits))
+    return tuple(grasp_set.joint_names[joint] for joint in kept_joints(samples.keeping(columns), most, limits))
 
 
 def _exactly(

@@ -1,20 +1,17 @@
 """`report_html`: one HTML file that needs no other file, no network and no date."""
 
-import base64
-import hashlib
-from collections.abc import Iterable
 from functools import lru_cache
 
-import msgspec
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment
 from markupsafe import Markup
 
+from ..pages import embedded, policy_hash, templates
 from ..pictures import colour_variables
 from ..segmenting.transitions import graph_of
 from ..text import sentence
 from . import results, sections
 from .content import ReportContent
-from .frontier import Detail, frontier_view
+from .frontier import frontier_view
 from .hand import HandPicture, hand_picture
 from .tree import LINE, STEP, WORDS, TreeView, tree_view
 
@@ -42,22 +39,15 @@ def report_html(content: ReportContent) -> bytes:
         graph=None if content.transitions is None else graph_of(content.transitions),
         style=Markup(colour_variables()) + _file(environment, "report.css"),
         script=script,
-        script_sha256=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        points=_json(() if frontier is None else frontier.details),
+        script_sha256=policy_hash(script),
+        points=embedded({str(detail.number): detail for detail in (() if frontier is None else frontier.details)}),
     )
     return page.encode()
 
 
 @lru_cache(maxsize=1)
 def _environment() -> Environment:
-    environment = Environment(
-        loader=PackageLoader(__package__, "templates"),
-        undefined=StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    environment = templates(__package__, "templates")
     environment.filters["sentence"] = sentence
     return environment
 
@@ -66,15 +56,6 @@ def _file(environment: Environment, name: str) -> Markup:
     """Return a file of the templates' folder verbatim."""
     assert environment.loader is not None
     return Markup(environment.loader.get_source(environment, name)[0])
-
-
-def _json(details: Iterable[Detail]) -> Markup:
-    """Return number -> detail for the script, between tags."""
-    text = msgspec.json.encode({str(detail.number): detail for detail in details}).decode()
-    # Whatever a name contains, it must not begin or end a tag or be an entity.
-    for letter in "<>&":
-        text = text.replace(letter, f"\\u{ord(letter):04x}")
-    return Markup(text)
 
 
 def _tree(content: ReportContent) -> TreeView | None:

@@ -1,7 +1,6 @@
 """`try_html`: the page of a build, with its tables, its hand and some of its rows in one file."""
 
 import base64
-import hashlib
 import re
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -9,7 +8,7 @@ from importlib.resources import files
 
 import msgspec
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment
 from markupsafe import Markup
 from numpy.typing import NDArray
 
@@ -21,6 +20,7 @@ from thenar.runtime.rejection import none_leads
 from thenar.runtime.sources.rows import steps_of
 from thenar.runtime.taxels import TaxelSettings, calibration_of, count_limit
 
+from ..pages import embedded, policy_hash, templates
 from ..text import counted, listed
 
 MOST_BYTES = 500_000
@@ -181,9 +181,9 @@ def _rendered(manifest: Manifest, data: Json) -> bytes:
         .get_template("try.html.j2")
         .render(
             style=Markup(style),
-            style_sha256=_sha256(style),
+            style_sha256=policy_hash(style),
             script=Markup(script),
-            script_sha256=_sha256(script),
+            script_sha256=policy_hash(script),
             sentence=f"It distinguishes {len(manifest.classes)} classes by {listed(read)}.",
             levels=levels,
             checksum=manifest.checksum[:16],
@@ -194,28 +194,9 @@ def _rendered(manifest: Manifest, data: Json) -> bytes:
     return page.encode()
 
 
-def embedded(data: object) -> Markup:
-    """Return JSON for a script element: whatever a name contains, it begins or ends no tag and is no entity."""
-    text = msgspec.json.encode(data).decode()
-    for letter in "<>&":
-        text = text.replace(letter, f"\\u{ord(letter):04x}")
-    return Markup(text)
-
-
-def _sha256(text: str) -> str:
-    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-
-
 @lru_cache(maxsize=1)
 def _environment() -> Environment:
-    return Environment(
-        loader=PackageLoader(__package__, "page"),
-        undefined=StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    return templates(__package__, "page")
 
 
 def _own(name: str) -> str:

@@ -3,6 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import astuple
 from itertools import pairwise
 from math import ceil, floor, log10
 from statistics import median
@@ -23,9 +24,11 @@ from ..sources.rows import RowKind
 _PATIENCE_US = 6_000_000
 _MOST_ROWS = 100_000
 _WAIT_S = 0.1
+# A sender that leaves no pause is read as fast as it sends after this time.
+_BACKLOG_US = 100_000
 _JOINT = re.compile(r"flex|bend|joint|angle|deg|enc|mcp|mpj|pip|pij|dip|dij|abduct|wrist|pitch|roll|yaw", re.IGNORECASE)
 _TAXEL = re.compile(r"fsr|pad|force|press|taxel|adc|analog|raw|newton", re.IGNORECASE)
-_TIME = re.compile(r"^(t|ts|ms|us|s)$|time|milli|micro|stamp|clock|sec", re.IGNORECASE)
+_TIME = re.compile(r"^(t|ts|ms|us|s)$|time|milli|micro|stamp|clock|(^|_)secs?$|seconds", re.IGNORECASE)
 _UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 _HIGHEST = (255, 1023, 4095, 16_383, 32_767, 65_534)
 _PARTS = (1.0, 3.3, 5.0, 10.0, 100.0, 180.0, 360.0)
@@ -54,9 +57,9 @@ class Proposal(msgspec.Struct, frozen=True):
     remarks: tuple[str, ...]
 
 
-def reader_of(port: str, baud: int) -> RowReader:
-    """Return a reader of rows from `port`. Raises SettingError if there is none."""
-    wiring = StreamWiring(port=port, baud=baud)
+def reader_of(wiring: StreamWiring) -> RowReader:
+    """Return a reader of the rows of a stream. Raises SettingError if there is none for its port."""
+    port = wiring.port
     for kind in SOURCES.values():
         if isinstance(kind, RowKind) and kind.reader is not None and kind.takes(port):
             return kind.reader(wiring)
@@ -69,33 +72,48 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
 
     Raises SettingError for an invalid port, DeviceError if no rows come.
     """
-    with reader_of(port, baud) as reader:
+    bare = StreamWiring(port=port, baud=baud, columns=tuple(columns))
+    with reader_of(bare) as reader:
         reader.open()
         came = list(_listened(reader, listen_s))
         counts, odd = reader.counts(), reader.odd
+    wrong = counts.misfits + counts.overlong
     if not came:
-        what = f"the data holds no rows: {odd}; is {baud} its baud rate?" if odd else "nothing comes"
-        raise DeviceError(f"{port}: {what}")
-    remarks = []
-    if wrong := counts.misfits + counts.overlong:
-        remarks.append(f"{wrong} lines were not rows" + (f", such as {odd}" if odd else ""))
-    return _proposed(StreamWiring(port=port, baud=baud, columns=tuple(columns)), came, remarks)
+        raise DeviceError(f"{port}: {_no_rows(port, baud, odd) if wrong else 'nothing comes'}")
+    such = f", such as {odd}" if odd else ""
+    remarks = [f"{wrong} lines were not rows{such}" if wrong > 1 else f"1 line was not a row: {odd}"] if wrong else []
+    return _proposed(bare, came, remarks)
+
+
+def _no_rows(port: str, baud: int, odd: str) -> str:
+    """Return the advice for lines none of which is a row."""
+    if not odd:
+        return "its lines are longer than any row: end each row with a line feed"
+    serial = port.startswith("rfc2217:") or not (port == "-" or re.match("[a-z0-9]+:", port))
+    wanted = (
+        "a row is numbers with commas between, name:value, or JSON; --names says how many columns rows with texts have"
+    )
+    return f"the data holds no rows: {odd}; {f'is {baud} its baud rate? ' if serial else ''}{wanted}"
 
 
 def _listened(reader: RowReader, listen_s: float) -> Iterator[tuple[int, Row]]:
-    end_us, first, count = now_us() + _PATIENCE_US, True, 0
+    """Yield rows and when they came. Those that had been waiting, in buffers between the sender and this program, when
+    the first one was read came at the same time.
+    """
+    end_us, count, waited_us = now_us() + _PATIENCE_US, 0, 0
     while (time_us := now_us()) < end_us and count < _MOST_ROWS:
         try:
-            rows = reader.read(_WAIT_S)
+            rows = reader.read(0.0 if waited_us else _WAIT_S)
         except DeviceError:
-            if first:
+            if not count and not sum(astuple(reader.counts())):
                 raise
             return
-        for row in rows:
-            if first:
-                first, end_us = False, time_us + round(listen_s * 1e6)
-            count += 1
-            yield now_us(), row
+        if rows and not count:
+            waited_us, end_us = time_us, time_us + round(listen_s * 1e6)
+        elif not rows or time_us - waited_us > _BACKLOG_US:
+            waited_us = 0
+        count += len(rows)
+        yield from ((waited_us or now_us(), row) for row in rows)
 
 
 def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], remarks: list[str]) -> Proposal:
@@ -103,17 +121,17 @@ def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], remarks: list
     if most < len(came):
         remarks.append(f"{len(came) - most} of {len(came)} rows had other columns")
     alike = [(time_us, row) for time_us, row in came if (row.names, len(row.values)) == (names, width)]
-    given = bare.columns or (("",) * width if names is None else names)
-    if len(given) != width:
-        raise SettingError(f"{len(given)} columns are named, but rows have {width}: name every one, in order")
-    columns = tuple(_sound(name, place) for place, name in enumerate(names or given, start=1))
+    columns = _columns(bare.columns, names, width, remarks)
     values = {name: [row.values[place] for _, row in alike] for place, name in enumerate(columns)}
-    span_s = (alike[-1][0] - alike[0][0]) / 1e6
-    time, unit, by_clock_s = _clock(values, span_s)
+    timed = alike[sum(time_us == alike[0][0] for time_us, _ in alike) - 1 :]
+    span_s = (timed[-1][0] - timed[0][0]) / 1e6
+    if span_s < _LEAST_S:
+        timed = alike
+    time, unit, by_clock_s = _clock({name: found[-len(timed) :] for name, found in values.items()}, span_s)
     if span_s < _LEAST_S:
         span_s = by_clock_s
         remarks.append("the rows came all at once: rate_hz is by their clock" if by_clock_s else _NO_RATE)
-    rate_hz = _rounded((len(alike) - 1) / span_s) if span_s > 0 and len(alike) > 1 else bare.rate_hz
+    rate_hz = _rounded((len(timed) - 1) / span_s) if span_s > 0 and len(timed) > 1 else bare.rate_hz
     stamped = alike[0][1].time_s is not None
     heard, kinds = [], {"switch": [], "joint": [], "taxel": []}  # type: tuple[list[Heard], dict[str, list[str]]]
     for name, found in values.items():
@@ -123,7 +141,7 @@ def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], remarks: list
         heard.append(Heard(name, min(numbers, default=None), max(numbers, default=None), kind))
         if len(numbers) < len(found):
             remarks.append(f"{name}: {len(found) - len(numbers)} of {len(found)} values were not numbers")
-    gaps = [later - earlier for (earlier, _), (later, _) in pairwise(alike)]
+    gaps = [later - earlier for (earlier, _), (later, _) in pairwise(timed)]
     if gaps and max(gaps) > max(4 * median(gaps), 100_000):
         remarks.append(f"the longest break between two rows was {max(gaps) / 1000:.0f} ms")
     if time is None and not stamped:
@@ -143,8 +161,17 @@ def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], remarks: list
     return Proposal(stream, tuple(heard), len(came), tuple(remarks))
 
 
-def _sound(name: str, place: int) -> str:
-    return f"c{place}" if fault(name) else name
+def _columns(given: tuple[str, ...], names: tuple[str, ...] | None, width: int, remarks: list[str]) -> tuple[str, ...]:
+    """Return the names of `width` columns: those that the sender sends, those that the user gave, or c1, c2 and on."""
+    if given and len(given) != width:
+        raise SettingError(f"{len(given)} columns are named, but rows have {width}: name every one, in order")
+    if max(Counter(filter(None, given)).values(), default=1) > 1:
+        raise SettingError(f"--names names a column twice: {', '.join(given)}")
+    if given and names is not None and given != names:
+        remarks.append("the sender names its columns itself, so --names is not used")
+    return tuple(
+        f"c{place}" if fault(name) else name for place, name in enumerate(names or given or ("",) * width, start=1)
+    )
 
 
 def _rounded(rate_hz: float) -> float:
@@ -183,6 +210,8 @@ def _kind(name: str, numbers: Sequence[float]) -> str:
         return "nothing: no number came"
     if _rises(numbers):
         return "nothing: it only rises, as a count does"
+    if _TIME.search(name) and not {0.0, 1.0} >= set(numbers) and sorted(numbers) == list(numbers):
+        return "nothing: a clock that does not change from row to row"
     if _JOINT.search(name):
         return "joint"
     if _TAXEL.search(name):
@@ -212,7 +241,7 @@ def _joint_range(numbers: Sequence[float]) -> Range:
 
 
 def _widened(least: float, greatest: float) -> Range:
-    span = max(greatest - least, 1e-3)
+    span = max(greatest - least, 1e-3, 1e-2 * abs(greatest))
     step = 10.0 ** (floor(log10(span)) - 1)
     ends = floor((least - span / 4) / step) * step, ceil((greatest + span / 4) / step) * step
     return float(f"{ends[0]:.6g}"), float(f"{ends[1]:.6g}")

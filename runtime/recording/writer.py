@@ -7,11 +7,11 @@ from contextlib import suppress
 from pathlib import Path
 from struct import Struct
 from threading import Event, Thread
-from typing import Self
 
 import msgspec
 from msgspec.structs import astuple, replace
 
+from thenar.drivers.closing import Closing
 from thenar.drivers.errors import SettingError
 
 from ..files import write_atomically
@@ -106,7 +106,7 @@ class _Recognition(LiveGrasp, frozen=True, omit_defaults=True):
     """A prediction as recorded: without empty fields, such as those of a segment while there is none."""
 
 
-class Recorder:
+class Recorder(Closing):
     """Writes a recording; every message has left the process when its method returns.
 
     A message is published at the time of its frame and logged then too, but never before the message written last: the
@@ -186,12 +186,6 @@ class Recorder:
         if self._file.size == self._tail.size:
             self._file.append(ending(self._tail))
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _message(self, channel: int, time_us: int, data: bytes) -> None:
         tail = self._tail

@@ -10,7 +10,7 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from ..errors import BuildError
-from ..manifest import decode_document, encode_document
+from ..json_document import decode_document, encode_document
 from ..names import fault, shortened
 
 SCHEMA = 1

@@ -7,7 +7,7 @@ from .rows import row_kinds
 
 
 def _reader(wiring: StreamWiring) -> LineReader:
-    return LineReader(wiring.port, wiring.baud)
+    return LineReader(wiring.port, wiring.baud, len(wiring.columns))
 
 
 MEMBER = row_kinds(

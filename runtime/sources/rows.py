@@ -29,6 +29,8 @@ _WINDOW = 10
 # A shorter break between rows is not counted: serial adapters and radios deliver rows in bunches.
 _BUNCH_US = 50_000
 _SLOW = 0.75
+# What is wrong with a sender that is connected is reported after this time without a row, or since it was noticed.
+_NOTICE_US = 2_000_000
 # A serial adapter, or a radio, may hold a row back for this long in normal operation.
 _WAY_US = 20_000
 # What a column may become in a frame.
@@ -187,10 +189,14 @@ class RowSource(Source):
         self._debounce = harness.debounce
         self.watch = RowWatch(wiring.period_us)
         self._ready = deque[SwitchFrame | GloveFrame]()
+        self._wrong = (0, 0)
         self._begin()
 
     def _begin(self) -> None:
         self._clock = SenderClock(self.wiring.period_us)
+        # When a row came last; when the sender's clock changed last; until when it counts as stopped.
+        self._came_us = self._ticked_us = now_us()
+        self._still_until_us = -1
         self._last: tuple[float, Sequence[float | None]] | None = None
         self._ready.clear()
         self.watch.begin()
@@ -219,11 +225,16 @@ class RowSource(Source):
         if values is None:
             counts.wrong_columns += 1
             return
+        self._came_us, self._wrong = came_us, self._wrong_rows()
         counts.missing += values.count(None)
         if self.wiring.time is not None and values[-1] is None:
             return  # its time is unknown
         time_us, sent_us = came_us, self._sent_us(row, values)
         if sent_us is not None:
+            if sent_us != self._clock.last_us:
+                self._ticked_us = came_us
+            elif came_us - self._ticked_us > self.longest_us:
+                self._still_until_us = came_us + _NOTICE_US
             if (sent_us, values) == self._last:
                 counts.repeated += 1
                 return
@@ -284,22 +295,38 @@ class RowSource(Source):
 
     def counts(self) -> tuple[Count, ...]:
         """Return the rate of rows, and counts of their faults."""
-        rate = Count("rows a second", round(self.watch.hz or 0))
+        rate = Count("rows a second", 0 if self._silent else round(self.watch.hz or 0))
         return (rate, *counted(self.watch.counts), *counted(self.reader.counts()))
 
     def trouble(self) -> str:
         """Return the fault of arriving rows or lines; "" if there is none."""
-        counts, found, hz = self.watch.counts, self._columns.found, self.watch.hz
-        if not counts.rows and found is not None:
+        found, hz, silent = self._columns.found, self.watch.hz, self._silent
+        # Compared with the counts at the last row: what came since.
+        unlike, misfits = (
+            (0, 0) if self.watch.counts.rows and not silent else map(int.__sub__, self._wrong_rows(), self._wrong)
+        )
+        if unlike and found is not None:
             wanted = list_names([name for name in self.wiring.columns if name] or self.wiring.used)
             has = list_names([shortened(name) for name in found])
             return f"its rows have other columns than glove.toml: {has}, not {wanted}"
-        if not counts.rows and (odd := self.reader.odd):
+        if misfits and (odd := self.reader.odd):
             return f"the data holds no rows: {odd}"
+        if silent:
+            return f"connected, but no row has come for {_NOTICE_US / 1e6:g} s or longer: is its program running?"
+        if now_us() < self._still_until_us:
+            return "its clock does not change from row to row, so rows count as old: leave out `time` in glove.toml"
         if hz is not None and hz < _SLOW * self.wiring.rate_hz:
             return f"{hz:.3g} rows a second arrive, but glove.toml says {self.wiring.rate_hz:g}: set rate_hz = {hz:.2g}"
         faulty = [f"{each.names[0]}: {each.faults[0]}" for each in self._taxels if each.faults[0] not in ("", "silent")]
         return f"taxels with faults: {list_names(faulty)}" if faulty else ""
+
+    def _wrong_rows(self) -> tuple[int, int]:
+        """Return how many rows had other columns, and how many lines were not rows."""
+        return self.watch.counts.wrong_columns, self.reader.counts().misfits
+
+    @property
+    def _silent(self) -> bool:
+        return now_us() - self._came_us > max(_NOTICE_US, 4 * self.wiring.period_us)
 
     def close(self) -> None:
         """Close the reader."""

@@ -4,8 +4,8 @@ Every open browser shows the same, and keys count in each.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from types import TracebackType
-from typing import Self
+
+from thenar.drivers.closing import Closing
 
 from ..frames import GloveFrame, Mask, SwitchFrame
 from ..live.sources import DeviceState
@@ -19,7 +19,7 @@ from .server import Server, message
 _PERIOD_US = 50_000
 
 
-class GuidePage:
+class GuidePage(Closing):
     """Serves the page of a collection until it is left; a context manager.
 
     Parameters
@@ -110,14 +110,6 @@ class GuidePage:
     def close(self) -> None:
         """Close the page."""
         self._server.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _seen(self, switches: SwitchFrame | None, glove: GloveFrame | None) -> dict[str, object]:
         """Return the glove's readings: one character per switch, "1" closed, "0" open, "x" not read; the joint values,

@@ -7,10 +7,10 @@ from collections import deque
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import msgspec
+
+from thenar.drivers.closing import Closing
 
 from ..build import Build
 from ..detail import Details
@@ -30,7 +30,7 @@ _encode = msgspec.json.Encoder().encode
 _FRAME = b'{"topic":"frame",'
 
 
-class LivePage:
+class LivePage(Closing):
     """Serves the live page of a glove until it is left; a context manager.
 
     Parameters
@@ -103,14 +103,6 @@ class LivePage:
         """Close the page, and a recording that it began."""
         self.server.close()
         self._recordings.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _tell_recording(self) -> None:
         self.server.publish("recording", message("recording", self._recordings.state))

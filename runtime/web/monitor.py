@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from threading import Event
-from typing import Self
 
 import msgspec
 
+from thenar.drivers.closing import Closing
 from thenar.drivers.errors import DeviceError, SettingError
 
 from ..build import load_manifest
@@ -42,7 +42,7 @@ class Source(msgspec.Struct, frozen=True):
     error: str = ""
 
 
-class StreamMonitor:
+class StreamMonitor(Closing):
     """Shows the stream at `where` on a page; a context manager.
 
     Parameters
@@ -96,12 +96,6 @@ class StreamMonitor:
     def close(self) -> None:
         """Close the page."""
         self.server.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _show(self, text: bytes) -> None:
         try:

@@ -1,8 +1,8 @@
 """The page of a guided calibration: the pose to hold, each sensor's byte live, and the keys pressed there."""
 
 from collections.abc import Mapping
-from types import TracebackType
-from typing import Self
+
+from thenar.drivers.closing import Closing
 
 from ..posing import PoseGuide, PoseKey, PoseStage
 from .presses import Presses
@@ -11,7 +11,7 @@ from .server import Server, message
 _PERIOD_US = 50_000
 
 
-class PosePage:
+class PosePage(Closing):
     """Serves the page of a calibration until it is left; a context manager.
 
     Parameters
@@ -86,11 +86,3 @@ class PosePage:
     def close(self) -> None:
         """Close the page, once it shows the last message."""
         self._server.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

@@ -10,11 +10,12 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
 from time import monotonic
-from typing import Any, Self
+from typing import Any
 
 import msgspec
 from msgspec.structs import replace
 
+from thenar.drivers.closing import Closing
 from thenar.drivers.errors import SettingError, ThenarError
 
 from ..build import Build
@@ -121,7 +122,7 @@ class Overview:
             self._begun = None
 
 
-class ReplayPage:
+class ReplayPage(Closing):
     """Serves the page of a recording; a context manager.
 
     Parameters
@@ -183,12 +184,6 @@ class ReplayPage:
         if self._thread.is_alive():
             self._thread.join()
         self.server.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _described(self, name: str, folder: Path | None) -> Sequence[bytes]:
         build = self._build

@@ -12,11 +12,11 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from threading import Event, Thread
-from typing import Self
 
 import msgspec
 from aiohttp import WSCloseCode, WSMsgType, web
 
+from thenar.drivers.closing import Closing
 from thenar.drivers.errors import ThenarError
 
 from ..sinks.sockets import listen
@@ -54,7 +54,7 @@ def message(topic: str, content: object = None, **more: object) -> bytes:
     return msgspec.json.encode({"topic": topic, **fields, **more})
 
 
-class Server:
+class Server(Closing):
     """Serves a page until it is closed; a context manager.
 
     Parameters
@@ -130,12 +130,6 @@ class Server:
         if self.thread.is_alive():
             self._loop.call_soon_threadsafe(self._closing.set)
             self.thread.join()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _run(self) -> None:
         try:

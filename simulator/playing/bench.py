@@ -3,13 +3,12 @@
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import msgspec
 import numpy as np
 
 from thenar.drivers.calibration import SensorCalibration
+from thenar.drivers.closing import Closing
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c, EmulatedSpi
 from thenar.drivers.emulated.lines import LineSender, lines_like
@@ -69,7 +68,7 @@ def cable_of(scene: Scene, line: int) -> Cable | None:
 _USUAL_BAUD = 115_200
 
 
-class Bench:
+class Bench(Closing):
     """Emulated devices for every device of `harness`, their serial ports linked in `folder`.
 
     harness      the same harness with the ports of the emulated devices
@@ -197,14 +196,6 @@ class Bench:
     def close(self) -> None:
         """Stop all devices and remove their ports."""
         self._stack.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _emulated(wiring: BusWiring, adapter: AdapterKind) -> EmulatedBus:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from thenar.runtime.manifest import manifest_from_bytes
+from thenar.runtime.manifest_file import manifest_from_bytes
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 

@@ -13,7 +13,7 @@ import pytest
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime.harness.loading import load_harness
-from thenar.runtime.manifest import manifest_from_bytes
+from thenar.runtime.manifest_file import manifest_from_bytes
 
 Thenar = Callable[..., Any]
 PADS = tuple(f"pad_{finger}_{number}" for finger in ("thumb", "index", "palm") for number in (1, 2, 3))

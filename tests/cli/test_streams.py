@@ -1,5 +1,6 @@
 """A glove that sends lines, from `thenar doctor --line` to `thenar run`, by every way that lines come."""
 
+import contextlib
 import json
 import math
 import os
@@ -122,6 +123,77 @@ def test_names_that_the_sender_gives_say_what_columns_are(thenar: Thenar, tmp_pa
     ]
 
 
+def listened(rows: str, *options: str) -> "subprocess.CompletedProcess[str]":
+    """Run `thenar doctor --line -` on these lines, after which its standard input ends."""
+    command = [sys.executable, "-m", "thenar.cli", "doctor", "--line", "-", *options]
+    return subprocess.run(command, input=rows, capture_output=True, text=True, check=False)
+
+
+def test_a_table_with_labels_coarse_times_and_a_constant_is_proposed_as_a_harness_that_loads(tmp_path: Path) -> None:
+    path = tmp_path / "glove.toml"
+    header = "time,ms,thumb,flex,weight,label\n"
+    rows = (
+        f"{1_700_000_000 + n // 50},{20 * n},{n % 2},{9 * n},123456.7,{'fist' if n % 9 else 'open'}\n"
+        for n in range(99)
+    )
+    done = listened(header + "".join(rows), "--propose", str(path))
+    assert done.returncode == 0, done.stderr
+    stream = load_harness(path).streams[0]
+    assert (stream.columns, stream.time) == (("", "ms", "thumb", "", "weight", ""), "ms")
+    low, high = stream.taxels["weight"]
+    assert low < 123456.7 < high
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("0x3f,0x01", "no rows: '0x3f,0x01'; a row is numbers with commas between, name:value, or JSON"),
+        ("10:00:00.125 -> 1,0", "the data holds no rows: '10:00:00.125 -> 1,0'; a row is numbers"),
+        ("5,1,fist", "--names says how many columns rows with texts have"),
+        ("7" * 20_000, "its lines are longer than any row"),
+        ('{"fingers": {"thumb": 1}}', "no column is a switch, a joint or a taxel, so no glove.toml is proposed"),
+    ],
+)
+def test_lines_from_which_nothing_can_be_proposed_are_shown_and_no_file_is_written(
+    line: str, said: str, tmp_path: Path
+) -> None:
+    done = listened(f"{line}\n" * 9, "--propose", str(tmp_path / "glove.toml"))
+    assert done.returncode
+    assert said in " ".join(done.stderr.split())
+    assert "baud" not in done.stderr
+    assert not any(tmp_path.iterdir())
+
+
+def test_names_are_stripped_checked_and_left_to_a_sender_that_names_its_columns() -> None:
+    rows = "".join(f"{20 * n},{n % 2}\n" for n in range(30))
+    found = json.loads(listened(rows, "--names", "ms, thumb", "--json").stdout)
+    assert found["stream"]["columns"] == ["ms", "thumb"]
+    done = listened(rows, "--names", "thumb,thumb")
+    assert (done.returncode, "--names names a column twice: thumb, thumb" in done.stderr) == (2, True)
+    found = json.loads(listened(f"t_ms,index\n{rows}", "--names", "ms,thumb", "--json").stdout)
+    assert found["stream"]["columns"] == ["t_ms", "index"]
+    assert "the sender names its columns itself, so --names is not used" in found["remarks"]
+
+
+@pytest.mark.slow
+def test_rows_that_had_been_waiting_do_not_count_for_the_rate(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "thenar.cli", "doctor", "--line", "-", "--seconds", "2", "--json"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdin is not None
+        descriptor = process.stdin.fileno()
+        os.write(descriptor, b"".join(b"%d,%d\n" % (n * 0.1, n % 2) for n in range(600)))
+
+        def send(line: bytes) -> None:
+            with contextlib.suppress(BrokenPipeError):
+                os.write(descriptor, line)
+
+        with LineSender(send, ("ms", "thumb"), 100, "ms", "ms"):
+            assert process.wait(60) == 0
+        assert process.stdout is not None
+        found = json.loads(process.stdout.read())
+    assert 0 < found["stream"]["rate_hz"] <= 110
+
+
 def test_a_line_where_nothing_comes_or_nothing_can_is_said(thenar: Thenar, tmp_path: Path) -> None:
     for port, said in (
         ("spy://x", "is not a supported port"),
@@ -234,6 +306,17 @@ def test_joints_alone_of_bytes_are_recognised_as_they_were_recorded(thenar: Then
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert right(log, out) == 1.0
+
+
+@pytest.mark.parametrize("options", [(), ("--taxels",)])
+def test_calibrate_refuses_rows_from_stdin_where_the_user_types(
+    thenar: Thenar, tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    path = tmp_path / "glove.toml"
+    path.write_text('[[stream]]\nport = "-"\njoints = { flex = [0, 9] }\ntaxels = { pad = [0, 9] }\n')
+    done = thenar("calibrate", path, "-o", tmp_path / "anna.toml", *options)
+    assert done.returncode == 2
+    assert "the keys that lead a calibration come from stdin: send rows by udp: instead" in done.stderr
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from msgspec.structs import replace as replace_fields
 
 from thenar.cli.verify_command import print_firmware, verdict
 from thenar.compiler.artifact.verify_firmware import Carried, Difference, FirmwareVerification, TargetCheck
-from thenar.runtime.manifest import manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.tables import tables_from_bytes, tables_to_bytes
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]

@@ -90,6 +90,7 @@ def test_nobody_there_is_a_device_error_that_says_what_to_look_at(tmp_path: Path
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     taken = DatagramLines()
+    (tmp_path / "file").write_text("1,2\n")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(taken.to)
         for where, said in (
@@ -97,6 +98,7 @@ def test_nobody_there_is_a_device_error_that_says_what_to_look_at(tmp_path: Path
             (f"ws://127.0.0.1:{port}/", "is the sender running"),
             (f"unix:{tmp_path}/none", "is the sender running"),
             (f"unix:{tmp_path}/{'x' * 200}", "too long"),
+            (f"unix:{tmp_path}/file", "it is not a socket"),
             (taken.port, "close other programs that have the port"),
         ):
             with pytest.raises(DeviceError, match=said):
@@ -106,7 +108,10 @@ def test_nobody_there_is_a_device_error_that_says_what_to_look_at(tmp_path: Path
 
 @pytest.mark.parametrize(
     "port",
-    ["", "tcp://:80", "tcp://h", "udp://h:0", "udp://h:99999", "unix:", "ws://", "ws://h:x/", "spy://x", "http://h:1"],
+    [
+        *("", "tcp://:80", "tcp://h", "udp://h:0", "udp://h:99999", "unix:", "ws://", "ws://h:x/", "spy://x"),
+        *("http://h:1", "tcp://a..b:1", f"tcp://{'a' * 64}.x:1", "udp://.a:1"),
+    ],
 )
 def test_what_is_no_port_is_refused_before_anything_is_opened(port: str) -> None:
     assert line_port_fault(port)

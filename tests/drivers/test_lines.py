@@ -50,6 +50,7 @@ def test_where_chunks_end_changes_nothing(lines: list[bytes], data: st.DataObjec
         (b'{"a": true, "b": null, "c": [1], "d": 1e999, "e": NaN}', (1, *[None] * 4)),
         (b"\xef\xbb\xbf7 8", (7, 8)),
         (b'"1","2"', (1, 2)),
+        (b'{"a": "1", "b": " -2.5", "c": "on", "d": {"e": 1}}', (1, -2.5, None, None)),
     ],
 )
 def test_values_that_are_no_numbers_are_none(line: bytes, values: tuple[float | None, ...]) -> None:
@@ -96,9 +97,20 @@ def test_a_header_names_the_rows_after_it_until_the_line_begins_anew() -> None:
     assert parser.feed(b"1,2\n") == [Row(None, (1, 2))]
 
 
-@given(st.binary(max_size=200))
-def test_nothing_that_comes_raises(line: bytes) -> None:
-    parsed(line)
+def test_a_text_in_a_row_of_known_width_is_a_missing_value() -> None:
+    row = b"5,1,fist\n5,fist,open\n5,1,2,fist\n"
+    parser = LineParser()
+    assert parser.feed(b"ms,flex [deg],label\n" + row) == [Row(("ms", "flex [deg]", "label"), (5, 1, None))]
+    assert (parser.counts.misfits, parser.odd) == (2, "'5,1,2,fist'")
+    assert LineParser(3).feed(row) == [Row(None, (5, 1, None))]
+    assert LineParser().feed(row) == []
+    assert LineParser(3).feed(b"booting\n" + row) == [Row(None, (5, 1, None))]
+    assert parser.feed(b"ready\n" + row) == [Row(("ms", "flex [deg]", "label"), (5, 1, None))]
+
+
+@given(st.binary(max_size=200), st.integers(0, 9))
+def test_nothing_that_comes_raises(line: bytes, columns: int) -> None:
+    parsed(line, columns)
 
 
 def test_ten_megabytes_without_a_line_feed_fill_no_memory_and_the_next_row_counts() -> None:

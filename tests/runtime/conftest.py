@@ -13,17 +13,8 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME, Build
-from thenar.runtime.manifest import (
-    SCHEMA,
-    Calibration,
-    Manifest,
-    Options,
-    Origin,
-    Proof,
-    Recognised,
-    Switch,
-    manifest_to_bytes,
-)
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Recognised, Switch
+from thenar.runtime.manifest_file import manifest_to_bytes
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import Count, DeviceHealth, Drift, HealthReport, JointAngles, LiveGrasp
 from thenar.runtime.tables import IntegerTables, Slope, tables_to_bytes

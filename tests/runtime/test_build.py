@@ -10,7 +10,8 @@ from msgspec.structs import replace
 from thenar.runtime import Build
 from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME
 from thenar.runtime.errors import BuildError, ThenarError
-from thenar.runtime.manifest import Manifest, manifest_to_bytes
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.manifest_file import manifest_to_bytes
 from thenar.runtime.tables import MAX_BYTES, IntegerTables, tables_to_bytes
 
 MakeTables = Callable[..., IntegerTables]

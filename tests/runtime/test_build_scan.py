@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from thenar.runtime.build import MANIFEST_NAME, SCAN_NAME, Build
 from thenar.runtime.errors import BuildError
-from thenar.runtime.manifest import manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.scanning.scanmap import SCHEMA, Port, ScanMap, scanmap_to_bytes
 
 SCAN = ScanMap(SCHEMA, "0" * 64, (Port(0, 0, "AB", tuple((bit, bit) for bit in range(9)), False),), ())

@@ -7,16 +7,8 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from thenar.runtime.errors import BuildError, ThenarError
-from thenar.runtime.manifest import (
-    MAX_BYTES,
-    Compared,
-    Fitting,
-    Manifest,
-    Options,
-    Recognised,
-    manifest_from_bytes,
-    manifest_to_bytes,
-)
+from thenar.runtime.manifest import Compared, Fitting, Manifest, Options, Recognised
+from thenar.runtime.manifest_file import MAX_BYTES, manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.published import NONE
 from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables

@@ -305,6 +305,12 @@ def build() -> Build:
 
 
 @pytest.fixture
+def of_switches() -> Callable[[Sequence[str]], Build]:
+    """Return what makes a build of other switches."""
+    return small_build
+
+
+@pytest.fixture
 def stack() -> Iterator[ExitStack]:
     with ExitStack() as stack:
         yield stack

@@ -1,8 +1,10 @@
 """Sketches of every kind of wiring: what they read and send, and that the compilers of their parts take them."""
 
+import re
 import subprocess
 from collections.abc import Callable
 from contextlib import ExitStack
+from itertools import product
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -10,6 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from thenar.compiler.firmware.targets import wired
+from thenar.compiler.firmware.targets.sketch import SketchPart
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine
@@ -55,17 +59,46 @@ CASES = {
     ),
     "glove, matrix": (PICO + IN_MATRIX.replace("GPIO23", "GPIO26") + "false\n[cyberglove]\n", "glove"),
 }
+# The chips besides the ESP32, with the compiler of each core.
+XTENSA, RISCV = "ESP32, Xtensa", "ESP32-C3"
+CHIPS = {"esp32s2": XTENSA, "esp32s3": XTENSA, "esp32c3": RISCV, "esp32c6": RISCV}
+
+
+def on_every_pin(part: str) -> str:
+    """Return the board.toml of a part with a switch on every usable pin."""
+    return f'part = "{part}"\n[pins]\n' + "".join(f's{key} = "{pin}"\n' for key, pin in enumerate(wired()[part].pins))
+
+
+for _part in CHIPS:
+    _start = f'part = "{_part}"\nscan_us = 3000\n'
+    CASES |= {
+        f"{_part}, pins": (on_every_pin(_part), "scan"),
+        f"{_part}, converter": (
+            f'{_start}{ON_CHIPS}[analog]\nindex_pij = "ADC1_CH0"\nthumb_rotation = "ADC1_CH3"\n',
+            "glove",
+        ),
+        f"{_part}, CyberGlove": (f"{_start}[wifi]\n{ON_CHIPS}[cyberglove]\nuart = 1\n", "glove"),
+    }
 FREESTANDING = Path(__file__).with_name("freestanding")
 CORES = {
-    "ESP32, Xtensa": ("xtensa-lx106-elf-", "-mlongcalls"),
-    "ESP32-C3": ("riscv64-unknown-elf-", "-march=rv32imc", "-mabi=ilp32"),
+    XTENSA: ("xtensa-lx106-elf-", "-mlongcalls"),
+    RISCV: ("riscv64-unknown-elf-", "-march=rv32imc", "-mabi=ilp32"),
     "RP2040": ("arm-none-eabi-", "-mcpu=cortex-m0plus", "-mthumb"),
 }
 CPP = ("-std=gnu++17", "-fno-exceptions", "-fno-rtti")
 
 
-@pytest.mark.parametrize("case", ["pins, Wi-Fi", "taxels", "glove, converter", "glove, CyberGlove", "glove, matrix"])
-@pytest.mark.parametrize("core", CORES)
+KINDS = ("pins, Wi-Fi", "taxels", "glove, converter", "glove, CyberGlove", "glove, matrix")
+OF_A_CHIP = ("pins", "converter", "CyberGlove")
+
+
+@pytest.mark.parametrize(
+    ("core", "case"),
+    [
+        *product(CORES, KINDS),
+        *((core, f"{part}, {kind}") for (part, core), kind in product(CHIPS.items(), OF_A_CHIP)),
+    ],
+)
 def test_compilers_of_the_parts_have_nothing_to_say(
     written: Callable[..., Path], tool: Tool, shim: Path, tmp_path: Path, core: str, case: str
 ) -> None:
@@ -85,6 +118,19 @@ def test_compilers_of_the_parts_have_nothing_to_say(
             assert (done.returncode, done.stderr) == (0, ""), source.name
             found.add(source.suffix)
     assert found == {".c", ".cpp", ".ino"}
+
+
+PARTS = [name for name, part in wired().items() if isinstance(part, SketchPart)]
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_a_switch_on_every_usable_pin_is_read_there(
+    written: Callable[..., Path], of_switches: Callable[[list[str]], Any], tmp_path: Path, part: str
+) -> None:
+    pins = [pin for pin in wired()[part].pins if pin not in wired()[part].uarts[0]]
+    sketch = written(tmp_path, on_every_pin(part), "scan", of_switches([f"s{key}" for key in range(len(pins))]))
+    lines = re.findall(r"^    (\d+)u, /\* (.*) \*/$", (sketch / "thenar_pins.cpp").read_text(), re.MULTILINE)
+    assert lines == [(pin.removeprefix("GPIO"), f"{key}: s{key}") for key, pin in enumerate(pins)]
 
 
 def until(scanner: Scanner, wanted: Callable[[ScannerReading], bool]) -> ScannerReading:
@@ -185,13 +231,18 @@ def _says(grasp: BoardGrasp, expected: tuple[int, int]) -> bool:
     return not grasp.degraded and grasp.number == number and (grasp.early or grasp.margin == margin)
 
 
-def test_a_glove_with_a_converter_recognises_as_python_does(start: Start, build: Any) -> None:
-    board, random = start(*CASES["glove, converter"]), np.random.default_rng(4)
+@pytest.mark.parametrize("case", ["glove, converter", *(f"{part}, converter" for part in CHIPS)])
+def test_a_glove_with_a_converter_recognises_as_python_does(start: Start, build: Any, case: str) -> None:
+    """Switches are on pins, or on chips; the converter's pins are those of the joints' channels."""
+    board, random, chip = start(*CASES[case]), np.random.default_rng(4), wired().get(case.partition(",")[0])
+    pins = (28, 26) if chip is None else [chip.converter[channel] for channel in ("ADC1_CH3", "ADC1_CH0")]
+    board.do(*(AT_CHIPS if chip is not None else ()))
     with Scanner(board.port("serial")) as host:
         for _ in range(12):
             bits, codes = random.integers(0, 2, 8).astype(bool), random.integers(0, 256, 2)
-            analog = (f"analog {pin} {16 * code + 15}" for pin, code in zip((28, 26), codes, strict=True))
-            board.do(*(f"wire {pin} 255 {int(bit)}" for pin, bit in zip(PINS, bits, strict=True)), *analog)
+            board.do(*(f"analog {pin} {16 * code + 15}" for pin, code in zip(pins, codes, strict=True)))
+            wires = [f"wire {pin} 255" for pin in PINS] if chip is None else [f"close {key}" for key in range(8)]
+            board.do(*(f"{wire} {int(bit)}" for wire, bit in zip(wires, bits, strict=True)))
             recognises(host, recognised(build, bits, codes))
 
 

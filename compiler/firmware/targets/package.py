@@ -16,12 +16,11 @@ from .cortex_m import MEMBER as _CORTEX_M
 
 if TYPE_CHECKING:
     from ..classifier import Library
+    from ..example import Pins
     from ..layout import Layout
     from ..probes import Frames, Lost, Predictions
 
 _VERSION = "1.0.0"
-_LED = 13  # has the board's LED, whose resistor to ground overrides a pull-up on some boards
-_FIRST_PIN = 2  # 0 and 1 are the serial port's
 
 _TYPES = ("class", "switch", "code")
 _FUNCTIONS = ("init", "set_switch", "classify", "update", "margin", "probability", "grasp")
@@ -42,23 +41,27 @@ class Package(Target):
         """The core that is counted on, and the part that it represents."""
         return self.part if self.like is None else f"{self.like.part}, for {self.part}"
 
+    @property
+    def example_pins(self) -> "Pins | None":
+        """The pins for the example for Arduino; None: numbered as on an Uno or a Mega."""
+        return None
+
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text of the package thenar_NAME: the classifier in src/, the files that each ecosystem
         requires, a self test in check/, and an example for Arduino.
-
-        The example's pins are numbered as on an Uno or a Mega: switches from 2 on without 13, sensors from A0 on.
         """
         from thenar.firmware_templates.rendering import render
 
+        from ..example import Wiring, example_values
         from ..probes import CHECKS, check_header
         from ..words import comment, inputs_in_words, markdown
 
-        name, names = library.name, library.names
+        name, names, wiring = library.name, library.names, Wiring.of(library, self.example_pins)
         counts = {"switches": len(names.switches), "joints": len(names.joints)}
         grasps = [comment(grasp) for grasp in names.grasps]
         values = {
             **{"name": name, "version": _VERSION, "thenar": markdown(names.thenar), "checks": CHECKS},
-            **{"grasps": grasps, **counts, "wiring": str(Wiring.of(library)), "on_pins": library.sensors.on_pins},
+            **{"grasps": grasps, **counts, "wiring": str(wiring), "on_pins": library.sensors.on_pins},
             "sensors": bool(library.sensors.every),
             "known": library.sensors.known,
             "points": [
@@ -75,12 +78,16 @@ class Package(Target):
             **{path: render(f"package/{path.rsplit('/', 1)[-1]}.j2", **values) for path in _BESIDE},
             "check/check.c": render("host/check.c.j2", name=name, checks=CHECKS),
             f"check/thenar_{name}_check.h": check_header(name, library.layout, names.grasps),
-            "examples/Recognise/Recognise.ino": render("package/Recognise.ino.j2", name=name, **_example(library)),
+            "examples/Recognise/Recognise.ino": render(
+                "package/Recognise.ino.j2", name=name, **example_values(library, wiring)
+            ),
         }
 
     def said(self, library: "Library") -> str:
-        """Return which of Arduino's boards the example fits."""
-        return str(Wiring.of(library))
+        """Return which boards the example fits."""
+        from ..example import Wiring
+
+        return str(Wiring.of(library, self.example_pins))
 
     def missing(self) -> str | None:
         """Return which of compiler and emulator is missing, and how to install it; None if neither is."""
@@ -126,75 +133,6 @@ def _keywords(name: str, segments: bool, codes: bool) -> list[tuple[str, str]]:
     words = [(f"thenar_{name}", "KEYWORD1")]
     words += [(f"thenar_{name}_{word}", kind) for kind, ours in kinds.items() for word in ours]
     return [*words, *((f"THENAR_{name.upper()}_{word}", "LITERAL1") for word in _CONSTANTS)]
-
-
-# Digital pins that are not also analog inputs, and analog inputs.
-_BOARDS = {"Uno": (14, 6), "Nano": (14, 8), "Mega": (54, 16)}
-_ON_MULTIPLEXER, _ON_REGISTER = 16, 8
-
-
-@dataclass(frozen=True, slots=True)
-class Wiring:
-    """The pins of the example: of each switch that has one, by number, and of the multiplexers' addresses; and the
-    number of sensors.
-    """
-
-    switches: dict[int, int]
-    addresses: tuple[int, ...]
-    sensors: int
-
-    @classmethod
-    def of(cls, library: "Library") -> "Wiring":
-        """Return the pins, numbered as on an Uno or a Mega."""
-        plain = [number for number, switch in enumerate(library.names.switches) if switch.threshold is None]
-        free = [pin for pin in range(_FIRST_PIN, _FIRST_PIN + len(plain) + 5) if pin != _LED]
-        pins = dict(zip(plain, free, strict=False))
-        return cls(pins, tuple(free[len(plain) :][:4]), len(library.sensors.every))
-
-    def needed(self, *, multiplexed: bool = False) -> int:
-        """Return the smallest number of digital pins of a board on which every switch has a separate pin."""
-        used = [*self.switches.values(), *(self.addresses if multiplexed else ())]
-        return max(used, default=0) + 1
-
-    def on(self, digital: int, analog: int) -> str:
-        """Return the additional parts for a board with these numbers of pins: "2 shift registers 74HC165"."""
-        multiplexed = analog < self.sensors
-        parts = []
-        if digital < self.needed(multiplexed=multiplexed):
-            parts.append((-(-len(self.switches) // _ON_REGISTER), "74HC165"))
-        if multiplexed:
-            parts.append((-(-self.sensors // _ON_MULTIPLEXER), "CD74HC4067"))
-        return " and ".join(f"{count} {part}" for count, part in parts)
-
-    def __str__(self) -> str:
-        """Return which boards the example fits, in a sentence without its full stop."""
-        needs: dict[str, list[str]] = {}
-        for board, pins in _BOARDS.items():
-            needs.setdefault(self.on(*pins), []).append(board)
-        fits = [f"{' and '.join(boards)} {f'with {parts}' if parts else 'as it is'}" for parts, boards in needs.items()]
-        return f"the example Recognise fits Arduino {'; '.join(fits)}"
-
-
-def _example(library: "Library") -> dict[str, object]:
-    """Return the values for the example's template."""
-    from ..words import comment
-
-    wiring, sensors = Wiring.of(library), library.sensors
-    text = f"thenar_{library.name}_grasp(grasp)"
-    said = [comment(f"{sensor.name}: {' and '.join(sensor.says)}") for sensor in sensors.every]
-    digital = "NUM_DIGITAL_PINS - NUM_ANALOG_INPUTS" if said else "NUM_DIGITAL_PINS"
-    return {
-        "switches": [(n, pin, comment(library.names.switches[n].name)) for n, pin in wiring.switches.items()],
-        "sensors": [(f"A{number}", what) for number, what in enumerate(said)],
-        "sorts": "taxels" if not sensors.joints and sensors.taxels else "joints",
-        "on_pins": sensors.on_pins,
-        "digital_pins": digital,
-        "needed": wiring.needed(),
-        "needed_multiplexed": wiring.needed(multiplexed=True),
-        "address_pins": wiring.addresses,
-        "output_pins": [f"A{number}" for number in range(-(-len(said) // _ON_MULTIPLEXER))],
-        "text": f"(const __FlashStringHelper *){text}" if library.avr else text,
-    }
 
 
 M0PLUS, _M4 = _CORTEX_M

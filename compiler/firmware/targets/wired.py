@@ -15,7 +15,7 @@ class Wired(Target):
     uarts     the (RXD, TXD) pins of every UART; the first is the host's, () where the host has another line
     twi       the SDA and SCL pins
     analog    the channels of its converter by name, with the pin each shares; "" for a channel without a digital pin
-    tied      pins that are not in `pins` although they might seem usable, and the reason
+    tied      pins and channels that are not listed although they might seem usable, and the reason
     code_bits of a code of the converter
     wireless  whether it can send its frames by Wi-Fi
     """

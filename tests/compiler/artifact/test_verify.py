@@ -22,7 +22,7 @@ from thenar.runtime import Build, BuildError
 from thenar.runtime.build import SCAN_NAME
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import BusWiring, Harness
-from thenar.runtime.manifest import manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.scanning.plan import check_harness
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.scanmap import scanmap_to_bytes

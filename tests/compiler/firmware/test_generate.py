@@ -180,13 +180,15 @@ def test_less_flash_is_a_smaller_layout_and_too_little_is_refused(build: Build, 
             "cortex-m4",
             "scan",
             "scan pins",
-            "the mode scan is available for avr328p, avr2560, esp32 and rp2040, not for cortex-m4",
+            "the mode scan is available for avr328p, avr2560, esp32, esp32c3, esp32c6, esp32s2, esp32s3 and rp2040, "
+            "not for cortex-m4",
         ),
         (
             "arduino",
             "glove",
             "scan pins",
-            "the mode glove is available for avr328p, avr2560, esp32 and rp2040, not for arduino",
+            "the mode glove is available for avr328p, avr2560, esp32, esp32c3, esp32c6, esp32s2, esp32s3 and rp2040, "
+            "not for arduino",
         ),
         ("avr328p", "scan", None, r"the mode scan needs a board\.toml"),
         ("avr2560", "scan", "scan pins", "the board has an atmega328p, but the target avr2560 is an atmega2560"),

@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thenar.compiler.frontier.find import choices_to_mark, find_frontier
+from thenar.compiler.frontier.find import find_frontier
+from thenar.compiler.frontier.marks import choices_to_mark
 from thenar.compiler.frontier.points import FrontierError, PlacementChoice
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.search import (

@@ -12,9 +12,10 @@ import pytest
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.artifact.documents import Documents
+from thenar.compiler.pages import embedded
 from thenar.compiler.pictures import PALETTE
 from thenar.compiler.tryout import writing
-from thenar.compiler.tryout.writing import MOST_BYTES, embedded, sample, scoped
+from thenar.compiler.tryout.writing import MOST_BYTES, sample, scoped
 
 Make = Callable[..., GraspSet]
 

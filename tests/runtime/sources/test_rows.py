@@ -196,6 +196,28 @@ def test_what_is_wrong_with_all_rows_is_said(play: Play) -> None:
     assert source.trouble() == "10 rows a second arrive, but glove.toml says 100: set rate_hz = 10"
 
 
+def test_a_sender_that_falls_silent_or_sends_something_else_is_said(play: Play) -> None:
+    row, silent = b"5,0,0,0,0,0,0\n", "connected, but no row has come for 2 s or longer: is its program running?"
+    source, _ = play([(1_000_000, b"boot\n" + row), (2_900_000, b"")])
+    assert source.trouble() == ""
+    source, _ = play([(1_000_000, b"boot\n1,2\n" + row), (3_100_000, b"")])
+    assert source.trouble() == silent
+    assert source.counts()[0].value == 0
+    source, _ = play([(1_000_000, row), (3_100_000, b"1,2\n")])
+    assert source.trouble().startswith("its rows have other columns than glove.toml: column 1, column 2, not ms")
+    source, _ = play([(1_000_000, row), (3_100_000, b"rst:0x10\n")])
+    assert source.trouble() == "the data holds no rows: 'rst:0x10'"
+
+
+@pytest.mark.parametrize("moving", [0, 1])
+def test_a_clock_that_stands_still_is_said(play: Play, moving: int) -> None:
+    still = [(1_000_000 + 10_000 * n, b"7,%d,0,0,0,0,0\n" % (n % 2 * moving)) for n in range(8)]
+    source, _ = play(still[:4])
+    assert source.trouble() == ""
+    source, _ = play(still)
+    assert source.trouble().startswith("its clock does not change from row to row")
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -12,7 +12,7 @@ from thenar.drivers.errors import SettingError
 from thenar.runtime import Build
 from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME
 from thenar.runtime.frames import SwitchFrame
-from thenar.runtime.manifest import manifest_to_bytes
+from thenar.runtime.manifest_file import manifest_to_bytes
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.tables import tables_to_bytes

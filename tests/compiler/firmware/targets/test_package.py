@@ -30,7 +30,7 @@ HARD_FLOAT = "-mthumb -mfloat-abi=hard"
 # The family's cores, and what its SDK calls our CMakeLists.txt by.
 BOARDS = {
     "ESP32, Xtensa": ("esp32", "esp-idf", XTENSA, "-mlongcalls"),
-    "ESP32-C3": ("esp32", "esp-idf", RISCV, "-march=rv32imc -mabi=ilp32"),
+    "ESP32-C3": ("esp32c3", "esp-idf", RISCV, "-march=rv32imc -mabi=ilp32"),
     "RP2040": ("rp2040", "cmake", ARM, "-mcpu=cortex-m0plus -mthumb"),
     "RP2350, Arm": ("rp2350", "cmake", ARM, f"-mcpu=cortex-m33 {HARD_FLOAT} -mfpu=fpv5-sp-d16"),
     "RP2350, RISC-V": ("rp2350", "cmake", RISCV, "-march=rv32imac -mabi=ilp32"),
@@ -219,12 +219,14 @@ def test_the_program_in_the_readme_compiles(tool: Tool, written: Written, tmp_pa
 
 def test_a_package_is_counted_on_the_core_that_it_says(make_tables: MakeTables) -> None:
     layout = arrange(make_tables())
-    for core, names in {"cortex-m0plus": ["rp2040"], "cortex-m4": ["nrf52", "stm32", "generic"]}.items():
+    cores = {"cortex-m0plus": ["rp2040"], "cortex-m4": ["nrf52", "stm32", "generic"], "rv32imac": ["esp32c3", "esp32c6"]}
+    for core, names in cores.items():
         for name in names:
             target = TARGETS[name]
             assert (target.counted_on, target.missing()) == (f"{core}, for {name}", TARGETS[core].missing())
             assert target.cost(layout) == TARGETS[core].cost(layout)
-    assert TARGETS["esp32"].counted_on == "lx106, for esp32"
+    for name in ("esp32", "esp32s2", "esp32s3"):
+        assert TARGETS[name].counted_on == f"lx106, for {name}"
     assert TARGETS["rp2350"].counted_on == "cortex-m33, for rp2350"
     assert TARGETS["arduino"].missing() == "thenar has no simulator of an arduino"
 

@@ -1,24 +1,30 @@
 """The Arduino sketch, compiled for this machine, with the parts around a board: each frame is answered as by Python."""
 
 import dataclasses
+import re
 import subprocess
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
 from thenar.compiler.firmware.classifier import Library
+from thenar.compiler.firmware.example import BOARDS, ArduinoBoard, Wiring, example_values
 from thenar.compiler.firmware.layout import arrange
-from thenar.compiler.firmware.sensors import sensors_of
+from thenar.compiler.firmware.sensors import Sensors, sensors_of
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.firmware.targets.package import Wiring
+from thenar.compiler.firmware.targets.package import Package
 from thenar.compiler.firmware.words import numbered
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
 from thenar.runtime.tables import IntegerTables
+
+VARIANTS = Path("/usr/share/arduino/hardware/arduino/avr/variants")
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
@@ -33,25 +39,29 @@ BOARD = r"""
 #include <vector>
 enum { LOW, HIGH, INPUT, OUTPUT, INPUT_PULLUP };
 enum { A0 = 100, A1, A2, A3, A4, A5, A6, A7, A8, A9, A10, A11, A12, A13, A14, A15 };
-static int levels[64], modes[64], closed[256], counts[256], wired_to[256];
+static const int registers[] = {REGISTERS}; /* PL, CP, Q7 */
+static const int analog[] = {ANALOG};
+static int levels[256], modes[256], closed[256], counts[256], wired_to[256];
 static std::vector<int> chain;
 static size_t at;
 void pinMode(int pin, int mode) { modes[pin] = mode; }
 void digitalWrite(int pin, int level) {
     if (modes[pin] != OUTPUT) abort();
-    if (pin == 2 && level == LOW) { chain.assign(closed, closed + 256); at = 0; }
-    if (pin == 3 && level == HIGH && levels[3] == LOW) at++;
+    if (pin == registers[0] && level == LOW) { chain.assign(closed, closed + 256); at = 0; }
+    if (pin == registers[1] && level == HIGH && levels[pin] == LOW) at++;
     levels[pin] = level;
 }
 int digitalRead(int pin) {
     if (modes[pin] != INPUT_PULLUP) abort();
 #ifdef WITH_REGISTERS
-    return pin == 4 && chain[at] ? LOW : HIGH;
+    return pin == registers[2] && chain[at] ? LOW : HIGH;
 #else
     return wired_to[pin] >= 0 && closed[wired_to[pin]] ? LOW : HIGH;
 #endif
 }
 int analogRead(int pin) {
+    size_t place = 0;
+    while (analog[place] != pin) place++;
 #ifdef ADDRESS
     static const int address[] = {ADDRESS};
     int channel = 0;
@@ -59,9 +69,9 @@ int analogRead(int pin) {
         if (modes[address[bit]] != OUTPUT) abort();
         channel |= levels[address[bit]] << bit;
     }
-    return counts[16 * (pin - A0) + channel];
+    return counts[16 * place + channel];
 #else
-    return counts[pin - A0];
+    return counts[place];
 #endif
 }
 void delay(int) {}
@@ -88,65 +98,105 @@ int main() {
     }
 }
 """
-GLOVE = 'name = "glove"\n[[stream]]\nport = "/dev/ttyUSB0"\njoints = {{ {} }}\ntaxels = {{ pad = [0, 1023] }}\n'
+GLOVE = 'name = "glove"\n[[stream]]\nport = "/dev/ttyUSB0"\njoints = {{ {} }}\ntaxels = {{ {} }}\n'
+# A target, one of Arduino's boards, switches, joints and taxels of the build, and the parts that the board needs.
+CASES = [
+    ("arduino", "Uno", 8, 3, 1, ""),
+    ("arduino", "Uno", 16, 0, 0, ""),
+    ("arduino", "Uno", 17, 0, 0, ""),
+    ("arduino", "Uno", 18, 0, 0, "3 74HC165"),
+    ("arduino", "Uno", 19, 3, 1, "3 74HC165"),
+    ("arduino", "Nano", 11, 3, 0, ""),
+    ("arduino", "Nano", 12, 7, 1, "2 74HC165"),
+    ("arduino", "Mega", 8, 18, 1, "2 CD74HC4067"),
+    ("arduino", "Uno", 32, 17, 1, "4 74HC165 and 2 CD74HC4067"),
+    ("arduino", "Uno", 0, 4, 0, ""),
+    ("arduino", "Uno", 0, 0, 1, ""),
+    ("arduino", "Uno", 0, 18, 0, "2 CD74HC4067"),
+    ("esp32", "", 10, 5, 1, ""),
+    ("esp32s2", "", 19, 10, 0, ""),
+    ("esp32s3", "", 20, 8, 1, "3 74HC165"),
+    ("esp32c3", "", 8, 0, 0, ""),
+    ("esp32c3", "", 4, 3, 1, ""),
+    ("esp32c3", "", 9, 12, 1, "2 74HC165 and 1 CD74HC4067"),
+    ("esp32c6", "", 0, 5, 0, ""),
+    ("rp2040", "", 19, 3, 1, "1 CD74HC4067"),
+]
+
+
+def build_of(make_tables: MakeTables, describe: Describe, switches: int, joints: int, taxels: int) -> Build:
+    """Return a build of these inputs; a taxel is one level, before all but two switches."""
+    tables = make_tables(seed=1, switches=switches + taxels, joints=joints)
+    manifest = describe(tables)
+    level = Switch(0, "pad", 0.5, Threshold(600, 0.0, Calibration(0, "pad", "counts", 0, 0.0, 1, 1.0)))
+    named = manifest.switches[:2][:switches] + (level,) * taxels
+    manifest = replace(
+        manifest,
+        switches=named + manifest.switches[len(named) :],
+        joints=tuple(replace(joint, unit="raw", code_a=1, value_a=1.0, code_b=255) for joint in manifest.joints),
+    )
+    return Build(manifest, tables)
+
+
+def expected_of(build: Build, sensors: Sensors, known: bool, closed: np.ndarray, counts: np.ndarray) -> list[str]:
+    """Return Python's grasp types for rows of switches, and of the counts of joints and taxels."""
+    names = [switch.name for switch in build.manifest.switches]
+    # Filled in, a reading becomes a code at once, and not the byte of a stream first.
+    read = [
+        sensor if known else dataclasses.replace(sensor, readings=(0, 1016), grid=None) for sensor in sensors.joints
+    ]
+    expected = []
+    for one, other in zip(closed, counts.tolist(), strict=True):
+        bits = np.insert(one, names.index("pad"), other[-1] > 600) if "pad" in names else one
+        codes = [sensor.code(count) for sensor, count in zip(read, other, strict=False)]
+        expected.append(build.classify(bits, np.array(codes, np.uint16)))
+    return expected
 
 
 @pytest.mark.parametrize(
-    ("switches", "joints", "pins", "parts"),
-    [
-        (9, 3, (14, 6), ""),
-        (20, 3, (14, 6), "3 74HC165"),
-        (9, 18, (20, 6), "2 CD74HC4067"),
-        (33, 17, (14, 6), "4 74HC165 and 2 CD74HC4067"),
-    ],
-    ids=["pins", "registers", "multiplexers", "both"],
+    ("case", "known"),
+    [(case, known) for case in CASES for known in (True, False) if known or case[3] + case[4]],
+    ids=lambda value: "-".join(map(str, value)) if isinstance(value, tuple) else "of a glove" * value or "filled in",
 )
-@pytest.mark.parametrize("known", [True, False], ids=["of a glove", "filled in"])
 def test_every_frame_is_answered_as_by_python(
     tool: Callable[[str], str],
     make_tables: MakeTables,
     describe: Describe,
     tmp_path: Path,
-    switches: int,
-    joints: int,
-    pins: tuple[int, int],
-    parts: str,
+    case: tuple[str, str, int, int, int, str],
     known: bool,
 ) -> None:
-    tables = make_tables(seed=3, switches=switches, joints=joints)
-    manifest = describe(tables)
-    level = Threshold(600, 0.0, Calibration(0, "pad", "counts", 0, 0.0, 1, 1.0))
-    manifest = replace(
-        manifest,
-        switches=(*manifest.switches[:2], Switch(0, "pad", 0.5, level), *manifest.switches[3:]),
-        joints=tuple(replace(joint, unit="raw", code_a=1, value_a=1.0, code_b=255) for joint in manifest.joints),
-    )
-    harness = parse_harness(GLOVE.format(", ".join(f"{joint.name} = [0, 1016]" for joint in manifest.joints)), "g")
+    target, board, switches, joints, taxels, parts = case
+    build = build_of(make_tables, describe, switches, joints, taxels)
+    manifest, layout = build.manifest, arrange(build.tables)
+    ranges = ", ".join(f"{joint.name} = [0, 1016]" for joint in manifest.joints)
+    harness = parse_harness(GLOVE.format(ranges, "pad = [0, 1023]" * taxels), "g") if joints + taxels else None
     sensors = sensors_of(manifest, harness)
-    library = Library("hand", manifest, arrange(tables), avr=False, glove=sensors if known else None)
-    wiring = Wiring.of(library)
-    assert wiring.on(*pins) == parts
-    for path, text in TARGETS["arduino"].files(library).items():
+    library = Library("hand", manifest, layout, avr=False, glove=sensors if known and joints + taxels else None)
+    package = TARGETS[target]
+    assert isinstance(package, Package)
+    wiring = Wiring.of(library, package.example_pins)
+    assert str(wiring.on(BOARDS[board]) if board else wiring.of_part) == parts
+    values = example_values(library, wiring)
+    for path, text in package.files(library).items():
         (tmp_path / Path(path).name).write_text(text)
     if not known:
-        sketch = (tmp_path / "Recognise.ino").read_text()
-        assert sketch.count("    {0, 0}, /*") == joints + 1
+        before, table, after = (tmp_path / "Recognise.ino").read_text().partition("readings[SENSORS][2]")
+        assert after.count("    {0, 0}, /*") == joints + taxels
         # What the readings are at codes 1 and 255; the counts of the taxel are its codes.
-        sketch = sketch.replace("{0, 0}, /* pad", "{0, 1}, /* pad").replace("{0, 0}", "{0, 1016}")
-        (tmp_path / "Recognise.ino").write_text(sketch)
+        after = after.replace("{0, 0}, /* pad", "{0, 1}, /* pad").replace("{0, 0}", "{0, 1016}")
+        (tmp_path / "Recognise.ino").write_text(before + table + after)
+    behind = "address_pins_behind_registers" if "165" in parts else "address_pins"
     given = {
-        "NUM_DIGITAL_PINS": sum(pins),
-        "NUM_ANALOG_INPUTS": pins[1],
-        "SWITCHES_THERE": switches - 1,
-        "SENSORS_THERE": joints + 1,
-        "PINS": "".join(f"{pin}," for pin in wiring.switches.values()),
+        **(macros(BOARDS[board]) if board else {}),
+        "SWITCHES_THERE": switches,
+        "SENSORS_THERE": joints + taxels,
+        "REGISTERS": listed(values["register_pins"]),
+        "ANALOG": listed(values["output_pins"] if "4067" in parts else dict(values["sensors"])) or "-1",
+        "PINS": "".join(f"{pin}," for _, pin, _ in values["switches"] if "165" not in parts),
         "CALIBRATED": 1,
         **({"WITH_REGISTERS": 1} if "165" in parts else {}),
-        **(
-            {"ADDRESS": "5,6,7,8" if "165" in parts else ",".join(map(str, wiring.addresses))}
-            if "4067" in parts
-            else {}
-        ),
+        **({"ADDRESS": listed(values[behind])} if "4067" in parts else {}),
     }
     (tmp_path / "board.cpp").write_text(BOARD)
     defined = [f"-D{name}={value}" for name, value in given.items()]
@@ -158,30 +208,90 @@ def test_every_frame_is_answered_as_by_python(
     assert done.returncode == 0, done.stderr
 
     random = np.random.default_rng(7)
-    closed = random.random((80, switches - 1)) < 0.5
-    counts = random.integers(0, 1024, (80, joints + 1))
+    closed = random.random((300, switches)) < 0.5
+    counts = random.integers(0, 1024, (300, joints + taxels))
     lines = "\n".join(" ".join(map(str, [*map(int, one), *other])) for one, other in zip(closed, counts, strict=True))
     printed = subprocess.run([tmp_path / "board"], input=lines, capture_output=True, text=True, check=True).stdout
-    build = Build(manifest, tables)
-    # Filled in, a reading becomes a code at once, and not the byte of a stream first.
-    read = [
-        sensor if known else dataclasses.replace(sensor, readings=(0, 1016), grid=None) for sensor in sensors.joints
-    ]
-    expected = []
-    for one, other in zip(closed, counts.tolist(), strict=True):
-        bits = np.insert(one, 2, other[-1] > 600)
-        codes = [sensor.code(count) for sensor, count in zip(read, other[:-1], strict=True)]
-        expected.append(build.classify(bits, np.array(codes, np.uint16)))
-    assert len(set(expected)) > 2
+    expected = expected_of(build, sensors, known, closed, counts)
+    assert len(set(expected)) > 1
     assert printed.splitlines() == expected
 
 
+def listed(pins: Any) -> str:
+    """Return pins for a table in C."""
+    return ",".join(map(str, pins))
+
+
+def macros(board: ArduinoBoard) -> dict[str, int]:
+    """Return the macros of a board of Arduino's."""
+    return {"NUM_DIGITAL_PINS": board.digital, "PIN_A0": board.first_analog, "NUM_ANALOG_INPUTS": board.analog}
+
+
+@pytest.mark.parametrize("board", BOARDS)
+def test_macros_are_those_of_arduinos_core(tool: Callable[[str], str], board: str) -> None:
+    variant = {"Uno": "standard", "Nano": "eightanaloginputs", "Mega": "mega"}[board]
+    if not (VARIANTS / variant).is_dir():
+        tool("arduino-core-avr")
+    part = "atmega2560" if board == "Mega" else "atmega328p"
+    command = [tool("avr-gcc"), f"-mmcu={part}", "-E", "-dM", str(VARIANTS / variant / "pins_arduino.h")]
+    defined = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    found = {name: re.search(rf"#define {name} +\(?(\d+)\)?$", defined, re.MULTILINE) for name in macros(BOARDS[board])}
+    assert {name: int(match[1]) for name, match in found.items() if match is not None} == macros(BOARDS[board])
+
+
+def test_what_is_printed_is_what_the_sketch_chooses_on_each_board(
+    tool: Callable[[str], str], make_tables: MakeTables, describe: Describe
+) -> None:
+    """From no switch to more than a Mega has pins for, without sensors and with few and many, in one preprocessing."""
+    text, expected = "", []
+    for joints, switches in product((0, 1, 6, 7, 16, 17), range(1, 71)):
+        build = build_of(make_tables, describe, switches, joints, 0)
+        library = Library("hand", build.manifest, arrange(build.tables, bins="search"), avr=False)
+        wiring, sketch = Wiring.of(library), TARGETS["arduino"].files(library)["examples/Recognise/Recognise.ino"]
+        for board in BOARDS.values():
+            parts = wiring.on(board)
+            assert parts is not None
+            expected.append(f"{int(parts.registers > 0)} {int(parts.multiplexers > 0)}")
+            text += chosen(sketch, macros(board))
+    command = [tool("gcc"), "-E", "-P", "-x", "c", "-"]
+    done = subprocess.run(command, input=text, capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert [line for line in done.stdout.splitlines() if line.strip()] == expected
+    assert len(set(expected)) == 4
+
+
+def chosen(sketch: str, given: dict[str, int]) -> str:
+    """Return what preprocesses to two digits: whether a sketch has registers and multiplexers with these macros."""
+    lines = [line for line in sketch.splitlines() if line.startswith("#") and "include" not in line]
+    used = {match[1] for line in lines if (match := re.match(r"#define (\w+)", line))}
+    before = [f"#define {name} {value}" for name, value in {**given, "SHOW_READINGS": 1}.items()]
+    for name in ("SHIFT_REGISTERS", "MULTIPLEXERS"):
+        lines += [f"#ifdef {name}", f"#define {name}_THERE 1", "#else", f"#define {name}_THERE 0", "#endif"]
+        used.add(f"{name}_THERE")
+    after = [f"#undef {name}" for name in sorted({*used, *given, "SHOW_READINGS", "SHIFT_REGISTERS", "MULTIPLEXERS"})]
+    return "\n".join([*before, *lines, "SHIFT_REGISTERS_THERE MULTIPLEXERS_THERE", *after, ""])
+
+
 def test_a_library_says_which_boards_the_example_fits(make_tables: MakeTables) -> None:
-    def said(switches: int, joints: int) -> str:
-        tables = make_tables(switches=switches, joints=joints)
-        return TARGETS["arduino"].said(Library("hand", numbered(tables), arrange(tables), avr=False))
+    def said(switches: int, joints: int, target: str = "arduino") -> str:
+        tables = make_tables(switches=switches, joints=joints, bins=3)
+        return TARGETS[target].said(Library("hand", numbered(tables), arrange(tables, bins="search"), avr=False))
 
     assert said(9, 3) == "the example Recognise fits Arduino Uno and Nano and Mega as it is"
+    assert said(16, 0) == "the example Recognise fits Arduino Uno and Nano and Mega as it is"
     assert said(20, 7) == (
         "the example Recognise fits Arduino Uno with 3 74HC165 and 1 CD74HC4067; Nano with 3 74HC165; Mega as it is"
     )
+    assert said(2, 97) == (
+        "the example Recognise fits Arduino Uno in no way, for want of pins; Nano and Mega with 7 CD74HC4067"
+    )
+    assert said(8, 0, "esp32c3") == "the example Recognise fits an esp32c3 as it is"
+    assert said(9, 12, "esp32c3") == "the example Recognise fits an esp32c3 with 2 74HC165 and 1 CD74HC4067"
+    assert said(9, 17, "esp32c3") == "the example Recognise fits an esp32c3 in no way, for want of pins"
+
+
+def test_the_example_for_a_part_with_too_few_pins_does_not_compile(make_tables: MakeTables) -> None:
+    tables = make_tables(switches=9, joints=17, bins=3)
+    library = Library("hand", numbered(tables), arrange(tables, bins="search"), avr=False)
+    sketch = TARGETS["esp32c3"].files(library)["examples/Recognise/Recognise.ino"]
+    assert '\n#error "an esp32c3 has too few pins, even with multiplexers: read the inputs in another way"\n' in sketch

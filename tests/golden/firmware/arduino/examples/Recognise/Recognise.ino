@@ -16,7 +16,11 @@ static thenar_glove_codes codes;
 #error "this board has too few analog inputs, even for one to each multiplexer: read the sensors in reading_of()"
 #endif
 
+#ifdef PIN_A0
+#define DIGITAL_PINS PIN_A0 /* those before the analog inputs */
+#else
 #define DIGITAL_PINS (NUM_DIGITAL_PINS - NUM_ANALOG_INPUTS)
+#endif
 
 /* On a board with fewer digital pins, shift registers 74HC165 replace them, eight switches each, with a resistor to the
    supply at every input: the first switch is on D7 of the chip next to the board, the eighth on D0, the ninth on D7 of

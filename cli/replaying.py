@@ -1,0 +1,148 @@
+"""`thenar run --replay`: recorded frames, recognised again."""
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from itertools import islice
+from operator import eq
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .common import err, warning
+from .lines import echo
+from .sinks import say_what_was_lost, spoilt
+
+if TYPE_CHECKING:
+    from thenar.runtime import Build
+    from thenar.runtime.live.recogniser import Moment
+    from thenar.runtime.policy import Policy
+    from thenar.runtime.preshape import Preshape, PreshapeSelector
+    from thenar.runtime.published import LiveGrasp
+    from thenar.runtime.task import TaskFollower
+
+
+def selecting(build: "Build", preshape: str | None, **how: bool) -> "PreshapeSelector | None":
+    """Return the selector of preshapes, if one was requested."""
+    if preshape is None:
+        return None
+    from thenar.runtime.preshape import preshape_selector
+
+    selector, lacking = preshape_selector(preshape, build, **how)
+    if lacking:
+        err().print(f"thenar: {lacking}")
+    return selector
+
+
+def replay_recording(
+    build: "Build",
+    replay: Path,
+    sinks: Sequence[str],
+    selector: "PreshapeSelector | None",
+    frames: int | None,
+    policy: "Policy | None",
+    follower: "TaskFollower | None",
+) -> None:
+    """Recognise the frames of a live recording again, at their original times.
+
+    Send them to the sinks as the live run did, or as JSON lines to stdout if there are none; on stderr, print how many
+    match the recording.
+    """
+    from thenar.runtime.live.replay import moments
+    from thenar.runtime.sinks.jsonl import encode
+
+    same = count = 0
+    with _published(build, sinks, selector, lambda grasp, shape: encode(grasp, shape, None), follower) as publish:
+        for then, now in islice(moments(build, replay, policy, warning), frames):
+            same += then == now.grasp
+            count += 1
+            publish(now.grasp, now)
+    echo(f"{same} of {count} frames recognised as they were recorded", err=True)
+    if follower is not None:
+        echo(follower.progress.text, err=True)
+
+
+def replay_set(
+    build: "Build",
+    replay: Path,
+    sinks: Sequence[str],
+    selector: "PreshapeSelector | None",
+    frames: int | None,
+    period_us: int,
+) -> None:
+    """Classify every row of a set of grasps alone and send it to each sink, or as a JSON line to stdout if there is
+    none; on stderr, print the accuracy.
+    """
+    import msgspec
+
+    from thenar.compiler.artifact.replay import replayed, trials_recognised
+    from thenar.compiler.recordings.graspset import GraspSet
+
+    whole, found = GraspSet.load(replay), list[str]()
+    grasp_set = whole.rows(range(len(whole))[:frames])
+
+    def line(grasp: "LiveGrasp", shape: "Preshape | None") -> bytes:
+        shown = {
+            "time_us": grasp.time_us,
+            "grasp": grasp.grasp,
+            "probability": round(grasp.probability, 6),
+            "margin": grasp.margin,
+            "degraded": grasp.health == "degraded",
+            "recorded": str(grasp_set.grasps[grasp.number]),
+        }
+        return msgspec.json.encode(shown if selector is None else shown | {"preshape": shape}) + b"\n"
+
+    with _published(build, sinks, selector, line) as publish:
+        for grasp in replayed(build, grasp_set, period_us):
+            found.append(grasp.grasp)
+            publish(grasp, None)
+    rows = len(grasp_set)
+    correct = sum(map(eq, found, grasp_set.grasps.tolist()))
+    echo(f"{correct} of {rows} frames predicted correctly ({correct / max(rows, 1):.1%})", err=True)
+    if (trials := len(set(grasp_set.trial_ids.tolist()))) < rows:
+        correct = trials_recognised(grasp_set, found)
+        echo(f"{correct} of {trials} trials by majority of their frames ({correct / trials:.1%})", err=True)
+
+
+@contextmanager
+def _published(
+    build: "Build",
+    sinks: Sequence[str],
+    selector: "PreshapeSelector | None",
+    line: "Callable[[LiveGrasp, Preshape | None], bytes]",
+    follower: "TaskFollower | None" = None,
+) -> "Iterator[Callable[[LiveGrasp, Moment | None], None]]":
+    """Yield a function that publishes a replayed grasp with its preshape, and news of a task: to sinks, which wait for
+    their readers, or without any as a `line` on stdout. At the end report losses, with exit code 1.
+    """
+    from thenar.runtime.sinks import Fanout, open_sink
+    from thenar.runtime.sinks.jsonl import encode_task
+
+    with ExitStack() as stack:
+        opened = []
+        for name in sinks:
+            opened.append(open_sink(name, wait=True))
+            stack.callback(opened[-1].close)
+        fanout = Fanout(opened)
+        fanout.begin(build)
+
+        def publish(grasp: "LiveGrasp", moment: "Moment | None") -> None:
+            shape = None if selector is None else selector.update(grasp)
+            if opened:
+                fanout.publish(grasp, shape, None)
+                if moment is not None:
+                    fanout.moment(moment)
+            else:
+                sys.stdout.buffer.write(line(grasp, shape))
+            progress = None if follower is None else follower.update(grasp)
+            if progress is not None and opened:
+                fanout.task(progress)
+            elif progress is not None:
+                sys.stdout.buffer.write(encode_task(progress))
+
+        yield publish
+    sys.stdout.flush()
+    say_what_was_lost(fanout.reports())
+    if spoilt(fanout.reports()):
+        click.get_current_context().exit(1)

@@ -1,0 +1,87 @@
+"""The marks of a frontier's pictures: the paper's placement, all switches, and the user's build."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from thenar.runtime.build import Build
+from thenar.runtime.manifest import PAPERS_TRAINER
+
+from ..evaluation.rates import Rate
+from ..placement.elements import Element, above
+from ..placement.methods.base import BEST, PAPERS
+from ..recordings.graspset import GraspSet
+from .equipment import Equipment
+from .finalists import Close, papers_tables
+from .points import FrontierError, Mark, PlacementChoice
+from .search import Candidate
+from .survey import Survey
+from .timing.scan_times import scan_times
+
+# The paper's S.
+_PAPERS = (62.0,)
+
+
+def choices_to_mark(
+    n_switches: int, n_joints: int, trainer: str = PAPERS_TRAINER, levels: int | None = None
+) -> dict[Candidate, str]:
+    """Return the choices to mark, with their names: the paper's placement and all switches, alone and with the joints;
+    with `levels` levels of each taxel.
+    """
+    if not n_switches:
+        return {}
+    marked = {PlacementChoice(PAPERS, prune): f"paper, S = {prune:g}" for prune in _PAPERS}
+    # Keeping all switches is the same by any method.
+    marked[PlacementChoice(BEST, float(n_switches))] = f"all of {n_switches}"
+    alone = {Candidate(choice, "switches", trainer, levels=levels): name for choice, name in marked.items()}
+    with_joints = {replace(one, inputs="both"): f"{name}, joints" for one, name in alone.items()}
+    return alone | (with_joints if n_joints else {})
+
+
+def marks_of(named: dict[Candidate, str], closes: Sequence[Close], survey: Survey) -> tuple[Mark, ...]:
+    """Return the marks of those choices that were fully evaluated, with the paper's rounds and whole scans."""
+    found, tabled = [], papers_tables(survey.search)
+    for close in closes:
+        screened = close.screened
+        if screened.choice in named:
+            priced = next(tables for tables in close.priced if tables.tabled == tabled)
+            us = priced.fastest_us(survey.transfer(screened.choice).us)
+            if us is not None:
+                found.append(Mark(named[screened.choice], len(screened.columns), close.tables[tabled].rate, us))
+    return tuple(found)
+
+
+def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
+    """Return the user's build as a mark: its recorded rate, and its frame in the fastest wiring for its switches.
+
+    Raises FrontierError if it has no rate, or is not for these recordings or this equipment.
+    """
+    build = Build.load(folder)
+    manifest = build.manifest
+    names = [switch.name for switch in manifest.switches]
+    # Comparable with the frontier's rates.
+    pooled = [rate for rate in manifest.rates if rate.protocol != "training" and not rate.of.startswith("new")]
+    if not pooled:
+        raise FrontierError(f"{folder} has no accuracy: compile it with --folds 4, or leave --build out")
+    options, fitting = equipment.model.options(build.tables), equipment.fitting(names)
+    if not options or (names and not fitting):
+        raise FrontierError(f"{folder} cannot be built for {equipment.model.target}: leave --build out, or --target")
+    joints = [joint.name for joint in manifest.joints]
+    sources = _places([switch.source for switch in manifest.switches], grasp_set.element_names, folder)
+    above_codes = [0 if switch.threshold is None else switch.threshold.code for switch in manifest.switches]
+    bits = above(grasp_set.switches, grasp_set.taxels, tuple(map(Element, sources, above_codes)))
+    codes = grasp_set.codes[:, _places(joints, [joint.name for joint in grasp_set.joints], folder)]
+    scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.overhead).full_us for wiring in fitting]
+    frame_us = max(min(scans, default=0.0), equipment.records.of(len(joints)).us) + options[0].us
+    return Mark(
+        f"build {folder.name}", len(names), Rate.counted((pooled[0].correct,), pooled[0].total, of="pooled"), frame_us
+    )
+
+
+def _places(names: Sequence[str], there: Sequence[str], folder: Path) -> list[int]:
+    for name in names:
+        if name not in there:
+            raise FrontierError(
+                f"{folder} reads {name!r}, which the recordings do not hold: it was compiled from others"
+            )
+    return [there.index(name) for name in names]
