@@ -1,9 +1,9 @@
 """The classifier in AVR assembly: which registers hold the sums, and how each lookup finds its row."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from itertools import pairwise, product
-from typing import cast
+from itertools import accumulate, chain, pairwise, product
+from typing import NamedTuple
 
 from . import FirmwareError
 from .layout import Field, JointLayout, Layout, Lookup, looked_up
@@ -35,11 +35,15 @@ def check_size(layout: Layout) -> None:
         raise FirmwareError(f"the tables need {needed} bytes, an AVR reads constants from the first {_LPM_REACH} bytes")
 
 
-def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> dict[str, object]:
-    """Return the values for the assembly template; if `near`, calls are relative."""
-    parts = layout.parts
+def assembly_values(
+    name: str, names: Names, layout: Layout, *, near: bool, whole: Layout | None = None
+) -> dict[str, object]:
+    """Return the values for the assembly template; if `near`, calls are relative. `whole` is the layout whose state
+    update() keeps, where `layout` has but a part of its lookups.
+    """
+    parts, seen = layout.parts, seen_inputs(whole or layout)
     stride, call = parts.width * layout.entry_bits // 8, "rcall" if near else "call"
-    passes = [_pass(names, layout, number) for number in range(len(parts.firsts))]
+    passes = [_pass(names, layout, number, seen, near=near) for number in range(len(parts.firsts))]
     bins = sum(len(joint.bins) for joint in layout.joints)
     return {
         "byte_sums": layout.sum_bits == 8,
@@ -52,6 +56,7 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
         "finds_first": finds_first(layout),
         "compares": compares_input(layout),
         "add_row": "add_row" if layout.adding == "unrolled" else f"{call} add_row_at_z",
+        "add_changed_row": f"{call if layout.adding == 'unrolled' else 'call '} add_row_at_z",
         "call": call,
         "jump": "rjmp" if near else "jmp",
         "passes": passes,
@@ -61,7 +66,6 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
         "kept": kept_registers(layout),
         "last": last_size(layout),
         "seen": seen_size(layout),
-        "sources": FLAGS + layout.frame_size + _n_found(layout),
         "clean": layout.biased and not layout.entry_shift,  # r1 is zero between lookups
         "tables": [
             *([(f"thenar_{name}_rows", layout.n_rows * len(parts.firsts) * stride)] if layout.n_rows else []),
@@ -93,18 +97,36 @@ def compares_input(layout: Layout) -> bool:
     return layout.adding == "unrolled" or layout.code_bits == 8
 
 
-def compared_bytes(layout: Layout, lookup: Lookup) -> list[int]:
-    """Return the offsets in the frame of the input bytes that update() compares to decide whether a lookup's row may
-    have changed. A lookup of switches alone has none: its row number is cheap to compute.
+class Seen(NamedTuple):
+    """The byte of a port, or a code of `size` bytes, at the offset `now` of the input, and its previous value."""
+
+    now: int
+    before: int
+    size: int
+
+
+def seen_inputs(layout: Layout) -> dict[int, list[Seen]]:
+    """Return what update() compares to decide whether a distance or a row may have changed, for each slope and lookup,
+    numbered as in `found_place`. Lookups of switches alone have nothing: their row numbers are cheap to compute.
     """
-    if not lookup.joints or not compares_input(layout):
+    if not compares_input(layout):
+        return {}
+    places = [[_code_place(layout, slope.joint)] for slope in layout.tables.slopes]
+    places += [_lookup_places(layout, lookup) for lookup in layout.lookups]
+    before, found = found_place(layout, _n_found(layout)), {}
+    for number, own in enumerate(places):
+        sizes = [1 if place < len(layout.ports) else layout.code_bits // 8 for place in own]
+        kept = accumulate(sizes, initial=before)
+        found[number] = [Seen(*each) for each in zip(own, kept, sizes, strict=False)]
+        before += sum(sizes)
+    return found
+
+
+def _lookup_places(layout: Layout, lookup: Lookup) -> list[int]:
+    if not lookup.joints:
         return []
     ports = [] if lookup.group is None else [field.port for field in layout.fields[lookup.group]]
-    return [*dict.fromkeys(ports), *(place for joint in lookup.joints for place in _code_bytes(layout, joint.number))]
-
-
-def _compared_of_slope(layout: Layout, joint: int) -> list[int]:
-    return _code_bytes(layout, joint) if compares_input(layout) else []
+    return [*dict.fromkeys(ports), *(_code_place(layout, joint.number) for joint in lookup.joints)]
 
 
 def found_size(layout: Layout) -> int:
@@ -116,9 +138,7 @@ def seen_size(layout: Layout) -> int:
     """Return the size of the state of update(): the distances of slopes, the row numbers of lookups, and the compared
     input bytes.
     """
-    codes = sum(len(compared_bytes(layout, lookup)) for lookup in layout.lookups)
-    codes += sum(len(_compared_of_slope(layout, slope.joint)) for slope in layout.tables.slopes)
-    return max(_n_found(layout) + codes, 1)
+    return max(_n_found(layout) + sum(each.size for own in seen_inputs(layout).values() for each in own), 1)
 
 
 def _n_found(layout: Layout) -> int:
@@ -159,6 +179,9 @@ def _moved(bit: int, width: int, to: int) -> tuple[str, ...]:
     return min(found, key=len)
 
 
+_LOAD, _STORE = "ldd   r{register}, Y+{place}", "std   Y+{place}, r{register}"
+
+
 def far(place: int, *, wide: bool = False) -> int:
     """Return how Y reaches an offset from the glove's input: directly (0), after one `adiw` (1), or after a 16-bit
     addition (2).
@@ -182,7 +205,7 @@ def _at(place: int, transfer: str, registers: Sequence[int]) -> list[str]:
 
 def taken(place: int, register: int, *, wide: bool = False) -> list[str]:
     """Return the instructions that load the input at an offset in the frame, two bytes if `wide`."""
-    return _at(place, "ldd   r{register}, Y+{place}", range(register, register + 1 + wide))
+    return _at(place, _LOAD, range(register, register + 1 + wide))
 
 
 def found_place(layout: Layout, number: int) -> int:
@@ -193,7 +216,7 @@ def found_place(layout: Layout, number: int) -> int:
 def _exchange(layout: Layout, number: int) -> Row:
     """Return the instructions that load the previous row number or distance into r31, and that store r30 over it."""
     place = found_place(layout, number)
-    return {"before_in_r31": taken(place, 31), "store_r30": _at(place, "std   Y+{place}, r{register}", [30])}
+    return {"before_in_r31": taken(place, 31), "store_r30": _at(place, _STORE, [30])}
 
 
 def group_lines(fields: Sequence[Field]) -> list[str]:
@@ -254,7 +277,7 @@ def kept_registers(layout: Layout) -> list[int]:
     return sorted(sums | {_POINTER, _POINTER + 1})
 
 
-def _pass(names: Names, layout: Layout, number: int) -> Row:
+def _pass(names: Names, layout: Layout, number: int, seen: Mapping[int, Sequence[Seen]], *, near: bool) -> Row:
     """Return a pass over all lookups for some classes.
 
     Each sum is in a register, or in a pair from `low` on; those in `spilled`, the last, stay in memory while Y points
@@ -265,12 +288,9 @@ def _pass(names: Names, layout: Layout, number: int) -> Row:
     starts = layout.start[first : first + parts.width].tolist()
     grasps = map(comment, names.grasps[first : first + parts.width])
     high = int(layout.sum_bits == 16)
-    steps = [_step(names, layout, lookup, number) for lookup in layout.lookups]
-    slopes = [_slope(names, layout, at, first) for at in range(len(layout.tables.slopes))]
-    before = 0
-    for each in (*steps, *slopes):
-        each["before"] = before  # offset of its compared input bytes
-        before += len(cast("list[Row]", each["compared_bytes"]))
+    n_slopes = len(layout.tables.slopes)
+    slopes = [_slope(names, layout, at, first, seen.get(at, ())) for at in range(n_slopes)]
+    steps = [_step(names, layout, lookup, number, seen.get(n_slopes + lookup.index, ())) for lookup in layout.lookups]
     sums = [
         {"low": low, "high": low + high, "start": start, "grasp": grasp, "immediate": low >= _IMMEDIATE}
         for low, start, grasp in zip(_registers(layout), starts, grasps, strict=True)
@@ -281,32 +301,58 @@ def _pass(names: Names, layout: Layout, number: int) -> Row:
         "sums": sums,
         "held": sums[: len(held)],
         "spilled": sums[len(held) :],
+        "back": f"{'rjmp' if near else 'jmp'}  back_{number}" if sums[len(held) :] else "ret",
+        "last_bytes": [(_POINTER + at, 2 * len(held) + at * (2 - high)) for at in range(last_size(layout))],
         "scores": 2 * first,
         "again": parts.firsts[number - 1] + parts.width - first if number else 0,
         "steps": steps,
+        "switches": [step for step in steps if step["kind"] == "switches"],
+        "replaces": any(step["kind"] != "switches" for step in steps),
         "slopes": slopes,
         "last": number == len(parts.firsts) - 1,
     }
 
 
-def _code_bytes(layout: Layout, joint: int) -> list[int]:
-    """Return the offsets in the frame of the bytes of a joint's code."""
-    each = layout.code_bits // 8
-    first = len(layout.ports) + layout.padding + joint * each
-    return [*range(first, first + each)]
+def _code_place(layout: Layout, joint: int) -> int:
+    """Return the offset in the frame of a joint's code."""
+    return len(layout.ports) + layout.padding + joint * layout.code_bits // 8
 
 
-def _loaded(places: Sequence[int]) -> list[list[str]]:
-    """Return the instructions that load each input byte into r0."""
-    return [taken(place, 0) for place in places]
+def _compared(seen: Sequence[Seen]) -> Row:
+    """Return how update() loads inputs, a byte into r30 or a code into r31:r30, and the previous ones, into r31 or
+    r1:r0.
+    """
+    compared = [
+        {
+            "wide": each.size > 1,
+            "now": taken(each.now, 30, wide=each.size > 1),
+            "before": taken(each.before, 0, wide=True) if each.size > 1 else taken(each.before, 31),
+        }
+        for each in seen
+    ]
+    return {"kind": "compared" if seen else "found", "compared_inputs": compared}
 
 
-def _code(layout: Layout, joint: int) -> list[str]:
-    """Return the instructions that load a joint's code into r30 or r31:r30."""
-    return taken(_code_bytes(layout, joint)[0], 30, wide=layout.code_bits == 16)
+def _noted(each: Seen) -> list[str]:
+    """Return the instructions that store an input in r30 or r31:r30 as the previous one."""
+    return _at(each.before, _STORE, (30, 31)[: each.size])
 
 
-def _slope(names: Names, layout: Layout, at: int, first: int) -> Row:
+def _taken(layout: Layout, joint: int, seen: Sequence[Seen]) -> Row:
+    """Return the instructions that load a joint's code into r30 or r31:r30: always (`taken`), where update() has
+    compared it (`retaken`: if it has compared nothing else, it is there already), and where it also stores it.
+    """
+    place = _code_place(layout, joint)
+    load = taken(place, 30, wide=layout.code_bits == 16)
+    again = [] if len(seen) == 1 else load
+    return {
+        "taken": load,
+        "retaken": again,
+        "noted": [*again, *chain(*(_noted(each) for each in seen if each.now == place))],
+    }
+
+
+def _slope(names: Names, layout: Layout, at: int, first: int, seen: Sequence[Seen]) -> Row:
     """Return a slope: how its code is loaded, clamped and scaled, and the entries that it multiplies, each with the
     sums that the product is added to or subtracted from.
     """
@@ -314,8 +360,8 @@ def _slope(names: Names, layout: Layout, at: int, first: int) -> Row:
     return {
         "at": at,
         "what": comment(names.joints[slope.joint].name),
-        "taken": _code(layout, slope.joint),
-        "compared_bytes": _loaded(_compared_of_slope(layout, slope.joint)),
+        **_taken(layout, slope.joint, seen),
+        **_compared(seen),
         **_exchange(layout, at),
         "low": slope.low,
         "span": slope.high - slope.low,
@@ -342,27 +388,29 @@ def products(row: Sequence[int]) -> list[tuple[int, list[tuple[int, bool]]]]:
     return [(row[classes[0]], [(k, row[k] == row[classes[0]]) for k in classes]) for classes in found.values()]
 
 
-def _step(names: Names, layout: Layout, lookup: Lookup, part: int) -> Row:
-    """Return a lookup in the pass of a part: its inputs, how its row number is computed and in which register, how each
-    input byte is loaded into r0, and the offset of its rows.
+def _step(names: Names, layout: Layout, lookup: Lookup, part: int, seen: Sequence[Seen]) -> Row:
+    """Return a lookup in the pass of a part: its inputs, how its row number is computed and in which register, what
+    update() compares, and the offset of its rows.
     """
+    grouped = lookup.group is not None
     compared = [joint for joint in reversed(lookup.joints) if joint.compared]
     trimmed = [joint for joint in lookup.joints if not joint.compared]
-    grouped = lookup.group is not None
     weights = [joint.weight for joint in compared]
     factors = [before // weight for before, weight in pairwise(weights)]
     groups = [] if lookup.group is None else [switches_in_words(layout.groups[lookup.group])]
     group = [] if lookup.group is None else group_lines(layout.fields[lookup.group])
+    ports = [each for each in seen if each.now < len(layout.ports)]
     return {
         "index": lookup.index,
         "what": ", ".join([*groups, *(comment(names.joints[joint.number].name) for joint in lookup.joints)]),
         "rows": (part * layout.n_rows + lookup.first_row) * layout.parts.width * layout.entry_bits // 8,
-        "compared_bytes": _loaded(compared_bytes(layout, lookup)),
+        **_compared(seen),
         **_exchange(layout, len(layout.tables.slopes) + lookup.index),
-        "one_group": not lookup.joints,
+        **({} if lookup.joints or layout.biased else {"kind": "switches"}),
+        "noted": [*chain(*([*taken(each.now, 30), *_noted(each)] for each in ports))],
         "compared": [
             {
-                "taken": _code(layout, joint.number),
+                **_taken(layout, joint.number, seen),
                 "times": times,
                 "steps": (joint.thresholds.astype(int) + 1).tolist(),
             }
@@ -370,7 +418,7 @@ def _step(names: Names, layout: Layout, lookup: Lookup, part: int) -> Row:
         ],
         "times": weights[-1] if weights else 1,
         "trimmed": [
-            {"taken": _code(layout, joint.number), **_bins(layout, joint), "how": how}
+            {**_taken(layout, joint.number, seen), **_bins(layout, joint), "how": how}
             for joint, how in zip(trimmed, _adding(len(trimmed), bool(compared), grouped), strict=True)
         ],
         "group": group,

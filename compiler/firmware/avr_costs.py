@@ -20,7 +20,6 @@ from thenar.firmware_templates.rendering import render
 from .assembly import (
     MOST_DISTANCE,
     assembly_values,
-    compared_bytes,
     far,
     finds_first,
     found_place,
@@ -28,6 +27,7 @@ from .assembly import (
     glove_size,
     kept_registers,
     last_size,
+    seen_inputs,
 )
 from .costs import NAME_BYTES, Cost
 from .layout import Field, JointLayout, Layout, Lookup
@@ -226,9 +226,9 @@ _LARGE = 5  # numbers from here on are multiplied by `mul`
 # Bytes of C code, rounded up; a table of whole pages of bins begins at one.
 _SET_SWITCH, _GRASP, _INIT, _PAGE = 80, 40, 70, 256
 _LOSING, _LOSING_JOINTS = 400, 300
-_POINTER = 2  # bytes of variables: what is done while an input is missing, and the glove, where rows are found first
+# Bytes of variables: what is done while an input is missing, the glove where rows are found first, rows in update().
+_POINTER = 2
 # Return addresses of update(), of what it calls about a change, and of what adds a row; a row's number is on top.
-# One more where a group's change takes the last sum from memory to add, and puts it back.
 _CALLS_DEEP = 3
 _RCALL_REACH = 4094  # bytes, forwards and backwards
 _ELPM_BYTES = 16  # where a part has ELPM, classify() looks where its tables end
@@ -290,7 +290,7 @@ def _anywhere(fields: tuple[Field, ...]) -> tuple[Field, ...]:
 def _counted(part: _Part, near: bool, elpm: bool) -> Counts:
     """Return the counts of the assembly of a layout with only these lookups."""
     layout = replace(part.layout, lookups=part.lookups)
-    values = assembly_values("x", numbered(layout.tables), layout, near=near)
+    values = assembly_values("x", numbered(layout.tables), layout, near=near, whole=part.layout)
     common = {"name": "x", "opening": "", "biased": layout.biased, "width": layout.parts.width}
     common |= {"classes": layout.tables.n_classes, "n_rows": layout.n_rows, "relative": layout.tables.relative}
     common |= {"n_lookups": len(layout.lookups), "n_slopes": len(layout.tables.slopes)}
@@ -310,13 +310,14 @@ def _total(layout: Layout, near: bool, elpm: bool) -> Counts:
     compares = layout.code_bits == 16 and layout.bins == "search"
     kind = layout.entry_bits, layout.sum_bits, layout.entry_shift, layout.code_bits, compares, layout.adding
     of_all = (layout.tables.n_classes, layout.tables.relative, layout.tables.slopes, *kind)
+    seen, slopes = seen_inputs(layout), len(layout.tables.slopes)
 
     def count(*lookups: Lookup) -> Counts:
         shapes = tuple(
             (
                 _of_group(layout, lookup),
-                len(compared_bytes(layout, lookup)),
-                far(found_place(layout, len(layout.tables.slopes) + lookup.index)),
+                tuple([far(each.before, wide=each.size > 1) for each in seen.get(slopes + lookup.index, ())]),
+                far(found_place(layout, slopes + lookup.index)),
                 tuple([_of_joint(layout, joint) for joint in lookup.joints]),
             )
             for lookup in lookups
@@ -328,12 +329,12 @@ def _total(layout: Layout, near: bool, elpm: bool) -> Counts:
 
     if layout.tables.slopes:
         return count(*layout.lookups)  # which take longer to render than many lookups
-    ordered = sorted(layout.lookups, key=lambda lookup: not lookup.joints)
-    kinds = {bool(lookup.joints): lookup for lookup in layout.lookups}
-    between = {kind: around(lookup) for kind, lookup in kinds.items()}
-    counts = count(*ordered[:1])
-    for lookup in ordered[1:]:
-        counts = counts.plus(count(lookup)).plus(between[bool(lookup.joints)], -1)
+    first = {bool(lookup.joints): lookup for lookup in reversed(layout.lookups)}
+    between = {joints: around(lookup) for joints, lookup in first.items()}
+    counts = count(*first.values())
+    for lookup in layout.lookups:
+        if lookup is not first[bool(lookup.joints)]:
+            counts = counts.plus(count(lookup)).plus(between[bool(lookup.joints)], -1)
     return counts
 
 
@@ -378,9 +379,8 @@ class AvrCosts:
     def ram(self) -> int:
         """Bytes of a glove, of variables and of the deepest stack, return address included."""
         layout = self._layout
-        taking = last_size(layout) > 0 and not layout.biased and any(not lookup.joints for lookup in layout.lookups)
-        stack = len(kept_registers(layout)) + (_CALLS_DEEP + taking) * self._counter + 1
-        variables = _POINTER * (1 + finds_first(layout)) + found_size(layout) + last_size(layout)
+        stack = len(kept_registers(layout)) + _CALLS_DEEP * self._counter + 1
+        variables = _POINTER * (1 + finds_first(layout) + (layout.n_rows > 0)) + found_size(layout) + last_size(layout)
         return glove_size(layout) + variables + stack
 
     @property
