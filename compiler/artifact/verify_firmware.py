@@ -26,7 +26,7 @@ from ..firmware.choose import Fit, fit_for, smallest_fit
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Library
 from ..firmware.generate import LARGEST
 from ..firmware.layout import ports_of_scan
-from ..firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, lost_inputs, random_frames
+from ..firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, lost_inputs, random_frames, states_of
 from ..firmware.targets import TARGETS
 from ..firmware.targets import kinds as every_kind
 from ..recordings.graspset import GraspSet, Joint
@@ -146,8 +146,8 @@ class TargetCheck(Struct, frozen=True, kw_only=True):
 
     layout     which layout was compiled, and why
     missing    whether inputs are missing in every frame; in every second frame it is a single one
-    frames     how many were classified; `differing` of them differ from Python in a score, grasp type, margin or
-               probability
+    frames     how many were classified; `differing` of them differ from Python in a score, grasp type, margin,
+               probability or state of a segment
     shares     whether margins and probabilities were requested: on an AVR only where inputs are missing
     first      the first differing frame
     misnamed   how many grasp types thenar_NAME_grasp names differently from the manifest; None: not tested, on an AVR
@@ -198,6 +198,8 @@ class FirmwareTrial:
         wrong = (found.scores != scores).any(axis=1) | (found.classes != classes)
         if (said := _said(found)) is not None:
             wrong |= (said != self._said(missing=missing)).any(axis=1)
+        if found.states is not None:
+            wrong |= found.states != self._states(scores, classes)
         return TargetCheck(
             part=fit.target.part,
             layout=fit.choice.why,
@@ -234,6 +236,12 @@ class FirmwareTrial:
         softmax = self._build.softmax
         shares = [softmax.probabilities(own)[n % len(own)] for n, own in enumerate(scores.tolist())]
         return np.stack([best - second, shares], axis=1)
+
+    def _states(self, scores: NDArray[np.int64], classes: NDArray[np.intp]) -> NDArray[np.uint16]:
+        """Return the state of the decoder of segments at each frame (n,), of a build that has learnt segments."""
+        model = self._build.manifest.segments
+        assert model is not None
+        return states_of(model, scores, classes == scores.shape[1])
 
     def _misnamed(self, found: Predictions) -> int | None:
         if found.names is None:
