@@ -86,9 +86,11 @@ def answers_from(printed: bytes, frames: Frames, layout: Layout) -> Predictions:
     size, classes = len(layout.start) + 3, len(layout.start)
     if len(printed) not in (whole := [2 * each * len(frames) for each in (size, size + 1)]):
         raise FirmwareError(f"the program printed {len(printed)} bytes for {len(frames)} frames of {2 * size} bytes")
-    words = np.frombuffer(printed, "<u2").astype(np.uint16).reshape(len(frames), -1)
-    scores, said = words[:, :classes].view(np.int16), words[:, classes:size].T
-    return Predictions(scores, *said, states=words[:, size] if len(printed) == whole[1] and len(frames) else None)
+    with_states = len(frames) > 0 and len(printed) == whole[1]
+    words = np.frombuffer(printed, "<u2").astype(np.uint16).reshape(len(frames), size + with_states)
+    scores, (best, margins, shares) = words[:, :classes].view(np.int16), words[:, classes:size].T
+    states = words[:, size] if with_states else None
+    return Predictions(scores, best, margins, shares, states=states)
 
 
 def states_of(model: SegmentModel, scores: NDArray[np.integer], refused: NDArray[np.bool_]) -> NDArray[np.uint16]:

@@ -169,9 +169,11 @@ def _counted(written: bytes, frames: "Frames", layout: "Layout", machine: Machin
 
     size = 2 * len(layout.start) + 10
     names, written = names_in(written, layout)
-    if len(written) not in {4 + each * len(frames) for each in (size, size + 2)}:
+    if len(frames) and len(written) == 4 + (size + 2) * len(frames):  # each with a state
+        size += 2
+    if len(written) != 4 + size * len(frames):
         raise FirmwareError(f"the program on {machine.name} wrote {len(written)} bytes for {len(frames)} frames")
-    records = np.frombuffer(written, np.uint8, offset=4).reshape(len(frames), -1)
+    records = np.frombuffer(written, np.uint8, offset=4).reshape(len(frames), size)
     ticks = np.ascontiguousarray(records[:, -4:]).view("<u4")[:, 0]
     predictions = answers_from(records[:, :-4].tobytes(), frames, layout)
     instructions = machine.instructions(ticks, int.from_bytes(written[:4], "little"))
