@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 SOAKED = Path(__file__).with_name("soaked.py")
 # Five minutes of switches a millisecond apart.
 FRAMES = 300_000
-MOST_BYTES = 24 << 20
+MOST_BYTES = 48 << 20
 # Until caches are full and every path was taken once, in windows of 10,000 frames.
 WARM_UP = 5
 MOST_KIB = 1024
