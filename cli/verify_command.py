@@ -45,10 +45,10 @@ def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bo
 
     The worst integer error is not searched for among the rows: it is calculated over all possible frames.
 
-    With --firmware, every score, grasp type, margin and probability of the compiled classifiers is compared with
-    Python's: on every row, on 10,000 random frames and on all extreme ones. host runs with sanitizers; avr runs in
-    simavr on an ATmega328P, or on an ATmega2560 if the build does not fit; cortex-m on an M0+ and an M4, riscv on an
-    RV32IMAC and xtensa on an LX106 run in qemu.
+    With --firmware, every score, grasp type, margin and probability of the compiled classifiers, and every state of
+    segments that were learnt, is compared with Python's: on every row, on 10,000 random frames and on all extreme ones.
+    host runs with sanitizers; avr runs in simavr on an ATmega328P, or on an ATmega2560 if the build does not fit;
+    cortex-m on an M0+ and an M4, riscv on an RV32IMAC and xtensa on an LX106 run in qemu.
 
     With --faults, every fault is applied to every row: each input lost, with and without its substitute row; each input
     stuck at each of its values; each port, chip and board of the build's scan map dead; and any two inputs lost.
@@ -192,6 +192,8 @@ def _outcome(check: "TargetCheck") -> str:
     counted = "" if check.worst is None else f", at most {check.worst} {check.unit}"
     stack = "" if check.stack is None else f" and {check.stack} bytes of stack"
     what = "score, grasp type, margin and probability" if check.shares else "score and grasp type"
+    if check.states:
+        what = "score, grasp type, margin, probability and state of a segment"
     return f"every {what} of {check.frames} frames matches Python's{counted}{stack}"
 
 
@@ -204,4 +206,5 @@ def _print_difference(first: "Difference") -> None:
         ("compiled", first.compiled_grasp, first.compiled_scores, first.compiled_said),
     ):
         more = f", margin {said[0]}, probability {said[1]} of 65535" if said else ""
+        more += f", segment state {said[2]}" if len(said) > 2 else ""
         console.print(f"    {who}: {grasp}, scores {' '.join(map(str, scores))}{more}")

@@ -26,7 +26,7 @@ from ..firmware.choose import Fit, fit_for, smallest_fit
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Library
 from ..firmware.generate import LARGEST
 from ..firmware.layout import ports_of_scan
-from ..firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, lost_inputs, random_frames
+from ..firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, lost_inputs, random_frames, states_of
 from ..firmware.targets import TARGETS
 from ..firmware.targets import kinds as every_kind
 from ..recordings.graspset import GraspSet, Joint
@@ -126,7 +126,8 @@ def _content(path: Path) -> bytes | None:
 class Difference(Struct, frozen=True):
     """A frame with different results: its inputs (closed, coded, missing), and the results of both sides.
 
-    `said` holds the margin and the probability of one grasp type, in 65535ths, where they were requested.
+    `said` holds the margin and the probability of one grasp type, in 65535ths, and the state of segments, where
+    they were requested.
     """
 
     frame: str
@@ -146,9 +147,10 @@ class TargetCheck(Struct, frozen=True, kw_only=True):
 
     layout     which layout was compiled, and why
     missing    whether inputs are missing in every frame; in every second frame it is a single one
-    frames     how many were classified; `differing` of them differ from Python in a score, grasp type, margin or
-               probability
+    frames     how many were classified; `differing` of them differ from Python in a score, grasp type, margin,
+               probability or state of a segment
     shares     whether margins and probabilities were requested: on an AVR only where inputs are missing
+    states     whether the states of the decoder of segments were: not on an AVR, nor of a build without segments
     first      the first differing frame
     misnamed   how many grasp types thenar_NAME_grasp names differently from the manifest; None: not tested, on an AVR
     worst      the cost of the slowest call, in `unit`; `stack`: bytes of stack that a call needs; None: not counted
@@ -160,6 +162,7 @@ class TargetCheck(Struct, frozen=True, kw_only=True):
     function: Function
     missing: bool
     shares: bool
+    states: bool = False
     frames: int
     differing: int
     first: Difference | None
@@ -197,7 +200,8 @@ class FirmwareTrial:
         classes = scores.argmax(axis=1) if bare else self._classes(scores, missing=missing)
         wrong = (found.scores != scores).any(axis=1) | (found.classes != classes)
         if (said := _said(found)) is not None:
-            wrong |= (said != self._said(missing=missing)).any(axis=1)
+            expected = self._said(found, missing=missing)
+            wrong |= (said != expected).any(axis=1)
         return TargetCheck(
             part=fit.target.part,
             layout=fit.choice.why,
@@ -206,6 +210,7 @@ class FirmwareTrial:
             shares=said is not None,
             frames=len(wrong),
             differing=int(np.count_nonzero(wrong)),
+            states=found.states is not None,
             first=self._difference(int(wrong.argmax()), found, missing=missing) if wrong.any() else None,
             misnamed=self._misnamed(found),
             worst=None if found.cost is None else int(found.cost.max()),
@@ -227,13 +232,22 @@ class FirmwareTrial:
         ]
         return np.asarray(np.where(refused, k, found))
 
-    def _said(self, *, missing: bool) -> NDArray[np.int64]:
-        """Return the margin of each frame and the probability of one grasp type, cycling through the types: (n, 2)."""
+    def _said(self, found: Predictions, *, missing: bool) -> NDArray[np.int64]:
+        """Return the margin of each frame and the probability of one grasp type, cycling through the types, (n, 2);
+        then, where the program decodes segments, their state, (n, 3).
+        """
         scores = self._scores_without if missing else self._scores
         best, second = np.sort(scores, axis=1)[:, :-3:-1].T
         softmax = self._build.softmax
         shares = [softmax.probabilities(own)[n % len(own)] for n, own in enumerate(scores.tolist())]
-        return np.stack([best - second, shares], axis=1)
+        states = [] if found.states is None else [self._states(scores, missing=missing)]
+        return np.stack([best - second, shares, *states], axis=1).astype(np.int64)
+
+    def _states(self, scores: NDArray[np.int64], *, missing: bool) -> NDArray[np.uint16]:
+        """Return the state of the decoder of segments at each frame (n,), of a build that has learnt segments."""
+        model = self._build.manifest.segments
+        assert model is not None
+        return states_of(model, scores, self._classes(scores, missing=missing) == scores.shape[1])
 
     def _misnamed(self, found: Predictions) -> int | None:
         if found.names is None:
@@ -260,7 +274,7 @@ class FirmwareTrial:
             scores=tuple(scores[frame].tolist()),
             compiled_grasp=self._grasp(int(found.classes[frame])),
             compiled_scores=tuple(found.scores[frame].tolist()),
-            said=() if said is None else tuple(self._said(missing=missing)[frame].tolist()),
+            said=() if said is None else tuple(self._said(found, missing=missing)[frame].tolist()),
             compiled_said=() if said is None else tuple(said[frame].tolist()),
             lost=tuple(compress(inputs, self._lost[frame])) if missing else (),
         )
@@ -277,10 +291,13 @@ class FirmwareTrial:
 
 
 def _said(found: Predictions) -> NDArray[np.int64] | None:
-    """Return the margins and probabilities of a program, (n, 2); None where they were not requested."""
+    """Return the margins and probabilities of a program, and the states of segments, (n, 2 or 3); None where they were
+    not requested.
+    """
     if found.margins is None or found.shares is None:
         return None
-    return np.stack([found.margins, found.shares], axis=1).astype(np.int64)
+    states = [] if found.states is None else [found.states]
+    return np.stack([found.margins, found.shares, *states], axis=1).astype(np.int64)
 
 
 def _masks(flags: NDArray[np.bool_]) -> list[int]:

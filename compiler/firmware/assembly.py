@@ -106,8 +106,9 @@ class Seen(NamedTuple):
 
 
 def seen_inputs(layout: Layout) -> dict[int, list[Seen]]:
-    """Return what update() compares to decide whether a distance or a row may have changed, for each slope and lookup,
-    numbered as in `found_place`. Lookups of switches alone have nothing: their row numbers are cheap to compute.
+    """Return for each slope and lookup, numbered as in `found_place`, the inputs that update() compares to decide
+    whether a distance or a row may have changed. Lookups of switches alone have none: their row numbers are cheap to
+    compute.
     """
     if not compares_input(layout):
         return {}

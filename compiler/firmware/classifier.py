@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from thenar.firmware_templates.rendering import render
 from thenar.runtime.manifest import Rejection
-from thenar.runtime.published import NONE
 from thenar.runtime.softmax import POWERS, Softmax
 
 from .assembly import assembly_values, check_size
@@ -19,7 +18,17 @@ from .avr_costs import calls_are_near
 from .layout import MOST_INLINE, Field, JointLayout, Layout, Lookup, Parts
 from .segments import segment_files
 from .sensors import Sensors, codes_files, sensors_of
-from .words import Names, answers_of, comment, identifiers, inputs_in_words, joint_in_words, string, switches_in_words
+from .words import (
+    Names,
+    answers_of,
+    comment,
+    identifiers,
+    inputs_in_words,
+    joint_in_words,
+    none_of,
+    string,
+    switches_in_words,
+)
 
 _STARTS_PER_LINE = 4
 _HIGHEST = 65535  # the highest code
@@ -405,7 +414,7 @@ def _common_values(name: str, names: Names, layout: Layout, avr: bool) -> dict[s
         "n_lookups": len(layout.lookups),
         "n_slopes": len(layout.tables.slopes),
         "relative": layout.tables.relative,
-        "nothing_held": len(outputs) - 1 if (outputs := answers_of(names))[-1] == NONE else None,
+        "nothing_held": none_of(names),
         "rejection": names.rejection,
     }
 

@@ -69,7 +69,7 @@ class Wiring:
         return cls(tuple(plain), len(library.sensors.every), known)
 
     def parts(self, digital: int, analog: int) -> Parts | None:
-        """Return what else is needed with these numbers of usable pins; None if even that is not enough."""
+        """Return the other parts that these numbers of usable pins need; None if even those are not enough."""
         multiplexers = -(-self.sensors // _ON_MULTIPLEXER) if analog < self.sensors else 0
         addresses = _ADDRESS_PINS if multiplexers else 0
         registers = -(-len(self.switches) // _ON_REGISTER) if digital < len(self.switches) + addresses else 0
@@ -77,7 +77,7 @@ class Wiring:
         return None if lacking else Parts(registers, multiplexers)
 
     def on(self, board: ArduinoBoard) -> Parts | None:
-        """Return what else is needed on a board of Arduino's; None if even that is not enough."""
+        """Return the other parts that a board of Arduino's needs; None if even those are not enough."""
         last = board.first_analog if self.sensors else board.digital
         return self.parts(len([pin for pin in islice(_numbers(), last) if pin < last]), board.analog)
 

@@ -14,15 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.firmware_templates.rendering import render
+from thenar.runtime.segmenting.decoder import Decoder
+from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables
 
 from . import FirmwareError
 from .costs import Unit
 from .layout import Layout, code_bits
+from .segments import lag_of
 from .words import string
 
 Frames = NDArray[np.uint8]
 Lost = NDArray[np.bool_]
+STREAM_TICKS = 200
+"""The frames that a program's decoder of segments takes before it begins afresh."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,6 +39,8 @@ class Predictions:
     cost   the cost of each prediction (n,) in `unit`; None where nothing was counted (unit "")
     stack  bytes of stack that a prediction needs; None where not measured
     names  of the K types, as the program returned them; None where not requested
+    states  of the decoder of segments at each frame (n,), which begins afresh every `STREAM_TICKS` frames; None where
+            the program has none
     """
 
     scores: NDArray[np.int16]
@@ -44,6 +51,7 @@ class Predictions:
     unit: Unit = ""
     stack: int | None = None
     names: tuple[str, ...] | None = None
+    states: NDArray[np.uint16] | None = None
 
     @property
     def most(self) -> int:
@@ -70,16 +78,31 @@ def names_in(printed: bytes, layout: Layout) -> tuple[tuple[str, ...], bytes]:
 
 
 def answers_from(printed: bytes, frames: Frames, layout: Layout) -> Predictions:
-    """Return the predictions that a program printed: for each frame K scores, a class, a margin and a probability, 16
-    bits each, little-endian.
+    """Return the predictions that a program printed: for each frame K scores, a class, a margin and a probability, and
+    a state where it decodes segments, 16 bits each, little-endian.
 
     Raises FirmwareError unless there is one for every frame.
     """
     size, classes = len(layout.start) + 3, len(layout.start)
-    if len(printed) != 2 * size * len(frames):
+    if len(printed) not in (whole := [2 * each * len(frames) for each in (size, size + 1)]):
         raise FirmwareError(f"the program printed {len(printed)} bytes for {len(frames)} frames of {2 * size} bytes")
-    words = np.frombuffer(printed, "<u2").astype(np.uint16).reshape(len(frames), size)
-    return Predictions(words[:, :classes].view(np.int16), *words[:, classes:].T)
+    with_states = len(frames) > 0 and len(printed) == whole[1]
+    words = np.frombuffer(printed, "<u2").astype(np.uint16).reshape(len(frames), size + with_states)
+    scores, (best, margins, shares) = words[:, :classes].view(np.int16), words[:, classes:size].T
+    states = words[:, size] if with_states else None
+    return Predictions(scores, best, margins, shares, states=states)
+
+
+def states_of(model: SegmentModel, scores: NDArray[np.integer], refused: NDArray[np.bool_]) -> NDArray[np.uint16]:
+    """Return the states that a program prints for the scores (n, n_lanes) of frames, of which some are `refused`: those
+    of Python's decoder, which begins afresh every `STREAM_TICKS` frames.
+    """
+    states: list[int] = []
+    for number, (lanes, no) in enumerate(zip(scores.tolist(), refused.tolist(), strict=True)):
+        if number % STREAM_TICKS == 0:
+            decoder = Decoder(model, lag_of(model))
+        states.append(decoder.push(lanes, refused=no).state)
+    return np.array(states, np.uint16)
 
 
 def record_files(
@@ -89,13 +112,14 @@ def record_files(
     function: Literal["classify", "update"],
     *,
     lost: bool = False,
+    segments: bool = False,
 ) -> dict[str, str]:
     """Return the files, name -> text, of the program that calls `function` of the classifier `name` for every frame.
 
     For classify() it writes the ports' bytes into the input; for update() it calls set_switch() for every switch. With
-    `lost`, frames have the format of `with_lost`.
+    `lost`, frames have the format of `with_lost`; with `segments`, it also pushes each to the decoder of segments.
     """
-    values = record_values(name, layout, function, lost=lost)
+    values = record_values(name, layout, function, lost=lost) | {"segments": segments}
     files = {"main.c": render(f"checking/{machine}_main.c.j2", **values)}
     if machine == "avr" and not lost:
         return files
@@ -115,6 +139,7 @@ def record_values(
         "name": name,
         "function": function,
         "lost_bytes": _lost_bytes(layout) if lost else 0,
+        "stream_ticks": STREAM_TICKS,
         "classes": len(layout.start),
         "ports": len(layout.ports),
         "places": list(layout.places),

@@ -1,6 +1,7 @@
-"""The decoder of segments as C99 for every target, and as assembly for an AVR."""
+"""The decoder of segments: C99 for every target, assembly for an AVR, and the values for other languages."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from thenar.firmware_templates.rendering import render
 from thenar.runtime.segmenting.model import SegmentModel
@@ -45,23 +46,13 @@ def segment_files(name: str, model: SegmentModel, *, avr: bool) -> dict[str, str
 
     They extend the classifier of the same name. Raises FirmwareError if there are too many states.
     """
-    if model.n_types >= _MOST_STATES:
-        raise FirmwareError(f"{model.n_types} grasp types: the segment decoder in C takes at most {_MOST_STATES - 1}")
-    states, rings = _laid_out(model)
-    assembled = avr and len(states) <= _MOST_ASSEMBLED and model.gain <= _MOST_GAIN
+    values = decoder_values(model)
+    assembled = avr and len(values["states"]) <= _MOST_ASSEMBLED and model.gain <= _MOST_GAIN
     limit = -(-model.most * 256 // model.gain) << model.shift
     clipped = model.most if limit <= 65535 else min((65535 >> model.shift) * model.gain >> 8, model.most)
-    values = {
+    values |= {
         "name": name,
         "upper": name.upper(),
-        "model": model,
-        "types": model.n_types,
-        "refusal": model.refusal,
-        "lag": _lag(model),
-        "states": states,
-        "groups": rings,
-        "waiting": rings[-1].end if rings else 0,
-        "mask_bytes": -(-len(states) // 8),
         "limit": min(limit, 65535),
         "clipped": clipped,
         "avr": avr,
@@ -77,15 +68,38 @@ def segment_files(name: str, model: SegmentModel, *, avr: bool) -> dict[str, str
     }
 
 
+def decoder_values(model: SegmentModel) -> dict[str, Any]:
+    """Return the values for a template of the decoder in any language. Raises FirmwareError for too many states."""
+    if model.n_types >= _MOST_STATES:
+        raise FirmwareError(f"{model.n_types} grasp types: the segment decoder takes at most {_MOST_STATES - 1}")
+    states, rings = _laid_out(model)
+    return {
+        "model": model,
+        "types": model.n_types,
+        "refusal": model.refusal,
+        "lag": lag_of(model),
+        "states": states,
+        "groups": rings,
+        "waiting": rings[-1].end if rings else 0,
+        "mask_bytes": -(-len(states) // 8),
+    }
+
+
 def segmenter_bytes(model: SegmentModel) -> int:
     """Return the bytes of RAM of the decoder's `thenar_NAME_segmenter` on an AVR."""
-    K, rings, lag = model.n_types, len({least for least in model.least if least > 1}), _lag(model)
+    K, rings, lag = model.n_types, len({least for least in model.least if least > 1}), lag_of(model)
     waiting = sum(least - 1 for least in model.least)
     return 4 * (K + 1) + 12 + 2 * max(rings, 1) + 2 * max(waiting, 1) + (4 + 2 * -(-(K + 1) // 8)) * lag
 
 
-def _lag(model: SegmentModel) -> int:
+def lag_of(model: SegmentModel) -> int:
+    """Return the ticks until a tick's state is known."""
     return min(max(LAG_US // model.tick_us, 1), 250)
+
+
+def times_of(model: SegmentModel) -> dict[str, str]:
+    """Return the time of a tick, and that until its state is known, in ms: values for texts."""
+    return {"tick_ms": f"{model.tick_us / 1000:g}", "lag_ms": f"{model.tick_us * lag_of(model) / 1000:g}"}
 
 
 def _laid_out(model: SegmentModel) -> tuple[list[_State], list[_Ring]]:

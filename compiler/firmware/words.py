@@ -59,8 +59,16 @@ class Names(Protocol):
 
 
 def answers_of(names: Names) -> tuple[str, ...]:
-    """Return the possible predictions for a frame: the grasp types, and "none" if the build can reject frames."""
-    return names.grasps if names.rejection is None else (*names.grasps, NONE)
+    """Return the possible results for a frame: the grasp types, and "none" if it is not one of them but a frame can be
+    rejected, or a segment can be of no type.
+    """
+    segments = names.segments is not None and names.segments.refusal is not None
+    return (*names.grasps, NONE) if names.rejection is not None or segments else names.grasps
+
+
+def none_of(names: Names) -> int | None:
+    """Return the number of "none" among the possible results for a frame; None if it is not one of them."""
+    return len(found) - 1 if (found := answers_of(names))[-1] == NONE else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -406,8 +406,9 @@ def _joint(
     codes, joint, cost = code_joint(name, columns, values, trials)
     if calibrated:  # coded like live bytes, including halves between two codes
         coded = _coded(joint)
-        parts = {id(part): codes_of_bytes(coded, part.session.calibration) for part, _ in grasps}
-        codes = np.array([parts[id(part)][_raw(name, part, grasp)] for part, grasp in grasps], np.uint16)
+        parts = {id(part): part for part, _ in grasps}
+        tables = {key: codes_of_bytes(coded, part.session.calibration) for key, part in parts.items()}
+        codes = np.array([tables[id(part)][_raw(name, part, grasp)] for part, grasp in grasps], np.uint16)
     return codes, joint, cost
 
 

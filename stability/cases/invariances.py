@@ -230,14 +230,22 @@ class Partings:
         """Train on the other set without weights, and follow the rounds until the end or until the two diverge."""
         one, hard, of = training.stumps, training.hard, change.hard
         other = renumbered(boost(of.X, of.labels, of.n_classes, rounds=one.n_rounds)[0], change)
-        steps: list[Step] = []
+        alike: list[tuple[Floats, Floats]] = []
         for number, both in enumerate(zip(training.scores, other.staged_scores(hard.X), strict=True)):
             at = f"{hard.name}, {change.name}, round {number + 1}"
             if self._see_stumps(training, number, other, change, at):
-                return
-            steps.append(training.step(number, float(np.abs(both).max())))
-            self._apart.see(float((np.abs(both[0] - both[1]).ravel() / (2 * grown(steps))).max()), at)
+                break
+            alike.append(both)
             self._winners.see(_predicted_otherwise(*both), at, len(hard.X))
+        self._see_scores(training, change, alike)
+
+    def _see_scores(self, training: Followed, change: Change, alike: Sequence[tuple[Floats, Floats]]) -> None:
+        """Compare the scores after rounds 1, 2, 4, 8 and so on, and after the last round whose stumps agree."""
+        steps = [training.step(number, float(np.abs(both).max())) for number, both in enumerate(alike)]
+        for number, (one, other) in enumerate(alike, 1):
+            if number & (number - 1) == 0 or number == len(alike):
+                at = f"{training.hard.name}, {change.name}, round {number}"
+                self._apart.see(float((np.abs(one - other).ravel() / (2 * grown(steps[:number]))).max()), at)
 
     def _see_stumps(self, training: Followed, number: int, other: Stumps, change: Change, at: str) -> bool:
         """Return whether the stumps of round `number` differ; if so, record the difference in explained variation."""

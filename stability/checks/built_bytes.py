@@ -22,7 +22,7 @@ from thenar.simulator.scenes.decode import load_scene
 
 SCENE = "quick"  # 160 switches, 16 joints, 14 grasp types, two hands
 SMALL = 3, 20, 2  # repetitions, rounds, folds: about half a second
-LARGE = 24, 200, 4  # twice the defaults of the shipped scene and `thenar compile`
+LARGE = 12, 100, 4  # the defaults of the shipped scene and `thenar compile`
 
 
 class Built(msgspec.Struct, frozen=True):

@@ -17,7 +17,7 @@ from thenar.runtime import Build
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 # A trainer of which nothing is left to choose.
-SETTLED = ("--trainer", "logitboost", "--shrinkage", 1, "--max-bins", 65536)
+SETTLED = ("--trainer", "logitboost", "--shrinkage", 1, "--max-bins", 65536, "--ties", "least-used")
 QUICK = (
     *("--target", "host", "--methods", "elimination,id3", "--baselines", "mrmr"),
     *("--rounds", 6, "--finalists", 2, "--repeats", 1, "--jobs", 1, *SETTLED),

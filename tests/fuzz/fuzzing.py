@@ -150,10 +150,10 @@ class Fuzzer:
         with self._counted(form):
             self._in_child(form, partial(self._plain, form, first, count))
 
-    def guide(self, form: Format, seconds: int, round_: int) -> None:
-        """Read mutants for so long, and mutate again what reaches new code (atheris)."""
+    def guide(self, form: Format, limit: str, round_: int) -> None:
+        """Read mutants up to libFuzzer's `limit`, and mutate again what reaches new code (atheris)."""
         with self._counted(form):
-            self._in_child(form, partial(self._guided, form, seconds, round_))
+            self._in_child(form, partial(self._guided, form, limit, round_))
 
     @contextmanager
     def _counted(self, form: Format) -> Iterator[None]:
@@ -240,7 +240,7 @@ class Fuzzer:
         path.write_bytes(data)
         return str(path)
 
-    def _guided(self, form: Format, seconds: int, round_: int) -> None:
+    def _guided(self, form: Format, limit: str, round_: int) -> None:
         """Let libFuzzer choose what to mutate; it ends the process."""
         import atheris
 
@@ -256,7 +256,7 @@ class Fuzzer:
         def mutator(data: bytes, largest: int, seed: int) -> bytes:
             return form.mutate(data, Random(seed))[:largest]
 
-        limits = (f"-max_total_time={seconds}", f"-seed={self._seed + round_}", "-max_len=200000")
+        limits = (limit, f"-seed={self._seed + round_}", "-max_len=200000")
         ends = (f"-timeout={STUCK_S}", "-rss_limit_mb=0", "-handle_int=0", f"-artifact_prefix={self._folder}/")
         folders = [str(grown), *(str(path) for path in [self._corpus / form.name] if path.is_dir())]
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)

@@ -3,9 +3,9 @@
     python tests/fuzz/run.py --mutants 20000
     python tests/fuzz/run.py --minutes 60 --formats npz,mcap
 
-With a number of mutants, the same ones come every time. By time, coverage guides where atheris is installed: inputs
-that reach new code are kept in .fuzz/, from where the next run goes on. What fails goes into tests/fuzz/corpus/, which
-every run replays first. Exits with 1 if anything failed.
+With a number of mutants, the same ones come every time. By time, or with --guided, coverage guides where atheris is
+installed: inputs that reach new code are kept in .fuzz/, from where the next run goes on. What fails goes into
+tests/fuzz/corpus/, which every run replays first. Exits with 1 if anything failed.
 """
 
 import argparse
@@ -42,6 +42,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first mutant of every format")
     parser.add_argument("--plain", action="store_true", help="without coverage")
+    parser.add_argument("--guided", action="store_true", help="with coverage, also so many mutants")
     parser.add_argument("--corpus", type=Path, default=HERE / "corpus")
     return parser.parse_args()
 
@@ -49,7 +50,8 @@ def arguments() -> argparse.Namespace:
 def main() -> int:
     """Run, and return the exit code."""
     asked = arguments()
-    guided = asked.mutants is None and not asked.plain and importlib.util.find_spec("atheris") is not None
+    guided = asked.guided or (asked.mutants is None and not asked.plain)
+    guided &= importlib.util.find_spec("atheris") is not None
     formats = _formats(asked.formats, guided)
     # Not before the formats: what is imported before cannot be instrumented any more.
     from fuzzing import Fuzzer, healthy
@@ -63,7 +65,11 @@ def main() -> int:
         if asked.mutants is not None:
             share = asked.mutants / sum(form.weight for form in formats)
             for form in formats:
-                fuzzer.mutate(form, asked.first, ceil(share * form.weight))
+                count = ceil(share * form.weight)
+                if guided:
+                    fuzzer.guide(form, f"-runs={count}", 0)
+                else:
+                    fuzzer.mutate(form, asked.first, count)
         else:
             _by_time(fuzzer, asked.minutes, asked.first, guided)
     except KeyboardInterrupt:
@@ -102,7 +108,7 @@ def _by_time(fuzzer: "Fuzzer", minutes: float, first: int, guided: bool) -> None
                 break
             before, began = fuzzer.mutants[form.name], monotonic()
             if guided:
-                fuzzer.guide(form, turn_s, turn)
+                fuzzer.guide(form, f"-max_total_time={turn_s}", turn)
             else:
                 fuzzer.mutate(form, first + turn * _TURN, _TURN)
             done = fuzzer.mutants[form.name] - before

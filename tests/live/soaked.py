@@ -1,6 +1,6 @@
 """Runs the live loop through frames from memory, as fast as they go, by a clock that goes a millisecond a frame.
 
-    python soaked.py BUILD GLOVE.toml ROWS.npz FOLDER FRAMES CPU_S MOST_BYTES
+    python soaked.py BUILD GLOVE.toml ROWS.npz FOLDER FRAMES MOST_BYTES
 
 Switches come every millisecond, the glove every ten, but for half a second in ten; all sinks are on, one with a reader;
 files may have MOST_BYTES at most, so that the recording ends amid the run. After every WINDOW frames a line of JSON.
@@ -11,7 +11,6 @@ import resource
 import socket
 import sys
 import threading
-import time
 from itertools import count
 from pathlib import Path
 from types import FrameType
@@ -28,13 +27,15 @@ from thenar.runtime.live.sources import Arrivals, Taken
 from thenar.runtime.recording.writer import Recorder
 
 WINDOW = 10_000
+# Calls are counted in the last frames of a window, in which every period of the feed lies at the same place.
+COUNTED = 1000
 SWITCH_US, GLOVE_FRAMES, AWAY_FRAMES, HELD_FRAMES = 1000, 10, 500, 400
 PLUGGED = 0x81
 LONGEST_US = 20_000
 
 
 class Sample(msgspec.Struct):
-    """The state of the process after so many frames, and the mean number of calls that a frame of the window made."""
+    """The state of the process after so many frames, and the mean number of calls that a counted frame made."""
 
     frames: int
     calls: float
@@ -83,8 +84,8 @@ class Feed:
         return self._arrivals.take()
 
 
-def soak(build: Build, harness: Harness, rows: Path, folder: Path, frames: int, cpu_s: float) -> None:
-    """Print a sample a window, until there were so many frames or so much CPU was used."""
+def soak(build: Build, harness: Harness, rows: Path, folder: Path, frames: int) -> None:
+    """Print a sample a window, until there were so many frames."""
     clock = Clock()
     vars(thenar.runtime.live.sources)["now_us"] = clock
     feed = Feed(rows, build.tables.n_switches, clock)
@@ -109,13 +110,13 @@ def soak(build: Build, harness: Harness, rows: Path, folder: Path, frames: int, 
 
         for frame in count():
             if frame % WINDOW == 0 and frame:
-                print(msgspec.json.encode(_sample(frame, calls / WINDOW, glove.recorder)).decode(), flush=True)
+                print(msgspec.json.encode(_sample(frame, calls / COUNTED, glove.recorder)).decode(), flush=True)
                 calls = 0
-                if frame >= frames or time.process_time() >= cpu_s:
+                if frame >= frames:
                     break
             clock.us += SWITCH_US
             feed.put(frame)
-            sys.setprofile(count_call)
+            sys.setprofile(count_call if frame % WINDOW >= WINDOW - COUNTED else None)
             next(glove)
             sys.setprofile(None)
             while len(reader.recv(65536)) == 65536:
@@ -131,9 +132,9 @@ def _sample(frame: int, calls: float, recorder: Recorder) -> Sample:
 
 
 def main() -> None:
-    build, glove, rows, folder, frames, cpu_s, most = sys.argv[1:]
+    build, glove, rows, folder, frames, most = sys.argv[1:]
     resource.setrlimit(resource.RLIMIT_FSIZE, (int(most), int(most)))
-    soak(Build.load(build), load_harness(glove), Path(rows), Path(folder), int(frames), float(cpu_s))
+    soak(Build.load(build), load_harness(glove), Path(rows), Path(folder), int(frames))
 
 
 if __name__ == "__main__":

@@ -88,6 +88,10 @@ class Bare(Target):
         values = {**origins, "flash": flash, "ram": ram, "stack": STACK, "architecture": self.architecture}
         return {name: render(f"bare/{name}.j2", **values) for name in ("link.ld", "startup.c", "semihosting.h")}
 
+    def sources(self, library: "Library") -> dict[str, str]:
+        """Return the classifier and the decoder of segments, for `run`."""
+        return library.files | library.segments
+
     def missing(self) -> str | None:
         """Return which of compiler and emulator is missing, and how to install it; None if neither is."""
         assert self.compiler is not None
@@ -114,7 +118,14 @@ class Bare(Target):
 
         check_frames(frames, layout)
         main = {"ticks.h": render("checking/ticks.h.j2")}
-        main |= record_files(name, layout, "bare", "update" if incremental else "classify", lost=lost is not None)
+        main |= record_files(
+            name,
+            layout,
+            "bare",
+            "update" if incremental else "classify",
+            lost=lost is not None,
+            segments=f"thenar_{name}_segments.c" in files,
+        )
         given: dict[str, str | bytes] = {**files, **main, "frames": with_lost(frames, lost).tobytes()}
         return _counted(self.emulate(given, limit_s), frames, layout, self.machine)
 
@@ -156,12 +167,14 @@ def _counted(written: bytes, frames: "Frames", layout: "Layout", machine: Machin
 
     from ..probes import answers_from, names_in
 
-    size = 2 * len(layout.start) + 6
+    size = 2 * len(layout.start) + 10
     names, written = names_in(written, layout)
-    if len(written) != 4 + (size + 4) * len(frames):
+    if len(frames) and len(written) == 4 + (size + 2) * len(frames):  # each with a state
+        size += 2
+    if len(written) != 4 + size * len(frames):
         raise FirmwareError(f"the program on {machine.name} wrote {len(written)} bytes for {len(frames)} frames")
-    records = np.frombuffer(written, np.uint8, offset=4).reshape(len(frames), size + 4)
-    ticks = np.ascontiguousarray(records[:, size:]).view("<u4")[:, 0]
-    predictions = answers_from(records[:, :size].tobytes(), frames, layout)
+    records = np.frombuffer(written, np.uint8, offset=4).reshape(len(frames), size)
+    ticks = np.ascontiguousarray(records[:, -4:]).view("<u4")[:, 0]
+    predictions = answers_from(records[:, :-4].tobytes(), frames, layout)
     instructions = machine.instructions(ticks, int.from_bytes(written[:4], "little"))
     return replace(predictions, cost=instructions, unit="instructions", names=names)

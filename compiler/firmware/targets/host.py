@@ -32,6 +32,10 @@ class Host(Target):
             f"thenar_{library.name}_check.h": check_header(library.name, library.layout, library.names.grasps),
         }
 
+    def sources(self, library: "Library") -> dict[str, str]:
+        """Return the classifier and the decoder of segments, for `run`."""
+        return library.files | library.segments
+
     def missing(self) -> str | None:
         """Return how to install a compiler if there is none."""
         return lacking(HOST_COMPILER)
@@ -57,7 +61,14 @@ class Host(Target):
 
         check_frames(frames, layout)
         command = find(HOST_COMPILER if compiler is None else ((compiler,), compiler))
-        main = record_files(name, layout, "host", "update" if incremental else "classify", lost=lost is not None)
+        main = record_files(
+            name,
+            layout,
+            "host",
+            "update" if incremental else "classify",
+            lost=lost is not None,
+            segments=f"thenar_{name}_segments.c" in files,
+        )
         with workshop({**files, **main}) as folder:
             sources = sorted(path for path in (*files, *main) if path.endswith(".c"))
             call([command, *STRICT, "-O2", *(_SANITIZE if sanitize else ()), *sources, "-o", "classifier"], folder)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..layout import Layout
     from ..probes import Frames, Lost, Predictions
 
-_BYTES_PER_LINE, _COLUMNS = 72, 100
+_BYTES_PER_LINE, _COLUMNS, _MOST_SAID = 72, 100, 2000
 _MODULE = "micropython_unix"  # a Python package of its Unix port
 
 
@@ -33,10 +33,12 @@ class MicroPython(Target):
         """Return path -> text of the Python module, and in modules/ of the user module in C."""
         from thenar.firmware_templates.rendering import render
 
-        from ..words import answers_of, string
+        from ..segments import times_of
+        from ..words import answers_of, none_of, string
 
+        segments = library.names.segments
         name, folder = library.name, f"modules/thenar_{library.name}"
-        c_files = library.files | library.codes
+        c_files = library.whole
         values = {
             "name": name,
             "upper": name.upper(),
@@ -51,6 +53,9 @@ class MicroPython(Target):
             "switches": len(library.names.switches),
             "joints": len(library.names.joints),
             "rejection": library.names.rejection,
+            "nothing_held": none_of(library.names),
+            "segments": segments is not None,
+            **({} if segments is None else times_of(segments)),
         }
         made = {
             "micropython.mk": "micropython.mk",
@@ -68,6 +73,8 @@ class MicroPython(Target):
         """Return the Python module."""
         from thenar.firmware_templates.rendering import render
         from thenar.runtime.softmax import POWERS, Softmax
+
+        from ..words import none_of
 
         tables, names = library.layout.tables, library.names
         steps = [*tables.thresholds, *(each for pair in tables.pairs for each in pair.thresholds)]
@@ -88,6 +95,8 @@ class MicroPython(Target):
             "pairs": _lines((*pair.joints, tables.n_joints + 2 * n) for n, pair in enumerate(tables.pairs)),
             "powers": _lines(POWERS),
             **_sensor_values(library),
+            "segments": _segment_values(library),
+            "nothing_held": none_of(names),
             "softmax": Softmax(tables.scale),
         }
         if (rejection := names.rejection) is not None:
@@ -131,7 +140,9 @@ class MicroPython(Target):
         values = record_values(name, layout, "update" if incremental else "classify", lost=lost is not None)
         main = render("checking/record.py.j2", **values)
         with workshop({**files, "main.py": main, "frames": with_lost(frames, lost).tobytes()}) as folder:
-            call([*_interpreter(), "main.py"], folder)
+            # As a Python package the Unix port ends with 0 whatever happens, and prints errors to stdout.
+            if said := call([*_interpreter(), "main.py"], folder).decode(errors="replace"):
+                raise FirmwareError(f"micropython failed: {said[:_MOST_SAID]}")
             return answers_in((folder / "predictions").read_bytes(), frames, layout)
 
 
@@ -155,6 +166,18 @@ def _sensor_values(library: "Library") -> dict[str, object]:
         "fraction": FRACTION,
         "farthest": FARTHEST,
     }
+
+
+def _segment_values(library: "Library") -> dict[str, object] | None:
+    """Return the template's values for the decoder of segments; None where the build has no segment costs."""
+    from ..segments import decoder_values
+
+    if (model := library.names.segments) is None:
+        return None
+    rings = accumulate((least - 1 for least in model.least), initial=0)
+    per_state = {"durations": model.least, "rings": rings, "stay": model.stay}
+    per_type = {"enter": model.enter, "direct": model.direct, "leave": model.leave}
+    return {**decoder_values(model), **{key: _lines(each) for key, each in {**per_state, **per_type}.items()}}
 
 
 def _interpreter() -> list[str]:

@@ -6,6 +6,7 @@ Its scores are compared with Python's in the same way as those of the C.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from ..tools import RUST, call, find, lacking, workshop
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from thenar.runtime.segmenting.model import SegmentModel
     from thenar.runtime.tables import Slope
 
     from ..classifier import Library
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
 
 _MOST_COMPARED = 8
 _HIGHEST = 65535
+_CHECK_TICKS = 20  # of each frame, in the self test of the decoder of segments
+_SEGMENTS = "src/segments.rs"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +43,9 @@ class Rust(Target):
         scores = layout.scores(frames.bits, frames.codes)
         rows = zip(frames.bits, frames.codes, scores.argmax(axis=1), scores, strict=True)
         checks = [(_array(bits), _array(codes), int(grasp), _array(own)) for bits, codes, grasp, own in rows]
-        test = render("rust/self_test.rs.j2", name=library.name, switches=len(library.names.switches), checks=checks)
+        states, ticks = _stream(library, scores), _CHECK_TICKS
+        values = {"name": library.name, "switches": len(library.names.switches), "checks": checks}
+        test = render("rust/self_test.rs.j2", **values, states=states, ticks=ticks)
         return {**self.sources(library), "tests/self_test.rs": test}
 
     def sources(self, library: "Library") -> dict[str, str]:
@@ -47,6 +53,7 @@ class Rust(Target):
         from thenar.firmware_templates.rendering import render
         from thenar.runtime.softmax import POWERS, Softmax
 
+        from ..segments import times_of
         from ..words import comment, identifiers, inputs_in_words
 
         names, layout, rejection = library.names, library.layout, library.names.rejection
@@ -89,6 +96,8 @@ class Rust(Target):
             "joint_bins": [(joint.number, joint.bins.tolist()) for joint in layout.joints if not joint.compared],
             "finds": _finds(layout),
             "rejection": rejection,
+            "segments": names.segments is not None,
+            **({} if names.segments is None else times_of(names.segments)),
             **_sensor_values(library),
         }
         if rejection is not None:
@@ -96,7 +105,10 @@ class Rust(Target):
             values["closed"] = _array(rejection.closed)
             values["ranges"] = [_array(own) for own in rejection.ranges]
         made = {"Cargo.toml": "Cargo.toml", "lib.rs": "src/lib.rs", "tables.rs": "src/tables.rs"}
-        return {path: render(f"rust/{of}.j2", **values) for of, path in made.items()}
+        files = {path: render(f"rust/{of}.j2", **values) for of, path in made.items()}
+        if names.segments is not None:
+            files[_SEGMENTS] = render("rust/segments.rs.j2", **_segment_values(names.segments))
+        return files
 
     def missing(self) -> str | None:
         """Return which of cargo and rustc is missing, and how to install it; None if neither is."""
@@ -119,7 +131,8 @@ class Rust(Target):
 
         check_frames(frames, layout)
         values = record_values(name, layout, "update" if incremental else "classify", lost=lost is not None)
-        main = render("checking/record.rs.j2", **values, rejection="fn held(" in files["src/lib.rs"])
+        has = {"rejection": "fn held(" in files["src/lib.rs"], "segments": _SEGMENTS in files}
+        main = render("checking/record.rs.j2", **values, **has)
         given: dict[str, str | bytes] = {
             **files,
             "examples/record.rs": main,
@@ -149,6 +162,29 @@ def _sensor_values(library: "Library") -> dict[str, object]:
         "fraction": FRACTION,
         "farthest": FARTHEST,
     }
+
+
+def _stream(library: "Library", scores: "NDArray[np.int64]") -> str:
+    """Return the states of a stream that holds the frame of each of the scores for some ticks, of which every fifth is
+    refused; "" for a build without costs of segments.
+    """
+    from thenar.runtime.segmenting.decoder import Decoder
+
+    from ..segments import lag_of
+
+    if (model := library.names.segments) is None:
+        return ""
+    decoder = Decoder(model, lag_of(model))
+    pushed = (decoder.push(own, refused=tick % 5 == 0).state for own in scores.tolist() for tick in range(_CHECK_TICKS))
+    return "[" + ", ".join("None" if state == model.n_types else f"Some({state})" for state in pushed) + "]"
+
+
+def _segment_values(model: "SegmentModel") -> dict[str, object]:
+    """Return the template's values for the decoder of segments."""
+    from ..segments import decoder_values
+
+    waits = [*accumulate((least - 1 for least in model.least), initial=0)]
+    return {**decoder_values(model), "waits": waits}
 
 
 def _variants(kind: str, words: Iterable[str]) -> list[str]:

@@ -24,14 +24,13 @@ class Wasm(Target):
         """Return path -> text: the library, the JavaScript module with its types, and the sources of the .wasm."""
         from thenar.firmware_templates.rendering import render
         from thenar.runtime.code_line import FARTHEST
-        from thenar.runtime.published import NONE
 
-        from ..words import answers_of, inputs_in_words
+        from ..segments import decoder_values
+        from ..words import answers_of, inputs_in_words, none_of
 
         name, names, files = library.name, library.names, library.whole
         inputs = inputs_in_words(len(names.switches), len(names.joints))
         sentence = f"Recognises {len(names.grasps)} grasp types from {inputs} of a glove."
-        outputs = answers_of(names)
         values = {
             "name": name,
             "opening": f"thenar_{name}: {sentence} From the tables {names.tables_sha256[:16]}.",
@@ -40,11 +39,11 @@ class Wasm(Target):
             "switches": len(names.switches),
             "joints": len(names.joints),
             "rejection": names.rejection is not None,
-            "none": len(outputs) - 1 if outputs[-1] == NONE else None,
-            "segments": names.segments is not None,
+            "nothing_held": none_of(names),
+            "segments": None if names.segments is None else decoder_values(names.segments),
             "highest_code": (1 << library.layout.code_bits) - 1,
             "grasps": _array(names.grasps),
-            "names": _array(outputs),
+            "names": _array(answers_of(names)),
             "switch_names": _array(switch.name for switch in names.switches),
             "joint_names": _array(joint.name for joint in names.joints),
             "sensors": len(library.sensors.every),

@@ -9,13 +9,17 @@ from msgspec import structs
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.artifact.verify import verify
-from thenar.compiler.artifact.verify_firmware import verify_firmware
+from thenar.compiler.artifact.verify_firmware import FirmwareTrial, verify_firmware
 from thenar.compiler.firmware import FirmwareError, classifier
+from thenar.compiler.firmware.choose import fit_for
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import Layout
-from thenar.compiler.firmware.probes import extreme_frames
+from thenar.compiler.firmware.probes import Probes, extreme_frames, random_frames
+from thenar.compiler.firmware.segments import segment_files
+from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
+from thenar.runtime.segmenting.model import SegmentModel
 
 MakeSet = Callable[..., GraspSet]
 Tool = Callable[[str], str]
@@ -174,6 +178,37 @@ def test_a_margin_or_a_probability_that_is_off_is_found(
     assert first is not None
     assert (first.scores, first.grasp) == (first.compiled_scores, first.compiled_grasp)
     assert [*first.said] != [*first.compiled_said]
+
+
+@pytest.mark.parametrize("wrong", [False, True], ids=["right", "wrong"])
+def test_a_state_of_a_segment_that_is_off_is_found(
+    build: Path, tool: Tool, monkeypatch: pytest.MonkeyPatch, wrong: bool
+) -> None:
+    tool("gcc")
+    loaded = Build.load(build)
+    tables = loaded.tables
+    usual = SegmentModel.usual(tables.n_classes, False, tables.scale)
+    costs = structs.replace(usual, least=(2,) * (tables.n_classes + 1), enter=(20,) * tables.n_classes)
+    named = Build(structs.replace(loaded.manifest, segments=costs), tables)
+
+    def off(*arguments: Any, **options: Any) -> dict[str, str]:
+        files = segment_files(*arguments, **options)
+        text = files["thenar_glove_segments.c"]
+        assert text.count("ahead < gap") == 1
+        return files | {"thenar_glove_segments.c": text.replace("ahead < gap", "ahead >= gap")}
+
+    if wrong:
+        monkeypatch.setattr(classifier, "segment_files", off)
+    held = random_frames(tables, 120, 3)
+    rows = Probes(held.bits.repeat(9, axis=0), held.codes.repeat(9, axis=0))
+    trial = FirmwareTrial(named, rows, extreme_frames(tables), random_frames(tables, 50, 1))
+    for missing in (False, True):
+        found = trial.check(fit_for(TARGETS["host"], tables), "update", missing=missing)
+        assert found.states
+        assert bool(found.differing) == wrong
+        if found.first is not None:
+            assert found.first.said[:2] == found.first.compiled_said[:2]
+            assert found.first.said[2] != found.first.compiled_said[2]
 
 
 @pytest.mark.parametrize("kind", ["host", "cortex-m"])

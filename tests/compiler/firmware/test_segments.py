@@ -126,15 +126,11 @@ def test_on_an_avr_a_tick_of_14_types_and_none_takes_the_cycles_and_the_memory_t
         assert run.stack <= 40
 
 
-# The modules in Python and Rust have no decoder.
-WITHOUT_DECODER = {"micropython", "rust"}
-
-
 def _learnt(tables: IntegerTables, describe: Callable[[IntegerTables], Manifest]) -> Manifest:
     return replace(describe(tables), segments=SegmentModel.usual(tables.n_classes, False, tables.scale))
 
 
-@pytest.mark.parametrize("target", sorted(TARGETS.keys() - WITHOUT_DECODER))
+@pytest.mark.parametrize("target", sorted(TARGETS))
 def test_firmware_of_a_build_that_has_costs_of_segments_brings_the_decoder_along(
     make_tables: Callable[..., IntegerTables],
     describe: Callable[[IntegerTables], Manifest],
@@ -146,11 +142,18 @@ def test_firmware_of_a_build_that_has_costs_of_segments_brings_the_decoder_along
     manifest = _learnt(tables, describe)
     files = Firmware(tables, manifest, target).files()
     plain = Firmware(tables, describe(tables), target).files()
+    if target == "rust":
+        assert files.keys() - plain.keys() == {"src/segments.rs"}
+        return
     more = {path.rsplit("/", 1)[-1] for path in files.keys() - plain.keys()}
     assert more >= {"thenar_glove_segments.h", "thenar_glove_segments.c"}
     if isinstance(TARGETS[target], Package):
         assert "/src/thenar_glove_segments.c\n" in files["CMakeLists.txt"]
         assert "thenar_glove_segment_push\tKEYWORD2" in files["keywords.txt"]
+        return
+    if target == "micropython":
+        assert "/thenar_glove_segments.c\n" in files["modules/thenar_glove/micropython.mk"]
+        assert "Segmenter()" in files["README.md"]
         return
     with workshop(files) as folder:
         call(["make", "all"], folder)
@@ -163,5 +166,5 @@ def test_firmware_of_a_build_that_has_costs_of_segments_brings_the_decoder_along
 
 def test_more_types_than_a_byte_numbers_are_refused() -> None:
     assert segment_files("hand", SegmentModel.usual(254, True, 9.0), avr=True)
-    with pytest.raises(FirmwareError, match="255 grasp types: the segment decoder in C takes at most 254"):
+    with pytest.raises(FirmwareError, match="255 grasp types: the segment decoder takes at most 254"):
         segment_files("hand", SegmentModel.usual(255, True, 9.0), avr=True)

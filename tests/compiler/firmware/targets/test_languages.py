@@ -15,12 +15,15 @@ from msgspec import structs
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout, arrange
 from thenar.compiler.firmware.probes import Predictions, Probes, lost_inputs
+from thenar.compiler.firmware.segments import LAG_US
 from thenar.compiler.firmware.sensors import Sensor, sensors_of
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.tools import call, find
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Manifest, Rejection, Threshold
+from thenar.runtime.segmenting.decoder import Decoder
+from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.softmax import Softmax
 from thenar.runtime.tables import IntegerTables, Pair, Slope
 
@@ -114,6 +117,7 @@ for joint in range({joints}):
     glove.set_code(joint, 40 * joint)
 grasp = glove.classify()
 print(glove.margin(), *[glove.probability(k) for k in range({classes})], glove.held(grasp), glove.held(grasp, 1))
+print(library.NONE, library.NAMES[library.NONE])
 """,
     "rust": """
 use thenar_hand::*;
@@ -135,7 +139,7 @@ fn main() {{
     "wasm": """
 import {{ readFileSync }} from "node:fs";
 import {{ load }} from "./thenar_hand.js";
-const {{ Glove }} = await load(readFileSync("thenar_hand.wasm"));
+const {{ Glove, NONE, names }} = await load(readFileSync("thenar_hand.wasm"));
 const other = Array.from({{ length: 1000 }}, () => new Glove()); // more than one page of memory
 const glove = new Glove();
 for (let number = 0; number < {switches}; number += 3) {{
@@ -148,6 +152,7 @@ other.forEach((each) => each.classify());
 const grasp = glove.classify();
 const shares = Array.from({{ length: {classes} }}, (_, k) => Math.round(glove.probability(k) * 65535));
 console.log(glove.margin(), ...shares, glove.held(grasp), glove.held(grasp, 1));
+console.log(NONE, names[NONE]);
 """,
 }
 
@@ -185,9 +190,88 @@ def test_margin_probability_and_refusal_are_python_s(
     manifest = structs.replace(describe(tables), rejection=rejection)
     files = TARGETS[language].sources(Library("hand", manifest, layout, avr=False))
     program = MORE[language].format(switches=tables.n_switches, joints=j, classes=k)
-    margin, *shares = map(int, printed(language, files, program, tmp_path).split())
+    said, *of_none = printed(language, files, program, tmp_path).splitlines()
+    margin, *shares = map(int, said.split())
     assert margin == scores.max() - np.sort(scores)[-2]
     assert shares == [*Softmax(tables.scale).probabilities(scores.tolist()), k, best]
+    assert of_none == ([] if language == "rust" else [f"{k} none"])
+
+
+# At every tick the state, the newest state, whether they are of one segment; each third of the stream begins afresh.
+FOLLOWING = {
+    "micropython": """
+import thenar_hand as library
+glove, segmenter = library.Glove(), library.Segmenter()
+print(library.TICK_US, library.LAG_TICKS, library.NAMES[library.SEGMENT_NONE])
+for tick in range({ticks}):
+    if tick % {stream} == 0:
+        segmenter.start()
+    for number in range({switches}):
+        glove.set_switch(number, number % 5 == tick // {still} % 5)
+    state = segmenter.push(glove, glove.classify())
+    print(state, segmenter.newest(), segmenter.same() + 0)
+""",
+    "rust": """
+use thenar_hand::*;
+fn main() {{
+    let (mut glove, mut segmenter) = (Glove::new(), Segmenter::default());
+    println!("{{}} {{}} none", TICK_US, LAG_TICKS);
+    let number_of = |state: Option<Grasp>| state.map_or(CLASSES, |held| held as usize);
+    for tick in 0..{ticks} {{
+        if tick % {stream} == 0 {{
+            segmenter.start();
+        }}
+        for switch in Switch::ALL {{
+            glove.set_switch(switch, switch as usize % 5 == tick / {still} % 5);
+        }}
+        let grasp = glove.classify();
+        let state = segmenter.push(&glove, grasp, false);
+        println!("{{}} {{}} {{}}", number_of(state), number_of(segmenter.newest()), segmenter.same() as u8);
+    }}
+}}
+""",
+    "wasm": """
+import {{ readFileSync }} from "node:fs";
+import {{ load }} from "./thenar_hand.js";
+const {{ Glove, Segmenter, names, TICK_US, LAG_TICKS, SEGMENT_NONE }} = await load(readFileSync("thenar_hand.wasm"));
+const glove = new Glove();
+const segmenter = new Segmenter();
+console.log(TICK_US, LAG_TICKS, names[SEGMENT_NONE]);
+for (let tick = 0; tick < {ticks}; tick++) {{
+    if (tick % {stream} === 0) {{
+        segmenter.start();
+    }}
+    for (let number = 0; number < {switches}; number++) {{
+        glove.setSwitch(number, number % 5 === Math.floor(tick / {still}) % 5);
+    }}
+    const state = segmenter.push(glove, glove.classify());
+    console.log(state, segmenter.newest(), Number(segmenter.same()));
+}}
+""",
+}
+
+
+def test_a_segmenter_says_its_newest_state_and_whether_it_is_of_the_segment_that_is_known(
+    make_tables: MakeTables, describe: Describe, language: str, tmp_path: Path
+) -> None:
+    tables = make_tables(**SHAPES["small"])
+    model = structs.replace(SegmentModel.usual(tables.n_classes, False, tables.scale / 8), enter=(40,) * 7)
+    manifest = structs.replace(describe(tables), segments=model)
+    ticks, stream, still = 480, 160, 17
+    files = TARGETS[language].sources(Library("hand", manifest, arrange(tables), avr=False))
+    program = FOLLOWING[language].format(ticks=ticks, stream=stream, still=still, switches=tables.n_switches)
+    first, *lines = printed(language, files, program, tmp_path).splitlines()
+    assert first == f"{model.tick_us} {LAG_US // model.tick_us} none"
+    build, expected = Build(manifest, tables), []
+    for tick in range(ticks):
+        if tick % stream == 0:
+            decoder = Decoder(model, LAG_US // model.tick_us)
+        bits = np.arange(tables.n_switches) % 5 == tick // still % 5
+        found = decoder.push(build.scores(bits, np.zeros(tables.n_joints, np.uint16)).tolist())
+        known = found.tick >= 0 and found.start == found.newest_start
+        expected.append(f"{found.state} {found.newest} {int(known)}")
+    assert lines == expected
+    assert len(set(expected)) > 5
 
 
 CONVERTING = {
@@ -300,20 +384,27 @@ def test_readings_become_python_s_codes(
     assert lines[-1] == Build(manifest, tables).scores(bits, held).tolist()
 
 
+def with_segments(manifest: Manifest, tables: IntegerTables) -> Manifest:
+    return structs.replace(manifest, segments=SegmentModel.usual(tables.n_classes, False, tables.scale))
+
+
+@pytest.mark.parametrize("segments", [False, True], ids=["frames", "segments"])
 def test_a_crate_is_free_of_warnings_and_tests_itself(
     tool: Callable[[str], str],
     make_tables: MakeTables,
     describe: Describe,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
+    segments: bool,
 ) -> None:
     monkeypatch.setenv("RUSTFLAGS", "-D warnings")
     tables = make_tables(**SHAPES["small"])
-    for path, text in TARGETS["rust"].files(Library("hand", describe(tables), arrange(tables), avr=False)).items():
+    manifest = with_segments(describe(tables), tables) if segments else describe(tables)
+    for path, text in TARGETS["rust"].files(Library("hand", manifest, arrange(tables), avr=False)).items():
         (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / path).write_text(text)
     done = subprocess.run(
-        [tool("cargo"), "test", "--offline", "--tests"],
+        [tool("cargo"), "test", "--offline"],
         cwd=tmp_path,
         capture_output=True,
         text=True,
@@ -322,6 +413,7 @@ def test_a_crate_is_free_of_warnings_and_tests_itself(
     )
     assert done.returncode == 0, done.stderr
     assert "test every_frame_is_answered_as_by_python ... ok" in done.stdout
+    assert ("test every_state_of_a_stream_is_python_s ... ok" in done.stdout) == segments
 
 
 # What the module in C uses of MicroPython, as its documentation and headers declare it: no registry has its sources.
@@ -348,7 +440,8 @@ typedef struct {
     mp_obj_t (*three)(mp_obj_t, mp_obj_t, mp_obj_t);
     mp_obj_t (*more)(size_t, const mp_obj_t *);
 } mp_obj_fun_t;
-extern const mp_obj_type_t mp_type_tuple, mp_type_str, mp_type_module, mp_type_IndexError, mp_type_fun, mp_type_dict;
+extern const mp_obj_type_t mp_type_tuple, mp_type_str, mp_type_module, mp_type_fun, mp_type_dict;
+extern const mp_obj_type_t mp_type_IndexError, mp_type_TypeError;
 #define MP_OBJ_TO_PTR(o) ((void *)o)
 #define MP_OBJ_FROM_PTR(p) ((mp_obj_t)p)
 #define MP_OBJ_NEW_SMALL_INT(n) ((mp_obj_t)((((mp_uint_t)(n)) << 1) | 1))
@@ -369,6 +462,7 @@ extern const mp_obj_type_t mp_type_tuple, mp_type_str, mp_type_module, mp_type_I
 #define MP_REGISTER_MODULE(q, m)
 #define mp_const_none ((mp_obj_t)&mp_type_tuple)
 mp_int_t mp_obj_get_int(mp_const_obj_t o);
+const mp_obj_type_t *mp_obj_get_type(mp_const_obj_t o);
 bool mp_obj_is_true(mp_obj_t o);
 mp_obj_t mp_obj_new_bool(mp_int_t x);
 void mp_raise_msg(const mp_obj_type_t *type, const char *text) __attribute__((noreturn));
@@ -378,12 +472,14 @@ void *mp_obj_malloc_helper(size_t bytes, const mp_obj_type_t *type);
 """
 
 
+@pytest.mark.parametrize("segments", [False, True], ids=["frames", "segments"])
 @pytest.mark.parametrize("shape", ["small", "switches_only", "joints_only_wide_codes"])
 def test_the_user_module_in_c_compiles_without_a_warning_against_what_it_uses_of_micropython(
-    c_compiler: str, make_tables: MakeTables, describe: Describe, tmp_path: Path, shape: str
+    c_compiler: str, make_tables: MakeTables, describe: Describe, tmp_path: Path, shape: str, segments: bool
 ) -> None:
     tables = make_tables(**SHAPES[shape])
-    files = TARGETS["micropython"].files(Library("hand", describe(tables), arrange(tables, bins="search"), avr=True))
+    manifest = with_segments(describe(tables), tables) if segments else describe(tables)
+    files = TARGETS["micropython"].files(Library("hand", manifest, arrange(tables, bins="search"), avr=True))
     folder = tmp_path / "modules" / "thenar_hand"
     (folder / "py").mkdir(parents=True)
     for path, text in files.items():

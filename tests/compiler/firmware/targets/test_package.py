@@ -219,7 +219,11 @@ def test_the_program_in_the_readme_compiles(tool: Tool, written: Written, tmp_pa
 
 def test_a_package_is_counted_on_the_core_that_it_says(make_tables: MakeTables) -> None:
     layout = arrange(make_tables())
-    cores = {"cortex-m0plus": ["rp2040"], "cortex-m4": ["nrf52", "stm32", "generic"], "rv32imac": ["esp32c3", "esp32c6"]}
+    cores = {
+        "cortex-m0plus": ["rp2040"],
+        "cortex-m4": ["nrf52", "stm32", "generic"],
+        "rv32imac": ["esp32c3", "esp32c6"],
+    }
     for core, names in cores.items():
         for name in names:
             target = TARGETS[name]

@@ -3,8 +3,8 @@
  * @brief Recognises 3 grasp types from 6 switches and 2 joints of a glove.
  *
  * Layout for atmega2560: 16-bit entries, up to 6 switches per lookup, codes compared with thresholds, up to 2 joints
- * per lookup, rows added in line: the fastest of 108 layouts in 49152 bytes of flash, at most 143 cycles (314 by
- * update()) and 1760 bytes.
+ * per lookup, rows added in line: the fastest of 108 layouts in 49152 bytes of flash, at most 143 cycles (310 by
+ * update()) and 1780 bytes.
  *
  * From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.h.j2.
  */

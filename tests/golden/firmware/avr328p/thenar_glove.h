@@ -4,7 +4,7 @@
  *
  * Layout for atmega328p: 16-bit entries, up to 6 switches per lookup, codes looked up in 256 bytes a joint, up to 2
  * joints per lookup, rows added in line: the fastest of 108 layouts in 16384 bytes of flash, at most 134 cycles (298
- * by update()) and 2485 bytes.
+ * by update()) and 2505 bytes.
  *
  * From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.h.j2.
  */

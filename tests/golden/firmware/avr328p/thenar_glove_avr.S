@@ -10,7 +10,6 @@
 #define STRIDE 6 /* bytes of a row */
 #define STATE 12 /* offset in a glove of what Y points at: two flags (input missing, update() begun), the input */
 #define START 6
-#define SEEN 7 /* offset from Y of the input bytes of the previous call */
 
 /* Make Z the address of a row: its number is in a register, row 0 is at offset `rows`. */
 .macro to_row rows, number
@@ -148,6 +147,33 @@ thenar_glove_answer:
     ret
     .size thenar_glove_classify, . - thenar_glove_classify
 
+/* Keep Z, the address of a lookup's rows. */
+    .section .bss.thenar_glove_kept, "aw", @nobits
+thenar_glove_kept:
+    .zero 2
+
+.macro keep_rows
+    sts   thenar_glove_kept, r30
+    sts   thenar_glove_kept + 1, r31
+.endm
+
+/* Make Z, which is still the same, the address of row r0; make Z the address of row r30. */
+.macro to_row_r0
+    ldi   r31, STRIDE
+    mul   r0, r31
+    lds   r31, thenar_glove_kept + 1
+    add   r30, r0
+    adc   r31, r1
+.endm
+.macro to_row_r30
+    ldi   r31, STRIDE
+    mul   r30, r31
+    lds   r30, thenar_glove_kept
+    lds   r31, thenar_glove_kept + 1
+    add   r30, r0
+    adc   r31, r1
+.endm
+
     .section .text.thenar_glove_update, "ax", @progbits
 
     .global thenar_glove_update
@@ -161,7 +187,7 @@ thenar_glove_update:
     subi  r31, 1
     or    r30, r31
     breq  1f /* 0 times */
-    jmp   thenar_glove_prepare
+    rjmp thenar_glove_prepare
 1:
 
 changes_0:
@@ -178,26 +204,28 @@ loads_0:
     ldd   r30, Y+2
     andi  r30, 0x3f
     ldd   r31, Y+5
-    cpse  r30, r31
-    rcall change_0_0
-
-    brtc  1f /* 0 times */
-    jmp   all_0
+    cp    r30, r31
+    breq  1f
+    std   Y+5, r30
+    movw  r0, r30
+    ldi   r30, lo8(thenar_glove_rows + 0)
+    ldi   r31, hi8(thenar_glove_rows + 0)
+    rcall switches_0
 1:
-    to_state SEEN
 
     /* thumb_rotation, index_pij */
-    ldd   r0, Y+3
-    ld    r1, Z+
-    cp    r0, r1
+    ldd   r30, Y+3
+    ldd   r31, Y+7
+    brts  1f
+    cp    r30, r31
     brne  1f
-    ldd   r0, Y+4
-    ld    r1, Z+
-    cpse  r0, r1
+    ldd   r30, Y+4
+    ldd   r31, Y+8
+    cpse  r30, r31
 1:  rcall change_0_1
+2:
 
-changed_0:
-    to_state 0 - STATE
+    to_glove 0
     st    Z+, r22
     st    Z+, r23
     st    Z+, r24
@@ -219,45 +247,23 @@ thenar_glove_prepare:
     ldd   r30, Y+1
     tst   r30
     breq  1f
-    jmp   changes_0
+    rjmp changes_0
 1:  ldi   r30, 1
     std   Y+1, r30
     set
     ldi   r30, 0
     std   Y+5, r30
-
-begin_0:
-    to_state START + 0 - STATE
-    jmp   loads_0
-
-all_0:
-    rcall change_0_1
-    jmp   changed_0
-
-change_0_0:
-    std   Y+5, r30
-    /* Add the row of the switches that have closed, subtract the row of those that have opened. */
-    mov   r0, r30
-    eor   r0, r31
-    and   r31, r0
-    push  r31
-    and   r30, r0
-    breq  1f
-    to_row 0, r30
-    rcall add_0
-1:  pop   r30
-    tst   r30
-    breq  1f
-    to_row 0, r30
-    rjmp subtract_0
-1:  ret
+    to_glove START
+    rjmp loads_0
 
 change_0_1:
     ldd   r30, Y+3
+    std   Y+7, r30
     ldi   r31, hi8(thenar_glove_bins + 0)
     lpm   r30, Z
     mov   r0, r30
     ldd   r30, Y+4
+    std   Y+8, r30
     ldi   r31, hi8(thenar_glove_bins + 256)
     lpm   r30, Z
     add   r30, r0
@@ -267,26 +273,41 @@ change_0_1:
     breq  2f
 1:
     std   Y+6, r30
-    push  r31
-    to_row 384, r30
-    rcall add_0
+    movw  r0, r30
+    ldi   r30, lo8(thenar_glove_rows + 384)
+    ldi   r31, hi8(thenar_glove_rows + 384)
+    rjmp replace_0
+2:  ret
+
+/* Add row r0 of those at Z, and subtract row r1, unless the sums hold no rows yet. */
+replace_0:
+    push  r1
+    keep_rows
+    to_row_r0
+    add_row
     pop   r30
-    brts  2f
-    to_row 384, r30
-    rcall subtract_0
-2:
-    to_state SEEN + 0
-    ldd   r0, Y+3
-    st    Z+, r0
-    ldd   r0, Y+4
-    st    Z+, r0
+    brtc  subtract_0
     ret
 
-add_0:
-    add_row
+/* Add the row of the switches that have closed, and subtract that of those that have opened: r0 has them now, r1 as
+   they were before; Z is the address of their rows. */
+switches_0:
+    eor   r1, r0
+    and   r0, r1
+    eor   r1, r0
+    push  r1
+    keep_rows
+    tst   r0
+    breq  1f
+    to_row_r0
+    rcall add_row_at_z
+1:  pop   r30
+    tst   r30
+    brne  subtract_0
     ret
 
 subtract_0:
+    to_row_r30
     lpm   r0, Z+
     sub   r22, r0
     lpm   r0, Z+
@@ -300,6 +321,11 @@ subtract_0:
     lpm   r0, Z+
     sbc   r27, r0
     ret
+
+add_row_at_z:
+    add_row
+    ret
+
 thenar_glove_update_near:
     .size thenar_glove_update, . - thenar_glove_update
 

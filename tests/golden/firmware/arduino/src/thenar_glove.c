@@ -136,24 +136,16 @@ static void shift_start(thenar_glove *glove, uint16_t k, uint16_t steps)
 #define KEEP(constant) ((void)0)
 #endif
 
-/* Find the rows that an input adds. */
-static void find(const thenar_glove_frame *input, thenar_glove_seen *found)
-{
-    found->rows[0] = thenar_glove_rows[(input->switches[0] & 0x3Fu)];
-    found->rows[1] = thenar_glove_rows[64u + thenar_glove_bins[input->codes[0]] + thenar_glove_bins[256u
-        + input->codes[1]]];
-}
-
 /* The first class of the largest sum: that sum in the upper bits of a word, and ones below. */
 typedef struct {
     uint32_t sum;
     uint_fast16_t grasp;
 } largest;
 
-/* Store the lowest sixteen bits as a score. */
-static void store(uint32_t sum, int16_t *score)
+/* Store the lower sum of a word as a score. */
+static void store(uint32_t sums, int16_t *score)
 {
-    *score = (int16_t)(uint16_t)((sum ^ 0x8000u) & 0xFFFFu);
+    *score = (int16_t)(uint16_t)((sums ^ 0x8000u) & 0xFFFFu);
 }
 
 /* Store both sums of a word as scores, in one access if the second comes last in memory. */
@@ -182,14 +174,13 @@ static void take(uint32_t word, uint_fast16_t k, uint32_t ones, largest *best)
 #define PREDICT(first, best) do { \
     uint32_t ones = 0xFFFFu; \
     KEEP(ones); \
+    HIDE(s0); \
     store_two(s0, &glove->scores[0]); \
     store(s1, &glove->scores[(first) + 2u]); \
     take(s0 << 16, (first) + 0u, ones, (best)); \
     take(s0, (first) + 1u, ones, (best)); \
     take(s1 << 16, (first) + 2u, ones, (best)); \
 } while (false)
-
-static const thenar_glove_row nothing = {0u};
 
 #ifdef __ARM_ARCH_6M__
 #define ROW(lookup, number) found.rows[lookup]
@@ -209,11 +200,41 @@ static const thenar_glove_row nothing = {0u};
 } while (false)
 
 /* Replace a row in the sums. */
-static void replace(const uint32_t *before, const uint32_t *after, uint32_t *sum)
+#define REPLACE(before, after) do { \
+    s0 += (after)[0] - (before)[0]; \
+    HIDE(s0); \
+    s1 += (after)[1] - (before)[1]; \
+    HIDE(s1); \
+} while (false)
+
+/* To replace more rows than these takes longer than to add all. */
+#define MOST_REPLACED (LOOKUPS / 2u)
+
+/* Add the initial scores to the sums. */
+#define ADD_START(start) do { \
+    s0 += (start)[0]; \
+    s1 += (start)[1]; \
+} while (false)
+
+/* Begin the sums with the initial scores, and add all rows that have been found. */
+#define ADD_AGAIN(start) do { \
+    s0 = (start)[0]; \
+    s1 = (start)[1]; \
+    for (uint_fast16_t i = 0u; i < LOOKUPS; i++) { \
+        ADD(&glove->seen.rows[i][part * ROWS * WORDS]); \
+    } \
+} while (false)
+
+#ifdef __ARM_ARCH_6M__
+/* Find the rows that an input adds. */
+static void find(const thenar_glove_frame *input, thenar_glove_seen *found)
 {
-    sum[0] += after[0] - before[0];
-    sum[1] += after[1] - before[1];
+    found->rows[0] = thenar_glove_rows[(input->switches[0] & 0x3Fu)];
+    found->rows[1] = thenar_glove_rows[64u + thenar_glove_bins[input->codes[0]] + thenar_glove_bins[256u
+        + input->codes[1]]];
 }
+
+#endif
 
 static void add_up(thenar_glove *glove, largest *best)
 {
@@ -235,8 +256,7 @@ static void add_up(thenar_glove *glove, largest *best)
     ADD(ROW(0, (input->switches[0] & 0x3Fu)));
     ADD(ROW(1, 64u + thenar_glove_bins[input->codes[0]] + thenar_glove_bins[256u
             + input->codes[1]]));
-    s0 += start[0];
-    s1 += start[1];
+    ADD_START(start);
     PREDICT(0u, best);
 }
 
@@ -252,53 +272,84 @@ thenar_glove_class thenar_glove_classify(thenar_glove *glove)
     return (thenar_glove_class)best.grasp;
 }
 
-/* Replace the earlier rows in the sums of a part. */
-static void replace_all(thenar_glove *glove, uint_fast16_t part, const thenar_glove_seen *found)
+/* The changes since the last update(). */
+typedef struct {
+    const uint32_t *before;
+    const uint32_t *after;
+} change;
+
+typedef struct {
+    change rows[LOOKUPS];
+    change *end;
+    bool again; /* adding up all rows is faster */
+} changes;
+
+#define NOTE(lookup, row) do { \
+    const uint32_t *const after = (row); \
+    if (after != glove->seen.rows[lookup]) { \
+        end->before = glove->seen.rows[lookup]; \
+        end->after = after; \
+        end++; \
+        glove->seen.rows[lookup] = after; \
+    } \
+} while (false)
+
+static void find_changes(thenar_glove *glove, changes *changed)
 {
-    uint32_t *const sum = glove->sums[part];
+    const thenar_glove_frame *const input = &glove->input;
+#ifdef __ARM_ARCH_6M__
+    thenar_glove_seen found;
+#else
+    uint32_t row_bytes = sizeof(thenar_glove_row);
+#endif
+    change *end = changed->rows;
 
-    for (uint_fast16_t i = 0u; i < LOOKUPS; i++) {
-        const uint32_t *const before = glove->seen.rows[i];
-
-        if (found->rows[i] != before) {
-            replace(before, found->rows[i], sum);
-            glove->seen.rows[i] = found->rows[i];
-        }
-    }
+#ifdef __ARM_ARCH_6M__
+    find(input, &found);
+#else
+    HIDE(row_bytes);
+#endif
+    NOTE(0, ROW(0, (input->switches[0] & 0x3Fu)));
+    NOTE(1, ROW(1, 64u + thenar_glove_bins[input->codes[0]] + thenar_glove_bins[256u
+            + input->codes[1]]));
+    changed->again = !glove->begun || (end > &changed->rows[MOST_REPLACED]);
+    changed->end = end;
 }
 
-static void begin(thenar_glove *glove)
+/* Renew the sums of a part: add up all rows again, or replace those that have changed. */
+static void renew(thenar_glove *glove, uint_fast16_t part, const changes *changed, largest *best)
 {
-    for (uint_fast16_t part = 0u; part < PARTS; part++) {
-        for (uint_fast16_t lane = 0u; lane < LANES; lane++) {
-            glove->sums[part][lane] = glove->start[part][lane];
+    uint32_t *const sum = glove->sums[part];
+    const change *each = changed->rows;
+    uint32_t s0 = sum[0];
+    uint32_t s1 = sum[1];
+
+    if (changed->again) {
+        ADD_AGAIN(glove->start[part]);
+    }
+    else {
+        while (each != changed->end) {
+            REPLACE(&each->before[part * ROWS * WORDS], &each->after[part * ROWS * WORDS]);
+            each++;
         }
     }
-    for (uint_fast16_t i = 0u; i < LOOKUPS; i++) {
-        glove->seen.rows[i] = nothing;
-    }
-    glove->begun = true;
+    sum[0] = s0;
+    sum[1] = s1;
+    PREDICT(0u, best);
 }
 
 thenar_glove_class thenar_glove_update(thenar_glove *glove)
 {
     largest best = {0u, 0u};
-    thenar_glove_seen found;
+    changes changed;
 
     if (glove->missing) {
         leave_out(glove);
     }
-    if (!glove->begun) {
-        begin(glove);
-    }
-    find(&glove->input, &found);
+    find_changes(glove, &changed);
+    glove->begun = true;
     for (uint_fast16_t part = 0u; part < PARTS; part++) {
-        const uint32_t *const sum = glove->sums[part];
-
-        replace_all(glove, part, &found);
-        const uint32_t s0 = sum[0];
-        const uint32_t s1 = sum[1];
-        PREDICT(0u, &best);
+        renew(glove, part, &changed, &best);
     }
     return (thenar_glove_class)best.grasp;
 }

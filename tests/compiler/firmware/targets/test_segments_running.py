@@ -1,0 +1,113 @@
+"""The decoder of segments beside the classifier, in every language: Python's state at every frame of whole streams."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from thenar.compiler.firmware.classifier import Library
+from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.probes import STREAM_TICKS, Lost, Predictions, Probes, states_of
+from thenar.compiler.firmware.targets import TARGETS
+from thenar.runtime.build import Build
+from thenar.runtime.manifest import Manifest, Rejection
+from thenar.runtime.published import NONE
+from thenar.runtime.scores import LANE_OFFSET
+from thenar.runtime.segmenting.model import SegmentModel
+from thenar.runtime.tables import IntegerTables
+
+MakeTables = Callable[..., IntegerTables]
+Describe = Callable[[IntegerTables], Manifest]
+KINDS = ("cortex-m0plus", "host", "micropython", "rust", "rv32imac", "wasm")
+TICKS = 3 * STREAM_TICKS + 77  # several streams, the last without its end
+
+
+@pytest.fixture(params=KINDS)
+def target(request: pytest.FixtureRequest, tool: Callable[[str], str]) -> str:
+    if missing := TARGETS[request.param].missing():
+        tool(missing.split()[0])
+    return str(request.param)
+
+
+def movements(tables: IntegerTables, seed: int) -> tuple[Probes, Lost]:
+    """Return frames of a hand that holds still for a while, trembles, and moves on; inputs are missing at times."""
+    random, still = np.random.default_rng(seed), 30
+    holds = -(-TICKS // still)
+    bits = np.repeat(random.random((holds, tables.n_switches)) < 0.4, still, axis=0)[:TICKS]
+    codes = np.repeat(random.integers(0, 256, (holds, tables.n_joints)), still, axis=0)[:TICKS]
+    lost = np.repeat(random.random((holds, tables.n_switches + tables.n_joints)) < 0.2, still, axis=0)[:TICKS]
+    lost[np.arange(TICKS) // still % 3 > 0] = False
+    lost[-9:] = True
+    return Probes(bits ^ (random.random(bits.shape) < 0.02), codes.astype(np.uint16)), lost
+
+
+def model_of(tables: IntegerTables, knows_none: bool, seed: int) -> SegmentModel:
+    """Return costs that differ from state to state, with some shortest durations in common."""
+    types, random = tables.n_classes - knows_none, np.random.default_rng(seed)
+
+    def costs(low: int, high: int, n: int = types) -> tuple[int, ...]:
+        return tuple(random.integers(low, high, n).tolist())
+
+    return replace(
+        SegmentModel.usual(types, knows_none, tables.scale),
+        least=(*random.choice([1, 3, 3, 9, 20], types).tolist(), 4),
+        stay=costs(0, 4, types + 1),
+        enter=costs(20, 90),
+        leave=costs(10, 60),
+        direct=costs(40, 200),
+    )
+
+
+def scores_of(build: Build, frames: Probes, lost: Lost) -> NDArray[np.int64]:
+    s, without = build.tables.n_switches, build.scorer.lanes_without
+    held = zip(frames.bits, frames.codes, lost, strict=True)
+    return np.array([without(bits, codes, row[:s], row[s:]) for bits, codes, row in held]) - LANE_OFFSET
+
+
+def ran(target: str, manifest: Manifest, tables: IntegerTables, frames: Probes, lost: Lost | None) -> Predictions:
+    member, layout = TARGETS[target], arrange(tables)
+    files = member.sources(Library("hand", manifest, layout, avr=False))
+    sent = layout.frame_bytes(frames.bits, frames.codes)
+    return member.run(files, "hand", layout, sent, incremental=lost is not None, lost=lost)
+
+
+def described(tables: IntegerTables, describe: Describe, kind: str) -> Manifest:
+    """Return a manifest with costs of segments, and a class "none", a rejection of some of the frames, or neither."""
+    manifest = replace(describe(tables), segments=model_of(tables, kind == "class none", 5))
+    n, j = tables.n_classes, tables.n_joints
+    if kind == "class none":
+        return replace(manifest, grasps=(*manifest.grasps[:-1], NONE))
+    if kind == "neither":
+        return manifest
+    rejection = Rejection(0.1, (-300,) * n, ((2, 6),) * n, (((10, 240),) * j,) * n, 1)
+    return replace(manifest, rejection=rejection)
+
+
+@pytest.mark.parametrize("kind", ["class none", "refusals", "neither"])
+def test_every_state_is_python_s_with_missing_inputs_ends_and_restarts(
+    target: str, make_tables: MakeTables, describe: Describe, kind: str
+) -> None:
+    tables = make_tables(seed=4, classes=6, reach=60)
+    manifest = described(tables, describe, kind)
+    assert manifest.segments is not None
+    frames, lost = movements(tables, 8)
+    for missing in (None, lost):
+        found = ran(target, manifest, tables, frames, missing)
+        scores = scores_of(Build(manifest, tables), frames, np.zeros_like(lost) if missing is None else lost)
+        assert np.array_equal(found.scores, scores)
+        refused = found.classes == tables.n_classes
+        assert refused.any() == (kind == "refusals")
+        expected = states_of(manifest.segments, scores, refused)
+        assert len(set(expected.tolist())) > 3
+        assert found.states is not None
+        np.testing.assert_array_equal(found.states, expected)
+
+
+def test_a_build_without_costs_of_segments_has_no_decoder(
+    target: str, make_tables: MakeTables, describe: Describe
+) -> None:
+    tables = make_tables()
+    frames, _ = movements(tables, 1)
+    assert ran(target, describe(tables), tables, frames, None).states is None
