@@ -11,9 +11,6 @@ WORKERS = $(shell expr $(CORES) \* 3 / 2)
 # The scene that `make demo` simulates: a shipped one by its name, or a file. With TABLE=table.csv it imports that.
 SCENE ?= quick
 
-# Tests start hundreds of programs, each of which would compile all that it imports.
-unexport PYTHONDONTWRITEBYTECODE
-
 PACKAGES := cli compiler drivers firmware_templates runtime simulator stability
 
 .PHONY: help demo test test-slow test-all pythons mutants lint format types bench soak fuzz docs dist check clean

@@ -26,6 +26,10 @@ for _signal in (signal.SIGHUP, signal.SIGINT):
     if signal.getsignal(_signal) is signal.SIG_IGN:
         signal.signal(_signal, lambda *_: None)
 
+# Tests start hundreds of programs, and every worker imports all test modules: without bytecode each compiles them anew.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 # Every run draws the same examples, on every machine: what failed once fails again. (Among mutants it is theirs.)
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 if "quick_verdict" not in sys.modules:

@@ -1,14 +1,17 @@
 """A small set of grasps as a file, and a build of it, for the sub-commands to work on."""
 
+import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from shutil import copytree
 
 import numpy as np
 import pytest
 
+from thenar.cli import run
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.taxonomy import own
@@ -17,14 +20,46 @@ Thenar = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
 @pytest.fixture(scope="session")
-def thenar() -> Thenar:
-    """Run `thenar` in a process of its own."""
+def thenar_process() -> Thenar:
+    """Run `thenar` in a process of its own: slower, for what a process has alone."""
 
-    def run(*arguments: object) -> "subprocess.CompletedProcess[str]":
+    def in_process(*arguments: object) -> "subprocess.CompletedProcess[str]":
         command = [sys.executable, "-m", "thenar.cli", *map(str, arguments)]
         return subprocess.run(command, capture_output=True, text=True, check=False)
 
-    return run
+    return in_process
+
+
+@contextmanager
+def _redirected(name: str, number: int, path: Path) -> Iterator[None]:
+    """Let a standard stream, of this process and of those that it starts, lead to a file."""
+    before, kept = getattr(sys, name), os.dup(number)
+    before.flush()
+    try:
+        with path.open("w+", encoding="utf-8") as file:
+            os.dup2(file.fileno(), number)
+            setattr(sys, name, file)
+            yield
+    finally:
+        setattr(sys, name, before)
+        os.dup2(kept, number)
+        os.close(kept)
+
+
+@pytest.fixture(scope="session")
+def thenar(tmp_path_factory: pytest.TempPathFactory) -> Thenar:
+    """Run `thenar` in this process, which spares the start of Python and all imports."""
+    folder = tmp_path_factory.mktemp("printed")
+
+    def here(*arguments: object) -> "subprocess.CompletedProcess[str]":
+        words, out, err = list(map(str, arguments)), folder / "out", folder / "err"
+        with Path(os.devnull).open() as nothing, pytest.MonkeyPatch.context() as changed:
+            changed.setattr(sys, "stdin", nothing)
+            with _redirected("stdout", 1, out), _redirected("stderr", 2, err):
+                code = run(words)
+        return subprocess.CompletedProcess(words, code, out.read_text("utf-8"), err.read_text("utf-8"))
+
+    return here
 
 
 @pytest.fixture(scope="session")

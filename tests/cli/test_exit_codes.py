@@ -24,8 +24,8 @@ def _one_sentence(done: "subprocess.CompletedProcess[str]") -> str:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help_with_an_example(thenar: Thenar, command: str) -> None:
-    done = thenar(command, "--help")
+def test_every_command_has_help_with_an_example(thenar_process: Thenar, command: str) -> None:
+    done = thenar_process(command, "--help")
     assert done.returncode == 0, done.stderr
     assert f"thenar {command} " in done.stdout.split("Example:")[1]
 

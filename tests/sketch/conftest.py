@@ -251,9 +251,9 @@ def write(folder: Path, text: str, mode: Mode = "scan", build: Build | None = No
     return sketch
 
 
-def compiled(sketch: Path, tool: Callable[[str], str]) -> Path:
-    """Return the program of the sketch in that folder, compiled strictly and with sanitizers, on the shim."""
-    objects = []
+def compiled(sketch: Path, tool: Callable[[str], str], bench: Sequence[Path]) -> Path:
+    """Return the program of the sketch in that folder, compiled strictly, with sanitizers, for this bench."""
+    objects = list(map(str, bench))
     for source in sorted(sketch.iterdir()):
         commands = {
             ".c": [tool("gcc"), *STRICT_C, *SANITIZED, "-c", str(source)],
@@ -266,21 +266,33 @@ def compiled(sketch: Path, tool: Callable[[str], str]) -> Path:
                 [*commands[source.suffix], "-o", objects[-1]], capture_output=True, text=True, check=False
             )
             assert (done.returncode, done.stderr) == (0, ""), source.name
-    chips = [tool("gcc"), *SANITIZED, "-c", str(CHIPS / "board_chips.c"), "-o", str(sketch / "chips.o")]
-    subprocess.run(chips, check=True, timeout=300)
-    bench = [tool("g++"), *STRICT_CPP, *SANITIZED, f"-I{SHIM}", f"-I{CHIPS}", str(SHIM / "bench.cpp"), *objects]
-    subprocess.run([*bench, str(sketch / "chips.o"), "-o", str(sketch / "program")], check=True, timeout=300)
+    linked = [tool("g++"), *SANITIZED, *objects, "-o", str(sketch / "program")]
+    subprocess.run(linked, check=True, timeout=300)
     return sketch / "program"
 
 
 @pytest.fixture(scope="session")
-def program(tool: Callable[[str], str], tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+def bench(tool: Callable[[str], str], tmp_path_factory: pytest.TempPathFactory) -> Sequence[Path]:
+    """Return the compiled shim and models of chips, the same for all sketches."""
+    folder = tmp_path_factory.mktemp("bench")
+    chips = [tool("gcc"), *SANITIZED, "-c", str(CHIPS / "board_chips.c")]
+    shim = [tool("g++"), *STRICT_CPP, *SANITIZED, f"-I{SHIM}", f"-I{CHIPS}", "-c", str(SHIM / "bench.cpp")]
+    made = folder / "chips.o", folder / "bench.o"
+    for command, to in zip((chips, shim), made, strict=True):
+        subprocess.run([*command, "-o", str(to)], check=True, timeout=300)
+    return made
+
+
+@pytest.fixture(scope="session")
+def program(
+    tool: Callable[[str], str], tmp_path_factory: pytest.TempPathFactory, bench: Sequence[Path]
+) -> Callable[..., Path]:
     """Return what compiles the firmware of a board.toml, once."""
     made: dict[tuple[str, Mode], Path] = {}
 
     def program(text: str, mode: Mode = "scan") -> Path:
         if (text, mode) not in made:
-            made[text, mode] = compiled(write(tmp_path_factory.mktemp("sketch"), text, mode), tool)
+            made[text, mode] = compiled(write(tmp_path_factory.mktemp("sketch"), text, mode), tool, bench)
         return made[text, mode]
 
     return program

@@ -8,6 +8,7 @@ import pytest
 from msgspec import structs
 
 from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.artifact import verify_firmware as verify_firmware_module
 from thenar.compiler.artifact.verify import verify
 from thenar.compiler.artifact.verify_firmware import FirmwareTrial, verify_firmware
 from thenar.compiler.firmware import FirmwareError, classifier
@@ -61,6 +62,13 @@ def test_every_score_and_type_of_every_frame_is_pythons(
     assert (found.carried.present, found.carried.outdated) == (True, ())
 
 
+@pytest.fixture
+def few_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows, extreme frames and 400 random ones, each missing inputs too, show all that is wrong below."""
+    monkeypatch.setattr(verify_firmware_module, "RANDOM_FRAMES", 400)
+
+
+@pytest.mark.usefixtures("few_frames")
 @pytest.mark.parametrize("table_bits", [8, 16])
 @pytest.mark.parametrize("kind", ["host", "avr", pytest.param("cortex-m", marks=pytest.mark.slow)])
 def test_builds_with_linear_joints_are_pythons_too(
@@ -74,6 +82,7 @@ def test_builds_with_linear_joints_are_pythons_too(
     assert verify_firmware(made.folder, grasp_set, (kind,)).holds
 
 
+@pytest.mark.usefixtures("few_frames")
 @pytest.mark.parametrize("inputs", ["switches", "joints"])
 @pytest.mark.parametrize("kind", ["host", "avr"])
 def test_builds_without_joints_or_without_switches_are_pythons_too(
@@ -85,6 +94,7 @@ def test_builds_without_joints_or_without_switches_are_pythons_too(
     assert verify_firmware(folder, grasp_set, (kind,)).holds
 
 
+@pytest.mark.usefixtures("few_frames")
 def test_one_wrong_entry_is_found_with_the_first_frame_that_shows_it(
     build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -120,6 +130,7 @@ def test_one_wrong_entry_is_found_with_the_first_frame_that_shows_it(
     assert loaded.grasps[int(loaded.scores(bits, check.first.codes).argmax())] == check.first.grasp
 
 
+@pytest.mark.usefixtures("few_frames")
 @pytest.mark.parametrize("kind", ["host", "avr"])
 def test_a_frame_that_the_compiled_code_does_not_refuse_is_found(
     build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch, kind: str
@@ -144,6 +155,7 @@ def test_a_frame_that_the_compiled_code_does_not_refuse_is_found(
     assert all(wrong) or kind == "host"
 
 
+@pytest.mark.usefixtures("few_frames")
 @pytest.mark.parametrize("kind", ["host", "avr"])
 @pytest.mark.parametrize(
     ("right", "wrong"),
@@ -211,6 +223,7 @@ def test_a_state_of_a_segment_that_is_off_is_found(
             assert found.first.said[2] != found.first.compiled_said[2]
 
 
+@pytest.mark.usefixtures("few_frames")
 @pytest.mark.parametrize("kind", ["host", "cortex-m"])
 def test_a_switch_put_into_the_wrong_bit_is_found(
     build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch, kind: str
@@ -229,6 +242,7 @@ def test_a_switch_put_into_the_wrong_bit_is_found(
     assert {check.misnamed for check in found.checks} == {0}
 
 
+@pytest.mark.usefixtures("few_frames")
 @pytest.mark.parametrize("kind", ["host", "cortex-m"])
 def test_names_that_are_mixed_up_are_found(
     build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch, kind: str
@@ -247,6 +261,7 @@ def test_names_that_are_mixed_up_are_found(
     assert [(check.differing, check.misnamed) for check in found.checks[:2]] == [(0, 2), (0, 2)]
 
 
+@pytest.mark.usefixtures("few_frames")
 def test_what_does_not_hold_of_firmware_does_not_hold_of_the_build(
     build: Path, grasp_set: GraspSet, tool: Tool, tmp_path: Path
 ) -> None:
@@ -264,6 +279,7 @@ def test_what_does_not_hold_of_firmware_does_not_hold_of_the_build(
     assert not whole.holds
 
 
+@pytest.mark.usefixtures("few_frames")
 def test_a_build_of_before_carries_no_firmware_and_holds(grasp_set: GraspSet, tool: Tool, tmp_path: Path) -> None:
     tool("gcc")
     folder = compile_build(grasp_set, tmp_path / "build", rounds=5, folds=0).folder
@@ -283,6 +299,7 @@ def test_without_the_tools_it_says_what_to_install(
         verify_firmware(build, grasp_set, (kind,))
 
 
+@pytest.mark.usefixtures("few_frames")
 def test_its_progress_ends_before_the_last_run_and_never_goes_back(
     build: Path, grasp_set: GraspSet, tool: Tool
 ) -> None:

@@ -108,9 +108,27 @@ def _all_changing(layout: Layout, bits: np.ndarray, codes: np.ndarray) -> tuple[
     return np.vstack([bits, changing.bits]), np.vstack([codes, changing.codes])
 
 
-@pytest.mark.parametrize(("bins", "adding", "entry_bits"), WAYS)
-@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: "-".join(map(str, shape)))
-@pytest.mark.parametrize("part", [AVRS[0], pytest.param(AVRS[1], marks=pytest.mark.slow)])
+def _named(shape: tuple[int, int, int, int], way: tuple[Bins, Adding, int]) -> str:
+    return "-".join(map(str, (*shape, *way)))
+
+
+# Every shape in three ways, among which are all bins, both widths and both ways to add; in the slow tests in all six.
+HALVES = ((0, 2, 5), (1, 3, 4))
+COVERING = [
+    pytest.param(shape, *WAYS[n], id=_named(shape, WAYS[n]))
+    for number, shape in enumerate(SHAPES)
+    for n in HALVES[number % 2]
+]
+EVERY = [pytest.param(shape, *way, id=_named(shape, way)) for shape, way in product(SHAPES, WAYS)]
+
+
+@pytest.mark.parametrize(
+    ("part", "shape", "bins", "adding", "entry_bits"),
+    [
+        *(pytest.param(AVRS[0], *each.values, id=f"{AVRS[0]}-{each.id}") for each in COVERING),
+        *(pytest.param(AVRS[1], *each.values, id=f"{AVRS[1]}-{each.id}", marks=pytest.mark.slow) for each in EVERY),
+    ],
+)
 def test_the_model_says_to_the_cycle_what_every_frame_takes_and_the_bound_is_near(
     tool: Tool,
     size: Size,
@@ -147,8 +165,7 @@ def test_the_model_says_to_the_cycle_what_every_frame_takes_and_the_bound_is_nea
     assert 0 <= cost.ram - glove_size(layout) - variables - max(answers.stack, changed.stack) <= 4
 
 
-@pytest.mark.parametrize(("bins", "adding", "entry_bits"), WAYS)
-@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: "-".join(map(str, shape)))
+@pytest.mark.parametrize(("shape", "bins", "adding", "entry_bits"), COVERING)
 def test_an_avr_s_flash_is_what_the_model_allows_for_or_a_little_less(
     size: Size,
     make_tables: MakeTables,
@@ -214,7 +231,7 @@ shapes = st.tuples(st.integers(2, 40), st.integers(0, 30), st.integers(0, 5), st
 
 
 @given(shape=shapes, bins=st.sampled_from(["trimmed", "search"]), entry_bits=st.sampled_from([8, 16]))
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30)
 def test_no_frame_takes_longer_than_the_bound_and_more_look_ups_never_cost_less(
     make_tables: MakeTables, shape: tuple[int, int, int, int], bins: Bins, entry_bits: int
 ) -> None:
