@@ -38,22 +38,12 @@ def _scaled(target: Target, flash: int) -> Target:
     return replace(target, flash=flash)
 
 
-@pytest.fixture(scope="module")
-def few(make_tables: MakeTables) -> IntegerTables:
-    return make_tables(1, classes=14, switches=33, joints=5, bins=16, reach=12)
-
-
-@pytest.fixture(scope="module")
-def few_wide(make_tables: MakeTables) -> IntegerTables:
-    return make_tables(1, classes=14, switches=33, joints=5, bins=16, reach=300)
-
-
 @pytest.mark.parametrize("part", list(TARGETS))
-def test_what_is_chosen_is_the_fastest_that_fits_and_costs_what_it_says(few: IntegerTables, part: str) -> None:
+def test_what_is_chosen_is_the_fastest_that_fits_and_costs_what_it_says(tables: IntegerTables, part: str) -> None:
     target = TARGETS[part]
-    found = choose(few, target)
+    found = choose(tables, target)
     assert found.cost == target.cost(found.layout)
-    assert found.layout.tables is few
+    assert found.layout.tables is tables
     fitting = [cost for _, cost in found.frontier if cost.flash <= flash_shares(target)[0]]
     assert found.cost == min(fitting, key=lambda cost: cost.cycles)
 
@@ -140,7 +130,7 @@ def test_narrow_entries_are_chosen_where_many_rows_are_added_before_they_are_tak
 def test_where_few_rows_fill_a_byte_narrow_entries_are_slower_and_chosen_for_flash_alone(
     make_tables: MakeTables, part: str
 ) -> None:
-    tables, target = make_tables(1, classes=14, switches=33, joints=6, bins=16, reach=40), TARGETS[part]
+    tables, target = make_tables(1, classes=14, switches=33, joints=16, bins=16, reach=40), TARGETS[part]
     wide, narrow = (arrange(tables, group_size=3, entry_bits=bits) for bits in (16, 8))
     assert len(narrow.batches) > len(narrow.lookups) / 4
     faster, slower = target.cost(wide), target.cost(narrow)
@@ -153,10 +143,10 @@ def test_where_few_rows_fill_a_byte_narrow_entries_are_slower_and_chosen_for_fla
 
 @pytest.mark.parametrize("part", list(TARGETS))
 def test_scores_are_the_proved_ones_however_wide_the_entries_chosen_are(
-    few: IntegerTables, few_wide: IntegerTables, part: str
+    tables: IntegerTables, wide_tables: IntegerTables, part: str
 ) -> None:
     """Rows of a build that was compiled with 16 table bits may fit in bytes, and are exact there too."""
-    for each, width in ((few, 8), (few_wide, 16)):
+    for each, width in ((tables, 8), (wide_tables, 16)):
         layout = choose(each, TARGETS[part], flash=min(TARGETS[part].flash, 64 << 10)).layout
         assert layout.entry_bits == width
         frames = joined(extreme_frames(each), random_frames(each, 200, 1))
