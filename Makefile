@@ -49,7 +49,7 @@ endif
 	@echo "what accuracy costs in time: $(OUT)/frontier/frontier.svg; the build on one page: $(OUT)/build/report.html; its glove: $(OUT)/build/spec;"
 	@echo "the rates: $(OUT)/evaluation.json."
 
-test: $(VENV)/installed  ## the tests, some thirteen minutes on two cores
+test: $(VENV)/installed  ## the tests, some ten minutes on two cores
 	$(BIN)/python -m pytest -m "not slow" -n $(WORKERS)
 
 test-slow: $(VENV)/installed pythons  ## the slower checks: real Weka, fuzzing, real recordings at full length
