@@ -235,6 +235,7 @@ def _says(grasp: BoardGrasp, expected: tuple[int, int]) -> bool:
 def test_a_glove_with_a_converter_recognises_as_python_does(start: Start, build: Any, case: str) -> None:
     """Switches are on pins, or on chips; the converter's pins are those of the joints' channels."""
     board, random, chip = start(*CASES[case]), np.random.default_rng(4), wired().get(case.partition(",")[0])
+    assert chip is None or isinstance(chip, SketchPart)
     pins = (28, 26) if chip is None else [chip.converter[channel] for channel in ("ADC1_CH3", "ADC1_CH0")]
     board.do(*(AT_CHIPS if chip is not None else ()))
     with Scanner(board.port("serial")) as host:

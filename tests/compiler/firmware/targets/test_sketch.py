@@ -177,7 +177,7 @@ def test_every_frame_is_answered_as_by_python(
     assert isinstance(package, Package)
     wiring = Wiring.of(library, package.example_pins)
     assert str(wiring.on(BOARDS[board]) if board else wiring.of_part) == parts
-    values = example_values(library, wiring)
+    values: dict[str, Any] = example_values(library, wiring)
     for path, text in package.files(library).items():
         (tmp_path / Path(path).name).write_text(text)
     if not known:
