@@ -7,7 +7,7 @@ instructions; its 24 bits are enough for a million.
 
 from functools import partial
 
-from ..costs import Core
+from ..costs import Core, Updating
 from ..tools import ARM_COMPILER, ARM_EMULATOR
 from .bare import Bare, Machine
 
@@ -43,12 +43,22 @@ MEMBER = (
             found=9,
             part=0,
             pair=3,
-            quad=9,
-            replaced_pair=13,
-            replaced_quad=33,
-            replaced_halves=5,
+            quad=6,
+            updating=Updating(
+                fixed=0,
+                a_class=15,
+                in_parts=4,
+                noted=16,
+                added=1,
+                pair=4,
+                quad=3,
+                split=27,
+                moved=11,
+                moved_part=14,
+                product=4,
+                halves=2,
+            ),
             product=5,
-            moved=8,
             compared=3,
         ),
         flags=("-mcpu=cortex-m0plus", "-mthumb", "-O2", "-ffreestanding"),

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..costs import Core
+from ..costs import Core, Updating
 from ..tools import XTENSA_COMPILER, XTENSA_EMULATOR
 from .bare import Bare, Machine
 from .base import Target
@@ -168,9 +168,20 @@ XTENSA = Bare(
         part=4,
         pair=2,
         quad=5,
-        replaced_pair=8,
-        replaced_quad=24,
-        replaced_halves=5,
+        updating=Updating(
+            fixed=23,
+            a_class=5,
+            in_parts=5,
+            noted=0,
+            added=16,
+            pair=3,
+            quad=4,
+            split=2,
+            moved=10,
+            moved_part=0,
+            product=6,
+            halves=5,
+        ),
         product=5,
     ),
 )

@@ -5,7 +5,7 @@ Code runs in qemu on SiFive's board with an E31, which counts retired instructio
 
 from dataclasses import replace
 
-from ..costs import CORTEX_M4
+from ..costs import CORTEX_M4, Updating
 from ..tools import RISCV_COMPILER, RISCV_EMULATOR
 from .bare import Bare, Machine
 
@@ -24,7 +24,27 @@ MEMBER = Bare(
     ram=16 << 10,
     clock_hz=108_000_000,
     kind="riscv",
-    core=replace(CORTEX_M4, fixed=40, in_parts=7, part=2, quad=4),
+    core=replace(
+        CORTEX_M4,
+        fixed=40,
+        in_parts=7,
+        part=2,
+        quad=4,
+        updating=Updating(
+            fixed=15,
+            a_class=6,
+            in_parts=3,
+            noted=2,
+            added=17,
+            pair=2,
+            quad=2,
+            split=3,
+            moved=6,
+            moved_part=10,
+            product=4,
+            halves=8,
+        ),
+    ),
     compiler=RISCV_COMPILER,
     size=(("riscv64-unknown-elf-size",), "binutils-riscv64-unknown-elf"),
     flags=("-march=rv32imac", "-mabi=ilp32", "-misa-spec=2.2", "-O2", "-ffreestanding"),
