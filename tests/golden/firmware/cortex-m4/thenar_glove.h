@@ -3,8 +3,8 @@
  * @brief Recognises 3 grasp types from 6 switches and 2 joints of a glove.
  *
  * Layout for cortex-m4: 16-bit entries, up to 6 switches per lookup, codes looked up in 256 bytes a joint, up to 2
- * joints per lookup: the fastest of 54 layouts in 131072 bytes of flash, about 74 instructions (116 by update()) and
- * 2211 bytes.
+ * joints per lookup: the fastest of 54 layouts in 131072 bytes of flash, about 74 instructions (92 by update()) and
+ * 2034 bytes.
  *
  * From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.h.j2.
  */
