@@ -1,6 +1,6 @@
 """Errors in recordings, the size limits of files, and the rules for names.
 
-Within the limits, reading a file of n bytes takes at most 200 MB + 20 n of memory.
+Within the limits, reading a file of n bytes takes at most 220 MB + 20 n of memory.
 """
 
 from collections.abc import Iterable

@@ -3,9 +3,10 @@
 const LONGEST = 16384;
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?$/;
 const NO_NUMBER = /^([+-]?nan|[+-]?inf(inity)?|null|none|na|-|)$/i;
-const NAME = /^[\p{L}_][^,;:\t"{}[\]]*$/u;
+const NAME = /^[\p{L}_][^,;:\t"{}]*$/u;
 
-const number = (field) => (NUMBER.test(field) && Number.isFinite(Number(field)) ? Number(field) : null);
+const finite = (value) => (Number.isFinite(value) ? value : null);
+const number = (field) => (NUMBER.test(field) ? finite(Number(field)) : null);
 const sound = (names) => new Set(names).size === names.length && !names.includes("");
 
 function fieldsOf(text) {
@@ -14,13 +15,20 @@ function fieldsOf(text) {
   return text.split(/\s+/).filter(Boolean);
 }
 
-function rowOf(names, fields) {
-  if (!fields.length || !fields.every((field) => NUMBER.test(field) || NO_NUMBER.test(field))) return null;
+function valueOf(found) {
+  if (typeof found === "string") return number(found.trim());
+  return typeof found === "boolean" ? Number(found) : finite(found);
+}
+
+// A text, such as a label, may stand in a row of as many fields as `columns`, most of them numbers.
+function rowOf(names, fields, columns = 0) {
+  const known = fields.filter((field) => NUMBER.test(field) || NO_NUMBER.test(field)).length;
+  if (!fields.length || (known < fields.length && (fields.length !== columns || 2 * known <= columns))) return null;
   return names && !sound(names) ? null : { names, values: fields.map(number) };
 }
 
 /** Parse a line: {names, values}, {header}, or null for an invalid line. A value that is not a number is null. */
-export function parsedLine(line) {
+export function parsedLine(line, columns = 0) {
   const text = line.replace(/^[\ufeff \r\t\0]+|[\ufeff \r\t\0]+$/g, "");
   if (text.startsWith("{") || text.startsWith("[")) {
     let found;
@@ -30,7 +38,7 @@ export function parsedLine(line) {
       return null;
     }
     const names = Array.isArray(found) ? null : Object.keys(found);
-    const values = Object.values(found).map((value) => (typeof value === "boolean" ? Number(value) : Number.isFinite(value) ? value : null));
+    const values = Object.values(found).map(valueOf);
     return values.length && (!names || sound(names)) ? { names, values } : null;
   }
   const fields = fieldsOf(text);
@@ -42,7 +50,7 @@ export function parsedLine(line) {
   const worded = fields.length === 1 || text.split(/\s+/).length < fields.length || /[,;\t]/.test(text);
   const named = fields.every((field) => NAME.test(field));
   if (worded && named && !fields.every((field) => NO_NUMBER.test(field))) return sound(fields) ? { header: fields } : null;
-  return rowOf(null, fields);
+  return rowOf(null, fields, columns);
 }
 
 /** Converts chunks of bytes to rows; `misfits` counts lines without a row, `odd` is the last of them. */
@@ -63,12 +71,13 @@ export class LineParser {
       this.misfits++;
     }
     for (const line of pieces.filter((piece) => piece.trim())) {
-      const found = line.length > LONGEST ? null : parsedLine(line);
+      const named = this.names?.length ?? 0;
+      const found = line.length > LONGEST ? null : parsedLine(line, named > 1 ? named : 0);
       if (!found) {
         this.misfits++;
         this.odd = line.slice(0, 60);
       } else if (found.header) {
-        this.names = found.header;
+        if (found.header.length > 1 || named < 2) this.names = found.header; // a word alone is a message
       } else {
         const known = !found.names && this.names?.length === found.values.length;
         rows.push(known ? { ...found, names: this.names } : found);

@@ -103,7 +103,7 @@ def test_a_hostile_table_takes_no_more_memory_than_its_size_allows(name: str, tm
     table = tmp_path / f"t.{suffix}"
     table.write_bytes(content())
     (tmp_path / "columns.toml").write_text(columns)
-    assert _peak(table, tmp_path / "columns.toml") < 200_000_000 + 20 * table.stat().st_size
+    assert _peak(table, tmp_path / "columns.toml") < 220_000_000 + 20 * table.stat().st_size
 
 
 @pytest.mark.slow
@@ -120,7 +120,7 @@ def test_a_set_takes_no_more_memory_than_its_size_allows(tmp_path: Path) -> None
         objects=np.full(rows, "b" * 60),
         trials=np.arange(rows),
     ).save(tmp_path / "t.grasps")
-    assert _peak(tmp_path / "t.grasps") < 200_000_000 + 20 * (tmp_path / "t.grasps").stat().st_size
+    assert _peak(tmp_path / "t.grasps") < 220_000_000 + 20 * (tmp_path / "t.grasps").stat().st_size
 
 
 def _peak(*files: Path) -> int:

@@ -793,14 +793,16 @@ TEXTS = (
     *("1,nan,-inf,-", "nan", "ms:12,thumb:0,flex:1023", "a:1 b:2", "a: 1, b :2", "a:1,a:2", ":1", "a:x"),
     *('{"ms": 12, "thumb": NaN}', '[1, null, true, "2"]', '{"a": {"b": 1}}', "{broken", "[]", "{}"),
     *("[NaN, -Infinity, 3]", '"1","2"', "1e5,.5,5.,+3", "1e1234", "\ufeffa,b", "_a,b", "1a,2b", "é,ß", "-", "a,a"),
-    *("time;x", "12, 13 ,14", "0x10", "1_000", "garbage!", "a,", ",", "1,2,"),
+    *("time;x", "12, 13 ,14", "0x10", "1_000", "garbage!", "a,", ",", "1,2,", "1,2,fist", "1,b,fist"),
+    *("flex[0],flex[1]", '[" 8 ", "1e2", "x"]', '{"a": "7.5", "b": "fist"}'),
 )
 
 
-def test_a_line_holds_what_the_driver_finds_in_it(parts: Trier) -> None:
-    told = parts.script("return arguments[0].map((text) => parts.parsedLine(text))", TEXTS)
+@pytest.mark.parametrize("columns", [0, 3])
+def test_a_line_holds_what_the_driver_finds_in_it(parts: Trier, columns: int) -> None:
+    told = parts.script("return arguments[0].map((text) => parts.parsedLine(text, arguments[1]))", TEXTS, columns)
     for text, found in zip(TEXTS, told, strict=True):
-        row = parsed(text.encode())
+        row = parsed(text.encode(), columns)
         wanted: dict[str, Any] | None = None
         if isinstance(row, Header):
             wanted = {"header": list(row.names)}
