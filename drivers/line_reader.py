@@ -46,10 +46,11 @@ _WAYS = (
 class RowReader(Closing, ABC):
     """A source of rows of numbers. It may be reopened after it was closed.
 
-    odd  the last input that was not a row, for display; "" if there was none
+    odd   the last input that was not a row, for display; "" if there was none
+    kind  what every column holds, "joint" or "" if the source does not say
     """
 
-    odd = ""
+    odd, kind = "", ""
 
     @abstractmethod
     def open(self) -> None:

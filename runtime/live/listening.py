@@ -76,13 +76,13 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
     with reader_of(bare) as reader:
         reader.open()
         came = list(_listened(reader, listen_s))
-        counts, odd = reader.counts(), reader.odd
+        counts, odd, kind = reader.counts(), reader.odd, reader.kind
     wrong = counts.misfits + counts.overlong
     if not came:
         raise DeviceError(f"{port}: {_no_rows(port, baud, odd) if wrong else 'nothing comes'}")
     such = f", such as {odd}" if odd else ""
     remarks = [f"{wrong} lines were not rows{such}" if wrong > 1 else f"1 line was not a row: {odd}"] if wrong else []
-    return _proposed(bare, came, remarks)
+    return _proposed(bare, came, kind, remarks)
 
 
 def _no_rows(port: str, baud: int, odd: str) -> str:
@@ -116,7 +116,8 @@ def _listened(reader: RowReader, listen_s: float) -> Iterator[tuple[int, Row]]:
         yield from ((waited_us or now_us(), row) for row in rows)
 
 
-def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], remarks: list[str]) -> Proposal:
+def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], every: str, remarks: list[str]) -> Proposal:
+    """Return the proposal for these rows; `every` is the kind of all columns, "" if it is not known."""
     (names, width), most = Counter((row.names, len(row.values)) for _, row in came).most_common(1)[0]
     if most < len(came):
         remarks.append(f"{len(came) - most} of {len(came)} rows had other columns")
@@ -136,7 +137,7 @@ def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], remarks: list
     heard, kinds = [], {"switch": [], "joint": [], "taxel": []}  # type: tuple[list[Heard], dict[str, list[str]]]
     for name, found in values.items():
         numbers = [value for value in found if value is not None]
-        kind = f"the sender's clock, in {unit}" if name == time else _kind(name, numbers)
+        kind = f"the sender's clock, in {unit}" if name == time else _kind(name, numbers, every)
         kinds.get(kind, []).append(name)
         heard.append(Heard(name, min(numbers, default=None), max(numbers, default=None), kind))
         if len(numbers) < len(found):
@@ -205,9 +206,11 @@ def _rises(numbers: Sequence[float]) -> bool:
     return len(steps) > 3 and sum(step < 0 for step in steps) < 2 and sum(step > 0 for step in steps) > 0.9 * len(steps)
 
 
-def _kind(name: str, numbers: Sequence[float]) -> str:
+def _kind(name: str, numbers: Sequence[float], every: str) -> str:
     if not numbers:
         return "nothing: no number came"
+    if every:
+        return every
     if _rises(numbers):
         return "nothing: it only rises, as a count does"
     if _TIME.search(name) and not {0.0, 1.0} >= set(numbers) and sorted(numbers) == list(numbers):

@@ -31,6 +31,8 @@ class RosReader(RowReader):
 
     def __init__(self, port: str) -> None:
         self._port, self._counts = port, LineCounts()
+        found = _PORT.fullmatch(port)
+        self.kind = "joint" if found and (found[2] or _TYPES[0]) == _TYPES[0] else ""
         self._reader: Any = None
         self._waiting: Any = None
         self._domain: Any = None

@@ -8,14 +8,16 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from itertools import count
 from pathlib import Path
+from threading import Event, Thread
 from types import ModuleType
-from typing import Any
+from typing import IO, Any
 
 import pytest
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.live.listening import propose_stream
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources.base import SOURCES
 from thenar.runtime.sources.ros import RosReader
@@ -24,29 +26,25 @@ from thenar.runtime.sources.rows import RowSource
 DOMAIN = 78
 TALKER = Path(__file__).with_name("ros_talker.py")
 names = count()
+Talk = Callable[[str, str], IO[str]]
 Hear = Callable[[str, str, Any, str], tuple[RowSource, list[SwitchFrame | GloveFrame]]]
 
 
+def _topic() -> str:
+    return f"/hand{time.monotonic_ns()}n{next(names)}"
+
+
 @pytest.fixture
-def hear(ros: ModuleType, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hear]:
-    """Return a source of the harness, and the frames of the first row that it makes of messages of such values."""
-    monkeypatch.delenv("CYCLONEDDS_URI", raising=False)
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+def talk(ros: ModuleType, monkeypatch: pytest.MonkeyPatch) -> Iterator[Talk]:
+    """Return what starts a process that sends a message of a topic for each line of values."""
     # The other process keeps to loopback as well, by the same settings.
     from thenar.runtime.ros import domain
 
+    monkeypatch.setenv("CYCLONEDDS_URI", domain._LOOPBACK)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
     with ExitStack() as stack:
 
-        def heard(kind: str, options: str, values: Any, text: str) -> tuple[RowSource, list[SwitchFrame | GloveFrame]]:
-            topic = f"/hand{time.monotonic_ns()}n{next(names)}"
-            monkeypatch.setenv("CYCLONEDDS_URI", domain._LOOPBACK)
-            harness = parse_harness(text.format(port=f"ros:{topic}{options}"), "glove.toml")
-            scan = whole_scan(harness, harness.switches, every_taxel=True)
-            made = [source for kind in SOURCES.values() for source in kind.sources(harness, harness.switches, scan)]
-            (source,) = made
-            assert isinstance(source, RowSource)
-            stack.callback(source.close)
-            source.open()
+        def started(topic: str, kind: str) -> IO[str]:
             command = [sys.executable, str(TALKER), topic, kind, str(DOMAIN)]
             process = stack.enter_context(
                 subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
@@ -55,10 +53,30 @@ def hear(ros: ModuleType, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hear]:
             assert process.stdin is not None
             assert process.stdout is not None
             assert process.stdout.readline() == "ready\n"
+            return process.stdin
+
+        yield started
+
+
+@pytest.fixture
+def hear(talk: Talk) -> Iterator[Hear]:
+    """Return a source of the harness, and the frames of the first row that it makes of messages of such values."""
+    with ExitStack() as stack:
+
+        def heard(kind: str, options: str, values: Any, text: str) -> tuple[RowSource, list[SwitchFrame | GloveFrame]]:
+            topic = _topic()
+            harness = parse_harness(text.format(port=f"ros:{topic}{options}"), "glove.toml")
+            scan = whole_scan(harness, harness.switches, every_taxel=True)
+            made = [source for kind in SOURCES.values() for source in kind.sources(harness, harness.switches, scan)]
+            (source,) = made
+            assert isinstance(source, RowSource)
+            stack.callback(source.close)
+            source.open()
+            sending = talk(topic, kind)
             end, frames = time.monotonic() + 20, list[SwitchFrame | GloveFrame]()
             while not frames and not source.reader.counts().misfits:
                 assert time.monotonic() < end
-                process.stdin.write(json.dumps(values) + "\n")
+                sending.write(json.dumps(values) + "\n")
                 frame = source.read(0.05)
                 while frame is not None:
                     frames.append(frame)
@@ -75,6 +93,34 @@ def test_positions_of_a_joint_state_are_joints_by_their_names(hear: Hear) -> Non
     assert isinstance(frames[0], GloveFrame)
     assert frames[0].sensors == bytes((128, 255))
     assert source.owned == 0
+
+
+@pytest.mark.parametrize("kind", ["JointState", "Float32MultiArray"])
+def test_doctor_proposes_joints_for_a_joint_state_whatever_their_names_and_values(talk: Talk, kind: str) -> None:
+    topic = _topic()
+    sending, done = talk(topic, kind), Event()
+
+    def send() -> None:
+        for place in count():
+            positions = [float(place % 2), 0.25 * (place % 5), 0.5]
+            stamped = {"stamp": [1_800_000_000, place], "name": ["ring", "thumb", "fsr"], "position": positions}
+            sending.write(json.dumps(stamped if kind == "JointState" else positions) + "\n")
+            if done.wait(0.01):
+                return
+
+    sender = Thread(target=send)
+    sender.start()
+    try:
+        found = propose_stream(f"ros:{topic}?type={kind}", 115_200, 0.5).stream
+    finally:
+        done.set()
+        sender.join()
+    if kind == "JointState":
+        assert list(found.joints) == ["ring", "thumb", "fsr"]
+        assert not found.switches
+        assert not found.taxels
+    else:
+        assert (found.switches, list(found.taxels)) == (("c1",), ["c2", "c3"])
 
 
 def test_numbers_of_an_array_are_columns_in_their_order(hear: Hear) -> None:
