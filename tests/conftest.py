@@ -54,6 +54,12 @@ def need_tool(name: str) -> str:
 
 
 @pytest.fixture(scope="session")
+def cases() -> Path:
+    """Return the folder of small inputs that were once read or judged wrongly, each with a README."""
+    return need(SHARED_DATA.parent / "cases")
+
+
+@pytest.fixture(scope="session")
 def weka() -> Callable[..., str]:
     """Return a function that runs a class of the real Weka 3.6 with arguments and returns what it prints."""
     command = [need_tool("java"), "-cp", str(need(WEKA_JAR))]
