@@ -156,14 +156,19 @@ def read_arrays(path: Path) -> dict[str, AnyArray]:
     Raises TableError with the reason, and OSError from the operating system.
     """
     with open_file(path, TableError) as file:
-        try:
-            return _columns(path.name, file)
-        except UNREADABLE as reason:
-            why = shortened(str(reason), 300) or "it is cut off or altered"
-            raise TableError(f"{path.name} cannot be read as npz: {why}") from reason
+        return arrays_in(path.name, file)
 
 
-def _columns(what: str, file: BinaryIO) -> dict[str, AnyArray]:
+def arrays_in(what: str, file: BinaryIO) -> dict[str, AnyArray]:
+    """Return the columns of the npz in `file`, which messages call `what`, as `read_arrays` does."""
+    try:
+        return _columns(file)
+    except UNREADABLE as reason:
+        why = shortened(str(reason), 300) or "it is cut off or altered"
+        raise TableError(f"{what} cannot be read as npz: {why}") from reason
+
+
+def _columns(file: BinaryIO) -> dict[str, AnyArray]:
     size = os.fstat(file.fileno()).st_size
     if size > LARGEST:
         raise TableError(f"it is larger than {LARGEST} bytes, the most that is read of a table")

@@ -17,9 +17,9 @@ from ..text import text_of
 from .arrays import AnyArray
 from .errors import check_room
 from .graspset import CODES
+from .headers import MISSING_NUMBERS
 from .table import Column, pieces
 
-MISSING_NUMBERS = frozenset({"", "?", "na", "n/a", "#n/a", "nan", "null", "none"})
 MISSING_NAMES = frozenset({"", "?"})
 
 _DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:\.\d{1,9})?)?")

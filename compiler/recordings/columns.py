@@ -109,13 +109,18 @@ TimeUnit = Literal["s", "ms", "us", "ns"]
 
 
 class TextFormat(NamedTuple):
-    """The format of a text table: `delimiter` None means the default, a tab for .tsv and a comma otherwise."""
+    """The format of a text table: `delimiter` None means the default, a tab for .tsv and a comma otherwise.
+
+    A blank as delimiter means any run of blanks and tabs. `skip` lines precede the header, also in a spreadsheet, where
+    None means that reading finds them.
+    """
 
     delimiter: str | None = None
     decimal: str = "."
     encoding: str = "utf-8"
     quote: str = '"'
     header: bool = True
+    skip: int | None = 0
 
 
 PLAIN = TextFormat()
@@ -149,6 +154,7 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
     encoding: str = "utf-8"
     quote: str = '"'
     header: bool = True
+    skip: Annotated[int, msgspec.Meta(ge=0)] = 0
     labels: dict[str, str] = {}
     taxels: tuple[TaxelColumns, ...] = ()
     joints: tuple[JointColumns, ...] = ()
@@ -179,7 +185,7 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
     @property
     def text(self) -> TextFormat:
         """The format of the table."""
-        return TextFormat(self.delimiter, self.decimal, self.encoding, self.quote, self.header)
+        return TextFormat(self.delimiter, self.decimal, self.encoding, self.quote, self.header, self.skip)
 
 
 def _is_encoding(name: str) -> bool:

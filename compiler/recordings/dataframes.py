@@ -14,6 +14,7 @@ from .errors import ColumnsError, TableError, check_names
 from .export import COLUMNS_TOML
 from .graspset import GraspSet
 from .importer import import_table
+from .lists import unlisted
 from .propose import propose
 from .table import Column, Table
 
@@ -56,8 +57,9 @@ def table_of(frame: "pd.DataFrame") -> Table:
         raise TableError(f"{_WHAT} has no rows")
     names = [str(name).strip() for name in frame.columns]
     check_names(f"{_WHAT}: column", names)
+    rows = np.arange(len(frame))
     columns = {name: _column(frame.iloc[:, number], name) for number, name in enumerate(names)}
-    return Table(_WHAT, columns, np.arange(len(frame)), size=int(frame.memory_usage(deep=True).sum()))
+    return Table(_WHAT, unlisted(_WHAT, columns, rows), rows, size=int(frame.memory_usage(deep=True).sum()))
 
 
 def _column(series: "pd.Series", name: str) -> Column:
@@ -68,4 +70,6 @@ def _column(series: "pd.Series", name: str) -> Column:
         raise TableError(f"{_WHAT}: column {shortened(repr(name))} holds complex numbers: split or drop it")
     if is_numeric_dtype(series):
         return series.to_numpy(np.float64, na_value=np.nan)  # type: ignore[no-any-return]
-    return ["" if gone else str(value) for value, gone in zip(series, series.isna(), strict=True)]
+    # An array's own text is rounded.
+    plain = (value.tolist() if isinstance(value, np.ndarray) else value for value in series)
+    return ["" if gone else str(value) for value, gone in zip(plain, series.isna(), strict=True)]

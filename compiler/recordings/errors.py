@@ -30,6 +30,7 @@ UNPACKED = 6_000_000
 UNPACKED_EACH = 1
 LONGEST_LINE = 16_000_000  # characters
 ROWS = 1_000_000
+LINES = 2 * ROWS  # of text, with empty ones, comments and line breaks in cells
 COLUMNS = 100_000
 TYPES = 100_000  # grasp types, and values that an ARFF lists
 # Bytes that the names of grasp types, subjects or objects may take as an array, four per character: a constant, plus a

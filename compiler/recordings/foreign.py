@@ -1,10 +1,11 @@
 """Tables of other programs: spreadsheets, Parquet, HDF5 and MATLAB files, read by their libraries.
 
-They are read in a process with limits on memory and processor time, and returned as npz: so a file that claims a
-terabyte, or that crashes a library, ends in an error message. Nothing is unpickled; links to other files are not
-followed.
+They are read in a process with limits on memory and time, and returned as npz: so a file that claims a terabyte, that
+crashes a library or that never ends, ends in an error message. The process ends with the one that started it, and
+leaves no files. Nothing is unpickled; links to other files are not followed.
 """
 
+import ctypes
 import os
 import resource
 import signal
@@ -14,51 +15,75 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryFile
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.files import open_file
 from thenar.runtime.names import list_names, shortened
 
-from .arrays import AnyArray, read_arrays
+from .arrays import AnyArray, arrays_in
 from .errors import COLUMNS, LARGEST, ROWS, TableError
+from .headers import preface
 
 # Bytes of memory that reading may take in addition to the libraries: a constant, and a factor per byte of the file.
 MEMORY, MEMORY_EACH = 600_000_000, 20
-# Seconds of processor time: a constant, and the number of bytes that add a second.
+# Seconds of processor time: a constant, and the number of bytes that add a second. By the clock it may take a few times
+# as long, on a busy machine.
 CPU_S, CPU_BYTES = 60, 200_000
+WALL = 4
+# Rows of a spreadsheet among which its header is.
+_SEEN_ROWS = 200
 # The exit code of the child if its output says why a file is rejected.
 _REFUSED = 3
+_PR_SET_PDEATHSIG = 1
 
 Columns = dict[str, AnyArray]
 
 
-def read_foreign(path: Path) -> tuple[Columns, NDArray[np.int64]]:
-    """Return the columns of a foreign table, text or numbers, and the numbers of its rows as the user sees them.
+def read_foreign(path: Path, skip: int | None = 0) -> tuple[Columns, NDArray[np.int64], int]:
+    """Return the columns of a foreign table, text or numbers, the numbers of its rows for the user, and `skip`.
+
+    skip  how many rows of a spreadsheet precede its header; None: find it
 
     Raises TableError with the reason.
     """
-    if path.stat().st_size > LARGEST:
+    with open_file(path, TableError) as file:
+        size = os.fstat(file.fileno()).st_size
+    if size > LARGEST:
         raise TableError(f"{path.name} is larger than {LARGEST} bytes, the most that is read of a table")
-    with TemporaryDirectory() as folder:
-        made = Path(folder) / "columns.npz"
-        command = [sys.executable, "-P", "-m", __name__, str(path.absolute()), str(made)]
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
-        if done.returncode == _REFUSED:
-            raise TableError(f"{path.name}: {shortened(done.stdout.decode(errors='replace').strip(), 600)}")
-        if done.returncode:
-            cause = "took too long" if done.returncode == -signal.SIGXCPU else "gave up"
-            raise TableError(
-                f"{path.name}: its reader {cause}: the file is damaged, or larger inside than is read: save it as CSV"
+    seconds = _cpu_s(size)
+    with TemporaryFile() as made:
+        command = [sys.executable, "-P", "-m", __name__, str(path.absolute()), str(skip), str(os.getpid())]
+        try:
+            done = subprocess.run(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=made,
+                stderr=subprocess.PIPE,
+                timeout=WALL * seconds,
+                check=False,
             )
-        columns = read_arrays(made)
-    names, rows = columns.pop("names"), columns.pop("rows")
-    return {str(name): columns[str(number)] for number, name in enumerate(names)}, rows.astype(np.int64)
+        except subprocess.TimeoutExpired:
+            raise TableError(f"{path.name}: its reader took longer than {WALL * seconds} s: save it as CSV") from None
+        if done.returncode == _REFUSED:
+            reason = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
+            raise TableError(f"{path.name}: {shortened(reason, 600)}")
+        if done.returncode == -signal.SIGXCPU:
+            raise TableError(f"{path.name}: its reader took longer than {seconds} s of processor time: save it as CSV")
+        if done.returncode:
+            raise TableError(
+                f"{path.name}: its reader gave up: the file is damaged, or larger inside than is read: save it as CSV"
+            )
+        columns = arrays_in(path.name, made)
+    names, rows, skipped = (columns.pop(name) for name in ("names", "rows", "skip"))
+    found = {str(name): columns[str(number)] for number, name in enumerate(names)}
+    return found, rows.astype(np.int64), int(skipped.astype(np.int64)[0])
 
 
-def _spreadsheet(path: Path) -> tuple[Columns, Sequence[int]]:
+def _spreadsheet(path: Path, skip: int | None) -> tuple[Columns, Sequence[int], int]:
     from python_calamine import load_workbook
 
     book = load_workbook(path)
@@ -69,6 +94,12 @@ def _spreadsheet(path: Path) -> tuple[Columns, Sequence[int]]:
     filled = [number for number, row in enumerate(cells) if any(cell != "" for cell in row)]
     if not filled:
         raise TableError("it holds no sheet with cells")
+    if skip is None:
+        before = preface([[_text(cell) for cell in cells[number]] for number in filled[:_SEEN_ROWS]])
+        skip = filled[before] if before else 0
+    filled = [number for number in filled if number >= skip]
+    if not filled:
+        raise TableError(f"it holds no cells below row {skip} (`skip`)")
     head = [_text(cell) for cell in cells[filled[0]]]
     body = filled[1:]
     columns: Columns = {}
@@ -76,10 +107,10 @@ def _spreadsheet(path: Path) -> tuple[Columns, Sequence[int]]:
         column = [cells[row][place] for row in body]
         if name or any(cell != "" for cell in column):
             _add(columns, name or f"column {place + 1}", _array(column))
-    return columns, [row + 1 for row in body]
+    return columns, [row + 1 for row in body], skip
 
 
-def _parquet(path: Path) -> tuple[Columns, Sequence[int]]:
+def _parquet(path: Path, _skip: int | None) -> tuple[Columns, Sequence[int], int]:
     import pyarrow
     from pyarrow import parquet
 
@@ -95,10 +126,10 @@ def _parquet(path: Path) -> tuple[Columns, Sequence[int]]:
         else:
             array = _array(column.to_pylist())
         _add(columns, name, array)
-    return columns, range(1, table.num_rows + 1)
+    return columns, range(1, table.num_rows + 1), 0
 
 
-def _hdf5(path: Path) -> tuple[Columns, Sequence[int]]:
+def _hdf5(path: Path, _skip: int | None) -> tuple[Columns, Sequence[int], int]:
     import h5py
 
     found: Columns = {}
@@ -108,8 +139,6 @@ def _hdf5(path: Path) -> tuple[Columns, Sequence[int]]:
         def visit(name: str, item: object) -> None:
             if not isinstance(item, h5py.Dataset) or name.startswith("#") or not 1 <= item.ndim <= 2:
                 return
-            if item.external or item.is_virtual:
-                raise TableError(f"{shortened(repr(name))} lies in another file: copy it into this one")
             if (array := _dataset(file, item, matlab)) is not None:
                 found[name] = array
 
@@ -123,16 +152,31 @@ def _dataset(file: Any, item: Any, matlab: bool) -> AnyArray | None:
 
     _check(max(item.shape) if matlab else item.shape[0], min(item.shape) if matlab else 1)
     if h5py.check_string_dtype(item.dtype):
-        return item[()] if item.dtype.kind == "S" else np.array(item.asstr("utf-8", "replace")[()], np.str_)
+        return np.array(_content(item, text=item.dtype.kind != "S"))
     kind = item.attrs.get("MATLAB_class", b"")
     if kind == b"cell" and h5py.check_ref_dtype(item.dtype):
-        return _array([_letters(file[reference][()]) for reference in item[()].ravel()])
+        return _array([_letters(_content(file[reference])) for reference in _content(item).ravel()])
     if kind == b"char":
-        return np.array([_letters(row) for row in np.atleast_2d(item[()].T)])
+        return np.array([_letters(row) for row in np.atleast_2d(_content(item).T)])
     if item.dtype.kind not in "biufSV" or h5py.check_vlen_dtype(item.dtype):
         return None
-    array: AnyArray = item[()]
+    array: AnyArray = _content(item)
     return array.T if matlab else array
+
+
+def _content(item: Any, text: bool = False) -> Any:
+    """Return all of an HDF5 dataset, as str if it is `text`: the one place that reads any.
+
+    Checked here, since a reference leads to datasets that no walk through the file meets. Raises TableError.
+    """
+    import h5py
+
+    name = shortened(repr(item.name))
+    if not isinstance(item, h5py.Dataset):
+        raise TableError(f"a cell refers to {name}, which holds no data: save each column of the table as an array")
+    if item.external or item.is_virtual:
+        raise TableError(f"{name} lies in another file: copy it into this one")
+    return np.array(item.asstr("utf-8", "replace")[()], np.str_) if text else item[()]
 
 
 def _letters(codes: Any) -> str:
@@ -140,13 +184,13 @@ def _letters(codes: Any) -> str:
     return bytes(np.asarray(codes, "<u2").ravel(order="F").tobytes()).decode("utf-16-le").rstrip()
 
 
-def _matlab(path: Path) -> tuple[Columns, Sequence[int]]:
+def _matlab(path: Path, skip: int | None) -> tuple[Columns, Sequence[int], int]:
     from scipy.io import loadmat
 
     with path.open("rb") as file:
         opening = file.read(128)
     if b"MATLAB 7.3" in opening:
-        return _hdf5(path)
+        return _hdf5(path, skip)
     found = loadmat(path, squeeze_me=False, chars_as_strings=True)
     return _even(
         {
@@ -176,7 +220,7 @@ def _cell(value: Any) -> object:
     return "" if not array.size else array.ravel()[0].item() if array.size == 1 else str(value)
 
 
-def _even(found: Mapping[str, AnyArray]) -> tuple[Columns, Sequence[int]]:
+def _even(found: Mapping[str, AnyArray]) -> tuple[Columns, Sequence[int], int]:
     """Return the arrays as columns; those with one element are left out if others have more."""
     columns: Columns = {}
     for name, array in found.items():
@@ -196,7 +240,7 @@ def _even(found: Mapping[str, AnyArray]) -> tuple[Columns, Sequence[int]]:
     for name, column in columns.items():
         if len(column) == rows:
             _add(made, name, column)
-    return made, range(1, rows + 1)
+    return made, range(1, rows + 1), 0
 
 
 def _columns(name: str, array: AnyArray) -> Columns:
@@ -214,7 +258,7 @@ def _array(cells: list[Any]) -> AnyArray:
     """Return cells as numbers, with NaN for empty ones, or as text."""
     if all(cell is None or cell == "" or isinstance(cell, (int, float)) for cell in cells):
         return np.array([np.nan if cell is None or cell == "" else cell for cell in cells], np.float64)
-    if cells and all(isinstance(cell, (list, tuple)) for cell in cells):
+    if all(isinstance(cell, (list, tuple)) for cell in cells) and len({*map(len, cells)}) == 1:
         return np.array(cells, np.float64)
     return np.array([_text(cell) for cell in cells], np.str_)
 
@@ -241,7 +285,7 @@ def _check(rows: int, columns: int) -> None:
 
 
 # By suffix: the kind of file, its package, and its reader.
-READERS: dict[str, tuple[str, str, Callable[[Path], tuple[Columns, Sequence[int]]]]] = {
+READERS: dict[str, tuple[str, str, Callable[[Path, int | None], tuple[Columns, Sequence[int], int]]]] = {
     **dict.fromkeys((".xlsx", ".xls", ".ods"), ("a spreadsheet", "python_calamine", _spreadsheet)),
     ".parquet": ("Parquet", "pyarrow.parquet", _parquet),
     **dict.fromkeys((".h5", ".hdf5"), ("HDF5", "h5py", _hdf5)),
@@ -249,9 +293,15 @@ READERS: dict[str, tuple[str, str, Callable[[Path], tuple[Columns, Sequence[int]
 }
 
 
+def _cpu_s(size: int) -> int:
+    """Return the seconds of processor time for a file of `size` bytes."""
+    return CPU_S + size // CPU_BYTES
+
+
 def _limit(size: int) -> None:
     """Limit the additional memory and the processor time of this process."""
-    resource.setrlimit(resource.RLIMIT_CPU, (CPU_S + size // CPU_BYTES,) * 2)
+    # SIGXCPU comes at the first limit; at the second, SIGKILL, which does not say why.
+    resource.setrlimit(resource.RLIMIT_CPU, (_cpu_s(size), _cpu_s(size) + 5))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     status = Path("/proc/self/statm")
     if status.exists():
@@ -259,9 +309,25 @@ def _limit(size: int) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (taken + MEMORY + MEMORY_EACH * size,) * 2)
 
 
-def main(source: str, target: str) -> int:
-    """Read the table in file `source` and write its columns to the npz `target`; return the exit code."""
+def _end_with(parent: int) -> None:
+    """Let this process end when its `parent` does, where the system can (Linux)."""
+    if prctl := getattr(ctypes.CDLL(None), "prctl", None):
+        prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def main(source: str, skip: str, parent: str) -> int:
+    """Read the table in file `source` and write its columns as npz to stdout; return the exit code.
+
+    skip    rows before the header of a spreadsheet, or "None"
+    parent  the number of the process that waits for this one
+    """
+    _end_with(int(parent))
     path = Path(source)
+    # What a library prints is no part of the npz.
+    output = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
     what, package, read = READERS[path.suffix.lower()]
     try:
         for name in {package, "h5py"} if path.suffix == ".mat" else {package}:
@@ -271,11 +337,13 @@ def main(source: str, target: str) -> int:
         return _REFUSED
     _limit(path.stat().st_size)
     try:
-        columns, rows = read(path)
+        columns, rows, skipped = read(path, None if skip == "None" else int(skip))
         if not columns:
             raise TableError("it holds no columns of numbers or text")
         numbered = {str(number): column for number, column in enumerate(columns.values())}
-        np.savez(target, names=np.array(list(columns)), rows=np.array(rows, np.int64), **numbered)  # type: ignore[arg-type]
+        told = {"names": np.array(list(columns)), "rows": np.array(rows, np.int64), "skip": np.array([skipped])}
+        np.savez(output, **told, **numbered)  # type: ignore[arg-type]
+        output.flush()
     except TableError as reason:
         print(reason)
     except MemoryError:

@@ -21,6 +21,8 @@ from .coding import sound_grid
 from .columns import KEYS, PLAIN, Columns, JointColumns, TaxelColumns, TextFormat, TimeUnit
 from .errors import TableError
 from .graspset import CODES
+from .headers import skipped
+from .oddities import first_oddity
 from .sniff import sniff
 from .table import Table, is_text, read_table
 from .taxonomy import plain, published_for
@@ -154,9 +156,15 @@ def _look(table: Table, name: str) -> _Column:
 
 def propose_file(path: Path) -> tuple[Table, Proposal]:
     """Return the table in `path`, and the proposed roles of its columns. Raises TableError, OSError."""
-    text, remarks = sniff(path) if is_text(path) else (PLAIN, [])
+    text, remarks = sniff(path) if is_text(path) else (PLAIN._replace(skip=None), [])
     table = read_table(path, text)
-    return table, propose(table, text, remarks)
+    if text.skip is None:
+        text = PLAIN._replace(skip=table.skip)
+        remarks = [skipped(table.skip)] if table.skip else []
+    try:
+        return table, propose(table, text, remarks)
+    except TableError as reason:
+        raise TableError(f"{reason}; {odd}" if (odd := first_oddity(table)) else str(reason)) from reason
 
 
 def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ()) -> Proposal:

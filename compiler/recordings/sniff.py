@@ -3,23 +3,24 @@
 import codecs
 import csv
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 
-from .cells import MISSING_NUMBERS
 from .columns import TextFormat
 from .errors import TableError
-from .table import open_bytes, open_lines
+from .headers import NUMBER, has_names, preface, skipped
+from .table import csv_rows, named_by_comment, open_bytes, open_lines
 
-# Rows examined, characters of each, and those given to clevercsv, whose run time is quadratic.
-_ROWS, _CHARACTERS, _SEEN = 60, 5000, 400
+# Lines examined, and cells of them.
+_LINES, _CELLS = 200, 200_000
+# Lines, and characters of each, given to clevercsv, whose run time is quadratic.
+_SEEN_LINES, _SEEN = 60, 400
 _CHUNK = 1 << 20
 # The bytes that Windows-1252 does not define: searching for them is many times faster than decoding.
 _NOT_WESTERN = b"\x81\x8d\x8f\x90\x9d"
 _DELIMITERS = (",", ";", "\t", "|", " ")
-_SPOKEN = {",": "a comma", ";": "a semicolon", "\t": "a tab", "|": "a bar", " ": "a blank"}
-_NUMBER = re.compile(r"[+-]?(?:\d++(?:[.,]\d*+)?|[.,]\d++)(?:[eE][+-]?\d++)?")
+_SPOKEN = {",": "a comma", ";": "a semicolon", "\t": "a tab", "|": "a bar", " ": "blanks"}
 
 
 def sniff(path: Path) -> tuple[TextFormat, list[str]]:
@@ -29,22 +30,25 @@ def sniff(path: Path) -> tuple[TextFormat, list[str]]:
     """
     encoding, why = _encoding(path)
     with open_lines(path, encoding) as lines:
-        sample = [line[:_CHARACTERS] for line in islice(lines, _ROWS)]
-    delimiter, quote = _dialect("".join(f"{line[:_SEEN].rstrip()}\n" for line in sample))
-    whole = [line for line in sample if len(line) < _CHARACTERS] or sample
-    rows = list(_rows(whole, delimiter or "\0", quote))
+        sample = list(islice(lines, _LINES))
+    # The second half is free of lines before the header.
+    rows, starts = _rows(sample, *_dialect(sample[len(sample) // 2 :]))
+    skip = starts[preface(rows)] if rows else 0
+    delimiter, quote = _dialect(sample[skip:])
+    rows, _ = _rows(sample[skip:], delimiter, quote)
     decimal = "," if delimiter != "," or quote else "."
-    numbers = [cell for row in rows for cell in row if _NUMBER.fullmatch(cell)]
+    numbers = [cell for row in rows for cell in row if NUMBER.fullmatch(cell)]
     if not any("," in number for number in numbers) or any("." in number for number in numbers):
         decimal = "."
-    header, reason = _header(rows)
+    header, reason = has_names(rows)
     sentences = [
         f"encoding {encoding}: {why}",
+        *([skipped(skip)] if skip else []),
         f"delimiter: {_SPOKEN[delimiter] if delimiter else 'none, one column'} (clevercsv)",
         f"decimal sign: {'a comma' if decimal == ',' else 'a point'}",
         f"header: {reason}",
     ]
-    return TextFormat(delimiter or None, decimal, encoding, quote or '"', header), sentences
+    return TextFormat(delimiter or None, decimal, encoding, quote or '"', header, skip), sentences
 
 
 def _encoding(path: Path) -> tuple[str, str]:
@@ -73,7 +77,7 @@ def _encoding(path: Path) -> tuple[str, str]:
     return "latin-1", "it is neither UTF-8 nor Windows-1252"
 
 
-def _dialect(sample: str) -> tuple[str, str]:
+def _dialect(lines: Iterable[str]) -> tuple[str, str]:
     """Return the delimiter, "" for none, and the quote."""
     try:
         from clevercsv import Detector, Error
@@ -81,6 +85,8 @@ def _dialect(sample: str) -> tuple[str, str]:
         raise TableError(
             "finding how a table is written needs clevercsv: pip install 'thenar[compiler]', or write a columns.toml"
         ) from None
+    # Runs of blanks are one delimiter; of other delimiters they are no part.
+    sample = "".join(re.sub(" +", " ", line[:_SEEN].strip(" \r\n")) + "\n" for line in islice(lines, _SEEN_LINES))
     try:
         found = Detector().detect(sample.replace("\0", ""), delimiters=list(_DELIMITERS))
     except Error:
@@ -88,9 +94,24 @@ def _dialect(sample: str) -> tuple[str, str]:
     return ("", "") if found is None else (found.delimiter or "", found.quotechar or "")
 
 
-def _rows(lines: list[str], delimiter: str, quote: str) -> Iterator[list[str]]:
-    reader = csv.reader(lines, delimiter=delimiter, quotechar=quote or '"')
+def _rows(lines: Sequence[str], delimiter: str, quote: str) -> tuple[list[list[str]], list[int]]:
+    """Return the rows in `lines` that are not empty, and how many lines precede each."""
+    rows: list[list[str]] = []
+    starts: list[int] = []
+    cells = 0
+    for start, row in _parsed(lines, delimiter, quote):
+        rows.append(named_by_comment([cell.strip() for cell in row], delimiter))
+        starts.append(start)
+        cells += len(row)
+        if cells > _CELLS:
+            break
+    return rows, starts
+
+
+def _parsed(lines: Sequence[str], delimiter: str, quote: str) -> Iterator[tuple[int, list[str]]]:
+    reader = csv_rows(lines, delimiter or "\0", quote or '"', strict=False)
     while True:
+        start = reader.line_num
         try:
             row = next(reader, None)
         except csv.Error:
@@ -98,28 +119,4 @@ def _rows(lines: list[str], delimiter: str, quote: str) -> Iterator[list[str]]:
         if row is None:
             return
         if row:
-            yield [cell.strip() for cell in row]
-
-
-def _header(rows: list[list[str]]) -> tuple[bool, str]:
-    """Return whether the first of `rows` names the columns, and why."""
-    first, body = rows[0] if rows else [], rows[1:]
-    if not body:
-        return True, "the only row"
-    numeric = [place for place in range(len(first)) if _is_numeric(row[place] for row in body if place < len(row))]
-    if numeric:
-        words = [first[place] for place in numeric if not _NUMBER.fullmatch(first[place])]
-        named = [word for word in words if word.casefold() not in MISSING_NUMBERS]
-        if named:
-            return True, f"the first row has {named[0][:40]!r} over numbers"
-        return False, "none: the first row has numbers where the others have them; columns are called column 1, ..."
-    repeated = {cell for row in body for cell in row}
-    if repeated.isdisjoint(first):
-        return True, "what the first row says occurs in no other"
-    return False, "none: what the first row says occurs in others, too; columns are called column 1, ..."
-
-
-def _is_numeric(cells: Iterator[str]) -> bool:
-    """Return whether most of `cells` are numbers, of those that are not missing."""
-    there = [bool(_NUMBER.fullmatch(cell)) for cell in cells if cell.casefold() not in MISSING_NUMBERS]
-    return sum(there) > 0.8 * len(there)
+            yield start, row

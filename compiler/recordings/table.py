@@ -15,9 +15,9 @@ from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import accumulate, chain
+from itertools import accumulate, chain, islice
 from pathlib import Path
-from typing import BinaryIO, overload
+from typing import TYPE_CHECKING, BinaryIO, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,12 @@ from thenar.runtime.names import list_names, shortened
 from ..text import text_of
 from .arrays import AnyArray, read_arrays
 from .columns import PLAIN, TextFormat
-from .errors import COLUMNS, LARGEST, LONGEST_LINE, ROWS, RecordingError, TableError, check_names, unpacked
+from .errors import COLUMNS, LARGEST, LINES, LONGEST_LINE, ROWS, RecordingError, TableError, check_names, unpacked
 from .foreign import READERS, read_foreign
+from .lists import unlisted
+
+if TYPE_CHECKING:
+    from _csv import Reader
 
 
 @contextmanager
@@ -92,6 +96,8 @@ def _lines(what: str, text: io.TextIOWrapper) -> Iterator[str]:
     number = 0
     while line := text.readline(LONGEST_LINE):
         number += 1
+        if number > LINES:
+            raise TableError(f"{what} has more than {LINES} lines, the most that are read of a table")
         if len(line) == LONGEST_LINE and line[-1] not in "\r\n":
             raise TableError(f"{what} line {number} is longer than {LONGEST_LINE} characters")
         yield line
@@ -221,7 +227,7 @@ class Table:
 
     `rows` are the rows' numbers as the user sees them: the line in a CSV or spreadsheet, counted from 1 elsewhere.
     `size` is the size of its file in bytes. `cells` says that names are written as cells of a spreadsheet; `decimal` is
-    the decimal sign of numbers in text.
+    the decimal sign of numbers in text. `skip` is the number of rows of a spreadsheet that precede its header.
     """
 
     what: str
@@ -230,6 +236,7 @@ class Table:
     size: int = 0
     cells: bool = False
     decimal: str = "."
+    skip: int = 0
 
 
 _TEXTS = (".csv", ".tsv", ".txt", ".csv.gz", ".tsv.gz", ".txt.gz")
@@ -258,47 +265,66 @@ def read_table(path: Path, text: TextFormat = PLAIN) -> Table:
         elif name.endswith(".npz"):
             table = _read_npz(path)
         elif name.endswith(tuple(READERS)):
-            columns, rows = read_foreign(path)
+            columns, rows, skip = read_foreign(path, text.skip)
             check_names("column", columns)
-            table = Table(path.name, columns, rows)
+            table = Table(path.name, columns, rows, skip=skip)
         else:
             raise TableError(f"{path.name}: a table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
     except RecordingError as reason:
         raise TableError(f"{path.name}: {reason}") from reason
     if not len(table.rows):
         raise TableError(f"{path.name} has no rows")
-    return replace(table, size=path.stat().st_size)
+    return replace(table, columns=unlisted(table.what, table.columns, table.rows), size=path.stat().st_size)
+
+
+def csv_rows(lines: Iterable[str], delimiter: str, quote: str, *, strict: bool) -> "Reader":
+    """Return a reader of the rows in `lines`. With a blank as `delimiter`, any run of blanks and tabs is one."""
+    blanks = delimiter == " "
+    return csv.reader(
+        (line.replace("\t", " ").strip() for line in lines) if blanks else lines,
+        delimiter=delimiter,
+        strict=strict,
+        quotechar=quote or None,
+        quoting=csv.QUOTE_MINIMAL if quote else csv.QUOTE_NONE,
+        skipinitialspace=blanks,
+    )
+
+
+def named_by_comment(header: list[str], delimiter: str) -> list[str]:
+    """Return a row of names without the sign of a comment before them, which numpy.savetxt writes."""
+    first = header[0] if header else ""
+    if delimiter == " " and first in ("#", "%"):
+        return header[1:]
+    return [first[1:].strip(), *header[1:]] if first[:1] in ("#", "%") and first[1:].strip() else header
 
 
 def _read_csv(what: str, lines: Iterator[str], text: TextFormat, delimiter: str) -> Table:
-    reader = csv.reader(
-        _narrow(what, lines, delimiter),
-        delimiter=delimiter,
-        strict=True,
-        quotechar=text.quote or None,
-        quoting=csv.QUOTE_MINIMAL if text.quote else csv.QUOTE_NONE,
-    )
+    skip = text.skip or 0
+    reader = csv_rows(_narrow(what, islice(lines, skip, None), delimiter), delimiter, text.quote, strict=True)
     rows = array("q")
     try:
         filled: Iterator[list[str]] = filter(None, reader)
         first: list[str] = next(filled, [])
+        if text.header:
+            first = named_by_comment(first, delimiter)
         names = [text_of(name.strip()) if text.header else "" for name in first]
         names = [name or f"column {number}" for number, name in enumerate(names, start=1)]
         cells = TextRows(len(names))
         if first and not text.header:
             filled = chain([first], filled)
         for row in filled:
+            number = skip + reader.line_num
             if len(row) > len(names) and not any(row[len(names) :]):
                 del row[len(names) :]
             if len(row) != len(names):
                 top = "header" if text.header else "first row"
-                raise TableError(f"{what} row {reader.line_num} has {len(row)} cells, its {top} {len(names)}")
-            rows.append(reader.line_num)
+                raise TableError(f"{what} row {number} has {len(row)} cells, its {top} {len(names)}")
+            rows.append(number)
             if len(rows) > ROWS:
                 raise TableError(f"{what} has more than {ROWS} rows, the most that are read of a table")
             cells.append(row)
     except csv.Error as reason:
-        raise TableError(f"{what} row {reader.line_num}: {reason}") from reason
+        raise TableError(f"{what} row {skip + reader.line_num}: {reason}") from reason
     check_names("column", names)
     columns = dict(zip(names, cells.columns(), strict=True))
     return Table(what, columns, np.frombuffer(rows, np.int64), cells=True, decimal=text.decimal)

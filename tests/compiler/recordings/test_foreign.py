@@ -1,4 +1,8 @@
+import os
+import select
+import subprocess
 import sys
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -151,16 +155,76 @@ def test_no_other_file_is_read_through_hdf5(tmp_path: Path) -> None:
     (tmp_path / "secret").write_bytes(b"1234")
     elsewhere = [("secret", 0, 4)]
     linked = hdf5(tmp_path / "t.h5", a={"shape": (4,), "dtype": "u1", "external": elsewhere}, b=[1, 2, 3, 4])
-    assert "'a' lies in another file" in refused(linked)
+    assert "'/a' lies in another file" in refused(linked)
+    # What only a reference of a cell leads to is met by no walk through the file.
+    os.mkfifo(tmp_path / "endless")
+    for name in ("secret", "endless"):
+        with h5py.File(tmp_path / "t.mat", "w", userblock_size=512) as file:
+            external = [(str(tmp_path / name), 0, 4)]
+            item = file.create_dataset("#refs#/0", (2, 1), "u2", external=external)
+            cell = file.create_dataset("grasp", (1, 3), h5py.ref_dtype)
+            cell[0] = [item.ref] * 3
+            cell.attrs["MATLAB_class"] = np.bytes_("cell")
+            file["flex"] = [JOINTS]
+        content = (tmp_path / "t.mat").read_bytes()
+        (tmp_path / "t.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(128) + content[128:])
+        assert "'/#refs#/0' lies in another file" in refused(tmp_path / "t.mat")
 
 
-def test_a_reader_that_crashes_ends_no_more_than_the_import(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    crash = tmp_path / "crash"
-    crash.write_text("#!/bin/sh\nkill -SEGV $$\n")
-    crash.chmod(0o755)
-    monkeypatch.setattr(sys, "executable", str(crash))
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [
+        ("kill -SEGV $$", "its reader gave up: the file is damaged"),
+        ("kill -XCPU $$", "its reader took longer than 60 s of processor time: save it as CSV"),
+        ("exec sleep 600", "its reader took longer than 0 s: save it as CSV"),
+    ],
+)
+def test_a_reader_that_crashes_or_never_ends_ends_no_more_than_the_import(
+    script: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = tmp_path / "program"
+    program.write_text(f"#!/bin/sh\n{script}\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(program))
+    if "sleep" in script:
+        monkeypatch.setattr(foreign, "WALL", 0)
     (tmp_path / "t.xlsx").write_bytes(b"")
-    assert "its reader gave up: the file is damaged" in refused(tmp_path / "t.xlsx")
+    assert said in refused(tmp_path / "t.xlsx")
+
+
+def test_a_reader_out_of_processor_time_says_so(tmp_path: Path) -> None:
+    """The limit at which SIGXCPU comes, which says why, is below the one of SIGKILL, which does not."""
+    limits = "from thenar.compiler.recordings import foreign; import resource; foreign._limit(0);"
+    program = f"{limits} print(resource.getrlimit(resource.RLIMIT_CPU))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "(60, 65)\n"
+
+
+def test_a_killed_import_leaves_no_reader_and_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "import").mkdir()
+    # The reader reports its number, and would not end by itself.
+    reader = tmp_path / "calls.py"
+    reader.write_text(
+        "import os, signal, sys\n"
+        "from thenar.compiler.recordings import foreign\n"
+        "foreign._end_with(int(sys.argv[-1]))\n"
+        "print(os.getpid(), file=open(os.environ['TOLD'], 'w'), flush=True)\n"
+        "signal.pause()\n"
+    )
+    program = tmp_path / "program"
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{reader}" "$@"\n')
+    program.chmod(0o755)
+    (tmp_path / "t.xlsx").write_bytes(b"")
+    os.mkfifo(tmp_path / "told")
+    begin = f"import sys; sys.executable = {str(program)!r}; from pathlib import Path\n"
+    begin += f"from thenar.compiler.recordings.table import read_table; read_table(Path({str(tmp_path / 't.xlsx')!r}))"
+    environment = os.environ | {"TMPDIR": str(tmp_path / "import"), "TOLD": str(tmp_path / "told")}
+    with subprocess.Popen([sys.executable, "-c", begin], env=environment) as importing:
+        number = int((tmp_path / "told").read_text())
+        importing.kill()
+    with suppress(ProcessLookupError):
+        assert select.select([os.pidfd_open(number)], [], [], 60)[0], "the reader lives on"
+    assert not list((tmp_path / "import").iterdir())
 
 
 def test_what_is_read_is_the_same_table_in_every_format(frame: pd.DataFrame, tmp_path: Path) -> None:

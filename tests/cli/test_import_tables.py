@@ -1,0 +1,205 @@
+"""Tables as other programs write them: what import makes of them, or which first oddity it names."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from thenar.cli import run
+from thenar.compiler import GraspSet
+
+FINGERS = ("thumb", "index", "middle", "ring", "pinky")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def imported(path: str | Path, capsys: pytest.CaptureFixture[str]) -> GraspSet:
+    """Import `path` with the detected columns, and again with the columns.toml of that: the sets are the same."""
+    for made in Path().glob("columns*.toml"):
+        made.unlink()
+    assert run(["import", str(path), "-o", "a.grasps", "--yes", "--overwrite"]) == 0, capsys.readouterr().err
+    assert run(["import", str(path), "-o", "b.grasps", "--columns", "columns.toml", "--overwrite"]) == 0
+    assert Path("a.grasps").read_bytes() == Path("b.grasps").read_bytes()
+    return GraspSet.load("a.grasps")
+
+
+def refused(path: str | Path, capsys: pytest.CaptureFixture[str]) -> str:
+    capsys.readouterr()
+    assert run(["import", str(path), "-o", "a.grasps", "--yes", "--overwrite"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    return said
+
+
+def rows(columns: int) -> list[list[str]]:
+    """Return 24 rows of grasp, trial and numbers."""
+    random = np.random.default_rng(1)
+    grasps = [(grasp, trial) for trial in range(1, 9) for grasp in range(3)]
+    values = 30 * np.array(grasps)[:, :1] + random.normal(0, 2, (24, columns))
+    return [
+        ["ABC"[grasp], str(trial), *map("{:.3f}".format, row)]
+        for (grasp, trial), row in zip(grasps, values, strict=True)
+    ]
+
+
+def write(path: str, lines: Sequence[Sequence[str]], delimiter: str = ",") -> None:
+    Path(path).write_text("".join(delimiter.join(line) + "\n" for line in lines))
+
+
+@pytest.mark.parametrize("columns", [5, 150, 367, 2000])
+def test_a_header_may_be_of_any_length(columns: int, capsys: pytest.CaptureFixture[str]) -> None:
+    names = [f"RightHand_{FINGERS[place % 5]}_Phalanx_{place}_Rotation" for place in range(columns)]
+    write("manus.csv", [["grasp", "trial", *names], *rows(columns)])
+    assert imported("manus.csv", capsys).joint_names == tuple(names)
+
+
+def test_the_wide_header_of_the_cases(cases: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    grasp_set = imported(cases / "wide_header" / "wide.csv", capsys)
+    assert (len(grasp_set), len(grasp_set.switch_names), len(grasp_set.joint_names)) == (24, 150, 0)
+
+
+def test_the_preface_of_the_cases(cases: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    grasp_set = imported(cases / "preface_lines" / "with_preface.csv", capsys)
+    assert grasp_set.joint_names == ("index_mcp", "thumb_ip")
+    assert "rows left out at the top: 7 (skip = 7), which have other cells" in capsys.readouterr().out
+    assert "skip = 7\n" in Path("columns.toml").read_text()
+
+
+# OpenSim, Vicon Nexus, a spreadsheet saved as text, notes of two cells, and none.
+PREFACES = {
+    "sto": "Coordinates\nversion=1\nnRows=24\n\nendheader\n",
+    "vicon": "Joints,,,,\n100,,,,\n,,Anna:Hand,,\n",
+    "notes": "Subject,Anna\nDate,2026-01-02\n\n",
+    "one line": "recorded by Anna\n",
+    "none": "",
+}
+
+
+@pytest.mark.parametrize("kind", PREFACES)
+@pytest.mark.parametrize("delimiter", [",", "\t", " "])
+@pytest.mark.parametrize("header", [True, False])
+def test_lines_before_the_table_are_left_out(
+    kind: str, delimiter: str, header: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    body = rows(4)
+    head = [["grasp", "trial", *FINGERS[:4]]] if header else []
+    write("t.txt", [*head, *body], delimiter)
+    text = Path("t.txt").read_text()
+    Path("t.txt").write_text(PREFACES[kind].replace(",", delimiter) + text)
+    said = ""
+    if header:
+        grasp_set = imported("t.txt", capsys)
+        assert grasp_set.joint_names == FINGERS[:4]
+        said = capsys.readouterr().out
+    else:
+        assert "no column tells which rows are frames of one trial" in refused("t.txt", capsys)
+    lines = PREFACES[kind].count("\n")
+    assert (f"skip = {lines}\n" in Path("columns.toml").read_text()) is bool(lines)
+    assert ("rows left out at the top" in said) is bool(lines and header)
+
+
+def test_a_spreadsheet_has_lines_before_its_table_too(capsys: pytest.CaptureFixture[str]) -> None:
+    frame = pd.DataFrame(rows(3), columns=["grasp", "trial", *FINGERS[:3]]).astype({"trial": int})
+    frame = frame.astype(dict.fromkeys(FINGERS[:3], float))
+    with pd.ExcelWriter("t.xlsx", engine="openpyxl") as writer:
+        pd.DataFrame([["Lab", "Bern"], ["Rate", 100]]).to_excel(writer, index=False, header=False)
+        frame.to_excel(writer, index=False, startrow=3)
+    grasp_set = imported("t.xlsx", capsys)
+    assert grasp_set.joint_names == FINGERS[:3]
+    assert "skip = 3\n" in Path("columns.toml").read_text()
+    Path("columns.toml").write_text(Path("columns.toml").read_text().replace("skip = 3", "skip = 99"))
+    assert run(["import", "t.xlsx", "-o", "c.grasps", "--columns", "columns.toml"]) == 2
+    assert "t.xlsx: it holds no cells below row 99 (`skip`)" in capsys.readouterr().err
+
+
+def test_rows_keep_their_numbers_below_a_preface(capsys: pytest.CaptureFixture[str]) -> None:
+    write("t.csv", [["grasp", "trial", "a"], *rows(1)])
+    text = PREFACES["sto"] + Path("t.csv").read_text()
+    Path("t.csv").write_text(text)
+    imported("t.csv", capsys)
+    lines = text.splitlines()
+    lines[9] = "A,1,oops"
+    Path("t.csv").write_text("\n".join(lines))
+    assert run(["import", "t.csv", "-o", "c.grasps", "--columns", "columns.toml"]) == 2
+    assert "row 10 'a' ('oops')" in capsys.readouterr().err
+
+
+def test_runs_of_blanks_are_one_delimiter(capsys: pytest.CaptureFixture[str]) -> None:
+    """As MATLAB's `save -ascii` and numpy.savetxt write them, with a comment for a header."""
+    body = [["0" if row[0] == "A" else "1", *row[1:]] for row in rows(3)]
+    lines = ["".join(f"{float(cell):16.7e}" for cell in row) + "  " for row in body]
+    for head in ("grasp  trial a b\tc", "# grasp trial a b c", "%grasp trial a  b c"):
+        Path("t.txt").write_text("\n".join([head, *lines]) + "\n")
+        grasp_set = imported("t.txt", capsys)
+        assert grasp_set.joint_names == ("a", "b", "c")
+        assert len(grasp_set) == 24
+    np.savetxt("t.csv", np.array(body, float), delimiter=",", header="grasp,trial,a,b,c")
+    assert imported("t.csv", capsys).joint_names == ("a", "b", "c")
+
+
+LISTS = {
+    "pandas": lambda row: str([float(cell) for cell in row]),
+    "numpy": lambda row: str(np.array(row, float)),
+    "numpy scalars": lambda row: str(list(np.array(row, float))),
+    "tuples": lambda row: str(tuple(map(float, row))),
+}
+
+
+@pytest.mark.parametrize("kind", LISTS)
+def test_lists_in_cells_become_columns(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    table = pd.DataFrame(
+        [[row[0], row[1], LISTS[kind](row[2:])] for row in rows(3)], columns=["grasp", "trial", "data"]
+    )
+    table.to_csv("t.csv", index=False)
+    table.to_excel("t.xlsx", index=False)
+    sets = [imported(name, capsys) for name in ("t.csv", "t.xlsx")]
+    assert sets[0].joint_names == ("data.0", "data.1", "data.2")
+    wide = pd.DataFrame([[row[0], row[1], *map(float, row[2:])] for row in rows(3)])
+    wide.columns = pd.Index(["grasp", "trial", "data.0", "data.1", "data.2"])
+    wide.to_csv("u.csv", index=False)
+    assert np.array_equal(imported("u.csv", capsys).codes, sets[0].codes)
+    assert np.array_equal(sets[1].codes, sets[0].codes)
+    lists = table.assign(data=[[float(cell) for cell in row[2:]] for row in rows(3)], trial=table["trial"].astype(int))
+    for made in (lists, lists.assign(data=[np.array(row) for row in lists["data"]])):
+        assert np.array_equal(GraspSet.from_dataframe(made).codes, sets[0].codes)
+    lists.to_parquet("t.parquet")
+    assert np.array_equal(imported("t.parquet", capsys).codes, sets[0].codes)
+
+
+def test_the_lists_of_the_cases(cases: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(cases / "list_in_cell" / "list.csv")
+    assert "no column tells which rows are frames of one trial" in refused(path, capsys)
+    text = Path("columns.toml").read_text()
+    Path("columns.toml").write_text('frames = "independent"\n' + text)
+    assert run(["import", path, "-o", "a.grasps", "--columns", "columns.toml"]) == 0
+    assert GraspSet.load("a.grasps").joint_names == ("data.0", "data.1")
+
+
+ODDITIES = {
+    'grasp,trial,data\nA,1,"[1, 2]"\nB,1,"[1, 2, 3]"\n': (
+        "column 'data' holds lists of unequal lengths, 2 in row 2 and 3 in row 3: write lists of one length"
+    ),
+    'grasp,trial,data\nA,1,"[1, 2]"\nB,1,x\n': "column 'data' holds lists of numbers, but row 3 has 'x'",
+    'grasp,trial,data\nA,1,"[[1, 2], [3, 4]]"\nB,1,"[[1, 2], [3, 4]]"\n': (
+        "row 2 has '[[1, 2], [3, 4]]' in column 'data': write a list of numbers in each cell, or a column for each"
+    ),
+    'grasp,trial,a,data.0,data\nA,1,1,2,"[1, 2]"\nB,1,3,4,"[1, 2]"\n': "column 'data.0' occurs twice",
+    "grasp,trial,a\n,,mm\nA,1,1.5\nB,1,2.5\nA,2,3\nB,2,4\n": (
+        "row 2 has 'mm' in column 'a', which holds numbers elsewhere: correct the cell or delete the row"
+    ),
+    "grasp,trial,a\nA,1,1.5\nB,1,2.5\nA,2,3\nB,2,4,5,6\n": "row 5 has 5 cells, its header 3",
+    "grasp,trial\nA,1,1.5\nB,1,2.5\nA,2,3\nB,2,4\n": "row 2 has 3 cells, its header 2",
+    "grasp-trial-a\nA-1-1.5\nB-1-2.5\n": "its rows have one cell each, under 'grasp-trial-a': name the `delimiter`",
+}
+
+
+@pytest.mark.parametrize("text", ODDITIES, ids=range(len(ODDITIES)))
+def test_the_error_names_the_first_oddity(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("t.csv").write_text(text)
+    assert ODDITIES[text] in refused("t.csv", capsys)
