@@ -341,8 +341,8 @@ def main(source: str, skip: str, parent: str) -> int:
         if not columns:
             raise TableError("it holds no columns of numbers or text")
         numbered = {str(number): column for number, column in enumerate(columns.values())}
-        told = {"names": np.array(list(columns)), "rows": np.array(rows, np.int64), "skip": np.array([skipped])}
-        np.savez(output, **told, **numbered)  # type: ignore[arg-type]
+        described = {"names": np.array(list(columns)), "rows": np.array(rows, np.int64), "skip": np.array([skipped])}
+        np.savez(output, **described, **numbered)  # type: ignore[arg-type]
         output.flush()
     except TableError as reason:
         print(reason)
