@@ -37,6 +37,8 @@ _UNREADABLE = (LibraryError, error, UnicodeDecodeError, OverflowError)
 # Limits that no valid time or count of a recording exceeds.
 _LEAST, _LARGEST = -(2**63), 2**63 - 1
 _REASON = 200
+# The most records of a file that are neither messages nor chunks: a recording has a few dozen.
+OTHER_RECORDS = 100_000
 
 
 @dataclass(slots=True)
@@ -73,6 +75,7 @@ class Decoder:
         self._schemas: dict[int, str] = {}
         self._channels: dict[int, int | None] = {}
         self._indexed = False
+        self._others = 0
         self._codes: tuple[int | None, tuple[int | None, ...]] = None, ()
 
     def channel(self, content: bytes) -> int | None:
@@ -81,6 +84,7 @@ class Decoder:
 
     def entries(self, record: RawRecord) -> Iterator[Entry]:
         """Yield the record's entries. Raises McapError, whose text continues "the record at byte 17 "."""
+        self.count(record)
         # Indices of its messages follow a chunk. They repeat its content.
         self._indexed = self._indexed and record.opcode == Opcode.MESSAGE_INDEX
         content = record.content
@@ -96,6 +100,15 @@ class Decoder:
             yield from self._chunk(record.offset, self._parsed(Chunk, record, content))
         else:
             yield from self._described(record, content)
+
+    def count(self, record: RawRecord) -> None:
+        """Count a record that holds no measurements. Raises McapError if there are too many to read in seconds."""
+        self._others += record.opcode not in (Opcode.MESSAGE, Opcode.CHUNK)
+        if self._others > OTHER_RECORDS:
+            raise McapError(
+                f"is one of more than {OTHER_RECORDS} that hold no measurements, the most that are read: the file is "
+                "damaged, or not a recording of thenar"
+            )
 
     def _described(self, record: RawRecord, content: bytes) -> Iterator[Session]:
         """Take a record that describes others."""
@@ -173,8 +186,10 @@ class Decoder:
     def _chunk(self, offset: int, chunk: Chunk) -> Iterator[Entry]:
         self.foreign = True
         if chunk.compression:
-            compression = shortened(chunk.compression)
-            raise McapError(f"is compressed by {compression}: `mcap decompress` makes a copy that can be read")
+            raise McapError(
+                f"is compressed by {shortened(chunk.compression)}, as thenar's recordings are not: of a copy of "
+                "one `mcap decompress` makes a file that is read; save other programs' data as CSV"
+            )
         # 0 if a program calculated none.
         if chunk.uncompressed_crc not in (0, crc32(chunk.data)) or chunk.uncompressed_size != len(chunk.data):
             self.broken = offset
@@ -310,7 +325,7 @@ class Reader:
         if record.opcode == Opcode.FOOTER:
             self._end_summary(record)
         elif not self._in_data:
-            return
+            self._decoder.count(record)
         elif record.opcode == Opcode.DATA_END:
             self._end_data(record)
         else:

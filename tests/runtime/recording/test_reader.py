@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mcap.opcode import Opcode
 from mcap.records import Channel, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
@@ -20,7 +21,7 @@ from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.guide import read_journal
 from thenar.runtime.recording.layout import CHANNELS, LARGEST_RECORD, MAGIC
-from thenar.runtime.recording.reader import Reader
+from thenar.runtime.recording.reader import OTHER_RECORDS, Reader
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
 
@@ -305,8 +306,24 @@ def test_a_compressed_copy_is_refused_with_advice(recording: Path, tmp_path: Pat
     length = int.from_bytes(data[chunk + 1 : chunk + 9], "little")
     changed = data[: chunk + 1] + pack("<Q", length + 4) + data[chunk + 9 : chunk + 37] + pack("<I", 4) + b"zstd"
     path.write_bytes(changed + data[chunk + 41 :])
-    with pytest.raises(McapError, match=r"copy\.mcap: the record at byte \d+ is compressed by zstd: `mcap decompress`"):
+    with pytest.raises(McapError, match=r"copy\.mcap: the record at byte \d+ is compressed by zstd, .* data as CSV"):
         read(path)
+
+
+@pytest.mark.parametrize("opcode", [Opcode.MESSAGE_INDEX, 0x80, Opcode.CHANNEL, Opcode.SCHEMA])
+@pytest.mark.parametrize("behind_the_data", [False, True])
+def test_records_without_measurements_are_read_up_to_a_limit(
+    recording: Path, opcode: int, behind_the_data: bool
+) -> None:
+    """Ten million of nine bytes each would take minutes."""
+    data = recording.read_bytes()
+    ends = [place for place in ends_of_records(data) if data[place] in (Opcode.DATA_END, Opcode.FOOTER)]
+    place = ends[-1] if behind_the_data else ends[0]
+    content = {Opcode.CHANNEL: pack("<HHIII", 90, 0, 0, 0, 0), Opcode.SCHEMA: pack("<HIII", 90, 0, 0, 0)}
+    record = pack("<BQ", opcode, len(content.get(opcode, b""))) + content.get(opcode, b"")
+    recording.write_bytes(data[:place] + record * (OTHER_RECORDS + 1) + data[place:])
+    with pytest.raises(McapError, match=r"is one of more than 100000 that hold no measurements, the most that are"):
+        read(recording)
 
 
 def test_chunks_inside_chunks_are_refused_however_deep(recording: Path) -> None:
