@@ -4,7 +4,7 @@ import os
 import shlex
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -31,8 +31,20 @@ if TYPE_CHECKING:
     from thenar.compiler.recordings.propose import Proposal
 
 
+class _Table(click.Path):
+    """A file, a folder, or a pattern of files: a path with fields in braces."""
+
+    def __init__(self) -> None:
+        super().__init__(exists=True, path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Return the path. Raises BadParameter if it is no pattern and nothing is there."""
+        is_pattern = "{" in os.fsdecode(value) and not Path(os.fsdecode(value)).exists()
+        return Path(os.fsdecode(value if is_pattern else super().convert(value, param, ctx)))
+
+
 @click.command("import")
-@click.argument("tables", metavar="TABLE", type=existing_file, nargs=-1, required=True)
+@click.argument("tables", metavar="TABLE", type=_Table(), nargs=-1, required=True)
 @click.option("-o", "--output", type=OutputFile(".grasps"), required=True, help="The .grasps file to write.")
 @overwrite_flag
 @click.option("--columns", type=existing_file, help="columns.toml: the meaning of each column of the table.")
@@ -45,6 +57,10 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream
     Without --columns, the command detects the meaning of each column, shows it with reasons, and writes it to a
     columns.toml next to the output, for you to correct; on a terminal it then asks whether to continue.
 
+    One file per trial: TABLE is a pattern whose fields in braces say what the path says, a column each; * is any text.
+    For a folder the command proposes the pattern. Quote patterns, and name fields as keys of columns.toml: label,
+    subject, object, session, trial.
+
     Malformed cells and unknown labels stop the import, which names their rows and columns. Merely odd data (constant
     switches, rows shared by two subjects, ...) are counted in warnings.
 
@@ -55,19 +71,32 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream
     Example:
         thenar import glove.csv -o set.grasps
         thenar import trials.csv.gz -o set.grasps --columns columns.toml
+        thenar import 'data/{label}/{subject}_{trial}.csv' -o set.grasps
         thenar import anna.mcap ben.mcap -o set.grasps
         thenar import anna.mcap -o movements.grasps --stream
     """
     keep_apart(*tables, columns, output)
     from thenar.compiler.recordings.mcap_recording import import_files
 
+    if len(tables) == 1 and tables[0].is_dir():
+        tables = (_pattern(tables[0]),)
     if columns is None and not stream and len(tables) == 1 and tables[0].suffix.lower() != ".mcap":
         grasp_set, report = _found(tables[0], output, yes)
     else:
-        with progress(f"importing {', '.join(table.name for table in tables)}"):
-            grasp_set, report = import_files(tables, columns, stream)
+        with progress(f"importing {', '.join(table.name for table in tables)}") as report_files:
+            grasp_set, report = import_files(tables, columns, stream, report_files)
     grasp_set.save(output)
     show(report, _print, output)
+
+
+def _pattern(folder: Path) -> Path:
+    """Return the pattern of the tables in a folder, and say what it is."""
+    from thenar.compiler.recordings.folders import propose_pattern
+
+    pattern, remarks = propose_pattern(folder)
+    for remark in remarks:
+        echo(remark, err=wants_json())
+    return pattern
 
 
 def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport]":
@@ -76,8 +105,8 @@ def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport
     from thenar.compiler.recordings.importer import import_table
     from thenar.compiler.recordings.propose import propose_file
 
-    with progress(f"reading {path.name}"):
-        read, proposal = propose_file(path)
+    with progress(f"reading {path.name}") as report_files:
+        read, proposal = propose_file(path, report_files)
     asked = not yes and os.isatty(0) and not wants_json()
     if not wants_json():
         _print_proposal(proposal)

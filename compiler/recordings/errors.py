@@ -3,7 +3,7 @@
 Within the limits, reading a file of n bytes takes at most 220 MB + 20 n of memory.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,41 @@ def check_room(rows: int, longest: int, size: int) -> None:
         raise RecordingError(f"a name of {longest} characters is too long in a table of {rows} rows: shorten it")
 
 
+class FileRows(np.ndarray[tuple[int], np.dtype[np.int64]]):
+    """Rows (n,) of a table that was read from several files, counted through all of them from 1.
+
+    column  the table's column that names the file
+    """
+
+    column: str
+    _files: tuple[str, ...]
+    _starts: NDArray[np.int64]
+    _numbers: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, files: Sequence[tuple[str, NDArray[np.int64]]], column: str) -> "FileRows":
+        """Return the rows of `files`, each a name and the numbers of its rows as the user sees them."""
+        counts = [len(rows) for _, rows in files]
+        made = np.arange(1, sum(counts) + 1).view(cls)
+        made.column = column
+        made._files = tuple(name for name, _ in files)
+        made._starts = np.cumsum([0, *counts])
+        made._numbers = np.concatenate([rows for _, rows in files])
+        return made
+
+    def __array_finalize__(self, source: object) -> None:
+        for name in ("column", "_files", "_starts", "_numbers"):
+            setattr(self, name, getattr(source, name, None))
+
+    def shown(self) -> list[str]:
+        """Return each row as its number in its file, and the file."""
+        file = np.searchsorted(self._starts, self, "left") - 1
+        places = zip(self._numbers[self - 1].tolist(), file.tolist(), strict=True)
+        return [f"{number} of {shortened(self._files[file])}" for number, file in places]
+
+
 def list_rows(rows: NDArray[np.int64]) -> str:
-    """Return "row 3" or "rows 3, 4, 5, 6, 7 and 7 more"."""
-    return f"row{'s' if len(rows) > 1 else ''} {list_names(rows[:SHOWN].astype(str).tolist(), len(rows))}"
+    """Return "row 3" or "rows 3, 4, 5, 6, 7 and 7 more"; with their files if there are several."""
+    first = rows[:SHOWN]
+    shown = first.shown() if isinstance(first, FileRows) else first.astype(str).tolist()
+    return f"row{'s' if len(rows) > 1 else ''} {list_names(shown, len(rows))}"

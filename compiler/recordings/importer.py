@@ -24,6 +24,7 @@ from .graspset import GraspSet
 from .summary import Finding, find_oddities
 from .table import Table, read_table
 from .taxonomy import Taxonomy, own, plain, published
+from .trial_files import Report, find_files, is_pattern, read_files
 from .trials import Frames, fill, groups, in_runs, in_time, numbered, otsu, restarts, unit_of_time
 
 
@@ -376,7 +377,8 @@ class _Reader:
         each = ((row, name) for name, faulty in columns.items() for row in np.flatnonzero(faulty)[:SHOWN].tolist())
         first = nsmallest(SHOWN, each, key=itemgetter(0))
         cells = [(row, name, shortened(repr(str(self.table.columns[name][row])))) for row, name in first]
-        shown = [f"row {self.table.rows[row]} {shortened(repr(name))} ({cell})" for row, name, cell in cells]
+        rows = self.table.rows
+        shown = [f"{list_rows(rows[[row]])} {shortened(repr(name))} ({cell})" for row, name, cell in cells]
         return f"{count} cell{'s' if count > 1 else ''}, {list_names(shown, count)}"
 
 
@@ -402,13 +404,17 @@ class ImportReport(msgspec.Struct, frozen=True):
     warnings: tuple[Finding, ...]
 
 
-def import_file(table: Path, columns: Path) -> tuple[GraspSet, ImportReport]:
-    """Import the table in file `table` with the columns.toml in file `columns`.
+def import_file(
+    table: Path, columns: Path, progress: Report = lambda _done, _total: None
+) -> tuple[GraspSet, ImportReport]:
+    """Import the table in file `table`, or the files that it matches as a pattern, with the columns.toml `columns`.
 
     Raises TableError, ColumnsError or RecordingError naming file, rows and columns, and OSError.
     """
     wanted = read_columns(columns)
-    return import_table(read_table(table, wanted.text), wanted)
+    if not is_pattern(table):
+        return import_table(read_table(table, wanted.text), wanted)
+    return import_table(read_files(find_files(table)[0], wanted.text, progress), wanted)
 
 
 def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport]:

@@ -38,6 +38,7 @@ from .importer import ImportReport, import_file, import_table, report_of
 from .propose import propose_file
 from .summary import Finding, find_oddities
 from .taxonomy import Taxonomy
+from .trial_files import Report
 
 WRIST = ("wrist_pitch", "wrist_yaw")
 # Half degrees, the paper's resolution, from below the range of a calibrated hand.
@@ -86,10 +87,15 @@ class _Part:
 
 
 def import_files(
-    paths: Sequence[Path], columns: Path | None = None, stream: bool = False
+    paths: Sequence[Path],
+    columns: Path | None = None,
+    stream: bool = False,
+    progress: Report = lambda _done, _total: None,
 ) -> tuple[GraspSet, ImportReport]:
     """Import one table with the columns.toml in file `columns`, or self-describing recordings.
 
+    A path with fields in braces, such as data/{label}_{trial}.csv, is a table in many files; `progress` takes how many
+    of how many were read.
     Recordings are imported as a `stream` or trial by trial. Without `columns`, the roles of a table's columns are found
     from their names and values. Raises TableError, ColumnsError, RecordingError or McapError naming file, rows and
     columns, and OSError.
@@ -101,13 +107,16 @@ def import_files(
     if stream:
         raise ColumnsError("each row of a table is imported as it is: --stream is for recordings (.mcap), leave it out")
     if len(paths) > 1:
-        raise TableError("several recordings (.mcap) can be imported together, but only one table")
+        raise TableError(
+            "several recordings (.mcap) can be imported together, but only one table: of tables with one trial each, "
+            "name the pattern of their paths, such as 'data/{label}_{trial}.csv'"
+        )
     if columns is None:
-        table, proposal = propose_file(paths[0])
+        table, proposal = propose_file(paths[0], progress)
         if proposal.lacks:
             raise ColumnsError(f"{paths[0].name}: {proposal.lacks}, in a columns.toml")
         return import_table(table, proposal.columns)
-    return import_file(paths[0], columns)
+    return import_file(paths[0], columns, progress)
 
 
 def import_recordings(paths: Sequence[Path], stream: bool = False) -> tuple[GraspSet, ImportReport]:

@@ -5,6 +5,7 @@ import numpy as np
 from thenar.runtime.names import shortened
 
 from .cells import numbers
+from .errors import list_rows
 from .table import Table
 
 
@@ -19,7 +20,7 @@ def first_oddity(table: Table) -> str:
         if not wrong.size:
             continue
         row, cell = int(wrong[0]), str(column[wrong[0]]).strip()
-        shown = f"row {table.rows[row]} has {shortened(repr(cell))} in column {shortened(repr(name))}"
+        shown = f"{list_rows(table.rows[[row]])} has {shortened(repr(cell))} in column {shortened(repr(name))}"
         if cell[:1] in ("[", "("):
             odd.append((row, name, f"{shown}: write a list of numbers in each cell, or a column for each number"))
         elif 2 * wrong.size < len(column):

@@ -13,19 +13,20 @@ import tomli_w
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from thenar.runtime.names import printable, shortened
+from thenar.runtime.names import list_names, printable, shortened
 from thenar.runtime.published import NONE
 
 from .cells import bits, names, numbers, times
 from .coding import sound_grid
 from .columns import KEYS, PLAIN, Columns, JointColumns, TaxelColumns, TextFormat, TimeUnit
-from .errors import TableError
+from .errors import FileRows, TableError
 from .graspset import CODES
 from .headers import skipped
 from .oddities import first_oddity
 from .sniff import sniff
 from .table import Table, is_text, read_table
 from .taxonomy import plain, published_for
+from .trial_files import Report, find_files, is_pattern, read_files
 from .trials import groups, in_runs, restarts, unit_of_time
 
 # Words in the names of columns, as people write them in several languages.
@@ -154,17 +155,53 @@ def _look(table: Table, name: str) -> _Column:
     return _Column(name, words, values, two, len(distinct), ~parsed.missing)
 
 
-def propose_file(path: Path) -> tuple[Table, Proposal]:
-    """Return the table in `path`, and the proposed roles of its columns. Raises TableError, OSError."""
-    text, remarks = sniff(path) if is_text(path) else (PLAIN._replace(skip=None), [])
-    table = read_table(path, text)
+def propose_file(path: Path, progress: Report = lambda _done, _total: None) -> tuple[Table, Proposal]:
+    """Return the table in `path`, or in the files that match it as a pattern, and the proposed roles of its columns.
+
+    `progress` takes the number of files that were read, and of all. Raises TableError, OSError.
+    """
+    files, others = find_files(path) if is_pattern(path) else ([], [])
+    first = files[0].path if files else path
+    text, remarks = sniff(first) if is_text(first) else (PLAIN._replace(skip=None), [])
+    table = read_files(files, text, progress) if files else read_table(path, text)
     if text.skip is None:
-        text = PLAIN._replace(skip=table.skip)
-        remarks = [skipped(table.skip)] if table.skip else []
+        text, remarks = PLAIN._replace(skip=table.skip), [skipped(table.skip)] * bool(table.skip)
     try:
-        return table, propose(table, text, remarks)
+        proposal = propose(table, text, remarks)
     except TableError as reason:
         raise TableError(f"{reason}; {odd}" if (odd := first_oddity(table)) else str(reason)) from reason
+    if others:
+        left = f"{len(others)} tables next to them do not match: {list_names([shortened(name) for name in others])}"
+        proposal = replace(proposal, remarks=(f"files: {len(files)}; {left}", *proposal.remarks))
+    return table, _by_file(table, proposal) if files else proposal
+
+
+def _by_file(table: Table, proposal: Proposal) -> Proposal:
+    """Return the proposal with the file among the columns of the trial, unless no trial is in two files.
+
+    Not in a stream with rest, whose trials are runs of rows of one label.
+    """
+    columns, rows = proposal.columns, table.rows
+    if not isinstance(rows, FileRows) or (columns.frames == "restart" and columns.none):
+        return proposal
+    told = [name for key in ("label", "subject", "object", "session", "trial") for name in columns.parts(key)]
+    file = groups(_texts(table, [rows.column]))
+    trial = groups(*(_texts(table, [name]) for name in told))
+    if columns.frames is None and columns.parts("trial") and len(np.unique(groups(trial, file))) == trial.max() + 1:
+        return proposal
+    parts = (rows.column, *columns.parts("trial"))
+    reason = "each file is one trial" if len(parts) == 1 else "numbers of trials are of one file"
+    roles = [
+        replace(role, columns=tuple(name for name in role.columns if name != rows.column))
+        for role in proposal.roles
+        if role.role != "trial"
+    ]
+    return replace(
+        proposal,
+        columns=replace(columns, trial=parts if len(parts) > 1 else parts[0], frames=None),
+        roles=(Role(parts, "trial", reason), *(role for role in roles if role.columns)),
+        lacks="",
+    )
 
 
 def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ()) -> Proposal:

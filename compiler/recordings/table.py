@@ -145,7 +145,7 @@ class TextRows:
         """Return the columns; no row may be appended afterwards."""
         if self._rows:
             self._store()
-        return [TextColumn(self._blocks, number) for number in range(self._width)]
+        return [TextColumn([(self._blocks, number)]) for number in range(self._width)]
 
     def _store(self) -> None:
         columns = list(zip(*self._rows, strict=True))
@@ -163,17 +163,24 @@ class TextRows:
 
 
 class TextColumn(Sequence[str]):
-    """One column of a table."""
+    """One column of a table: in each of some lists of blocks, the column of a number."""
 
-    def __init__(self, blocks: list[_Block], number: int) -> None:
-        self._blocks = blocks
-        self._number = number
+    def __init__(self, parts: Sequence[tuple[list[_Block], int]]) -> None:
+        self._parts = parts
+
+    @classmethod
+    def joined(cls, columns: "Iterable[TextColumn]") -> "TextColumn":
+        """Return the cells of `columns`, one after the other."""
+        return cls([part for column in columns for part in column._parts])
 
     def __len__(self) -> int:
-        return sum(block.rows for block in self._blocks)
+        return sum(block.rows for block, _ in self._blocks())
 
     def __iter__(self) -> Iterator[str]:
-        return chain.from_iterable(block.column(self._number) for block in self._blocks)
+        return chain.from_iterable(block.column(number) for block, number in self._blocks())
+
+    def _blocks(self) -> "Iterator[tuple[_Block, int]]":
+        return ((block, number) for blocks, number in self._parts for block in blocks)
 
     @overload
     def __getitem__(self, row: int) -> str: ...
@@ -184,17 +191,17 @@ class TextColumn(Sequence[str]):
     def __getitem__(self, row: int | slice) -> str | list[str]:
         if isinstance(row, slice):
             return list(self)[row]
-        for block in self._blocks:
+        for block, number in self._blocks():
             if row < block.rows:
-                return block.column(self._number)[row]
+                return block.column(number)[row]
             row -= block.rows
         raise IndexError("the column has fewer rows")
 
     def pieces(self) -> Iterator[list[str]]:
         """Yield the cells in lists of some thousands, which are slower to create than to iterate over."""
         piece: list[str] = []
-        for block in self._blocks:
-            piece += block.column(self._number)
+        for block, number in self._blocks():
+            piece += block.column(number)
             if len(piece) >= _READ:
                 yield piece
                 piece = []

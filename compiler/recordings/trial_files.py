@@ -1,0 +1,187 @@
+"""Sets recorded as one file per trial, whose paths say what was held: data/{label}/{subject}_{trial}.csv.
+
+A field in braces becomes a text column of that name; a star matches anything. Neither matches a slash, so a pattern is
+as deep as it has slashes, whatever links there are. Hidden files are left out.
+"""
+
+import os
+import re
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.names import list_names, shortened
+
+from .columns import TextFormat
+from .errors import LARGEST, ROWS, FileRows, RecordingError, TableError, check_room
+from .table import SUFFIXES, Column, Table, TextColumn, read_table
+from .trials import natural_key
+
+# The most files of a set.
+FILES = 100_000
+# The column that names the file of a row; the second name if the files have a column of the first.
+_FILE = ("file", "path")
+_FIELD = re.compile(r"\{(?P<name>[^\W\d]\w*)\}|(?P<star>\*)|[{}]")
+
+# Takes how many of how many files were read.
+Report = Callable[[int, int], None]
+
+
+class TrialFile(NamedTuple):
+    """A file, its path below the pattern's first folder, and the values of the fields in it."""
+
+    path: Path
+    name: str
+    fields: dict[str, str]
+
+
+def is_pattern(path: Path) -> bool:
+    """Return whether `path` is a pattern: it has a brace and is no file."""
+    return "{" in str(path) and not path.exists()
+
+
+def find_files(pattern: Path) -> tuple[list[TrialFile], list[str]]:
+    """Return the files that match `pattern`, in natural order, and the names of tables next to them that do not.
+
+    Raises TableError if there are none, too many, or files of several kinds; OSError from the operating system.
+    """
+    parts = pattern.parts
+    fixed = next((place for place, part in enumerate(parts) if _FIELD.search(part)), len(parts) - 1)
+    root = Path(*parts[:fixed])
+    expressions = [_expression(part, pattern) for part in parts[fixed:]]
+    found, others = [TrialFile(root, "", {})], list[str]()
+    for depth, expression in enumerate(expressions, start=1):
+        last = depth == len(expressions)
+        level = [_matches(file, expression, last, others) for file in found]
+        found = [file for matched in level for file in matched]
+        if len(found) > FILES:
+            raise TableError(f"{pattern} matches more than {FILES} files, the most that are read of a set")
+    if not found:
+        there = f": next to them are {list_names(others)}" if others else ""
+        raise TableError(f"no table matches {pattern}{there}")
+    kinds = sorted({file.path.suffix.lower() for file in found})
+    if len(kinds) > 1:
+        raise TableError(f"{pattern} matches files of several kinds, {list_names(kinds)}: name one")
+    _check_distinct(found)
+    return sorted(found, key=lambda file: natural_key(file.name)), others
+
+
+def _expression(part: str, pattern: Path) -> re.Pattern[str]:
+    """Return the regular expression of one folder or file name of a pattern. Raises TableError."""
+    text, start = "", 0
+    for field in _FIELD.finditer(part):
+        if not (field["name"] or field["star"]):
+            raise TableError(f"{pattern}: a field of a pattern is a name in braces, such as {{label}} or {{trial}}")
+        # A field takes as little as possible: it ends before the first text that follows it.
+        text += re.escape(part[start : field.start()])
+        name = field["name"]
+        text += ".*?" if name is None else f"(?P={name})" if f"(?P<{name}>" in text else f"(?P<{name}>.+?)"
+        start = field.end()
+    return re.compile(text + re.escape(part[start:]), re.DOTALL)
+
+
+def _matches(folder: TrialFile, expression: re.Pattern[str], last: bool, others: list[str]) -> Iterator[TrialFile]:
+    """Yield the entries of a folder that match; add to `others` the names of tables that do not."""
+    with os.scandir(folder.path) as entries:
+        for entry in entries:
+            if entry.name.startswith(".") or entry.is_dir() == last or not (entry.is_dir() or entry.is_file()):
+                continue
+            if last and not entry.name.lower().endswith(SUFFIXES):
+                continue
+            match = expression.fullmatch(entry.name)
+            fields = match.groupdict() if match else {}
+            if match and all(folder.fields.get(name, value) == value for name, value in fields.items()):
+                yield TrialFile(Path(entry.path), f"{folder.name}/{entry.name}".lstrip("/"), folder.fields | fields)
+            elif last:
+                others.append(entry.name)
+
+
+def _check_distinct(files: Sequence[TrialFile]) -> None:
+    """Raise TableError if two paths are one file, through a link: its trial would count twice."""
+    seen: dict[tuple[int, int], TrialFile] = {}
+    for file in files:
+        status = file.path.stat()
+        first = seen.setdefault((status.st_dev, status.st_ino), file)
+        if first is not file:
+            raise TableError(f"{file.name} and {first.name} are one file: its trial would count twice, remove the link")
+
+
+def read_files(files: Sequence[TrialFile], text: TextFormat, report: Report) -> Table:
+    """Return the tables in `files`, of the format `text`, as one: the fields of the paths, then the files' columns.
+
+    The last column is the path of each row's file. Raises TableError naming the file, and OSError.
+    """
+    if (size := sum(file.path.stat().st_size for file in files)) > LARGEST:
+        raise TableError(f"{len(files)} files have more than {LARGEST} bytes, the most that are read of a set")
+    tables: list[Table] = []
+    rows = 0
+    for number, file in enumerate(files, start=1):
+        tables.append(_read(file, text))
+        rows += len(tables[-1].rows)
+        if rows > ROWS:
+            raise TableError(f"the files up to {file.name} have more than {ROWS} rows, the most that are read of a set")
+        _check_alike(files[0].name, tables[0], file.name, tables[-1])
+        report(number, len(files))
+    columns: dict[str, Column] = {
+        name: _joined([table.columns[name] for table in tables]) for name in tables[0].columns
+    }
+    counts = [len(table.rows) for table in tables]
+    fields: dict[str, Column] = {}
+    for name in files[0].fields:
+        if name in columns:
+            raise TableError(f"{files[0].name} has a column {name!r}, as the pattern has: rename that field of it")
+        fields[name] = _repeated([file.fields[name] for file in files], counts, size)
+    named_by = next(name for name in (*_FILE, "") if name not in {*columns, *fields})
+    paths = _repeated([file.name for file in files], counts, size)
+    return Table(
+        f"{len(files)} files",
+        {**fields, **columns, named_by: paths},
+        FileRows.of([(file.name, table.rows) for file, table in zip(files, tables, strict=True)], named_by),
+        size=size,
+        cells=tables[0].cells,
+        decimal=tables[0].decimal,
+        skip=tables[0].skip,
+    )
+
+
+def _read(file: TrialFile, text: TextFormat) -> Table:
+    try:
+        return read_table(file.path, text)
+    except (TableError, RecordingError) as reason:
+        # Messages begin with the name of the file: complete its path.
+        folder = file.name.rpartition("/")[0]
+        raise TableError(f"{folder}/{reason}" if folder else str(reason)) from reason
+
+
+def _check_alike(first: str, table: Table, other: str, its: Table) -> None:
+    """Raise TableError if two tables have other columns, in whatever order."""
+    if table.columns.keys() == its.columns.keys():
+        return
+    lacks = [shortened(repr(name)) for name in table.columns if name not in its.columns]
+    more = [shortened(repr(name)) for name in its.columns if name not in table.columns]
+    said = [f"it lacks {list_names(lacks)}"] * bool(lacks) + [f"it has {list_names(more)}"] * bool(more)
+    raise TableError(f"{other} has other columns than {first}: {' and '.join(said)}")
+
+
+def _joined(parts: Sequence[Column]) -> Column:
+    """Return the cells of a column in several files: as they are if all are text or all numbers, else as text."""
+    texts = [part for part in parts if isinstance(part, TextColumn)]
+    if len(texts) == len(parts):
+        return TextColumn.joined(texts)
+    arrays = [np.asarray(part) for part in parts]
+    if len({array.dtype.kind == "U" for array in arrays}) == 1:
+        return np.concatenate(arrays)
+    return np.concatenate([array if array.dtype.kind == "U" else _written(array) for array in arrays])
+
+
+def _written(numbers: NDArray[np.generic]) -> NDArray[np.str_]:
+    cells = numbers.astype(np.float64).tolist()
+    return np.array(["" if cell != cell else np.format_float_positional(cell, trim="-") for cell in cells], np.str_)
+
+
+def _repeated(values: Sequence[str], counts: Sequence[int], size: int) -> NDArray[np.str_]:
+    check_room(sum(counts), max(map(len, values)), size)
+    return np.repeat(np.array(values, np.str_), counts)
