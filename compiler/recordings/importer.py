@@ -16,6 +16,7 @@ from thenar.runtime.names import SHOWN, list_names, shortened
 from thenar.runtime.published import NONE
 
 from .cells import Parsed, Value, bits, codes, integers, names, numbers, times
+from .clocks import Course, possible_clocks
 from .coding import CodingCost, coarse, code_joint
 from .columns import KEYS, Columns, Selection, read_columns, select
 from .errors import TYPES, ColumnsError, RecordingError, TableError, check_room, list_rows
@@ -421,6 +422,7 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         for column, (name, entry) in enumerate(selection.coded)
     ]
     costs = tuple(cost for _, _, cost in coded)
+    inputs = dict(zip((name for name, _ in selection.coded), readings.joints.T, strict=True))
     joints, taxels = coded[: len(selection.joints)], coded[len(selection.joints) :]
     empty = np.zeros((len(grasps), 0), np.uint16)
     # Read-only, so that the set uses them without copies.
@@ -448,6 +450,7 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         *aliases,
         *coarse(zip(costs, readings.joints.T, strict=True)),
         *find_oddities(grasp_set, readings.rows),
+        *possible_clocks(inputs, _course(readings, columns)),
     ]
     if taxels:
         notes.append(
@@ -455,6 +458,15 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
             '[[taxels]] of the columns.toml above which value they are closed (threshold = 0.4), or threshold = "otsu"'
         )
     return grasp_set, report_of(table.what, grasp_set, costs, warnings, notes)
+
+
+def _course(readings: Readings, columns: Columns) -> Course:
+    """Return the order of the rows, for the search for clocks among the inputs."""
+    owner = groups(readings.subjects, readings.sessions)
+    group = groups(owner, readings.labels, readings.objects)
+    time = None if columns.time is None or not np.isfinite(readings.time).all() else readings.time
+    trial = np.arange(len(owner)) if columns.frames == "independent" else groups(group, readings.trials)
+    return Course(owner, group, trial, time, columns.time or "")
 
 
 def report_of(

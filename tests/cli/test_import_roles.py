@@ -1,0 +1,154 @@
+"""What `thenar import` takes the columns of a stranger's table for."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.typing import NDArray
+
+from thenar.cli import run
+from thenar.compiler import Columns, GraspSet
+from thenar.compiler.recordings.columns import JointColumns
+
+Cells = Mapping[str, "list[str] | NDArray[np.generic]"]
+# Returns the set that a table becomes, and what was printed to stdout and stderr.
+Import = Callable[..., tuple[GraspSet, str, str]]
+
+TYPES, REPETITIONS, FRAMES = ("fist", "hook", "pinch"), 8, 12
+
+
+@pytest.fixture
+def import_cells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Import:
+    def imported(cells: Cells, *arguments: str) -> tuple[GraspSet, str, str]:
+        pd.DataFrame(cells).to_csv(tmp_path / "table.csv", index=False)
+        return import_file(tmp_path / "table.csv", *arguments)
+
+    def import_file(table: Path, *arguments: str) -> tuple[GraspSet, str, str]:
+        output = str(tmp_path / "set.grasps")
+        assert run(["import", str(table), "-o", output, "--overwrite", *(arguments or ["--yes"])]) == 0
+        said = capsys.readouterr()
+        return GraspSet.load(output), said.out, said.err
+
+    return lambda table, *arguments: (import_file if isinstance(table, Path) else imported)(table, *arguments)
+
+
+def inputs(grasp_set: GraspSet) -> tuple[str, ...]:
+    return (*grasp_set.switch_names, *(taxel.name for taxel in grasp_set.taxel_columns), *grasp_set.joint_names)
+
+
+def hand(closing: bool = False, numbered: bool = True, seed: int = 1) -> dict[str, "list[str] | NDArray[np.generic]"]:
+    """Return a table of trials in random order, with three noisy sensors of a hand that is closed or closes."""
+    random = np.random.default_rng(seed)
+    order = random.permutation(np.repeat(np.arange(len(TYPES)), REPETITIONS))
+    label = np.repeat(order, FRAMES)
+    trial = [int(np.count_nonzero(order[:place] == kind)) + 1 for place, kind in enumerate(order)]
+    course = np.tile(np.linspace(0.1, 1, FRAMES), len(order))[:, np.newaxis] if closing else 1.0
+    values = random.uniform(200, 900, (len(TYPES), 3))[label] * course + random.normal(0, 4, (len(label), 3))
+    cells: dict[str, list[str] | NDArray[np.generic]] = {"grasp": [TYPES[kind] for kind in label]}
+    cells |= {"trial": np.repeat(trial, FRAMES)} if numbered else {}
+    return cells | {f"f{number}": values[:, number].round(2) for number in range(3)}
+
+
+def clocks() -> dict[str, NDArray[np.generic]]:
+    """Return what boards and programs print beside the sensors of `hand`: pauses between trials, and jitter."""
+    random = np.random.default_rng(2)
+    trials = len(TYPES) * REPETITIONS
+    steps = random.uniform(15, 25, trials * FRAMES)
+    steps[::FRAMES] += random.uniform(300, 3000, trials)
+    ms, row = np.cumsum(steps), np.arange(trials * FRAMES)
+    return {
+        "ms": np.rint(ms),
+        "Elapsed_Time_In_Milliseconds": ms.round(5),
+        "secs": ms // 1000 + 1_700_000_000,
+        "nsecs": np.rint(ms * 1e6) % 1e9,
+        "unix_time": 1.7e9 + ms / 1000,
+        "seq": (row + 17) % 256,
+        "counter": 2 * row,
+        "Nr": row // FRAMES + 1,
+        "frame": row % FRAMES,
+    }
+
+
+NAMES = {
+    "ms": ("ms", "millis", "x"),
+    "Elapsed_Time_In_Milliseconds": ("Elapsed_Time_In_Milliseconds", "x"),
+    "secs": ("secs", "epoch", "x"),
+    "nsecs": ("nsecs",),
+    "unix_time": ("unix_time", "x"),
+    "seq": ("seq", "x"),
+    "counter": ("counter", "sample", "x"),
+    "Nr": ("Nr", "x"),
+    "frame": ("frame", "x"),
+}
+
+
+@pytest.mark.parametrize("closing", [False, True])
+@pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind, names in NAMES.items() for name in names])
+def test_a_clock_or_counter_is_no_sensor_whatever_its_name(
+    kind: str, name: str, closing: bool, import_cells: Import
+) -> None:
+    grasp_set, _, warnings = import_cells({name: clocks()[kind], **hand(closing)})
+    assert inputs(grasp_set) == ("f0", "f1", "f2")
+    assert len(set(grasp_set.trial_ids.tolist())) == len(TYPES) * REPETITIONS
+    assert "clocks" not in warnings
+
+
+def test_a_second_clock_is_left_out_and_the_one_with_a_unit_is_the_time(cases: Path, import_cells: Import) -> None:
+    grasp_set, said, _ = import_cells(cases / "second_clock_is_joint" / "two_clocks.csv")
+    assert inputs(grasp_set) == ("thumb_flex", "index_flex")
+    assert grasp_set.times_us[:2].tolist() == [0, 16667]
+    assert "Elapsed_Time_In_Milliseconds │ time     │ its name; 360 different; in ms" in said
+    assert "it counts the rows" in said
+
+
+@pytest.mark.parametrize(("table", "expected"), [("close", ("f1", "f2", "f3")), ("oneframe", ("f1", "f2"))])
+def test_rising_within_trials_and_being_constant_in_them_is_no_evidence(
+    table: str, expected: tuple[str, ...], cases: Path, import_cells: Import
+) -> None:
+    grasp_set, _, warnings = import_cells(cases / "rising_is_no_clock" / f"{table}.csv")
+    assert inputs(grasp_set) == expected
+    assert "clocks" not in warnings
+
+
+def test_a_single_movement_keeps_its_sensors_with_a_warning(import_cells: Import) -> None:
+    course = np.linspace(0, 1, 60)
+    cells = {"grasp": ["open"] * 20 + ["fist"] * 40, "f0": (500 * course**2).round(1), "f1": (90 * course**3).round(2)}
+    grasp_set, _, warnings = import_cells({"t": np.arange(60) / 50, **cells})
+    assert inputs(grasp_set) == ("f0", "f1")
+    assert "2 inputs may be clocks, counters or trial numbers" in warnings
+
+
+def test_sensors_that_rise_with_sorted_labels_are_kept_with_a_warning(import_cells: Import) -> None:
+    cells = {
+        "grasp": [f"g{number}" for number in range(9)],
+        "f0": np.arange(9) ** 2 + 3.5,
+        "f1": np.arange(9)[::-1] % 4,
+    }
+    grasp_set, _, warnings = import_cells(cells)
+    assert inputs(grasp_set) == ("f0", "f1")
+    assert "1 inputs may be clocks, counters or trial numbers, which say nothing about the hand: f0 (" in warnings
+
+
+def test_a_clock_among_the_inputs_of_a_users_columns_is_named(tmp_path: Path, import_cells: Import) -> None:
+    (tmp_path / "mine.toml").write_text(
+        'label = "grasp"\ntrial = "trial"\n[[joints]]\ncolumns = ["f?", "x", "nsecs"]\n'
+    )
+    some = clocks()
+    cells = {**hand(), "x": some["unix_time"] - 1.7e9, "nsecs": (some["nsecs"] / 1e6).round()}
+    columns = Columns("grasp", trial="trial", joints=(JointColumns(("f?", "x", "nsecs")),))
+    grasp_set, _, warnings = import_cells(cells, "--columns", str(tmp_path / "mine.toml"))
+    assert "x" in inputs(grasp_set)
+    for words in ("2 inputs may be clocks", "x (it rises from trial to trial", "nsecs (its name"):
+        assert words in warnings
+    with pytest.warns(UserWarning, match="2 inputs may be clocks"):
+        GraspSet.from_dataframe(pd.DataFrame(cells), columns)
+
+
+@pytest.mark.parametrize("name", ["Nr", "x"])
+def test_consecutive_numbers_one_a_trial_are_the_trial(name: str, import_cells: Import) -> None:
+    grasp_set, said, _ = import_cells({name: clocks()["Nr"], **hand(numbered=False)})
+    assert inputs(grasp_set) == ("f0", "f1", "f2")
+    assert grasp_set.trials.tolist() == clocks()["Nr"].tolist()
+    assert "consecutive numbers, one for each run of rows; 24 different" in said
