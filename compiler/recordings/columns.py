@@ -162,8 +162,8 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
             raise ValueError(f"`delimiter` must be one character that is not the `quote`, not {self.delimiter!r}")
         if not _is_encoding(self.encoding):
             raise ValueError(f"`encoding` must be one that Python knows, not {shortened(repr(self.encoding))}")
-        if self.frames == "restart" and self.trial is not None:
-            raise ValueError("`frames` = 'restart' excludes `trial`")
+        if self.frames is not None and self.trial is not None:
+            raise ValueError(f"`trial` and `frames` = {self.frames!r} both say what a trial is: leave one out")
         if self.time_unit is not None and self.time is None:
             raise ValueError("`time_unit` is given without `time`")
         if isinstance(self.taxonomy, dict) and len(self.taxonomy) != 1:

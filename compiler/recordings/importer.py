@@ -445,8 +445,8 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         times_us=times_us,
         simulated=columns.simulated,
     )
-    check_trials(grasp_set, ColumnsError)
     warnings += [
+        *check_trials(grasp_set, ColumnsError),
         *aliases,
         *coarse(zip(costs, readings.joints.T, strict=True)),
         *find_oddities(grasp_set, readings.rows),

@@ -29,7 +29,7 @@ _LISTS = {
     "trial": "trial rep repetition rerepetition repeat attempt take run versuch wiederholung durchgang essai "
     "répétition ensayo",
     "number": "no nr number",
-    # Words beside which a column of text, constant within trials, is a subject or a session.
+    # Words in the names of texts that are subjects or sessions if they are constant within trials.
     "person": "name tester operator volunteer",
     "occasion": "batch date round block group week recording",
     "note": "n num id idx duration age date gender sex row stimulus emg acc accel gyro inclin",
@@ -138,7 +138,7 @@ def inputs_of(columns: Sequence[Facts], held: NDArray[np.bool_], out: dict[str, 
     for several in sorted(families.values(), key=len, reverse=True):
         role = _input(several, held)
         if len(several) == 1:
-            role = _as_beside(several[0], role, [column for column in columns if column.name in judged], judged)
+            role = _as_on_finger(several[0], role, [column for column in columns if column.name in judged], judged)
         judged |= dict.fromkeys((column.name for column in several), role)
     for name, role in judged.items():
         found.setdefault(role, []).append(name)
@@ -151,11 +151,11 @@ def inputs_of(columns: Sequence[Facts], held: NDArray[np.bool_], out: dict[str, 
 
 
 def _family(column: Facts) -> object:
-    """Return what columns of one kind share: the words of the name but fingers, or what stands before its number."""
+    """Return the words of the name except fingers, or a name without words up to its number: siblings share them."""
     return column.words - WORDS["finger"] if column.words else _stem(column.name)
 
 
-def _as_beside(
+def _as_on_finger(
     column: Facts, role: tuple[str, str], others: Sequence[Facts], judged: dict[str, tuple[str, str]]
 ) -> tuple[str, str]:
     """Return the role of the other sensors of the same finger and range, if they agree, for a column judged by rest."""

@@ -139,7 +139,7 @@ def _vague(column: Facts) -> int:
 def _same(
     table: Table, found: Sequence[Facts], chosen: dict[str, tuple[str, ...]], why: dict[str, str]
 ) -> dict[str, str]:
-    """Name labels, subjects, objects and sessions by the text beside their number; return what is left out for that."""
+    """Replace the numbers of labels, subjects, objects and sessions by names; return the reasons for leaving out others."""
     out: dict[str, str] = {}
     for key in ("label", "subject", "object", "session"):
         if len(chosen.get(key, ())) != 1:
@@ -149,7 +149,7 @@ def _same(
         alike = [
             other
             for other in found
-            if other.name not in taken | out.keys() and _stands_for(table, other, column) and not other.bits
+            if other.name not in taken | out.keys() and _corresponds(table, other, column) and not other.bits
         ]
         names = [
             other for other in alike if other.values is None and not _is_named(other, WORDS.keys() & {*KEYS} - {key})
@@ -171,7 +171,7 @@ def _is_named(column: Facts, keys: Iterable[str]) -> bool:
     return any(column.words & WORDS[key] for key in keys)
 
 
-def _stands_for(table: Table, other: Facts, column: Facts) -> bool:
+def _corresponds(table: Table, other: Facts, column: Facts) -> bool:
     """Return whether a column has one value for each of another's, more than one and fewer than there are rows."""
     if not (other.nominal and 1 < other.distinct == column.distinct < other.rows):
         return False

@@ -52,7 +52,7 @@ def hand(closing: bool = False, numbered: bool = True, seed: int = 1) -> dict[st
 
 
 def clocks() -> dict[str, NDArray[np.generic]]:
-    """Return what boards and programs print beside the sensors of `hand`: pauses between trials, and jitter."""
+    """Return the clocks and counters of boards and programs for the rows of `hand`, with pauses and jitter."""
     random = np.random.default_rng(2)
     trials = len(TYPES) * REPETITIONS
     steps = random.uniform(15, 25, trials * FRAMES)
@@ -152,3 +152,43 @@ def test_consecutive_numbers_one_a_trial_are_the_trial(name: str, import_cells: 
     assert inputs(grasp_set) == ("f0", "f1", "f2")
     assert grasp_set.trials.tolist() == clocks()["Nr"].tolist()
     assert "consecutive numbers, one for each run of rows; 24 different" in said
+
+
+def in_blocks(frames: int, seed: int = 1) -> Cells:
+    """Return true trials, recorded in blocks of five between which the glove was worn anew: trials of a block agree."""
+    random = np.random.default_rng(seed)
+    kind, block, trial, _ = np.indices((3, 4, 5, frames)).reshape(4, -1)
+    worn, held = random.normal(0, 30, (3, 4, 4)), random.normal(0, 5, (3, 4, 5, 4))
+    values = 500 + 60 * kind[:, np.newaxis] + worn[kind, block] + held[kind, block, trial]
+    values += random.normal(0, 1, values.shape)
+    sensors = {f"f{number}": column.round(1) for number, column in enumerate(values.T)}
+    return {"grasp": [TYPES[number] for number in kind], "trial": 5 * block + trial, **sensors}
+
+
+@pytest.mark.parametrize("frames", [2, 20])
+def test_true_trials_in_blocks_are_imported_with_a_warning(frames: int, import_cells: Import) -> None:
+    grasp_set, _, warnings = import_cells(in_blocks(frames))
+    assert len(set(grasp_set.trial_ids.tolist())) == 60
+    assert "warning: trials resemble the trial before: within a subject, grasp type, object and session" in warnings
+    assert "name the blocks (`session`)" in warnings
+
+
+def test_pieces_of_trials_are_no_trials(
+    tmp_path: Path, import_cells: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cells = in_blocks(20)
+    cells = {**cells, "trial": np.arange(len(cells["grasp"])) // 4}
+    with pytest.raises(AssertionError):
+        import_cells(cells)
+    said = capsys.readouterr().err
+    assert "the rows look like frames of fewer trials" in said
+    assert 'name the column that numbers whole trials (trial = "..." in columns.toml)' in said
+    assert "independent" not in said
+
+
+def test_what_a_trial_is_is_said_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pd.DataFrame(hand()).to_csv(tmp_path / "table.csv", index=False)
+    (tmp_path / "c.toml").write_text('label = "grasp"\ntrial = "trial"\nframes = "independent"\n')
+    table, columns, output = (str(tmp_path / name) for name in ("table.csv", "c.toml", "set.grasps"))
+    assert run(["import", table, "-o", output, "--columns", columns]) == 2
+    assert "`trial` and `frames` = 'independent' both say what a trial is: leave one out" in capsys.readouterr().err

@@ -89,7 +89,7 @@ def test_frames_that_are_counted_as_trials_are_refused_with_both_remedies() -> N
     with pytest.raises(ColumnsError, match=r"look like frames .*trial = .*frames = \"independent\""):
         import_table(Table("t.csv", rows, np.arange(400)), columns)
     assert import_table(Table("t.csv", rows, np.arange(400)), replace(columns, trial="hold"))[1].trials == 40
-    stated = replace(columns, frames="independent")
+    stated = replace(columns, trial=None, frames="independent")
     assert import_table(Table("t.csv", rows, np.arange(400)), stated)[0].independent
 
 
