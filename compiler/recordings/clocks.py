@@ -24,8 +24,8 @@ POSSIBLE_CLOCKS = "possible clocks"
 # Clocks seldom fall: the largest share of falling steps from trial to trial, of one that is certain or suspicious, and
 # within trials.
 _FALLS, _SUSPICIOUS_FALLS = 0.05, 0.25
-# The least number of trials whose first values do not all rise by chance; and, among repetitions of one grasp, which may
-# be pairs, the least excess of rises in standard errors.
+# The least number of trials whose first values do not all rise by chance; and the least excess of rises, in standard
+# errors, among repetitions of one grasp, which may be pairs.
 _TRIALS, _ERRORS = 8, 4.4
 # The least share of equal steps, and of rows on a straight line.
 _EQUAL, _ON_LINE = 0.9, 0.95

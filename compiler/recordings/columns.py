@@ -127,7 +127,8 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
     A label, subject, object, session or trial may be spread over several columns, whose values are combined. Otherwise
     `frames` defines the trials: "independent" makes each row one; with "restart" a trial begins where `time` does not
     increase, or the label, subject, object or session changes. Labels in `none` mean that nothing is held, as "none"
-    always does; with "" among them, so does an empty cell.
+    always does; with "" among them, so does an empty cell. `rename` gives columns of the table other names, which all
+    other keys use, and the set has.
     """
 
     label: str | tuple[str, ...]
@@ -149,6 +150,7 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
     encoding: str = "utf-8"
     quote: str = '"'
     header: bool = True
+    rename: dict[str, str] = {}
     labels: dict[str, str] = {}
     taxels: tuple[TaxelColumns, ...] = ()
     joints: tuple[JointColumns, ...] = ()

@@ -12,14 +12,14 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.names import SHOWN, list_names, shortened
+from thenar.runtime.names import SHOWN, list_names, nearest, shortened
 from thenar.runtime.published import NONE
 
 from .cells import Parsed, Value, bits, codes, integers, names, numbers, times
 from .clocks import Course, possible_clocks
 from .coding import CodingCost, coarse, code_joint
 from .columns import KEYS, Columns, Selection, read_columns, select
-from .errors import TYPES, ColumnsError, RecordingError, TableError, check_room, list_rows
+from .errors import TYPES, ColumnsError, RecordingError, TableError, check_names, check_room, list_rows
 from .frames import check_trials
 from .graspset import GraspSet
 from .summary import Finding, find_oddities
@@ -414,6 +414,7 @@ def import_file(table: Path, columns: Path) -> tuple[GraspSet, ImportReport]:
 
 def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport]:
     """Import `table` with `columns`; raises TableError, ColumnsError or RecordingError."""
+    table = _renamed(table, columns.rename)
     selection = select(columns, list(table.columns))
     readings, times_us, warnings, notes = read_cells(table, columns, selection)
     grasps, taxonomy, aliases = _labels(table, columns, readings)
@@ -458,6 +459,17 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
             '[[taxels]] of the columns.toml above which value they are closed (threshold = 0.4), or threshold = "otsu"'
         )
     return grasp_set, report_of(table.what, grasp_set, costs, warnings, notes)
+
+
+def _renamed(table: Table, names: dict[str, str]) -> Table:
+    """Return `table` with other `names` for some columns. Raises ColumnsError, or RecordingError for a name twice."""
+    there = list(table.columns)
+    if unknown := [name for name in names if name not in table.columns]:
+        missing = shortened(repr(unknown[0]))
+        raise ColumnsError(f"rename: the table has no column {missing}{nearest(unknown[0], there)}")
+    renamed = [names.get(name, name) for name in there]
+    check_names("rename: column", renamed)
+    return replace(table, columns=dict(zip(renamed, table.columns.values(), strict=True)))
 
 
 def _course(readings: Readings, columns: Columns) -> Course:

@@ -139,7 +139,7 @@ def _vague(column: Facts) -> int:
 def _same(
     table: Table, found: Sequence[Facts], chosen: dict[str, tuple[str, ...]], why: dict[str, str]
 ) -> dict[str, str]:
-    """Replace the numbers of labels, subjects, objects and sessions by names; return the reasons for leaving out others."""
+    """Replace numbers of labels, subjects, objects and sessions by names; return why other columns are left out."""
     out: dict[str, str] = {}
     for key in ("label", "subject", "object", "session"):
         if len(chosen.get(key, ())) != 1:

@@ -192,3 +192,72 @@ def test_what_a_trial_is_is_said_once(tmp_path: Path, capsys: pytest.CaptureFixt
     table, columns, output = (str(tmp_path / name) for name in ("table.csv", "c.toml", "set.grasps"))
     assert run(["import", table, "-o", output, "--columns", columns]) == 2
     assert "`trial` and `frames` = 'independent' both say what a trial is: leave one out" in capsys.readouterr().err
+
+
+def test_renamed_columns_of_two_exports_merge(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = {name: str(tmp_path / name) for name in ("a.csv", "b.csv", "a.grasps", "b.grasps", "all.grasps", "b.toml")}
+    pd.DataFrame(hand()).to_csv(files["a.csv"], index=False)
+    pd.DataFrame(hand(seed=2)).rename(columns={"f1": "index_mcp"}).to_csv(files["b.csv"], index=False)
+    for name in ("a", "b"):
+        assert run(["import", files[f"{name}.csv"], "-o", files[f"{name}.grasps"], "--yes"]) == 0
+    merge = ["merge", files["a.grasps"], files["b.grasps"], "-o", files["all.grasps"], "--each", "session"]
+    assert run(merge) == 2
+    said = capsys.readouterr().err
+    assert "lacks 1 joint that" in said
+    assert "f1, and has index_mcp instead; only sets with the same columns are merged" in said
+    assert "import its table again with [rename] in the columns.toml" in said
+    columns = (tmp_path / "a.columns.toml").read_text()
+    Path(files["b.toml"]).write_text(f'{columns}\n[rename]\nindex_mcp = "f1"\n')
+    again = ["import", files["b.csv"], "-o", files["b.grasps"], "--columns", files["b.toml"], "--overwrite"]
+    assert run(again) == 0
+    assert run(merge) == 0
+    assert GraspSet.load(files["all.grasps"]).joint_names == ("f0", "f1", "f2")
+    for old, new, said in (("indx_mcp", "f1", "has no column 'indx_mcp'"), ("index_mcp", "f0", "'f0' occurs twice")):
+        Path(files["b.toml"]).write_text(f'label = "grasp"\n[rename]\n{old} = "{new}"\n')
+        capsys.readouterr()
+        assert run(again) == 2
+        assert said in capsys.readouterr().err
+
+
+HEAD, FINGERS = ("thumb", "index", "middle", "ring", "little"), 600
+
+
+def test_sensors_that_are_alike_have_one_role(import_cells: Import) -> None:
+    random = np.random.default_rng(3)
+    resting = np.where(random.random(FINGERS) < 0.7, 300, 900) + random.integers(0, 40, FINGERS)
+    flex = {finger: random.integers(300, 900, FINGERS) for finger in HEAD}
+    cells = {"grasp": [TYPES[row % 3] for row in range(FINGERS)], "trial": np.arange(FINGERS)}
+    alike = {**flex, "thumb": resting}
+    named = {f"{finger}_mcp": flex[finger] for finger in HEAD} | {"thumb_crossover": resting, "abd_ring": resting[::-1]}
+    for inputs_ in (alike, named):
+        grasp_set, _, _ = import_cells({**cells, **inputs_})
+        assert {*grasp_set.joint_names} == {*inputs_}
+    pads = {f"pad_{finger}": resting + number for number, finger in enumerate(HEAD)}
+    grasp_set, _, _ = import_cells({**cells, **pads, **{f"flex_{finger}": flex[finger] for finger in HEAD}})
+    assert {*grasp_set.taxel_names} == {*pads}
+
+
+def test_a_label_is_called_by_its_name(cases: Path, import_cells: Import) -> None:
+    grasp_set, said, _ = import_cells(cases / "label_number_beats_name" / "rps.csv")
+    assert {*grasp_set.grasps.tolist()} == {"rock", "paper", "scissors"}
+    assert inputs(grasp_set) == ("s1", "s2", "s3")
+    assert "the number of gesture_name" in said
+
+
+def test_text_that_is_constant_within_trials_is_a_subject_or_session(import_cells: Import) -> None:
+    cells = hand()
+    rows = np.arange(len(cells["grasp"]))
+    who = [("Ada", "Ben", "Cleo", "Dan", "Eva", "Fay")[trial % 6] for trial in rows // FRAMES]
+    batch = [("monday", "tuesday")[row // 144] for row in rows]
+    side = [("left", "right")[trial % 2] for trial in rows // FRAMES]
+    grasp_set, said, _ = import_cells(
+        {"Name": who, "batch": batch, "side": side, "note": [f"{row}" for row in rows], **cells}
+    )
+    assert {*grasp_set.subjects.tolist()} == {*who}
+    assert {*grasp_set.sessions.tolist()} == {*batch}
+    for words in (
+        "text, constant within trials; 6 different: is it the subject?",
+        "text, constant within trials; 2 different: is it the session?",
+        "text, constant within trials: name it (subject, object, session) if it is one",
+    ):
+        assert words in said
