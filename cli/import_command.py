@@ -2,7 +2,6 @@
 
 import os
 import shlex
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from .common import (
     keep_apart,
     out,
     overwrite_flag,
+    overwrites,
     progress,
     show,
     table,
@@ -54,8 +54,8 @@ class _Table(click.Path):
 def command(tables: tuple[Path, ...], output: Path, columns: Path | None, stream: bool, yes: bool) -> None:
     """Import TABLE (.csv, .tsv, .txt, .xlsx, .parquet, .h5, .mat, .arff or .npz) as labelled grasps.
 
-    Without --columns, the command detects the meaning of each column, shows it with reasons, and writes it to a
-    columns.toml next to the output, for you to correct; on a terminal it then asks whether to continue.
+    Without --columns, the command detects the meaning of each column, shows it with reasons, and writes it next to the
+    output, to set.columns.toml for set.grasps, for you to correct; on a terminal it then asks whether to continue.
 
     One file per trial: TABLE is a pattern whose fields in braces say what the path says, a column each; * is any text.
     For a folder the command proposes the pattern. Quote patterns, and name fields as keys of columns.toml: label,
@@ -112,9 +112,8 @@ def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport
         _print_proposal(proposal)
     if proposal.lacks and asked and click.confirm("Is each row a separate trial?"):
         proposal = proposal.independent()
-    written = _write(proposal.toml(), output.parent)
-    other = "" if written.name == "columns.toml" else "; columns.toml exists already, and is used only with --columns"
-    echo(f"{written}: the detected columns{other}", err=wants_json())
+    written = _write(proposal.toml(), output.with_suffix(".columns.toml"), asked)
+    echo(f"{written}: the detected columns", err=wants_json())
     replacing = ["--overwrite"] if output.exists() else []
     again = shlex.join(["thenar", "import", str(path), "-o", str(output), *replacing, "--columns", str(written)])
     if proposal.lacks:
@@ -127,22 +126,21 @@ def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport
         return import_table(read, proposal.columns)
 
 
-def _write(text: str, folder: Path) -> Path:
-    """Write a columns.toml into `folder` under the first name that is free or holds this text; return its path."""
+def _write(text: str, path: Path, asked: bool) -> Path:
+    """Write the detected columns to `path`; replace others there only if the user agrees. Return the path."""
+    from thenar.compiler.recordings.errors import ColumnsError
     from thenar.runtime.files import write_atomically
 
-    paths = (folder / f"columns{f'-{number}' if number > 1 else ''}.toml" for number in count(1))
-    for path in paths:
-        if not os.path.lexists(path):
-            write_atomically(path, text.encode())
-            return path
-        if path.is_file() and path.read_bytes() == text.encode():
-            return path
-    raise AssertionError
+    kept = os.path.lexists(path) and not (path.is_file() and path.read_bytes() == text.encode())
+    replace = overwrites(click.get_current_context()) or (asked and kept and click.confirm(f"Replace {path}?"))
+    if kept and not replace:
+        raise ColumnsError(f"{path} holds other columns than those detected: add --columns {path} or --overwrite")
+    write_atomically(path, text.encode())
+    return path
 
 
 def _print_proposal(proposal: "Proposal") -> None:
-    from thenar.compiler.recordings.propose import listed
+    from thenar.compiler.recordings.inputs import listed
 
     for remark in proposal.remarks:
         echo(remark)

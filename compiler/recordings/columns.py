@@ -132,7 +132,8 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
     A label, subject, object, session or trial may be spread over several columns, whose values are combined. Otherwise
     `frames` defines the trials: "independent" makes each row one; with "restart" a trial begins where `time` does not
     increase, or the label, subject, object or session changes. Labels in `none` mean that nothing is held, as "none"
-    always does; with "" among them, so does an empty cell.
+    always does; with "" among them, so does an empty cell. `rename` gives columns of the table other names, which all
+    other keys use, and the set has.
     """
 
     label: str | tuple[str, ...]
@@ -155,6 +156,7 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
     quote: str = '"'
     header: bool = True
     skip: Annotated[int, msgspec.Meta(ge=0)] = 0
+    rename: dict[str, str] = {}
     labels: dict[str, str] = {}
     taxels: tuple[TaxelColumns, ...] = ()
     joints: tuple[JointColumns, ...] = ()
@@ -168,8 +170,8 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
             raise ValueError(f"`delimiter` must be one character that is not the `quote`, not {self.delimiter!r}")
         if not _is_encoding(self.encoding):
             raise ValueError(f"`encoding` must be one that Python knows, not {shortened(repr(self.encoding))}")
-        if self.frames == "restart" and self.trial is not None:
-            raise ValueError("`frames` = 'restart' excludes `trial`")
+        if self.frames is not None and self.trial is not None:
+            raise ValueError(f"`trial` and `frames` = {self.frames!r} both say what a trial is: leave one out")
         if self.time_unit is not None and self.time is None:
             raise ValueError("`time_unit` is given without `time`")
         if isinstance(self.taxonomy, dict) and len(self.taxonomy) != 1:

@@ -1,5 +1,6 @@
 """Convert a pandas DataFrame to a `GraspSet`; export.py has the other direction."""
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ from thenar.runtime.names import shortened
 from thenar.runtime.toml_source import TomlText
 from thenar.runtime.toml_struct import convert
 
+from .clocks import POSSIBLE_CLOCKS
 from .columns import Columns, read_columns
 from .errors import ColumnsError, TableError, check_names
 from .export import COLUMNS_TOML
@@ -29,7 +31,11 @@ def from_dataframe(frame: "pd.DataFrame", columns: Columns | str | Path | None =
     table = table_of(frame)
     if columns is None:
         columns = _said(frame) or _proposed(table)
-    return import_table(table, columns if isinstance(columns, Columns) else read_columns(Path(columns)))[0]
+    grasp_set, report = import_table(table, columns if isinstance(columns, Columns) else read_columns(Path(columns)))
+    for finding in report.warnings:
+        if finding.kind == POSSIBLE_CLOCKS:
+            warnings.warn(finding.message, stacklevel=3)
+    return grasp_set
 
 
 def _said(frame: "pd.DataFrame") -> Columns | None:

@@ -48,10 +48,12 @@ def heads_of(grasp_set: GraspSet) -> Heads:
 def meta_of(grasp_set: GraspSet) -> dict[str, NDArray[np.generic]]:
     """Return the columns other than inputs and label, by their keys in a columns.toml.
 
-    There is a session only if the set has several, and a time only if it is known.
+    There is a session only if the set has several, a time only if it is known, and a trial only if rows are not
+    independent.
     """
     found = {key: getattr(grasp_set, f"{key}s" if key != "time" else "times_us") for key in Heads._fields[1:]}
     absent = {"time"} if not grasp_set.times_us.size else set()
+    absent |= {"trial"} if grasp_set.independent else set()
     absent |= {"session"} if not (grasp_set.sessions != "1").any() else set()
     return {key: column for key, column in found.items() if key not in absent}
 

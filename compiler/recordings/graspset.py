@@ -137,7 +137,7 @@ class GraspSet:
     sessions : (n,) array of str, optional
         Sessions, between which the glove was taken off. None: a single session, "1".
     independent : bool
-        Whether the rows are stated to be separate trials, whatever their numbers.
+        Whether the rows are stated to be separate trials; then all `trials` are 1.
     taxels : (n, t) array of uint16, optional
         The codes of analog columns that training turns into switches, with learned thresholds.
     taxel_columns : tuple of Joint
@@ -217,6 +217,9 @@ class GraspSet:
             self._freeze(name, np.str_, (rows,))
             check_names(name[:-1], np.unique(getattr(self, name)).tolist())
         self._freeze("trials", np.int64, (rows,))
+        if self.independent:
+            object.__setattr__(self, "trials", np.ones(rows, np.int64))
+            self.trials.setflags(write=False)
         self._freeze("times_us", np.int64, (rows if self.times_us.size else 0,))
         check_simulated(self.simulated)
         object.__setattr__(self, "labels", self._label())

@@ -12,13 +12,14 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.names import SHOWN, list_names, shortened
+from thenar.runtime.names import SHOWN, list_names, nearest, shortened
 from thenar.runtime.published import NONE
 
 from .cells import Parsed, Value, bits, codes, integers, names, numbers, times
+from .clocks import Course, possible_clocks
 from .coding import CodingCost, coarse, code_joint
 from .columns import KEYS, Columns, Selection, read_columns, select
-from .errors import TYPES, ColumnsError, RecordingError, TableError, check_room, list_rows
+from .errors import TYPES, ColumnsError, RecordingError, TableError, check_names, check_room, list_rows
 from .frames import check_trials
 from .graspset import GraspSet
 from .summary import Finding, find_oddities
@@ -419,6 +420,7 @@ def import_file(
 
 def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport]:
     """Import `table` with `columns`; raises TableError, ColumnsError or RecordingError."""
+    table = _renamed(table, columns.rename)
     selection = select(columns, list(table.columns))
     readings, times_us, warnings, notes = read_cells(table, columns, selection)
     grasps, taxonomy, aliases = _labels(table, columns, readings)
@@ -427,6 +429,7 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         for column, (name, entry) in enumerate(selection.coded)
     ]
     costs = tuple(cost for _, _, cost in coded)
+    inputs = dict(zip((name for name, _ in selection.coded), readings.joints.T, strict=True))
     joints, taxels = coded[: len(selection.joints)], coded[len(selection.joints) :]
     empty = np.zeros((len(grasps), 0), np.uint16)
     # Read-only, so that the set uses them without copies.
@@ -449,11 +452,12 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         times_us=times_us,
         simulated=columns.simulated,
     )
-    check_trials(grasp_set, ColumnsError)
     warnings += [
+        *check_trials(grasp_set, ColumnsError),
         *aliases,
         *coarse(zip(costs, readings.joints.T, strict=True)),
         *find_oddities(grasp_set, readings.rows),
+        *possible_clocks(inputs, _course(readings, columns)),
     ]
     if taxels:
         notes.append(
@@ -461,6 +465,26 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
             '[[taxels]] of the columns.toml above which value they are closed (threshold = 0.4), or threshold = "otsu"'
         )
     return grasp_set, report_of(table.what, grasp_set, costs, warnings, notes)
+
+
+def _renamed(table: Table, names: dict[str, str]) -> Table:
+    """Return `table` with other `names` for some columns. Raises ColumnsError, or RecordingError for a name twice."""
+    there = list(table.columns)
+    if unknown := [name for name in names if name not in table.columns]:
+        missing = shortened(repr(unknown[0]))
+        raise ColumnsError(f"rename: the table has no column {missing}{nearest(unknown[0], there)}")
+    renamed = [names.get(name, name) for name in there]
+    check_names("rename: column", renamed)
+    return replace(table, columns=dict(zip(renamed, table.columns.values(), strict=True)))
+
+
+def _course(readings: Readings, columns: Columns) -> Course:
+    """Return the order of the rows, for the search for clocks among the inputs."""
+    owner = groups(readings.subjects, readings.sessions)
+    group = groups(owner, readings.labels, readings.objects)
+    time = None if columns.time is None or not np.isfinite(readings.time).all() else readings.time
+    trial = np.arange(len(owner)) if columns.frames == "independent" else groups(group, readings.trials)
+    return Course(owner, group, trial, time, columns.time or "")
 
 
 def report_of(

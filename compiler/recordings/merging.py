@@ -168,9 +168,12 @@ def _check_columns(first_name: str, first: GraspSet, name: str, other: GraspSet)
         for lacking, having, of, than in ((theirs, ours, name, first_name), (ours, theirs, first_name, name)):
             if missing := [column for column in having if column not in {*lacking}]:
                 plural = "es" if what == "switch" else "s"
+                others = [column for column in lacking if column not in {*having}]
+                instead = f", and has {list_names(others)} instead" if others else ""
                 raise RecordingError(
                     f"{of} lacks {len(missing)} {what}{plural if len(missing) > 1 else ''} that {than} has: "
-                    f"{list_names(missing)}; only sets with the same columns are merged"
+                    f"{list_names(missing)}{instead}; only sets with the same columns are merged: where one has "
+                    "another name, import its table again with [rename] in the columns.toml"
                 )
     if first.independent != other.independent:
         claims = (first_name, name) if first.independent else (name, first_name)

@@ -1,11 +1,8 @@
 """Propose a columns.toml for a table: the role of each column, from its name and values, with reasons."""
 
-import glob
-import re
-from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -16,12 +13,12 @@ from numpy.typing import NDArray
 from thenar.runtime.names import list_names, printable, shortened
 from thenar.runtime.published import NONE
 
-from .cells import bits, names, numbers, times
-from .coding import sound_grid
-from .columns import KEYS, PLAIN, Columns, JointColumns, TaxelColumns, TextFormat, TimeUnit
+from .cells import names, times
+from .clocks import Course, is_time, numbers_trials
+from .columns import KEYS, PLAIN, Columns, TaxelColumns, TextFormat, TimeUnit
 from .errors import FileRows, TableError
-from .graspset import CODES
 from .headers import skipped
+from .inputs import WORDS, Facts, Role, bits_of, facts_of, globs, inputs_of, joints_of, listed
 from .oddities import first_oddity
 from .sniff import sniff
 from .table import Table, is_text, read_table
@@ -29,51 +26,12 @@ from .taxonomy import plain, published_for
 from .trial_files import Report, find_files, is_pattern, read_files
 from .trials import groups, in_runs, restarts, unit_of_time
 
-# Words in the names of columns, as people write them in several languages.
-_LISTS = {
-    "label": "grasp grip label class gesture posture pose category target action griff griffart greifart "
-    "klasse geste prise classe agarre clase presa restimulus y",
-    "subject": "subject subj who wer participant person user wearer proband teilnehmer sujet participante sujeto",
-    "object": "object obj item thing objekt gegenstand objet objeto oggetto",
-    "session": "session day visit sitzung tag jour séance sesión sessione",
-    "trial": "trial rep repetition rerepetition repeat attempt take run versuch wiederholung durchgang essai "
-    "répétition ensayo",
-    "time": "time timestamp stamp elapsed clock frame t zeit zeitstempel bild temps tiempo tempo",
-    "unit": "ms s us sec second millisecond microsecond no nr number",
-    "note": "n num id idx duration age date gender sex row stimulus emg acc accel gyro inclin",
-    "pad": "pad taxel fsr pressure force tactile touch press contact druck kraft pression presión",
-    # Labels that mean that nothing is held, in plain spelling.
-    "none": "none nothing null nograsp nogrip nograsping noobject nomovement nomotion nogesture rest resting restpose "
-    "restposition idle idling idlemovement relax relaxed neutral neutralposition open openhand handopen openpalm "
-    "empty emptyhand free freehand background pause wait waiting approach approaching release releasing released ruhe "
-    "ruhelage ruheposition leerlauf offen offenehand leer leerehand keine keingriff entspannt repos aucun aucune rien "
-    "mainouverte vide reposo descanso ninguno ninguna nada manoabierta riposo nessuno nessuna manoaperta",
-    "joint": "flex bend joint angle glove cyberglove enc encoder mcp pip dip cmc abduction winkel biegung",
-}
-# Without a plural s, since words are looked up that way.
-_WORDS = {role: frozenset(word.removesuffix("s") or word for word in words.split()) for role, words in _LISTS.items()}
 # The share of a stream's label changes that lead to or from the label for nothing held.
 _BETWEEN = 0.9
 # Nothing is held before and after a grasp; a number shared by more runs than these is not the number of a movement.
 _SHARED = 3
 # Columns with more distinct values than this are not grasp types.
 _TYPES = 200
-# An unknown analog column is a pad if this share of its cells is at rest, in the lowest tenth of its range.
-_AT_REST, _REST = 0.5, 0.1
-# Resolutions in bits of existing converters.
-_CONVERTERS = (8, 10, 12, 14, 16)
-_PADS = ': a placement chooses their levels (threshold = 0.4, or "otsu", makes switches of them)'
-_CODES, _MOST_JOINTS = "whole numbers, taken as codes", 24
-# The start of the reason for joints with values, followed by their grid.
-_NUMBERS = "numbers, coded on a grid of "
-
-
-class Role(msgspec.Struct, frozen=True):
-    """The assumed role of some columns, and the reason."""
-
-    columns: tuple[str, ...]
-    role: str
-    reason: str
 
 
 class Proposal(msgspec.Struct, frozen=True):
@@ -95,64 +53,6 @@ class Proposal(msgspec.Struct, frozen=True):
         return (
             "".join(f"# {printable(line)}\n" for line in said) + "\n" + tomli_w.dumps(msgspec.to_builtins(self.columns))
         )
-
-
-def listed(columns: Sequence[str]) -> str:
-    """Return the names of columns; if more than three, only the first and the last."""
-    if len(columns) <= 3:
-        return ", ".join(map(shortened, columns))
-    return f"{shortened(columns[0])} ... {shortened(columns[-1])} ({len(columns)})"
-
-
-class _Column(NamedTuple):
-    """Facts about a column: the words of its name; its numbers, None for text; the number of distinct values, and which
-    rows have one.
-    """
-
-    name: str
-    words: frozenset[str]
-    values: NDArray[np.float64] | None
-    bits: bool
-    distinct: int
-    there: NDArray[np.bool_]
-
-    @property
-    def rows(self) -> int:
-        """Number of its rows."""
-        return len(self.there)
-
-    @property
-    def whole(self) -> bool:
-        """Whether it holds integers."""
-        return self.values is not None and bool((self.values == np.rint(self.values)).all())
-
-    @property
-    def nominal(self) -> bool:
-        """Whether it may be categorical."""
-        return bool(self.distinct) and (self.values is None or self.whole)
-
-    @property
-    def counts_rows(self) -> bool:
-        """Whether it numbers the rows."""
-        return self.whole and self.values is not None and self.rows > 2 and bool((np.diff(self.values) == 1).all())
-
-
-def _look(table: Table, name: str) -> _Column:
-    column = table.columns[name]
-    found = re.findall(r"[A-Z]{2,}(?![^\W\dA-Z_])|[^\W\d_][^\W\dA-Z_]*", name)
-    words = frozenset(word.casefold().removesuffix("s") or word for word in found)
-    parsed = (times if _is_time(words) else numbers)(column, table.decimal)
-    if parsed.wrong.any():
-        switch = bits(column, table.decimal)
-        if not switch.wrong.any():
-            closed = switch.values[~switch.missing].astype(np.float64)
-            return _Column(name, words, closed, True, 2, ~switch.missing)
-        read = names(column, table.cells, table.size)
-        return _Column(name, words, None, False, len(np.unique(read.values[~read.missing])), ~read.missing)
-    values = parsed.values[~parsed.missing]
-    distinct = np.unique(values)
-    two = bool(len(distinct)) and bool(np.isin(distinct, (0, 1)).all())
-    return _Column(name, words, values, two, len(distinct), ~parsed.missing)
 
 
 def propose_file(path: Path, progress: Report = lambda _done, _total: None) -> tuple[Table, Proposal]:
@@ -206,20 +106,24 @@ def _by_file(table: Table, proposal: Proposal) -> Proposal:
 
 def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ()) -> Proposal:
     """Return the proposed roles of the columns of `table`. Raises TableError if there is no label or no input."""
-    found = [_look(table, name) for name in table.columns]
+    found = [facts_of(table, name) for name in table.columns]
     chosen, why = _named(found)
     if "label" not in chosen:
         chosen["label"], why["label"] = _label(table.what, found, chosen)
+    out = _same(table, found, chosen, why)
     labels = _texts(table, chosen["label"])
     none = _none(labels)
     held = ~np.isin(labels, none)
+    _trial_number(table, [column for column in found if column.name not in out], chosen, why)
+    _constant_texts(table, found, chosen, why, out)
     frames, lacks = _frames(table, found, chosen, why, held)
     if (unit := _unit(table, chosen)) is not None:
         why["time"] += f"; in {unit}"
     taken = {name for columns in chosen.values() for name in columns}
-    inputs = _inputs([column for column in found if column.name not in taken], held)
+    rest = [column for column in found if column.name not in taken]
+    inputs = inputs_of(rest, held, _counting(table, rest, chosen) | out)
     if not any(role.role in ("switches", "taxels", "joints") for role in inputs):
-        raise TableError(f"{table.what}: no column holds numbers that change: it has no inputs")
+        raise TableError(f"{table.what}: no column holds numbers that change: it has no inputs{_left_out(inputs)}")
     used = taken | {name for role in inputs if role.role != "left out" for name in role.columns}
     excused = {name for key in ("label", "object", "session", "trial") for name in chosen.get(key, ())}
     missing = sum(
@@ -234,13 +138,13 @@ def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ())
         taxonomy=taxonomy,
         missing="keep" if missing else "refuse",
         **text._asdict(),
-        switches=_globs((name for role in inputs if role.role == "switches" for name in role.columns), table.columns),
+        switches=globs((name for role in inputs if role.role == "switches" for name in role.columns), table.columns),
         taxels=tuple(
-            TaxelColumns(_globs(role.columns, table.columns), bits=_bits_of(role, found))
+            TaxelColumns(globs(role.columns, table.columns), bits=bits_of(role, found))
             for role in inputs
             if role.role == "taxels"
         ),
-        joints=tuple(_joints(role, table.columns) for role in inputs if role.role == "joints"),
+        joints=tuple(joints_of(role, table.columns) for role in inputs if role.role == "joints"),
     )
     notes = [f"{missing} columns miss cells, which are filled: see `missing`"] if missing else []
     notes += [f"the labels are grasp types of {taxonomy}"] if taxonomy != "own" else []
@@ -251,31 +155,175 @@ def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ())
     return Proposal(columns, (*roles, *inputs), (*remarks, *notes), lacks)
 
 
-def _named(found: Sequence[_Column]) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
+def _named(found: Sequence[Facts]) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
     """Return the columns with a role given by their names, and the reasons."""
     chosen: dict[str, tuple[str, ...]] = {}
     for key in ("time", "session", "trial", "subject", "object", "label"):
         best = [
-            (not column.words <= _WORDS[key] | _WORDS["unit"], column.distinct == column.rows, place)
+            (
+                _vague(column) if key == "time" else 0,
+                key != "time" and not column.words <= WORDS[key] | WORDS["number"],
+                column.distinct == column.rows,
+                place,
+            )
             for place, column in enumerate(found)
             if (column.name,) not in chosen.values() and _may_be(key, column)
         ]
         if best:
-            chosen[key] = (found[min(best)[2]].name,)
+            chosen[key] = (found[min(best)[-1]].name,)
     distinct = {column.name: column.distinct for column in found}
     return chosen, {key: f"its name; {distinct[name]} different" for key, (name,) in chosen.items()}
 
 
-def _may_be(key: str, column: _Column) -> bool:
+def _vague(column: Facts) -> int:
+    """Return 0 if the name of a time tells its unit, 1 if its steps do, 2 if neither."""
+    steps = np.zeros(0) if column.values is None else column.values
+    return next((rank for rank, known in enumerate((steps[:0], steps)) if unit_of_time(column.name, known)), 2)
+
+
+def _same(
+    table: Table, found: Sequence[Facts], chosen: dict[str, tuple[str, ...]], why: dict[str, str]
+) -> dict[str, str]:
+    """Replace numbers of labels, subjects, objects and sessions by names; return why other columns are left out."""
+    out: dict[str, str] = {}
+    for key in ("label", "subject", "object", "session"):
+        if len(chosen.get(key, ())) != 1:
+            continue
+        column = next(column for column in found if (column.name,) == chosen[key])
+        taken = {name for columns in chosen.values() for name in columns}
+        alike = [
+            other
+            for other in found
+            if other.name not in taken | out.keys() and _corresponds(table, other, column) and not other.bits
+        ]
+        names = [
+            other for other in alike if other.values is None and not _is_named(other, WORDS.keys() & {*KEYS} - {key})
+        ]
+        if column.values is not None and names:
+            best = max(names, key=lambda other: bool(other.words & (WORDS[key] | WORDS["person"])))
+            chosen[key] = (best.name,)
+            why[key] = f"the name of each number in {column.name}; {best.distinct} different"
+            alike = [column, *(other for other in alike if other is not best)]
+        out |= {
+            other.name: f"the number of {shortened(chosen[key][0])}"
+            for other in alike
+            if other.values is not None and other.distinct == 1 + np.ptp(other.values)
+        }
+    return out
+
+
+def _is_named(column: Facts, keys: Iterable[str]) -> bool:
+    return any(column.words & WORDS[key] for key in keys)
+
+
+def _corresponds(table: Table, other: Facts, column: Facts) -> bool:
+    """Return whether a column has one value for each of another's, more than one and fewer than there are rows."""
+    if not (other.nominal and 1 < other.distinct == column.distinct < other.rows):
+        return False
+    return int(groups(_texts(table, [other.name]), _texts(table, [column.name])).max()) + 1 == column.distinct
+
+
+def _trial_number(
+    table: Table, found: Sequence[Facts], chosen: dict[str, tuple[str, ...]], why: dict[str, str]
+) -> None:
+    """Take a column that numbers the trials for the trial, if none has such a name."""
+    if "trial" in chosen:
+        return
+    group = groups(*(_texts(table, chosen[key]) for key in ("label", "subject", "object", "session") if key in chosen))
+    taken = {name for columns in chosen.values() for name in columns}
+    for column in found:
+        if column.name in taken or column.bits or not column.whole or column.distinct < 2:
+            continue
+        if numbers_trials(column.over_rows, group):
+            chosen["trial"] = (column.name,)
+            why["trial"] = f"consecutive numbers, one for each run of rows; {column.distinct} different"
+            return
+
+
+def _constant_texts(
+    table: Table,
+    found: Sequence[Facts],
+    chosen: dict[str, tuple[str, ...]],
+    why: dict[str, str],
+    out: dict[str, str],
+) -> None:
+    """Take texts that are constant within trials for the subject, the session or the object."""
+    label = _texts(table, chosen["label"])
+    who = [label, *(_texts(table, chosen[key]) for key in ("subject", "object", "session", "trial") if key in chosen)]
+    trial = np.cumsum(np.diff(groups(*who), prepend=-1) != 0)
+    taken = {name for columns in chosen.values() for name in columns}
+    for column in found:
+        if column.name in taken | out.keys() or column.values is not None or not 1 < column.distinct <= _TYPES:
+            continue
+        text = _texts(table, [column.name])
+        changes = np.count_nonzero(text[1:] != text[:-1])
+        inside = np.count_nonzero((text[1:] != text[:-1]) & (trial[1:] == trial[:-1]))
+        if 2 * column.distinct > changes + 1 + trial[-1] or (inside and "trial" in chosen):
+            continue
+        pairs = len(np.unique(groups(label, text)))
+        types = len(np.unique(label))
+        if pairs == types:
+            out[column.name] = f"text that {shortened(chosen['label'][0])} determines"
+        elif key := _who(column, pairs >= types * column.distinct / 2, chosen):
+            chosen[key] = (column.name,)
+            why[key] = f"text, constant within trials; {column.distinct} different: is it the {key}?"
+        else:
+            out[column.name] = "text, constant within trials: name it (subject, object, session) if it is one"
+
+
+def _who(column: Facts, crossed: bool, chosen: Iterable[str]) -> str:
+    """Return the role of a text that is constant within trials, by its name, or by whether it occurs with most labels.
+
+    A text of two values without a name that tells is none: it may be a remark, such as "left" or "ok".
+    """
+    if column.words & WORDS["person"] and "subject" not in chosen:
+        return "subject"
+    if column.words & WORDS["occasion"] and "session" not in chosen:
+        return "session"
+    likely = ("subject", "session") if crossed else ("object",)
+    return next((key for key in likely if key not in chosen and column.distinct > 2), "")
+
+
+def _counting(table: Table, rest: Sequence[Facts], chosen: dict[str, tuple[str, ...]]) -> dict[str, str]:
+    """Return which of the other columns are certainly clocks, counters or trial numbers, and why."""
+    keys = [key for key in ("subject", "session", "label", "object", "trial") if key in chosen]
+    texts = {key: groups(_texts(table, chosen[key])) for key in keys}
+    one = np.zeros(len(table.rows), np.intp)
+    owner = groups(one, *(texts[key] for key in ("subject", "session") if key in texts))
+    group = groups(owner, *(texts[key] for key in ("label", "object") if key in texts))
+    trial = groups(group, texts["trial"]) if "trial" in texts else group
+    time = _time(table, chosen)
+    name = chosen["time"][0] if time is not None and not np.isnan(time).any() else ""
+    course = Course(owner, group, trial, time if name else None, name)
+    found = {}
+    for column in rest:
+        if column.values is None or column.bits or column.distinct < 2:
+            continue
+        if (sign := course.sign(column.over_rows)) and sign.certain:
+            found[column.name] = sign.reason
+    return found
+
+
+def _left_out(inputs: Sequence[Role]) -> str:
+    """Return which columns of numbers were left out, for the error that there are no inputs."""
+    out = [f"{listed(role.columns)} ({role.reason})" for role in inputs if role.reason not in ("text", "empty")]
+    return f"; left out are {list_names(out)}" if out else ""
+
+
+def _may_be(key: str, column: Facts) -> bool:
     if key == "time":
-        return column.values is not None and column.distinct > 1 and _is_time(column.words)
-    named = column.words <= _WORDS[key] | _WORDS["unit"] if column.bits else True
+        return column.values is not None and column.distinct > 1 and is_time(column.words) and _dates(column)
+    named = column.words <= WORDS[key] | WORDS["number"] if column.bits else True
     fits = named and column.nominal and (key != "label" or 1 < column.distinct <= _TYPES)
-    return fits and bool(column.words & _WORDS[key])
+    return fits and bool(column.words & WORDS[key])
 
 
-def _is_time(words: frozenset[str]) -> bool:
-    return bool(words & _WORDS["time"]) and words <= _WORDS["time"] | _WORDS["unit"]
+def _dates(column: Facts) -> bool:
+    """Return whether a column with the name of a time dates rows: whole seconds do not, nor what wraps every second."""
+    assert column.values is not None
+    steps = np.diff(column.values)
+    wraps = column.values.max() < 1e9 and unit_of_time(column.name, column.values) == "ns"
+    return bool(2 * np.count_nonzero(steps) > len(steps) and not (wraps and (steps < 0).any()))
 
 
 def _none(labels: NDArray[np.str_]) -> tuple[str, ...]:
@@ -285,7 +333,7 @@ def _none(labels: NDArray[np.str_]) -> tuple[str, ...]:
     lie between runs of it. Unless two other labels remain, only "none" is taken.
     """
     found = np.unique(labels).tolist()
-    none = {label for label in found if plain(label).removesuffix("s") in _WORDS["none"]}
+    none = {label for label in found if plain(label).removesuffix("s") in WORDS["none"]}
     changes = np.flatnonzero(labels[1:] != labels[:-1])
     for label in {"", "0", "-1"}.intersection(found) if in_runs(labels) else ():
         if np.mean((labels[changes] == label) | (labels[changes + 1] == label)) >= _BETWEEN:
@@ -300,7 +348,7 @@ def _unit(table: Table, chosen: dict[str, tuple[str, ...]]) -> TimeUnit | None:
     return None if time is None else unit_of_time(chosen["time"][0], time[~np.isnan(time)])
 
 
-def _label(what: str, found: Sequence[_Column], chosen: dict[str, tuple[str, ...]]) -> tuple[tuple[str, ...], str]:
+def _label(what: str, found: Sequence[Facts], chosen: dict[str, tuple[str, ...]]) -> tuple[tuple[str, ...], str]:
     """Return the column that is most likely the label if none has such a name."""
     if "object" in chosen:
         return chosen.pop("object"), "no column is called label, grasp or class: the objects are what can be recognised"
@@ -320,7 +368,7 @@ def _texts(table: Table, columns: Iterable[str]) -> NDArray[np.str_]:
 
 def _frames(
     table: Table,
-    found: Sequence[_Column],
+    found: Sequence[Facts],
     chosen: dict[str, tuple[str, ...]],
     why: dict[str, str],
     held: NDArray[np.bool_],
@@ -375,7 +423,7 @@ def _add_parts(
     table: Table,
     ids: NDArray[np.intp],
     time: NDArray[np.float64] | None,
-    rest: Sequence[_Column],
+    rest: Sequence[Facts],
     chosen: dict[str, tuple[str, ...]],
     why: dict[str, str],
 ) -> None:
@@ -393,98 +441,3 @@ def _add_parts(
             why["trial"] = f"with {column.name}, no time occurs twice in a trial"
     if len(chosen["trial"]) > 1:
         why["trial"] += f"; {int(ids.max()) + 1} trials"
-
-
-def _inputs(columns: Sequence[_Column], held: NDArray[np.bool_]) -> list[Role]:
-    """Return the roles of the other columns, grouped; held (n,) are rows of grasps."""
-    found: dict[tuple[str, str], list[str]] = {}
-    stems: dict[str, list[_Column]] = {}
-    for column in columns:
-        if out := _no_input(column):
-            found.setdefault(("left out", out), []).append(column.name)
-        else:
-            stems.setdefault("" if column.bits else _stem(column.name), []).append(column)
-    # Columns whose names differ only in a number have the same role, whatever the range of each.
-    for several in stems.values():
-        found.setdefault(_input(several, held), []).extend(column.name for column in several)
-    if len(found.get(("joints", _CODES), ())) > _MOST_JOINTS:
-        found[("taxels", f"whole numbers in more columns than a hand has joints{_PADS}")] = found.pop(
-            ("joints", _CODES)
-        )
-    order = ["switches", "taxels", "joints", "left out"]
-    return [Role(tuple(alike), *key) for key, alike in sorted(found.items(), key=lambda item: order.index(item[0][0]))]
-
-
-def _stem(name: str) -> str:
-    return name.rstrip("0123456789")
-
-
-def _input(columns: Sequence[_Column], held: NDArray[np.bool_]) -> tuple[str, str]:
-    """Return the role of a group of inputs, and the reason; held (n,) are rows of grasps."""
-    words = frozenset[str]().union(*(column.words for column in columns))
-    values = np.concatenate([column.values for column in columns if column.values is not None])
-    if all(column.bits for column in columns):
-        return "switches", "0 and 1 only"
-    if words & _WORDS["pad"]:
-        return "taxels", f"pads by their names{_PADS}"
-    if not all(column.whole for column in columns) or values.min() < 0 or values.max() >= CODES:
-        return "joints", f"{_NUMBERS}{sound_grid(values):g}"
-    # A pad rests at the lower end of its range while others are touched; between supply and converter, at the upper.
-    each = [column.values[held[column.there]] for column in columns if column.values is not None]
-    places = [(part - part.min()) / max(float(np.ptp(part)), 1.0) for part in each if part.size]
-    rest = max(np.mean([np.mean(place <= _REST) for place in of]) for of in (places, [1 - place for place in places]))
-    if not words & _WORDS["joint"] and rest > _AT_REST:
-        return "taxels", f"at rest in most rows, as a pad is{_PADS}"
-    return "joints", _CODES
-
-
-def _bits_of(role: Role, found: Sequence[_Column]) -> int | None:
-    """Return the bits of the smallest converter that gives these counts, None if they are not counts."""
-    each = [column.values for column in found if column.name in role.columns and column.values is not None]
-    whole = all(column.whole for column in found if column.name in role.columns)
-    if not whole or min(part.min() for part in each) < 0:
-        return None
-    most = max(part.max() for part in each)
-    return next((bits for bits in _CONVERTERS if most < 2**bits), None)
-
-
-def _no_input(column: _Column) -> str:
-    """Return why a column is not an input, "" if it is one."""
-    if not column.distinct:
-        return "empty"
-    if column.values is None:
-        return "text"
-    if column.counts_rows:
-        return "it numbers the rows"
-    if column.bits:
-        return ""
-    if column.distinct == 1:
-        return "it never changes"
-    if column.words & _WORDS["note"] or _is_time(column.words):
-        return "by its name a note on the row"
-    if column.words and any(column.words <= _WORDS[key] - {"y"} for key in ("label", "trial")) and column.nominal:
-        return "by its name another label, or number of a trial"
-    return ""
-
-
-def _joints(role: Role, every: Iterable[str]) -> JointColumns:
-    """Return the entry of joints: with codes, or with values on one grid."""
-    columns = _globs(role.columns, every)
-    if not role.reason.startswith(_NUMBERS):
-        return JointColumns(columns, "counts", codes=True)
-    words = {word for name in role.columns for word in re.findall(r"[a-z]+", name.casefold())}
-    unit = next((unit for unit in ("deg", "rad", "mm", "cm") if unit in words), "units")
-    return JointColumns(columns, unit, grid=float(role.reason.removeprefix(_NUMBERS)))
-
-
-def _globs(columns: Iterable[str], every: Iterable[str]) -> tuple[str, ...]:
-    """Return globs that match exactly `columns` among `every` one: a star if a stem has no others."""
-    there = sorted(every)
-    stems: dict[str, list[str]] = {}
-    for name in columns:
-        stems.setdefault(_stem(name), []).append(name)
-    found: list[str] = []
-    for stem, alike in stems.items():
-        others = bisect_left(there, stem + "\U0010ffff") - bisect_left(there, stem) - len(alike)
-        found += [f"{glob.escape(stem)}*"] if stem and len(alike) > 2 and not others else map(glob.escape, alike)
-    return tuple(found)

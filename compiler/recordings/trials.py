@@ -58,7 +58,7 @@ def restarts(ids: NDArray[np.intp], time: NDArray[np.float64]) -> NDArray[np.int
 
 # Units of time by the words that name them, and the smallest step between two frames for each: frames come 2 to 2000
 # times a second.
-_UNITS = {
+UNITS = {
     "s": ({"s", "sec", "secs", "second", "seconds", "sekunde", "sekunden"}, 0.0005, 0.5),
     "ms": ({"ms", "msec", "milli", "millis", "millisecond", "milliseconds"}, 2.0, 500.0),
     "us": ({"us", "usec", "µs", "μs", "micro", "micros", "microsecond", "microseconds"}, 500.0, 5e5),
@@ -74,8 +74,10 @@ def unit_of_time(name: str, time: NDArray[np.float64]) -> Literal["s", "ms", "us
     words = {*re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())}
     steps = np.diff(time)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-    named = [unit for unit, (those, _, _) in _UNITS.items() if words & those]
-    found = named or [unit for unit, (_, least, most) in _UNITS.items() if least <= step < most]
+    named = [unit for unit, (those, _, _) in UNITS.items() if words & those]
+    # Numbers of frames have no unit, however far apart they are.
+    numbered = words & {"frame", "frames", "bild"}
+    found = named or [unit for unit, (_, least, most) in UNITS.items() if least <= step < most and not numbered]
     return found[0] if len(found) == 1 else None  # type: ignore[return-value]
 
 

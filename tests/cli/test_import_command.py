@@ -150,20 +150,30 @@ def test_a_table_is_imported_without_a_columns_toml(glove: Path, capsys: pytest.
         "a semicolon",
         "decimal sign: a comma",
         "Versuch │ trial",
-        "columns.toml: the detected columns",
+        "set.columns.toml: the detected columns",
     ):
         assert words in said.out
     assert "numbered as trials in natural order: 'T1' is 1, 'T2' is 2, 'T10' is 3" in said.out
     assert "24 grasps of 2 types (own); subjects 2, objects 1, switches 1, joints 1, trials 12" in said.out
     # What was written imports the same set; a second time it is there already.
-    assert run(["import", "my glove.csv", "-o", "again.grasps", "--columns", "columns.toml"]) == 0
+    assert run(["import", "my glove.csv", "-o", "again.grasps", "--columns", "set.columns.toml"]) == 0
     assert (glove / "again.grasps").read_bytes() == (glove / "set.grasps").read_bytes()
     capsys.readouterr()
-    assert run(["import", "my glove.csv", "-o", "third.grasps", "--yes", "--json"]) == 0
+    (glove / "set.grasps").unlink()
+    assert run(["import", "my glove.csv", "-o", "set.grasps", "--yes", "--json"]) == 0
     said = capsys.readouterr()
     assert json.loads(said.out)["trials"] == 12
-    assert said.err == "columns.toml: the detected columns\n"
-    assert sorted(path.name for path in glove.glob("*.toml")) == ["columns.toml"]
+    assert said.err == "set.columns.toml: the detected columns\n"
+    assert sorted(path.name for path in glove.glob("*.toml")) == ["set.columns.toml"]
+    # Another table does not replace them, unless it may.
+    (glove / "other.csv").write_text("grasp,trial,s1,s2\nmug,1,0,1\nball,2,1,0\n")
+    (glove / "set.grasps").unlink()
+    assert run(["import", "other.csv", "-o", "set.grasps", "--yes"]) == 2
+    refused = "set.columns.toml holds other columns than those detected: add --columns set.columns.toml or --overwrite"
+    assert refused in capsys.readouterr().err
+    assert run(["import", "other.csv", "-o", "set.grasps", "--yes", "--overwrite"]) == 0
+    assert "s2" in (glove / "set.columns.toml").read_text()
+    assert sorted(path.name for path in glove.glob("*.toml")) == ["set.columns.toml"]
 
 
 def test_a_stream_with_rest_is_imported_as_it_comes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -176,7 +186,7 @@ def test_a_stream_with_rest_is_imported_as_it_comes(tmp_path: Path, capsys: pyte
     said = capsys.readouterr().out
     assert "nothing is held where the label is 'rest' (45% of the rows): see `none`" in said
     assert "400 grasps of 2 types (own), in 180 of which nothing is held; subjects 1" in said
-    assert 'none = "rest"' in (tmp_path / "columns.toml").read_text()
+    assert 'none = "rest"' in (tmp_path / "set.columns.toml").read_text()
     grasp_set = GraspSet.load(tmp_path / "set.grasps")
     assert grasp_set.times_us[-1] == 3_990_000
     assert len(set(grasp_set.movement_ids.tolist())) == 5
@@ -192,13 +202,11 @@ def test_without_a_terminal_nothing_is_imported_and_the_next_command_is_said(
     glove: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(os, "isatty", lambda descriptor: False)
-    (glove / "columns.toml").write_text("# mine\n")
     assert run(["import", "my glove.csv", "-o", "set.grasps"]) == 2
     said = capsys.readouterr()
     assert "Versuch │ trial" in said.out
-    again = "thenar import 'my glove.csv' -o set.grasps --columns columns-2.toml\n"
-    assert said.err == f"thenar: nobody confirmed the columns on a terminal: review columns-2.toml, then run: {again}"
-    assert (glove / "columns.toml").read_text() == "# mine\n"
+    again = "thenar import 'my glove.csv' -o set.grasps --columns set.columns.toml\n"
+    assert said.err == f"thenar: nobody confirmed the columns on a terminal: review set.columns.toml, then run: {again}"
     assert not (glove / "set.grasps").exists()
     assert run(shlex.split(again)[1:]) == 0
 
@@ -208,7 +216,7 @@ def test_on_a_terminal_it_asks(
 ) -> None:
     asked(monkeypatch, "n")
     assert run(["import", "my glove.csv", "-o", "set.grasps"]) == 2
-    assert "thenar: nothing was imported: correct columns.toml, then run: thenar import" in capsys.readouterr().err
+    assert "thenar: nothing was imported: correct set.columns.toml, then run: thenar import" in capsys.readouterr().err
     assert not (glove / "set.grasps").exists()
     asked(monkeypatch, "y")
     assert run(["import", "my glove.csv", "-o", "set.grasps"]) == 0
@@ -222,8 +230,11 @@ def test_who_states_that_rows_are_independent_is_asked_for_it(
     assert run(["import", "rows.csv", "-o", "set.grasps", "--yes"]) == 2
     said = capsys.readouterr().err
     assert "no column tells which rows are frames of one trial: name it (trial = ...), or state that each row" in said
-    assert "TO DO: no column tells" in (glove / "columns.toml").read_text()
-    asked(monkeypatch, "y", "y")
+    assert "TO DO: no column tells" in (glove / "set.columns.toml").read_text()
+    asked(monkeypatch, "y", "n")
+    assert run(["import", "rows.csv", "-o", "set.grasps"]) == 2
+    assert "TO DO: no column tells" in (glove / "set.columns.toml").read_text()
+    asked(monkeypatch, "y", "y", "y")
     assert run(["import", "rows.csv", "-o", "set.grasps"]) == 0
     assert GraspSet.load("set.grasps").independent
     assert run(["compile", "set.grasps", "-o", "build", "--folds", "0", "--rounds", "2"]) == 0
@@ -231,7 +242,7 @@ def test_who_states_that_rows_are_independent_is_asked_for_it(
     for line in (["info", "set.grasps"], ["verify", "build", "set.grasps"]):
         assert run(line) == 0
         assert INDEPENDENT in capsys.readouterr().out.splitlines()
-    assert 'frames = "independent"' in (glove / "columns-2.toml").read_text()
+    assert 'frames = "independent"' in (glove / "set.columns.toml").read_text()
     asked(monkeypatch, "n")
     assert run(["import", "rows.csv", "-o", "no.grasps"]) == 2
     assert not (glove / "no.grasps").exists()
@@ -260,7 +271,7 @@ def test_junk_without_a_columns_toml_is_one_sentence(
     assert said.startswith(f"thenar: {name}")
     assert said.count("\n") == 1
     assert len(said) < 1000
-    assert not list(glove.glob("columns*.toml"))
+    assert not list(glove.glob("*.toml"))
 
 
 @pytest.mark.parametrize(

@@ -110,7 +110,7 @@ def test_trials_of_a_published_set_are_found_over_two_columns(r2g_table: Path, t
         "object",
         "subject",
     )
-    assert (proposal.columns.time, proposal.columns.frames) == ("frame", None)
+    assert (proposal.columns.time, proposal.columns.frames) == ("t_ms", None)
     assert (report.rows, report.trials, report.subjects, report.objects, report.grasp_types) == (16119, 1370, 29, 4, 6)
     # The same trials, told apart by hand.
     with gzip.open(r2g_table, "rt") as file:
