@@ -2,8 +2,8 @@
 
 import os
 import time
-from collections.abc import Iterable
-from contextlib import suppress
+from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from struct import Struct
 from threading import Event, Thread
@@ -17,6 +17,7 @@ from thenar.drivers.errors import SettingError
 from ..files import write_atomically
 from ..frames import GloveFrame, SwitchFrame
 from ..published import LiveGrasp
+from ..writer_thread import WriterThread
 from .layout import GLOVE, GRASP, MARKS, RECOGNITION, SWITCHES, TAXELS, TRIALS, Tail, beginning, ending, session_record
 from .messages import encode_bytes, encode_text, glove_bytes, switch_bytes, taxel_bytes
 from .session import Label, Mark, Session
@@ -28,14 +29,17 @@ class AppendedFile:
     """Appends to `path`.
 
     Data has reached the operating system when `append` returns: no kill can take it. A power failure can take about the
-    last second, because a separate thread calls fdatasync that often; nobody waits for it. The first error, such as a
-    full disk, ends the recording: `failure` says so, and the file keeps its whole records.
+    last second, because a separate thread calls fdatasync that often; nobody waits for it. What does not fit on a full
+    disk is lost, and `failure` says so until something fits again; the file keeps its whole records. A disk that does
+    not keep what it took ends it.
     """
 
     def __init__(self, path: Path, size: int, sync_s: float = SYNC_S) -> None:
         """Continue after the first `size` bytes of the file; the rest is cut off. Raises OSError."""
-        self.failure: str | None = None
         self.size = size
+        # Two threads fail: a write is tried again, a disk that kept nothing is not.
+        self._full: str | None = None
+        self._broken: str | None = None
         self._path = path
         self._synced = size
         self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC)
@@ -48,21 +52,29 @@ class AppendedFile:
         self._thread = Thread(target=self._keep_synced, args=(sync_s,), name="thenar recording", daemon=True)
         self._thread.start()
 
+    @property
+    def failure(self) -> str | None:
+        """Why nothing can be written now; None while there is no error."""
+        return self._broken or self._full
+
     def append(self, data: bytes) -> bool:
-        """Append `data` whole and return True; return False if that fails, ever after, and when closed."""
-        if self.failure is not None or self._closing.is_set():
+        """Append `data` whole and return True; return False if that fails, and when closed."""
+        if self._broken is not None or self._closing.is_set():
             return False
         try:
             written = os.write(self._file, data)
             while written < len(data):
                 written += os.write(self._file, data[written:])
         except OSError as reason:
-            self._fail(reason)
-            # Remove the part of the record that fitted.
-            with suppress(OSError):
+            self._full = self._sentence(reason)
+            try:
+                # Remove the part of the record that fitted.
                 os.ftruncate(self._file, self.size)
+            except OSError as worse:
+                self._broken = self._sentence(worse)
             return False
         self.size += len(data)
+        self._full = None
         return True
 
     def close(self) -> None:
@@ -80,18 +92,16 @@ class AppendedFile:
 
     def _sync(self) -> None:
         size = self.size
-        if size == self._synced or self.failure is not None:
+        if size == self._synced or self._broken is not None:
             return
         try:
             os.fdatasync(self._file)
         except OSError as reason:
-            self._fail(reason)
+            self._broken = self._sentence(reason)
         self._synced = size
 
-    def _fail(self, reason: OSError) -> None:
-        self.failure = (
-            f"{self._path}: {reason.strerror}: the recording has stopped after {self.size} bytes, all of them whole"
-        )
+    def _sentence(self, reason: OSError) -> str:
+        return f"{self._path}: {reason.strerror}: nothing more is written after {self.size} bytes, all of them whole"
 
 
 # Opcode, length of the rest, channel, sequence, log time, publish time (MCAP specification, Message).
@@ -113,7 +123,17 @@ class Recorder(Closing):
     file is in the order of its log times. Both use the monotonic clock, set to the date once when the session begins,
     so that a later change of the date moves nothing.
 
-    A full disk ends the recording and nothing else: no method raises, and `failure` holds the sentence for the user.
+    A full disk raises nothing: what does not fit is lost, and counted in `lost`; recording goes on once there is room.
+    `failure` says why nothing can be written now.
+
+    Attributes
+    ----------
+    session : Session
+        What is recorded, with the clock.
+    path : Path
+        The file.
+    lost : int
+        The number of messages that the disk did not take.
     """
 
     def __init__(
@@ -126,9 +146,14 @@ class Recorder(Closing):
         after_ns = 0 if tail is None else tail.last_ns
         self.session = replace(session, clock_ns=max(time.time_ns(), after_ns) - time.monotonic_ns())
         self.path = path
+        self.lost = 0
         self._tail = _begun(path, self.session, marks) if tail is None else tail
         self._file = AppendedFile(path, self._tail.size, sync_s)
-        if tail is not None and self._append(record := session_record(self.session)):
+        if tail is not None:
+            record = session_record(self.session)
+            if not self._append(record):
+                self._file.close()
+                raise OSError(self._file.failure)
             self._tail.add_session(len(record))
         self._grasp = ""
         self._switches, self._sensors, self._taxels = len(session.switches), len(session.sensors), len(session.taxels)
@@ -137,7 +162,7 @@ class Recorder(Closing):
 
     @property
     def failure(self) -> str | None:
-        """Why recording stopped; None while there is no error."""
+        """Why nothing can be written now; None while there is no error."""
         return self._file.failure
 
     @property
@@ -178,7 +203,9 @@ class Recorder(Closing):
         self._message(TRIALS, label.time_us, encode_text(_json(label)))
 
     def mark(self, mark: Mark) -> None:
-        """Record a mark."""
+        """Record a mark. Raises SettingError if the recording was begun without marks."""
+        if MARKS not in self._tail.counts:
+            raise SettingError(f"{self.path} was begun without marks: begin a recording with them")
         self._message(MARKS, mark.time_us, encode_text(_json(mark)))
 
     def close(self) -> None:
@@ -196,12 +223,65 @@ class Recorder(Closing):
         head = _MESSAGE.pack(_MESSAGE_OPCODE, length, channel, sequence, logged, published)
         if self._append(head + data):
             tail.add_message(channel, logged)
+        else:
+            self.lost += self.failure is not None
 
     def _append(self, record: bytes) -> bool:
         whole = self._file.append(record)
         if whole:
             self._tail.add_bytes(record)
         return whole
+
+
+# Moments that wait for the disk: those of five seconds of the fastest glove.
+MOST_WAITING = 8192
+
+
+class LiveRecorder(Closing):
+    """A recording, with marks, whose disk delays nobody: its messages are written on a separate thread.
+
+    A moment is written at once, unless the disk hangs: then up to `MOST_WAITING` moments and marks wait, and those
+    beyond are lost. A kill takes what waits.
+    """
+
+    def __init__(self, path: Path, session: Session) -> None:
+        """Begin a file. Raises as `Recorder` does."""
+        self._recorder = Recorder(path, session, marks=True)
+        self._thread = WriterThread("recording", MOST_WAITING)
+        self.path = path
+
+    @property
+    def failure(self) -> str | None:
+        """Why nothing can be written now; None if it can."""
+        hanging = f"{self.path}: the disk does not respond: up to {MOST_WAITING} moments wait for it"
+        return self._recorder.failure or (hanging if self._thread.hangs else None)
+
+    @property
+    def messages(self) -> int:
+        """The number of messages in the file."""
+        return self._recorder.messages
+
+    @property
+    def lost(self) -> str:
+        """What was not written, in words; "" if all was."""
+        messages, moments = self._recorder.lost, self._thread.dropped
+        return " and ".join(
+            f"{number} {what}{'s' * (number != 1)} lost"
+            for number, what in ((messages, "message"), (moments, "moment"))
+            if number
+        )
+
+    def moment(self, arrived: Sequence[SwitchFrame | GloveFrame], grasp: LiveGrasp) -> None:
+        """Record the frames that arrived since the last moment, then the prediction for the newest of them."""
+        self._thread.put(partial(self._recorder.moment, arrived, grasp))
+
+    def mark(self, mark: Mark) -> None:
+        """Record a mark."""
+        self._thread.put(partial(self._recorder.mark, mark))
+
+    def close(self) -> None:
+        """Write what waits and the summary, unless the disk hangs, and close; may be called again."""
+        self._thread.close(self._recorder.close)
 
 
 def _begun(path: Path, session: Session, marks: bool) -> Tail:
