@@ -1,4 +1,4 @@
-"""Whatever happens outside of `thenar run`, it goes on recognising, says so, publishes nothing old, and can be ended."""
+"""Whatever happens outside of `thenar run`, it goes on, says so, publishes nothing old, and can be ended."""
 
 import fcntl
 import json
