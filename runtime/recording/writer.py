@@ -3,6 +3,7 @@
 import os
 import time
 from collections.abc import Iterable, Sequence
+from dataclasses import replace as replace_dataclass
 from functools import partial
 from pathlib import Path
 from struct import Struct
@@ -110,6 +111,8 @@ _MESSAGE_OPCODE, _OPENING = 5, 9
 # A recording shows how a person's hand moves.
 _PRIVATE = 0o600
 _json = msgspec.json.Encoder().encode
+# Its channel, time in microseconds, and content.
+_Message = tuple[int, int, bytes]
 
 
 class _Recognition(LiveGrasp, frozen=True, omit_defaults=True):
@@ -151,9 +154,10 @@ class Recorder(Closing):
         self._file = AppendedFile(path, self._tail.size, sync_s)
         if tail is not None:
             record = session_record(self.session)
-            if not self._append(record):
+            if not self._file.append(record):
                 self._file.close()
                 raise OSError(self._file.failure)
+            self._tail.add_bytes(record)
             self._tail.add_session(len(record))
         self._grasp = ""
         self._switches, self._sensors, self._taxels = len(session.switches), len(session.sensors), len(session.taxels)
@@ -174,39 +178,34 @@ class Recorder(Closing):
         """Record a reading of the switches, and the taxels' codes before it. Raises FrameError if it does not have the
         switches of this session.
         """
-        if frame.taxels is not None:
-            self._message(TAXELS, frame.time_us, encode_bytes(taxel_bytes(frame.taxels, self._taxels)))
-        self._message(SWITCHES, frame.time_us, encode_bytes(switch_bytes(frame, self._switches, self._sensors)))
+        self._write(self._of_frame(frame))
 
     def glove(self, frame: GloveFrame) -> None:
         """Record a record of the CyberGlove. Raises FrameError if it does not have the sensors of this session."""
-        self._message(GLOVE, frame.time_us, encode_bytes(glove_bytes(frame, self._sensors)))
+        self._write(self._of_frame(frame))
 
     def grasp(self, grasp: LiveGrasp) -> None:
         """Record a prediction; the grasp type also separately whenever it changes."""
-        self._message(RECOGNITION, grasp.time_us, encode_text(_json(_Recognition(*astuple(grasp)))))
-        if grasp.grasp != self._grasp:
-            self._grasp = grasp.grasp
-            self._message(GRASP, grasp.time_us, encode_text(grasp.grasp.encode()))
+        self.moment((), grasp)
 
     def moment(self, arrived: Iterable[SwitchFrame | GloveFrame], grasp: LiveGrasp) -> None:
         """Record the frames that arrived since the last moment, then the prediction for the newest of them."""
-        for frame in arrived:
-            if isinstance(frame, SwitchFrame):
-                self.switches(frame)
-            else:
-                self.glove(frame)
-        self.grasp(grasp)
+        messages = [message for frame in arrived for message in self._of_frame(frame)]
+        messages.append((RECOGNITION, grasp.time_us, encode_text(_json(_Recognition(*astuple(grasp))))))
+        if grasp.grasp != self._grasp:
+            messages.append((GRASP, grasp.time_us, encode_text(grasp.grasp.encode())))
+        if self._write(messages):
+            self._grasp = grasp.grasp
 
     def label(self, label: Label) -> None:
         """Record the outcome of a trial."""
-        self._message(TRIALS, label.time_us, encode_text(_json(label)))
+        self._write([(TRIALS, label.time_us, encode_text(_json(label)))])
 
     def mark(self, mark: Mark) -> None:
         """Record a mark. Raises SettingError if the recording was begun without marks."""
         if MARKS not in self._tail.counts:
             raise SettingError(f"{self.path} was begun without marks: begin a recording with them")
-        self._message(MARKS, mark.time_us, encode_text(_json(mark)))
+        self._write([(MARKS, mark.time_us, encode_text(_json(mark)))])
 
     def close(self) -> None:
         """Write the summary and close; may wait for the disk, and may be called again."""
@@ -214,23 +213,30 @@ class Recorder(Closing):
             self._file.append(ending(self._tail))
         self._file.close()
 
-    def _message(self, channel: int, time_us: int, data: bytes) -> None:
-        tail = self._tail
-        published = self.session.clock_ns + 1000 * time_us
-        logged = max(published, tail.last_ns)
-        length = _MESSAGE.size - _OPENING + len(data)
-        sequence = tail.counts[channel] & 0xFFFFFFFF
-        head = _MESSAGE.pack(_MESSAGE_OPCODE, length, channel, sequence, logged, published)
-        if self._append(head + data):
-            tail.add_message(channel, logged)
-        else:
-            self.lost += self.failure is not None
+    def _of_frame(self, frame: SwitchFrame | GloveFrame) -> list[_Message]:
+        if isinstance(frame, GloveFrame):
+            return [(GLOVE, frame.time_us, encode_bytes(glove_bytes(frame, self._sensors)))]
+        found = [(SWITCHES, frame.time_us, encode_bytes(switch_bytes(frame, self._switches, self._sensors)))]
+        if frame.taxels is not None:
+            found.insert(0, (TAXELS, frame.time_us, encode_bytes(taxel_bytes(frame.taxels, self._taxels))))
+        return found
 
-    def _append(self, record: bytes) -> bool:
-        whole = self._file.append(record)
-        if whole:
-            self._tail.add_bytes(record)
-        return whole
+    def _write(self, messages: Sequence[_Message]) -> bool:
+        """Append all messages, or none, which are then lost; return whether they are in the file."""
+        tail, data = replace_dataclass(self._tail, counts=dict(self._tail.counts)), b""
+        for channel, time_us, content in messages:
+            published = self.session.clock_ns + 1000 * time_us
+            logged = max(published, tail.last_ns)
+            length = _MESSAGE.size - _OPENING + len(content)
+            sequence = tail.counts[channel] & 0xFFFFFFFF
+            data += _MESSAGE.pack(_MESSAGE_OPCODE, length, channel, sequence, logged, published) + content
+            tail.add_message(channel, logged)
+        if written := self._file.append(data):
+            tail.add_bytes(data)
+            self._tail = tail
+        elif self.failure is not None:
+            self.lost += len(messages)
+        return written
 
 
 # Moments that wait for the disk: those of five seconds of the fastest glove.
