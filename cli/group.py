@@ -95,13 +95,15 @@ def run_group(arguments: Sequence[str]) -> int:
         return 2
     except click.Abort:
         raise KeyboardInterrupt from None
-    except Exception as fault:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as fault:
         echo(f"thenar: {_sentence(fault, arguments)}", err=True)
         return 2
     return code if isinstance(code, int) else 0
 
 
-def _sentence(fault: Exception, arguments: Sequence[str]) -> str:
+def _sentence(fault: BaseException, arguments: Sequence[str]) -> str:
     """Return the sentence that reports an error."""
     match fault:
         case click.NoSuchOption() if fault.option_name in RENAMED:
@@ -115,6 +117,8 @@ def _sentence(fault: Exception, arguments: Sequence[str]) -> str:
             return f"{fault.filename}: {reason}" if fault.filename else reason
         case MemoryError():
             return f"not enough memory ({fault}): use fewer rows or columns"
+        case SystemExit():
+            return f"the module {_raised_in(fault)} called sys.exit({fault.code!r}): fix or uninstall its package"
         case ModuleNotFoundError():
             return f"{fault.name} is not installed: pip install '{_brought_by(fault, arguments)}'"
     return _kept(fault)
@@ -128,7 +132,13 @@ def _brought_by(lack: ModuleNotFoundError, arguments: Sequence[str]) -> str:
     return f"thenar[{bringing[0]}]" if bringing else "thenar"
 
 
-def _kept(fault: Exception) -> str:
+def _raised_in(fault: BaseException) -> str:
+    """Return the name of the module in which an exception was raised."""
+    *_, (frame, _) = traceback.walk_tb(fault.__traceback__)
+    return str(frame.f_globals.get("__name__"))
+
+
+def _kept(fault: BaseException) -> str:
     """Write the traceback of an unexpected error to a file that only its owner can read; return the message."""
     what = f"unexpected {type(fault).__name__}: this is a bug in thenar"
     try:

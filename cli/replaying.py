@@ -130,9 +130,7 @@ def _published(
         def publish(grasp: "LiveGrasp", moment: "Moment | None") -> None:
             shape = None if selector is None else selector.update(grasp)
             if opened:
-                fanout.publish(grasp, shape, None)
-                if moment is not None:
-                    fanout.moment(moment)
+                fanout.publish(grasp, shape, None, moment)
             else:
                 sys.stdout.buffer.write(line(grasp, shape))
             progress = None if follower is None else follower.update(grasp)

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -34,6 +34,10 @@ if TYPE_CHECKING:
     from thenar.runtime.web.live import LivePage
 
     from .live_view import LiveView
+
+
+# A drawing of the live view that waited for longer is not shown.
+_VIEW_US = 500_000
 
 
 class _SinkOption(click.Option):
@@ -260,25 +264,26 @@ def _run_live(
 
     from .ending import ended_by_signals
     from .live_view import LiveView
+    from .notices import unblocked
 
-    with ExitStack() as stack:
-        stop = stack.enter_context(ended_by_signals())
-        glove = Glove(build, str(harness), stop=stop, status=status, **asked)
-        for lacking in filter(None, (glove.system.unread, glove.lacking)):
-            err().print(f"thenar: {lacking}")
-        page = None if make_page is None else stack.enter_context(make_page(glove))
-        stack.enter_context(glove)
-        view = stack.enter_context(LiveView(out(), status)) if viewed else None
-        recorder = glove.recorder
-        _look_on(glove, view, page, frames)
-    reports = glove.reports()
-    say(f"{glove.frames} frame{'s' * (glove.frames != 1)}")
-    say_what_was_lost(reports)
-    recorders = [*([] if recorder is None else [recorder]), *([] if page is None else page.recorded)]
-    for each in recorders:
-        failed = f"; {each.failure}" if each.failure else ""
-        say(f"{each.path}: {each.messages} messages{failed}")
-    if any(each.failure for each in recorders) or spoilt(reports):
+    with unblocked("stderr"), unblocked("stdout", _VIEW_US) if viewed else nullcontext():
+        with ExitStack() as stack:
+            stop = stack.enter_context(ended_by_signals())
+            glove = Glove(build, str(harness), stop=stop, status=status, **asked)
+            for lacking in filter(None, (glove.system.unread, glove.lacking)):
+                err().print(f"thenar: {lacking}")
+            page = None if make_page is None else stack.enter_context(make_page(glove))
+            stack.enter_context(glove)
+            view = stack.enter_context(LiveView(out(), status)) if viewed else None
+            recorder = glove.recorder
+            _look_on(glove, view, page, frames)
+        reports = glove.reports()
+        say(f"{glove.frames} frame{'s' * (glove.frames != 1)}")
+        say_what_was_lost(reports)
+        recorders = [*([] if recorder is None else [recorder]), *([] if page is None else page.recorded)]
+        for each in recorders:
+            say("; ".join(filter(None, (f"{each.path}: {each.messages} messages", each.lost, each.failure))))
+    if any(each.lost or each.failure for each in recorders) or spoilt(reports):
         click.get_current_context().exit(1)
 
 
@@ -299,12 +304,11 @@ def _look_on(glove: "Glove", view: "LiveView | None", page: "LivePage | None", f
 
 
 def _say_news(glove: "Glove", health: "HealthReport", said: dict[str, str]) -> None:
-    """Print the state of devices, recording and quarantined inputs on stderr whenever it changes."""
+    """Print the state of devices, outputs and quarantined inputs on stderr whenever it changes."""
     from thenar.runtime.live.sources import NOT_YET
 
     news = {device.name: device.error or "connected" for device in health.devices}
-    if glove.recorder is not None and glove.recorder.failure:
-        news["recording"] = glove.recorder.failure
+    news |= {output.name: output.what for output in health.outputs}
     news |= {wrong.name: wrong.what for wrong in health.quarantined}
     # Devices are always reported.
     news |= {name: "works again" for name in said if name not in news}

@@ -1,7 +1,5 @@
 """What the commands say about sinks, on stderr."""
 
-import errno
-import os
 from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
@@ -14,7 +12,7 @@ if TYPE_CHECKING:
 
 def nobody_listens(reports: Sequence["SinkReport"]) -> bool:
     """Return whether every reader has gone for good (`| head`)."""
-    return bool(reports) and all(report.over for report in reports)
+    return bool(reports) and all(report.gone for report in reports)
 
 
 def say_what_was_lost(reports: Sequence["SinkReport"]) -> None:
@@ -28,8 +26,7 @@ def say_what_was_lost(reports: Sequence["SinkReport"]) -> None:
 
 def spoilt(reports: Sequence["SinkReport"]) -> bool:
     """Return whether a sink failed, other than by a reader's leaving."""
-    gone = os.strerror(errno.EPIPE)
-    return any(report.over and report.error != gone for report in reports)
+    return any(report.error and not report.gone and report.readers is None for report in reports)
 
 
 def say(line: str) -> None:

@@ -86,8 +86,12 @@ class Members(Mapping[str, M], Generic[M]):
     def _loaded(self, point: EntryPoint) -> M:
         try:
             member = point.load()
-        except Exception as error:
-            said = f"cannot be loaded: {shortened(str(error))}; fix or uninstall it"
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            # A call of sys.exit has no text of its own.
+            what = str(error) if isinstance(error, Exception) else repr(error)
+            said = f"cannot be loaded: {shortened(what)}; fix or uninstall it"
             raise MemberError(f"{self._where(point)} {said}") from error
         if not isinstance(member, self.shape):
             said = f"is not a {self.shape.__name__}: docs/how-to/extend.md says what to define"

@@ -12,7 +12,7 @@ from typing import Protocol, Self
 
 from .build import Build
 from .calibration import AngleReader
-from .frames import PERIODS, GloveFrame
+from .frames import PERIODS, GloveFrame, now_us
 from .harness.loading import load_harness
 from .harness.wiring import Harness
 from .harness.writing import harness_to_toml
@@ -22,10 +22,10 @@ from .live.sources import Taken
 from .live.system import System
 from .policy import Policy
 from .preshape.loading import preshape_selector
-from .published import DeviceHealth, HealthReport, JointAngles, Quarantined
+from .published import DeviceHealth, HealthReport, JointAngles, OutputTrouble, Quarantined
 from .recording.session import Session
-from .recording.writer import Recorder
-from .sinks.base import Fanout, Sink, SinkReport, open_sink
+from .recording.writer import LiveRecorder
+from .sinks.base import LATE_US, Fanout, Sink, SinkReport, open_sink
 from .task import TaskFollower
 from .taxels import calibration_of
 
@@ -43,7 +43,8 @@ class Glove:
     """A glove that recognises grasps: an endless iterator of published moments.
 
     Devices may be disconnected and connected again: missing inputs make the health "degraded", and "unknown" when too
-    few are left. There is a moment whenever a device has delivered something, and when something has expired.
+    few are left. There is a moment whenever a device has delivered something, and when something has expired. The
+    recording and each sink work on threads of their own: a disk or a reader that hangs delays no moment.
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ class Glove:
         The build and the harness, combined.
     sources : Sources
         The devices.
-    recorder : Recorder or None
+    recorder : LiveRecorder or None
         The writer of the recording.
     follower : TaskFollower or None
         The follower of the hand through `task`; `progress` is its state.
@@ -136,7 +137,7 @@ class Glove:
         self.stop = Event() if stop is None else stop
         self.frames, self.lacking = 0, ""
         self.health: HealthReport | None = None
-        self.recorder: Recorder | None = None
+        self.recorder: LiveRecorder | None = None
         # A recording is for training: it holds all sensors.
         whole = recordable or record is not None
         devices = system.sources(full_scan=full_scan, all_sensors=whole)
@@ -154,7 +155,6 @@ class Glove:
         self._measured: GloveFrame | None = None
         self._newest_angles: JointAngles | None = None
         self._sinks, self._record, self._status = tuple(sinks), record, status
-        self._recordable = recordable
         self.follower = None if task is None else TaskFollower.of(Path(task), loaded.grasps)
         self._health, self._due_us = Health(loaded), 0
         self._quarantined: tuple[Quarantined, ...] = ()
@@ -167,7 +167,9 @@ class Glove:
             for sink in self._sinks:
                 sinks.append(open_sink(sink) if isinstance(sink, str) else sink)
                 opening.callback(sinks[-1].close)
-            self._fanout = Fanout(sinks)
+            self._fanout = Fanout(sinks, live=True)
+            opening.pop_all()
+            opening.callback(self._fanout.close)
             self._fanout.begin(self.system.build)
             if self._record is not None:
                 self.recorder = opening.enter_context(self.new_recording(Path(self._record)))
@@ -198,8 +200,9 @@ class Glove:
             moment.preshape = self._selector.update(grasp)
         progress = None if self.follower is None else self.follower.update(grasp)
         moment.angles = self._angles_of(taken.measured)
-        self._fanout.publish(grasp, moment.preshape, moment.angles)
-        self._fanout.moment(moment)
+        # Only this process may have been stopped in between.
+        if self.feed is not self.sources or now_us() - now <= LATE_US:
+            self._fanout.publish(grasp, moment.preshape, moment.angles, moment)
         if progress is not None:
             self._fanout.task(progress)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None, moment.codes)
@@ -209,13 +212,13 @@ class Glove:
         self.frames += 1
         return moment
 
-    def new_recording(self, path: Path) -> Recorder:
+    def new_recording(self, path: Path) -> LiveRecorder:
         """Return a running recording of this glove. Only the thread that iterates may set it as `recorder`, or remove
         it; its creator closes it.
 
         Raises SettingError if the file exists, OSError as the operating system gives it.
         """
-        return Recorder(path, self._session(), marks=self._recordable)
+        return LiveRecorder(path, self._session())
 
     @property
     def has_preshapes(self) -> bool:
@@ -260,10 +263,16 @@ class Glove:
     def _look(self, now: int) -> None:
         self._due_us, self.sources.changed = now + _REPORT_US, False
         devices, overflowed = self.sources.health(), self.sources.overflowed
-        self.health = self._health.report(now, devices, overflowed, self._quarantined)
+        self.health = self._health.report(now, devices, overflowed, self._quarantined, self._troubles())
         if self._status:
             self._fanout.health(self.health)
         self.sources.raise_settings()
+
+    def _troubles(self) -> tuple[OutputTrouble, ...]:
+        """Return what takes nothing now: the recording, and sinks."""
+        failure = None if self.recorder is None else self.recorder.failure
+        recording = () if failure is None else (OutputTrouble("recording", failure),)
+        return (*recording, *self._fanout.troubles())
 
     def _session(self) -> Session:
         system = self.system

@@ -100,6 +100,13 @@ class Quarantined(msgspec.Struct, frozen=True):
         return f"{self.reason}, {'still used' if self.used else 'treated as lost'}"
 
 
+class OutputTrouble(msgspec.Struct, frozen=True):
+    """The recording or a sink that takes nothing or loses something, and why, in words."""
+
+    name: str
+    what: str
+
+
 class HealthReport(msgspec.Struct, frozen=True):
     """State at `time_us` of the host's monotonic clock.
 
@@ -111,6 +118,7 @@ class HealthReport(msgspec.Struct, frozen=True):
     overflowed                 frames that arrived but were not taken in time: a recording lacks them
     devices                    as reported by their drivers
     quarantined                inputs treated as lost, because they are read but wrong
+    outputs                    the recording and the sinks, as long as they take nothing
     """
 
     time_us: int
@@ -127,3 +135,4 @@ class HealthReport(msgspec.Struct, frozen=True):
     overflowed: int = 0
     devices: tuple[DeviceHealth, ...] = ()
     quarantined: tuple[Quarantined, ...] = ()
+    outputs: tuple[OutputTrouble, ...] = ()

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..build import Build
 from ..frames import Mask, SwitchFrame
-from ..published import UNKNOWN, DeviceHealth, Drift, HealthReport, LiveGrasp, Quarantined
+from ..published import UNKNOWN, DeviceHealth, Drift, HealthReport, LiveGrasp, OutputTrouble, Quarantined
 from .quarantine import Chattering, JointDrift, numbers
 
 RATE_US = 1_000_000
@@ -76,6 +76,7 @@ class Health:
         devices: Sequence[DeviceHealth] = (),
         overflowed: int = 0,
         quarantined: tuple[Quarantined, ...] = (),
+        outputs: tuple[OutputTrouble, ...] = (),
     ) -> HealthReport:
         """Return the current health."""
         drifts = zip(self._joint_names, self._drift.codes, strict=False)
@@ -94,6 +95,7 @@ class Health:
             overflowed=overflowed,
             devices=tuple(devices),
             quarantined=quarantined,
+            outputs=outputs,
         )
 
     def _named(self, switches: Sequence[int]) -> tuple[str, ...]:

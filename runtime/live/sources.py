@@ -28,8 +28,8 @@ READ_S = 0.1
 _MOST_WAITING = 4096
 # How long to wait for something new if there is no device with a period.
 _PATIENCE_US = 100_000
-# No device's frames are current for longer.
-_LONGEST_WAIT_US = 60_000_000
+# A run looks this often whether it should end, however slow its devices are.
+_LONGEST_WAIT_US = 250_000
 
 # Faults of one device that are logged with their traces; changing messages must not fill a disk.
 _MOST_FAULTS = 20
@@ -110,7 +110,7 @@ class Keeper(Generic[T]):
                     return
             except DeviceError as wrong:
                 self._become(connected=False, error=str(wrong))
-            except Exception as fault:  # a bug of ours must not leave a dead thread that looks like a live device
+            except BaseException as fault:  # a bug, or a call of sys.exit, must leave no dead thread that looks alive
                 self._blame(f"{type(fault).__name__}: {fault}")
             finally:
                 self._let_go()
@@ -121,7 +121,7 @@ class Keeper(Generic[T]):
             self._device.close()
         except OSError as gone:
             _log.debug("%s: closing it: %s", self.state.name, gone)
-        except Exception as fault:  # as above
+        except BaseException as fault:  # as above
             self._blame(f"{type(fault).__name__}: {fault}")
 
     def _read(self) -> None:

@@ -2,8 +2,9 @@
 
 import os
 import time
-from collections.abc import Iterable
-from contextlib import suppress
+from collections.abc import Iterable, Sequence
+from dataclasses import replace as replace_dataclass
+from functools import partial
 from pathlib import Path
 from struct import Struct
 from threading import Event, Thread
@@ -17,6 +18,7 @@ from thenar.drivers.errors import SettingError
 from ..files import write_atomically
 from ..frames import GloveFrame, SwitchFrame
 from ..published import LiveGrasp
+from ..writer_thread import WriterThread
 from .layout import GLOVE, GRASP, MARKS, RECOGNITION, SWITCHES, TAXELS, TRIALS, Tail, beginning, ending, session_record
 from .messages import encode_bytes, encode_text, glove_bytes, switch_bytes, taxel_bytes
 from .session import Label, Mark, Session
@@ -28,14 +30,17 @@ class AppendedFile:
     """Appends to `path`.
 
     Data has reached the operating system when `append` returns: no kill can take it. A power failure can take about the
-    last second, because a separate thread calls fdatasync that often; nobody waits for it. The first error, such as a
-    full disk, ends the recording: `failure` says so, and the file keeps its whole records.
+    last second, because a separate thread calls fdatasync that often; nobody waits for it. What does not fit on a full
+    disk is lost, and `failure` says so until something fits again; the file keeps its whole records. A disk that does
+    not keep what it took ends it.
     """
 
     def __init__(self, path: Path, size: int, sync_s: float = SYNC_S) -> None:
         """Continue after the first `size` bytes of the file; the rest is cut off. Raises OSError."""
-        self.failure: str | None = None
         self.size = size
+        # Two threads fail: a write is tried again, a disk that kept nothing is not.
+        self._full: str | None = None
+        self._broken: str | None = None
         self._path = path
         self._synced = size
         self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC)
@@ -48,21 +53,29 @@ class AppendedFile:
         self._thread = Thread(target=self._keep_synced, args=(sync_s,), name="thenar recording", daemon=True)
         self._thread.start()
 
+    @property
+    def failure(self) -> str | None:
+        """Why nothing can be written now; None while there is no error."""
+        return self._broken or self._full
+
     def append(self, data: bytes) -> bool:
-        """Append `data` whole and return True; return False if that fails, ever after, and when closed."""
-        if self.failure is not None or self._closing.is_set():
+        """Append `data` whole and return True; return False if that fails, and when closed."""
+        if self._broken is not None or self._closing.is_set():
             return False
         try:
             written = os.write(self._file, data)
             while written < len(data):
                 written += os.write(self._file, data[written:])
         except OSError as reason:
-            self._fail(reason)
-            # Remove the part of the record that fitted.
-            with suppress(OSError):
+            self._full = self._sentence(reason)
+            try:
+                # Remove the part of the record that fitted.
                 os.ftruncate(self._file, self.size)
+            except OSError as worse:
+                self._broken = self._sentence(worse)
             return False
         self.size += len(data)
+        self._full = None
         return True
 
     def close(self) -> None:
@@ -80,18 +93,16 @@ class AppendedFile:
 
     def _sync(self) -> None:
         size = self.size
-        if size == self._synced or self.failure is not None:
+        if size == self._synced or self._broken is not None:
             return
         try:
             os.fdatasync(self._file)
         except OSError as reason:
-            self._fail(reason)
+            self._broken = self._sentence(reason)
         self._synced = size
 
-    def _fail(self, reason: OSError) -> None:
-        self.failure = (
-            f"{self._path}: {reason.strerror}: the recording has stopped after {self.size} bytes, all of them whole"
-        )
+    def _sentence(self, reason: OSError) -> str:
+        return f"{self._path}: {reason.strerror}: nothing more is written after {self.size} bytes, all of them whole"
 
 
 # Opcode, length of the rest, channel, sequence, log time, publish time (MCAP specification, Message).
@@ -100,6 +111,8 @@ _MESSAGE_OPCODE, _OPENING = 5, 9
 # A recording shows how a person's hand moves.
 _PRIVATE = 0o600
 _json = msgspec.json.Encoder().encode
+# Its channel, time in microseconds, and content.
+_Message = tuple[int, int, bytes]
 
 
 class _Recognition(LiveGrasp, frozen=True, omit_defaults=True):
@@ -113,7 +126,17 @@ class Recorder(Closing):
     file is in the order of its log times. Both use the monotonic clock, set to the date once when the session begins,
     so that a later change of the date moves nothing.
 
-    A full disk ends the recording and nothing else: no method raises, and `failure` holds the sentence for the user.
+    A full disk raises nothing: what does not fit is lost, and counted in `lost`; recording goes on once there is room.
+    `failure` says why nothing can be written now.
+
+    Attributes
+    ----------
+    session : Session
+        What is recorded, with the clock.
+    path : Path
+        The file.
+    lost : int
+        The number of messages that the disk did not take.
     """
 
     def __init__(
@@ -126,9 +149,15 @@ class Recorder(Closing):
         after_ns = 0 if tail is None else tail.last_ns
         self.session = replace(session, clock_ns=max(time.time_ns(), after_ns) - time.monotonic_ns())
         self.path = path
+        self.lost = 0
         self._tail = _begun(path, self.session, marks) if tail is None else tail
         self._file = AppendedFile(path, self._tail.size, sync_s)
-        if tail is not None and self._append(record := session_record(self.session)):
+        if tail is not None:
+            record = session_record(self.session)
+            if not self._file.append(record):
+                self._file.close()
+                raise OSError(self._file.failure)
+            self._tail.add_bytes(record)
             self._tail.add_session(len(record))
         self._grasp = ""
         self._switches, self._sensors, self._taxels = len(session.switches), len(session.sensors), len(session.taxels)
@@ -137,7 +166,7 @@ class Recorder(Closing):
 
     @property
     def failure(self) -> str | None:
-        """Why recording stopped; None while there is no error."""
+        """Why nothing can be written now; None while there is no error."""
         return self._file.failure
 
     @property
@@ -149,37 +178,34 @@ class Recorder(Closing):
         """Record a reading of the switches, and the taxels' codes before it. Raises FrameError if it does not have the
         switches of this session.
         """
-        if frame.taxels is not None:
-            self._message(TAXELS, frame.time_us, encode_bytes(taxel_bytes(frame.taxels, self._taxels)))
-        self._message(SWITCHES, frame.time_us, encode_bytes(switch_bytes(frame, self._switches, self._sensors)))
+        self._write(self._of_frame(frame))
 
     def glove(self, frame: GloveFrame) -> None:
         """Record a record of the CyberGlove. Raises FrameError if it does not have the sensors of this session."""
-        self._message(GLOVE, frame.time_us, encode_bytes(glove_bytes(frame, self._sensors)))
+        self._write(self._of_frame(frame))
 
     def grasp(self, grasp: LiveGrasp) -> None:
         """Record a prediction; the grasp type also separately whenever it changes."""
-        self._message(RECOGNITION, grasp.time_us, encode_text(_json(_Recognition(*astuple(grasp)))))
-        if grasp.grasp != self._grasp:
-            self._grasp = grasp.grasp
-            self._message(GRASP, grasp.time_us, encode_text(grasp.grasp.encode()))
+        self.moment((), grasp)
 
     def moment(self, arrived: Iterable[SwitchFrame | GloveFrame], grasp: LiveGrasp) -> None:
         """Record the frames that arrived since the last moment, then the prediction for the newest of them."""
-        for frame in arrived:
-            if isinstance(frame, SwitchFrame):
-                self.switches(frame)
-            else:
-                self.glove(frame)
-        self.grasp(grasp)
+        messages = [message for frame in arrived for message in self._of_frame(frame)]
+        messages.append((RECOGNITION, grasp.time_us, encode_text(_json(_Recognition(*astuple(grasp))))))
+        if grasp.grasp != self._grasp:
+            messages.append((GRASP, grasp.time_us, encode_text(grasp.grasp.encode())))
+        if self._write(messages):
+            self._grasp = grasp.grasp
 
     def label(self, label: Label) -> None:
         """Record the outcome of a trial."""
-        self._message(TRIALS, label.time_us, encode_text(_json(label)))
+        self._write([(TRIALS, label.time_us, encode_text(_json(label)))])
 
     def mark(self, mark: Mark) -> None:
-        """Record a mark."""
-        self._message(MARKS, mark.time_us, encode_text(_json(mark)))
+        """Record a mark. Raises SettingError if the recording was begun without marks."""
+        if MARKS not in self._tail.counts:
+            raise SettingError(f"{self.path} was begun without marks: begin a recording with them")
+        self._write([(MARKS, mark.time_us, encode_text(_json(mark)))])
 
     def close(self) -> None:
         """Write the summary and close; may wait for the disk, and may be called again."""
@@ -187,21 +213,81 @@ class Recorder(Closing):
             self._file.append(ending(self._tail))
         self._file.close()
 
-    def _message(self, channel: int, time_us: int, data: bytes) -> None:
-        tail = self._tail
-        published = self.session.clock_ns + 1000 * time_us
-        logged = max(published, tail.last_ns)
-        length = _MESSAGE.size - _OPENING + len(data)
-        sequence = tail.counts[channel] & 0xFFFFFFFF
-        head = _MESSAGE.pack(_MESSAGE_OPCODE, length, channel, sequence, logged, published)
-        if self._append(head + data):
-            tail.add_message(channel, logged)
+    def _of_frame(self, frame: SwitchFrame | GloveFrame) -> list[_Message]:
+        if isinstance(frame, GloveFrame):
+            return [(GLOVE, frame.time_us, encode_bytes(glove_bytes(frame, self._sensors)))]
+        found = [(SWITCHES, frame.time_us, encode_bytes(switch_bytes(frame, self._switches, self._sensors)))]
+        if frame.taxels is not None:
+            found.insert(0, (TAXELS, frame.time_us, encode_bytes(taxel_bytes(frame.taxels, self._taxels))))
+        return found
 
-    def _append(self, record: bytes) -> bool:
-        whole = self._file.append(record)
-        if whole:
-            self._tail.add_bytes(record)
-        return whole
+    def _write(self, messages: Sequence[_Message]) -> bool:
+        """Append all messages, or none, which are then lost; return whether they are in the file."""
+        tail, data = replace_dataclass(self._tail, counts=dict(self._tail.counts)), b""
+        for channel, time_us, content in messages:
+            published = self.session.clock_ns + 1000 * time_us
+            logged = max(published, tail.last_ns)
+            length = _MESSAGE.size - _OPENING + len(content)
+            sequence = tail.counts[channel] & 0xFFFFFFFF
+            data += _MESSAGE.pack(_MESSAGE_OPCODE, length, channel, sequence, logged, published) + content
+            tail.add_message(channel, logged)
+        if written := self._file.append(data):
+            tail.add_bytes(data)
+            self._tail = tail
+        elif self.failure is not None:
+            self.lost += len(messages)
+        return written
+
+
+# Moments that wait for the disk: those of five seconds of the fastest glove.
+MOST_WAITING = 8192
+
+
+class LiveRecorder(Closing):
+    """A recording, with marks, whose disk delays nobody: its messages are written on a separate thread.
+
+    A moment is written at once, unless the disk hangs: then up to `MOST_WAITING` moments and marks wait, and those
+    beyond are lost. A kill takes what waits.
+    """
+
+    def __init__(self, path: Path, session: Session) -> None:
+        """Begin a file. Raises as `Recorder` does."""
+        self._recorder = Recorder(path, session, marks=True)
+        self._thread = WriterThread("recording", MOST_WAITING)
+        self.path = path
+
+    @property
+    def failure(self) -> str | None:
+        """Why nothing can be written now; None if it can."""
+        hanging = f"{self.path}: the disk does not respond: up to {MOST_WAITING} moments wait for it"
+        return self._recorder.failure or (hanging if self._thread.hangs else None)
+
+    @property
+    def messages(self) -> int:
+        """The number of messages in the file."""
+        return self._recorder.messages
+
+    @property
+    def lost(self) -> str:
+        """What was not written, in words; "" if all was."""
+        messages, moments = self._recorder.lost, self._thread.dropped
+        return " and ".join(
+            f"{number} {what}{'s' * (number != 1)} lost"
+            for number, what in ((messages, "message"), (moments, "moment"))
+            if number
+        )
+
+    def moment(self, arrived: Sequence[SwitchFrame | GloveFrame], grasp: LiveGrasp) -> None:
+        """Record the frames that arrived since the last moment, then the prediction for the newest of them."""
+        self._thread.put(partial(self._recorder.moment, arrived, grasp))
+
+    def mark(self, mark: Mark) -> None:
+        """Record a mark."""
+        self._thread.put(partial(self._recorder.mark, mark))
+
+    def close(self) -> None:
+        """Write what waits and the summary, unless the disk hangs, and close; may be called again."""
+        self._thread.close(self._recorder.close)
 
 
 def _begun(path: Path, session: Session, marks: bool) -> Tail:

@@ -4,23 +4,30 @@ import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import msgspec
+from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError, ThenarError
 from thenar.drivers.members import Members
 
 from ..names import shortened
 from ..preshape.selector import Preshape
-from ..published import HealthReport, JointAngles, LiveGrasp
+from ..published import HealthReport, JointAngles, LiveGrasp, OutputTrouble
 from ..task import Progress
+from ..writer_thread import WriterThread
 
 if TYPE_CHECKING:
     from ..build import Build
     from ..live.recogniser import Moment
 
 _log = logging.getLogger("thenar")
+# What has waited for longer is not published as now.
+LATE_US = 500_000
+# More than come in that time.
+_MOST_WAITING = 1024
 
 
 class SinkError(ThenarError, OSError):
@@ -35,7 +42,7 @@ class SinkReport(msgspec.Struct, frozen=True):
     sent      lines sent, counted once per reader
     lost      lines not sent: a reader was slow or gone, or the system refused
     error     the last error, or nothing
-    over      whether nothing more will be sent: its only reader is gone, the disk is full, it broke
+    gone      whether its only reader has gone for good
     dropped   number of readers dropped because they took nothing, or were the slowest when all places were taken
     """
 
@@ -44,14 +51,15 @@ class SinkReport(msgspec.Struct, frozen=True):
     sent: int
     lost: int
     error: str = ""
-    over: bool = False
+    gone: bool = False
     dropped: int = 0
 
 
 class Sink(ABC):
     """An open sink: it takes every frame's result. To write your own, derive from this; only `publish` is required.
 
-    No method blocks and none but the constructor raises: what cannot be sent is lost, and counted.
+    None but the constructor raises: what cannot be sent is lost, and counted. In a live run all but the constructor and
+    `report` run on a thread that serves this sink alone.
     """
 
     __slots__ = ()
@@ -162,71 +170,133 @@ def open_sink(where: str, *, wait: bool = False) -> Sink:
     return kind.open(SinkPlace(where, place, options, wait))
 
 
+class _Receiver:
+    """A sink, the reason if it is left out, and, if it must not delay its caller, the thread on which it works."""
+
+    def __init__(self, sink: Sink, *, live: bool) -> None:
+        name = f"{type(sink).__module__}.{type(sink).__qualname__}"
+        self._sink, self._fault, self._lost = sink, "", 0
+        self._thread = WriterThread(name, _MOST_WAITING) if live else None
+        self._said = self._nothing = SinkReport(name, None, 0, 0)
+
+    @property
+    def trouble(self) -> str:
+        """Why it takes nothing now; "" if it does."""
+        hangs = self._thread is not None and self._thread.hangs
+        return self._fault or ("does not respond: what comes meanwhile is lost" if hangs else "")
+
+    @property
+    def report(self) -> SinkReport:
+        """The last report that the sink has made."""
+        said = self._nothing if self._fault else self._said
+        lost = said.lost + self._lost + (0 if self._thread is None else self._thread.dropped)
+        return replace(said, lost=lost, error=self.trouble or said.error)
+
+    def send(self, send: Callable[[Sink], None], longest_us: int | None) -> None:
+        if self._thread is None:
+            self._try(send)
+        else:
+            self._thread.put(partial(self._try, send), longest_us)
+
+    def look(self) -> None:
+        """Let the sink make a report."""
+        if self._thread is None:
+            self._look()
+        elif not self._thread.hangs:
+            self._thread.put(self._look)
+
+    def close(self) -> None:
+        """Close the sink, also if it is left out; one that hangs is left to its thread."""
+        if self._thread is None:
+            self._close()
+        else:
+            self._thread.close(self._close)
+
+    def _try(self, send: Callable[[Sink], None]) -> None:
+        if self._fault or not self._carried_out(send):
+            self._lost += 1
+
+    def _look(self) -> None:
+        def report(sink: Sink) -> None:
+            self._said = sink.report()
+
+        if not self._fault:
+            self._carried_out(report)
+
+    def _close(self) -> None:
+        self._carried_out(lambda sink: sink.close())
+        self._look()
+
+    def _carried_out(self, call: Callable[[Sink], None]) -> bool:
+        """Return whether the sink did its part; one that raises is left out from then on."""
+        try:
+            call(self._sink)
+        except BaseException as reason:
+            # On the caller's thread it is the user's Ctrl-C.
+            if self._thread is None and isinstance(reason, KeyboardInterrupt):
+                raise
+            self._fault = f"{type(reason).__name__}: {reason}"
+            _log.error("sink %s: a bug in the program", self._nothing.where, exc_info=reason)
+            return False
+        return True
+
+
 class Fanout:
     """Publishes to every one of `sinks`. One that raises, against its contract, is left out from then on: its report
     says why, and the log has the trace.
+
+    If `live`, each sink works on a separate thread: one that waits delays neither the caller nor the others, and loses
+    what has waited for half a second, so that nothing old is published.
     """
 
-    __slots__ = ("_errors", "_lost", "_sinks")
-
-    def __init__(self, sinks: Iterable[Sink]) -> None:
-        self._sinks = tuple(sinks)
-        self._errors, self._lost = [""] * len(self._sinks), [0] * len(self._sinks)
+    def __init__(self, sinks: Iterable[Sink], *, live: bool = False) -> None:
+        self._receivers = tuple(_Receiver(sink, live=live) for sink in sinks)
 
     def begin(self, build: "Build") -> None:
         """Pass the build to all sinks."""
         self._all(lambda sink: sink.begin(build))
+        for receiver in self._receivers:
+            receiver.look()
 
-    def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Publish to all sinks that work."""
-        self._all(lambda sink: sink.publish(grasp, preshape, angles))
+    def publish(
+        self,
+        grasp: LiveGrasp,
+        preshape: Preshape | None,
+        angles: JointAngles | None,
+        moment: "Moment | None" = None,
+    ) -> None:
+        """Publish to all sinks that work, with the moment behind the grasp if there is one."""
 
-    def moment(self, moment: "Moment") -> None:
-        """Send the moment behind the newest grasp to all sinks that work."""
-        self._all(lambda sink: sink.moment(moment))
+        def send(sink: Sink) -> None:
+            sink.publish(grasp, preshape, angles)
+            if moment is not None:
+                sink.moment(moment)
+
+        self._all(send, LATE_US)
 
     def health(self, report: HealthReport) -> None:
         """Send the glove's health to all sinks that work."""
-        self._all(lambda sink: sink.health(report))
+        self._all(lambda sink: sink.health(report), LATE_US)
 
     def task(self, progress: Progress) -> None:
         """Send the hand's progress to all sinks that work."""
         self._all(lambda sink: sink.task(progress))
 
+    def troubles(self) -> tuple[OutputTrouble, ...]:
+        """Return the sinks that take nothing now, and why."""
+        return tuple(OutputTrouble(each.report.where, each.trouble) for each in self._receivers if each.trouble)
+
     def reports(self) -> tuple[SinkReport, ...]:
-        """Return the states of all sinks, in order."""
-        return tuple(self._report(number, sink) for number, sink in enumerate(self._sinks))
+        """Return the states of all sinks, in order; if live, those after the call before this one."""
+        for receiver in self._receivers:
+            receiver.look()
+        return tuple(receiver.report for receiver in self._receivers)
 
     def close(self) -> None:
         """Close all sinks, also after one of them fails to."""
-        for number, sink in enumerate(self._sinks):
-            try:
-                sink.close()
-            except Exception as reason:
-                self._blame(number, reason)
+        for receiver in self._receivers:
+            receiver.close()
 
-    def _all(self, send: Callable[[Sink], None]) -> None:
-        for number, sink in enumerate(self._sinks):
-            if self._errors[number]:
-                self._lost[number] += 1
-                continue
-            try:
-                send(sink)
-            except Exception as reason:
-                self._leave_out(number, reason)
-
-    def _report(self, number: int, sink: Sink) -> SinkReport:
-        if not self._errors[number]:
-            try:
-                return sink.report()
-            except Exception as reason:
-                self._blame(number, reason)
-        return SinkReport(type(sink).__name__, None, 0, self._lost[number], self._errors[number], over=True)
-
-    def _leave_out(self, number: int, reason: Exception) -> None:
-        self._blame(number, reason)
-        self._lost[number] += 1
-
-    def _blame(self, number: int, reason: Exception) -> None:
-        self._errors[number] = f"{type(reason).__name__}: {reason}"
-        _log.error("sink %s: a bug in the program", type(self._sinks[number]).__name__, exc_info=reason)
+    def _all(self, send: Callable[[Sink], None], longest_us: int | None = None) -> None:
+        for receiver in self._receivers:
+            receiver.send(send, longest_us)

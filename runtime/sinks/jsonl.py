@@ -99,6 +99,10 @@ class Outlet:
         """The number of bytes of the newest line that are not written yet."""
         return len(self._rest)
 
+    def forget(self) -> None:
+        """Drop what waits."""
+        self._rest = b""
+
     def send(self, line: bytes) -> bool:
         """Send `line` if the reader keeps up; return whether it was at least begun. Raises OSError if it is gone."""
         for data in (self._rest, line):
@@ -136,10 +140,11 @@ class JsonLines(Sink):
     """Writes one line per frame to `file`.
 
     A pipe with a slow reader loses whole lines and delays nobody; with `wait` it waits instead, which is right for a
-    replay and wrong for a live glove. A reader that is gone (`head`) is noted in the report.
+    replay and wrong for a live glove. A reader that is gone (`head`) is noted in the report. A full disk loses lines
+    until it has room again.
     """
 
-    __slots__ = ("_error", "_file", "_lost", "_outlet", "_owned", "_sent", "_where")
+    __slots__ = ("_error", "_file", "_gone", "_lost", "_outlet", "_owned", "_sent", "_where")
 
     def __init__(self, file: BinaryIO, *, wait: bool = False, where: str = "jsonl", owned: bool = False) -> None:
         """Write into `file`, which `close` closes only if it is `owned`."""
@@ -148,7 +153,7 @@ class JsonLines(Sink):
         self._owned = owned
         self._where = where
         self._sent = self._lost = 0
-        self._error = ""
+        self._error, self._gone = "", False
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
         """Write one line, or lose it."""
@@ -164,11 +169,12 @@ class JsonLines(Sink):
 
     def _send(self, line: bytes) -> None:
         sent = False
-        if not self._error:
+        if not self._gone:
             try:
                 sent = self._outlet.send(line)
             except (OSError, ValueError) as reason:  # ValueError: somebody closed the file
                 self._error = getattr(reason, "strerror", None) or str(reason)
+                self._gone = isinstance(reason, BrokenPipeError)
                 self._take_back(len(line) - self._outlet.waiting)
         if line:
             self._sent += sent
@@ -176,17 +182,18 @@ class JsonLines(Sink):
 
     def _take_back(self, torn: int) -> None:
         """Cut off the part of a line that still fitted on a full disk, unless another process has written after it."""
-        if not (torn > 0 and self._owned):
+        if not self._owned:
             return
         with suppress(OSError, ValueError):
             descriptor = self._file.fileno()
             end = os.lseek(descriptor, 0, os.SEEK_CUR)
             if os.fstat(descriptor).st_size == end:
                 os.ftruncate(descriptor, end - torn)
+                self._outlet.forget()
 
     def report(self) -> SinkReport:
         """Return how this sink is doing."""
-        return SinkReport(self._where, None, self._sent, self._lost, self._error, over=bool(self._error))
+        return SinkReport(self._where, None, self._sent, self._lost, self._error, gone=self._gone)
 
     def close(self) -> None:
         """Finish the line that was begun, if the reader allows, and close the file if it was opened here."""
@@ -197,9 +204,9 @@ class JsonLines(Sink):
 
 def _writer(file: BinaryIO, wait: bool) -> Writer:
     def write(data: bytes) -> int:
-        file.write(data)
+        written = file.write(data)
         file.flush()
-        return len(data)
+        return written
 
     if wait:
         return write

@@ -19,7 +19,7 @@ from ..hand import load_hand
 from ..harness.wiring import Harness
 from ..live.recogniser import Moment
 from ..published import HealthReport, LiveGrasp
-from ..recording.writer import Recorder
+from ..recording.writer import LiveRecorder
 from ..taxels import calibration_of
 from .recordings import Recordings
 from .server import Server, message
@@ -95,7 +95,7 @@ class LivePage(Closing):
         self._recordings.step()
 
     @property
-    def recorded(self) -> Sequence[Recorder]:
+    def recorded(self) -> Sequence[LiveRecorder]:
         """The recordings begun by pages."""
         return self._recordings.made
 

@@ -20,7 +20,7 @@ from thenar.drivers.errors import SettingError
 from ..frames import now_us
 from ..glove import Glove
 from ..recording.session import Mark
-from ..recording.writer import Recorder
+from ..recording.writer import LiveRecorder
 
 MOST_LETTERS, MOST_TEXT = 40, 200
 _NAME = re.compile(rf"[A-Za-z0-9][A-Za-z0-9_-]{{0,{MOST_LETTERS - 1}}}")
@@ -36,7 +36,7 @@ class RecordingState(msgspec.Struct, frozen=True):
     since_s   when it began, in seconds since 1970
     messages  its number of messages
     marks     its number of marks
-    failure   why recording stopped; "" while there is no error
+    failure   why nothing can be recorded now; "" while there is no error
     """
 
     folder: str
@@ -58,12 +58,12 @@ class Recordings:
 
     def __init__(self, glove: Glove, folder: Path, changed: Callable[[], None]) -> None:
         self._glove, self._folder, self._changed = glove, folder, changed
-        self._asked: deque[Recorder | Mark | None] = deque()
-        self._own: Recorder | None = None
+        self._asked: deque[LiveRecorder | Mark | None] = deque()
+        self._own: LiveRecorder | None = None
         self._beginning = False
         self._since_s, self._marks = time(), 0
         self._closing: list[Thread] = []
-        self.made: list[Recorder] = []
+        self.made: list[LiveRecorder] = []
 
     @property
     def state(self) -> RecordingState:
@@ -73,7 +73,7 @@ class Recordings:
             return RecordingState(str(self._folder))
         return RecordingState(
             str(self._folder),
-            on=self._glove.recorder is not None and shown.failure is None,
+            on=self._glove.recorder is not None,
             name=shown.path.name,
             fixed=shown is not self._own,
             since_s=self._since_s,
@@ -117,7 +117,7 @@ class Recordings:
         for thread in self._closing:
             thread.join()
 
-    def _begun(self, name: object) -> Recorder:
+    def _begun(self, name: object) -> LiveRecorder:
         if self._beginning or self._glove.recorder is not None:
             raise SettingError("a recording is running: stop it first")
         if not isinstance(name, str) or not (name == "" or _NAME.fullmatch(name)):
@@ -143,7 +143,7 @@ class Recordings:
         if recorder is not self._own:
             raise SettingError(f"{recorder.path.name} was begun by the command (--record), and ends with it")
 
-    def _replace(self, recorder: Recorder | None) -> None:
+    def _replace(self, recorder: LiveRecorder | None) -> None:
         """Record into this from now on, or nowhere; close the previous recording."""
         before = self._glove.recorder
         if recorder is not None:

@@ -27,7 +27,7 @@ from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.guide import read_journal
 from thenar.runtime.recording.layout import LARGEST_RECORD, Tail
 from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.session import Collection, Label, Session
+from thenar.runtime.recording.session import Collection, Label, Mark, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine
 
@@ -216,18 +216,29 @@ def test_a_recorder_goes_on_behind_the_last_whole_record(
 
 
 def fill(recorder: Recorder) -> list[SwitchFrame]:
-    """Record until it fails, and a little more."""
+    """Record until a frame is lost, and return the others."""
     frames: list[SwitchFrame] = []
     while recorder.failure is None:
         frames.append(SwitchFrame(now_us(), len(frames) % 4096))
         recorder.switches(frames[-1])
-    recorder.switches(SwitchFrame(now_us(), 1))
-    recorder.close()
     return frames[:-1]
 
 
+def check_that_it_goes_on(recorder: Recorder, frames: list[SwitchFrame]) -> None:
+    """Record once there is room again, and check that the file is whole and lacks one frame only."""
+    assert recorder.lost == 1
+    frames.append(SwitchFrame(now_us(), 7))
+    recorder.switches(frames[-1])
+    assert (recorder.failure, recorder.lost) == (None, 1)
+    recorder.close()
+    reader = Reader(recorder.path)
+    assert [entry for entry in reader if not isinstance(entry, Session)] == frames
+    assert reader.end is not None
+    assert (reader.end.closed, reader.altered, recorder.messages) == (True, False, len(frames))
+
+
 @pytest.mark.parametrize("beyond", range(0, 80, 7))
-def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path: Path, session: Session, beyond: int) -> None:
+def test_a_full_disk_loses_what_comes_and_nothing_else(tmp_path: Path, session: Session, beyond: int) -> None:
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     path = tmp_path / "a.mcap"
     recorder = Recorder(path, session)
@@ -238,7 +249,7 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path: Path, session
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     size = path.stat().st_size
     assert recorder.failure == (
-        f"{path}: File too large: the recording has stopped after {size} bytes, all of them whole"
+        f"{path}: File too large: nothing more is written after {size} bytes, all of them whole"
     )
     assert frames_of(path) == frames
     assert len(frames) > 10
@@ -246,23 +257,45 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path: Path, session
     list(reader)
     assert reader.end is not None
     assert (reader.end.whole, reader.end.reason) == (size, "it was never closed")
+    check_that_it_goes_on(recorder, frames)
 
 
-def test_a_disk_that_is_really_full_ends_the_recording_and_nothing_else(tmp_path: Path, session: Session) -> None:
+def test_a_disk_that_is_really_full_loses_what_comes_and_nothing_else(tmp_path: Path, session: Session) -> None:
     disk = tmp_path / "disk"
     disk.mkdir()
     mount = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "thenar", disk], check=False, capture_output=True)
     if mount.returncode:
         pytest.skip("a disk of its own takes the right to mount")
     try:
+        (disk / "ballast").write_bytes(bytes(8192))
         recorder = Recorder(disk / "a.mcap", session)
         frames = fill(recorder)
         assert recorder.failure is not None
         assert "No space left on device" in recorder.failure
         assert frames_of(recorder.path) == frames
         assert len(frames) > 100
+        (disk / "ballast").unlink()
+        check_that_it_goes_on(recorder, frames)
     finally:
         subprocess.run(["umount", disk], check=True)
+
+
+def test_a_session_that_does_not_fit_is_no_session(recording: Path, session: Session) -> None:
+    tail, before = read_journal(recording).tail, resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (tail.size + 10, before[1]))
+    try:
+        with pytest.raises(OSError, match="File too large: nothing more is written after"):
+            Recorder(recording, session, tail=tail)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_a_mark_needs_a_recording_with_marks(tmp_path: Path, session: Session) -> None:
+    with (
+        Recorder(tmp_path / "a.mcap", session) as recorder,
+        pytest.raises(SettingError, match="was begun without marks: begin a recording with them"),
+    ):
+        recorder.mark(Mark(now_us(), "here"))
 
 
 def test_nobody_waits_for_a_slow_disk(tmp_path: Path, session: Session, monkeypatch: pytest.MonkeyPatch) -> None:

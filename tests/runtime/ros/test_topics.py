@@ -356,6 +356,32 @@ def test_settings_that_dds_cannot_use_are_told(monkeypatch: pytest.MonkeyPatch, 
         open_sink(f"ros:{name}")
 
 
+def sockets() -> Iterator[socket.socket]:
+    """Yield the datagram sockets of this process, one after the other."""
+    for link in Path("/proc/self/fd").iterdir():
+        with suppress(OSError):
+            if str(link.readlink()).startswith("socket:"):
+                with socket.socket(fileno=os.dup(int(link.name))) as one:
+                    if one.type == socket.SOCK_DGRAM and one.family in (socket.AF_INET, socket.AF_INET6):
+                        yield one
+
+
+def test_broken_datagrams_write_nothing_to_stderr(
+    sink: Sink, listen: Listen, again: MakeGrasp, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Where nobody reads stderr, they would stop DDS."""
+    broken = b"RTPS\x02\x01\x01\x10" + bytes(12) + b"\x15\x01\xff\x00" + bytes(60)
+    ports = {one.getsockname()[1] for one in sockets()} - {0}
+    assert ports
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        for port in ports:
+            stranger.sendto(broken, ("127.0.0.1", port))
+    # A reader is found through the same sockets: by then they have been read.
+    heard = listen().hear("topic", "grasp", lambda: sink.publish(again(), None, None))
+    assert heard["message"] == {"data": "PoS"}
+    assert capfd.readouterr().err == ""
+
+
 @pytest.mark.parametrize("number", ["233", "-1", "lab"])
 def test_a_domain_that_ros_cannot_have_is_refused(monkeypatch: pytest.MonkeyPatch, name: str, number: str) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", number)
@@ -365,14 +391,7 @@ def test_a_domain_that_ros_cannot_have_is_refused(monkeypatch: pytest.MonkeyPatc
 
 def devices() -> set[bytes]:
     """Return to which network devices the datagram sockets of this process are bound; empty: to all."""
-    found = set()
-    for link in Path("/proc/self/fd").iterdir():
-        with suppress(OSError):
-            if str(link.readlink()).startswith("socket:"):
-                with socket.socket(fileno=os.dup(int(link.name))) as one:
-                    if one.type == socket.SOCK_DGRAM and one.family in (socket.AF_INET, socket.AF_INET6):
-                        found.add(one.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16).rstrip(b"\0"))
-    return found
+    return {one.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16).rstrip(b"\0") for one in sockets()}
 
 
 def test_unless_it_is_asked_for_no_other_machine_can_read(

@@ -34,6 +34,9 @@ class Faulty(Sink):
         raise RuntimeError("and that, too")
 
 
+FAULTY = f"{__name__}.Faulty"
+
+
 def test_one_that_raises_is_left_out_and_the_others_go_on(
     make_grasp: MakeGrasp, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -44,11 +47,11 @@ def test_one_that_raises_is_left_out_and_the_others_go_on(
     assert faulty.numbers == [0, 1, 2]
     assert file.getvalue().count(b"\n") == 5
     (logged,) = caplog.records
-    assert (logged.name, logged.getMessage()) == ("thenar", "sink Faulty: a bug in the program")
+    assert (logged.name, logged.getMessage()) == ("thenar", f"sink {FAULTY}: a bug in the program")
     assert logged.exc_info is not None
     assert logged.exc_info[0] is KeyError
     own, lines = fanout.reports()
-    assert own == SinkReport("Faulty", None, 0, 3, "KeyError: 'own fault'", over=True)
+    assert own == SinkReport(FAULTY, None, 0, 3, "KeyError: 'own fault'")
     assert (lines.sent, lines.lost, lines.error) == (5, 0, "")
 
 
@@ -73,4 +76,4 @@ def test_a_report_of_health_reaches_those_that_work(make_grasp: MakeGrasp, healt
     fanout.health(health)
     fanout.publish(make_grasp(0), None, None)
     assert file.getvalue().count(b"\n") == 2
-    assert fanout.reports()[0] == SinkReport("Faulty", None, 0, 2, "ValueError: no health", over=True)
+    assert fanout.reports()[0] == SinkReport(FAULTY, None, 0, 2, "ValueError: no health")

@@ -69,12 +69,16 @@ def test_a_full_disk_leaves_whole_lines_alone(make_grasp: MakeGrasp, tmp_path: P
         for number in range(20):
             sink.publish(make_grasp(number), None, None)
         report = sink.report()
-        sink.close()
+        full = path.read_bytes()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert (report.error, report.over) == ("File too large", True)
-    assert numbers(path.read_bytes()) == list(range(report.sent))
-    assert path.read_bytes().endswith(b"\n")
+    assert (report.error, report.gone) == ("File too large", False)
+    assert numbers(full) == list(range(report.sent))
+    # There is room again.
+    sink.publish(make_grasp(20), None, None)
+    sink.close()
+    assert numbers(path.read_bytes()) == [*range(report.sent), 20]
+    assert (sink.report().sent, sink.report().lost) == (report.sent + 1, report.lost)
 
 
 def test_a_slow_pipe_loses_whole_lines_and_holds_nobody_up(make_grasp: MakeGrasp) -> None:
@@ -129,7 +133,7 @@ def test_a_reader_that_is_gone_is_told_in_the_report(make_grasp: MakeGrasp) -> N
             sink.publish(make_grasp(number), None, None)
         report = sink.report()
         sink.close()
-    assert (report.sent, report.lost, report.error, report.over) == (0, 3, "Broken pipe", True)
+    assert (report.sent, report.lost, report.error, report.gone) == (0, 3, "Broken pipe", True)
 
 
 def test_a_file_that_somebody_closed_raises_nothing(make_grasp: MakeGrasp) -> None:

@@ -188,7 +188,7 @@ def test_where_all_keep_up_the_newest_is_turned_away(
         assert {reader.number() for reader in readers[:MAX_READERS]} == {3}
     assert sink.report().readers == MAX_READERS
     assert "rejected" in sink.report().error
-    assert not sink.report().over
+    assert not sink.report().gone
     assert readers[-1].socket.recv(1) == b""
     assert sink.report().dropped == 0
 
