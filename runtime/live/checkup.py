@@ -154,9 +154,8 @@ def _stream(harness: Harness, number: int) -> tuple[Finding, ...]:
                 end = end if rows else now + max(2 * _LISTEN_S, 5 * predicted / 1e6)
                 rows += 1
         measured = None if device.watch.hz is None else 1e6 / device.watch.hz
-        wrong = [f"{count.name} {count.value}" for count in device.counts()[2:] if count.value]
-        remarks = (*filter(None, [device.trouble()]), *([f"counted: {', '.join(wrong)}"] if wrong else []))
-        remarks = (*remarks, *_wrong(harness.switches, frames))
+        wrong = (device.trouble(), f"counted: {faults}" if (faults := device.faults()) else "")
+        remarks = (*filter(None, wrong), *_wrong(harness.switches, frames))
     except ThenarError as error:
         return (Finding(device.name, "", False, predicted, None, (str(error),)),)
     finally:

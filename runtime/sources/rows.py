@@ -350,6 +350,10 @@ class RowSource(Source):
         rate = Count("rows a second", 0 if self._silent else round(self.watch.hz or 0))
         return (rate, *counted(self.watch.counts), *counted(self.reader.counts()))
 
+    def faults(self) -> str:
+        """Return the counts of rows and lines that did not count, or lacked something: "late 3, gaps 1"."""
+        return ", ".join(f"{count.name} {count.value}" for count in self.counts()[2:] if count.value)
+
     def trouble(self) -> str:
         """Return the fault of arriving rows or lines; "" if there is none."""
         # Compared with the counts at the last row: what came since.

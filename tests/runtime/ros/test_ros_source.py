@@ -127,7 +127,7 @@ def test_doctor_proposes_joints_for_a_joint_state_whatever_their_names_and_value
 
     def send() -> None:
         for place in count():
-            positions = [float(place % 2), 0.25 * (place % 5), 0.5]
+            positions = [float(place % 2), 0.25 * (place % 5), 0.5 if kind == "JointState" else 0.5 * (place % 2)]
             stamped = {"stamp": [1_800_000_000, place], "name": ["ring", "thumb", "fsr"], "position": positions}
             sending.write(json.dumps(stamped if kind == "JointState" else positions) + "\n")
             if done.wait(0.01):
