@@ -347,6 +347,42 @@ def test_a_broken_sender_spoils_no_answer_and_is_counted(thenar: Thenar, build_f
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("named", [False, True])
+def test_a_second_board_on_the_port_and_impossible_clocks_change_no_answer(
+    thenar: Thenar, build_folder: Path, tmp_path: Path, named: bool
+) -> None:
+    out, done, path = tmp_path / "out.jsonl", Event(), tmp_path / "mine.toml"
+    with DatagramLines() as first, DatagramLines() as second:
+        second.to = first.to
+        first._line.bind(("127.0.0.1", 0))
+        sender = f'from = "127.0.0.1:{first._line.getsockname()[1]}"\n' if named else ""
+        text = STREAM.format(port=first.port, joints="{ j0 = [0, 127.5], j1 = [0, 127.5] }")
+        path.write_text(text.replace("rate_hz = 100\n", f"rate_hz = 50\n{sender}"))
+
+        def send() -> None:
+            began = monotonic()
+            while not done.wait(0.015):
+                now = round(1000 * (monotonic() - began))
+                first.send(b"%d,0,1,0,1,0,1,60,35\nA512B300C200\n1e305,0,0,0,0,0,0,0,0" % now)
+                if named or (out.exists() and '"health":"ok"' in out.read_text()):
+                    second.send(b"%d,1,0,1,0,1,0,35,60" % (now + 5))
+
+        thread = Thread(target=send)
+        thread.start()
+        finished = thenar("run", build_folder, "--glove", path, "--frames", "200", "--status", "--sink", f"jsonl:{out}")
+        done.set()
+        thread.join()
+    assert finished.returncode == 0, finished.stderr
+    found = [json.loads(line) for line in out.read_text().splitlines()]
+    assert len({one["candidate"] for one in found if one["kind"] == "grasp" and one["health"] == "ok"}) == 1
+    (device,) = [one for one in found if one["kind"] == "health"][-1]["devices"]
+    assert re.match(r"127.0.0.1:\d+ sends, too, and its lines are left out: those of 127.0.0.1", device["error"])
+    counts = {count["name"]: count["value"] for count in device["counts"]}
+    assert min(counts[name] for name in ("rows", "foreign", "untimed", "misfits")) > 0
+    assert counts["program faults"] == counts["late"] == counts["restarts"] == 0
+
+
+@pytest.mark.slow
 def test_joints_alone_of_bytes_are_recognised_as_they_were_recorded(thenar: Thenar, tmp_path: Path) -> None:
     high = {"cup": (200, 30), "pen": (30, 200), "rod": (200, 200)}
     labels = np.arange(60) % 3
