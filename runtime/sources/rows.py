@@ -180,7 +180,7 @@ class Columns:
         places = {name: place for place, name in enumerate(order) if name}
         found = tuple(places.get(name) for name in self._wanted)
         # A row that lacks a sensor counts; one that lacks its clock, or most used columns, is not from this glove.
-        if 2 * found.count(None) >= len(found) or (self._time is not None and self._time not in places):
+        if 2 * found.count(None) > len(found) or (self._time is not None and self._time not in places):
             return None
         self.absent = tuple(name for name in self._wanted if name not in places)
         return found
@@ -366,7 +366,7 @@ class RowSource(Source):
                 wanted = list_names([name for name in self.wiring.columns if name] or self.wiring.used)
                 has = list_names([shortened(name) for name in found])
                 return f"its rows have other columns than glove.toml: {has}, not {wanted}"
-            if misfits and (odd := self.reader.odd):
+            if misfits > 0 and (odd := self.reader.odd):
                 return f"the data holds no rows: {odd}"
         if self._silent:
             return f"{received} bytes have come, but no row" if received else _SILENT

@@ -397,7 +397,8 @@ def test_joints_alone_of_bytes_are_recognised_as_they_were_recorded(thenar: Then
     recorded.save(tmp_path / "set.grasps")
     build = compile_build(recorded, tmp_path / "build", rounds=10, folds=0, inputs="joints").folder
     (tmp_path / "mine.toml").write_text(
-        '[[stream]]\nport = "udp://0.0.0.0:1"\nrate_hz = 100\njoints = { flex_1 = [0, 4095], flex_2 = [3000, 10] }\n'
+        '[[stream]]\nport = "udp://0.0.0.0:1"\nfrom = "192.168.4.7"\nrate_hz = 100\n'
+        "joints = { flex_1 = [0, 4095], flex_2 = [3000, 10] }\n"
         'columns = ["flex_1", "flex_2"]\n'
     )
     out, log = tmp_path / "out.jsonl", tmp_path / "log.jsonl"

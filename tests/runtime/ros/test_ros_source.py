@@ -111,6 +111,14 @@ def test_messages_of_a_second_publisher_are_left_out_and_said(talk: Talk) -> Non
         source.close()
 
 
+def test_a_joint_that_is_renamed_is_lost_and_said(hear: Hear) -> None:
+    text = '[[stream]]\nport = "{port}"\njoints = {{ ring = [0, 2], index = [-1, 1] }}\n'
+    source, frames = hear("JointState", "", {"stamp": [0, 0], "name": ["idx", "ring"], "position": [1.0, 1.0]}, text)
+    assert isinstance(frames[0], GloveFrame)
+    assert frames[0].sensors == bytes((128, 0))
+    assert source.trouble() == "its rows lack index: name columns in glove.toml as it does"
+
+
 def test_positions_of_a_joint_state_are_joints_by_their_names(hear: Hear) -> None:
     text = '[[stream]]\nport = "{port}"\njoints = {{ ring = [0, 2], index = [-1, 1] }}\n'
     values = {"stamp": [1_800_000_000, 5], "name": ["index", "more", "ring"], "position": [1.0, 9.0, 1.0]}

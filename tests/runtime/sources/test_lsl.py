@@ -80,6 +80,21 @@ def test_samples_are_rows_on_their_senders_clock(
     source.close()
 
 
+def test_channels_with_other_labels_are_not_taken_by_their_order(outlet: Outlet, name: str) -> None:
+    sender = outlet(2, ["finger", "palm"])
+    harness = parse_harness(GLOVE.format(name=name), "glove.toml")
+    scan = whole_scan(harness, harness.switches, every_taxel=True)
+    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, harness.switches, scan))
+    source.open()
+    end = time.monotonic() + LONG_S
+    while not source.trouble():
+        assert time.monotonic() < end
+        sender.push_sample([1.0, 0.5])
+        assert source.read(0.05) is None
+    assert source.trouble() == "its rows have other columns than glove.toml: finger, palm, not thumb, pad"
+    source.close()
+
+
 def test_two_streams_of_one_name_are_said(outlet: Outlet, name: str) -> None:
     first = outlet(2)
     with LslReader(f"lsl:{name}") as reader:
