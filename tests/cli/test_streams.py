@@ -241,6 +241,43 @@ def test_two_senders_and_late_rows_are_said_and_datagrams_have_no_baud_rate(then
     assert load_harness(path).streams[0].baud == 115_200
 
 
+@pytest.mark.parametrize(
+    ("rate_hz", "line", "said"),
+    [
+        (20, "{ms},0,1,0,1,0,1,60,35", "rows a second arrive, but glove.toml says 20: set rate_hz = "),
+        (90, "ms,s0,s1,s2,s3,s4,s5,j0,k1\n{ms},0,1,0,1,0,1,60,35", "its rows lack j1: name columns in glove.toml as"),
+        (
+            90,
+            "ms,t0,t1,t2,t3,t4,t5,k0,k1\n{ms},0,1,0,1,0,1,60,35",
+            "its rows have other columns than glove.toml: ms, t0",
+        ),
+        (90, "{ms},0,1,0,1,0,1,60,35\n{late},0,1,0,1,0,1,60,35", "rows come after later ones and are left out"),
+        (90, "{ms},0,1,0,1,0,1,60,35\n{other},0,1,0,1,0,1,60,35", "rows of another clock come and are left out"),
+        (90, "A512,B300,C200", "the data holds no rows: 'A512,B300,C200'"),
+    ],
+)
+def test_doctor_says_what_is_wrong_with_rows(
+    thenar: Thenar, tmp_path: Path, rate_hz: int, line: str, said: str
+) -> None:
+    path, done = tmp_path / "glove.toml", Event()
+    with SocketLines(tmp_path / "line") as lines:
+        text = STREAM.format(port=lines.port, joints="{ j0 = [0, 127.5], j1 = [0, 127.5] }")
+        path.write_text(text.replace("rate_hz = 100", f"rate_hz = {rate_hz}"))
+
+        def send() -> None:
+            began = monotonic()
+            while not done.wait(0.01):
+                ms = round(1000 * (monotonic() - began))
+                lines.send(line.format(ms=ms, late=ms - 50, other=ms + 60_000).encode() + b"\n")
+
+        sender = Thread(target=send)
+        sender.start()
+        found = thenar("doctor", path, "--json")
+        done.set()
+        sender.join()
+    assert said in json.loads(found.stdout)[0]["remarks"][0]
+
+
 @pytest.mark.slow
 def test_rows_that_had_been_waiting_do_not_count_for_the_rate(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "thenar.cli", "doctor", "--line", "-", "--seconds", "2", "--json"]
