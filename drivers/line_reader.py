@@ -3,7 +3,7 @@
 /dev/ttyUSB0          a serial port, also rfc2217://HOST:PORT
 tcp://HOST:PORT       a server that sends lines to whoever connects
 udp://HOST:PORT       datagrams that come to this port; HOST is this computer's own address: 127.0.0.1, or 0.0.0.0
-for all; a datagram holds one line or more
+for all; a datagram holds one line or more; datagrams of a second sender are left out
 unix:PATH             a Unix socket that somebody listens on
 ws://HOST:PORT/PATH   a WebSocket, also wss://; needs the extra `ws`
 -                     standard input
@@ -14,12 +14,14 @@ import os
 import re
 import select
 import socket
+import struct
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from time import monotonic_ns, time_ns
+from typing import TYPE_CHECKING, NamedTuple
 from urllib.parse import urlsplit
 
 from .closing import Closing
@@ -27,6 +29,7 @@ from .errors import DeviceError, SettingError
 from .lines import LONGEST, LineCounts, LineParser, Row
 from .names import shortened
 from .ports import port_fault
+from .senders import Address, FirstSender, address_of, parse_address
 from .serial_line import SerialLine
 
 if TYPE_CHECKING:
@@ -34,6 +37,9 @@ if TYPE_CHECKING:
 
 _CHUNK = 65_536
 _CONNECT_S = 2.0
+# Linux dates every datagram on arrival, as a timespec of the clock of the date; Python does not name the option.
+_TIMESTAMPS = 35 if sys.platform == "linux" else None
+_TIMESPEC = struct.Struct("@ll")
 # Labels of a host's name are not empty, and at most 63 characters long: getaddrinfo raises UnicodeError for others.
 _HOST = r"[A-Za-z0-9_-]{1,63}(?:\.[A-Za-z0-9_-]{1,63})*\.?"
 _NET = re.compile(rf"(tcp|udp)://(\[[0-9A-Fa-f:.%]+\]|{_HOST}):(\d{{1,5}})/?")
@@ -46,11 +52,12 @@ _WAYS = (
 class RowReader(Closing, ABC):
     """A source of rows of numbers. It may be reopened after it was closed.
 
-    odd   the last input that was not a row, for display; "" if there was none
-    kind  what every column holds, "joint" or "" if the source does not say
+    odd       the last input that was not a row, for display; "" if there was none
+    kind      what every column holds, "joint" or "" if the source does not say
+    received  how many bytes came, rows or not, if the source counts them
     """
 
-    odd, kind = "", ""
+    odd, kind, received = "", "", 0
 
     @abstractmethod
     def open(self) -> None:
@@ -64,28 +71,66 @@ class RowReader(Closing, ABC):
         """Return the counts of input that was not a row."""
         return LineCounts()
 
+    def other_sender(self) -> str:
+        """Return a sentence on another sender whose rows do not count; "" if nobody else sends."""
+        return ""
+
 
 class LineReader(RowReader):
-    """Rows of the lines from `port`, of `columns` columns; 0: unknown. The constructor does not open it."""
+    """Rows of the lines from `port`, of `columns` columns; 0: unknown. The constructor does not open it.
 
-    def __init__(self, port: str, baud: int = 115_200, columns: int = 0) -> None:
+    sender  the address of the only sender of datagrams that counts; "": the first one
+    """
+
+    def __init__(self, port: str, baud: int = 115_200, columns: int = 0, sender: str = "") -> None:
         self.port, self._baud = port, baud
         self._line: Closing | None = None
         self._parser = LineParser(columns)
+        self._named = parse_address(sender) if sender else None
+        self._senders = FirstSender(self._named)
 
     def open(self) -> None:
         """Open the port."""
         if reason := line_port_fault(self.port):
             raise SettingError(f"{shortened(repr(self.port))} {reason}")
         self._parser.begin()
+        self._senders = FirstSender(self._named)
         self._line = _opened(self.port, self._baud)
 
     def read(self, timeout_s: float) -> Sequence[Row]:
         """Return the received rows."""
+        if isinstance(self._line, _Datagrams):
+            came = self._line.read(timeout_s)
+            return () if came is None else self._of_datagram(came)
         assert isinstance(self._line, SerialLine | _Descriptor | _WebSocket)
-        rows = self._parser.feed(self._line.read(timeout_s))
+        return self._rows(self._line.read(timeout_s))
+
+    def _rows(self, data: bytes) -> list[Row]:
+        self.received += len(data)
+        rows = self._parser.feed(data)
         self.odd = self._parser.odd
         return rows
+
+    def _of_datagram(self, came: "_Datagram") -> Sequence[Row]:
+        """Return the rows of a datagram, each of which begins and ends lines; none if it is from another sender."""
+        named, before = self._named, self._senders.current
+        sender = named if named is not None and named.covers(came.sender) else came.sender
+        if not self._senders.admits(sender, came.came_us):
+            self._parser.counts.foreign += came.data.strip().count(b"\n") + 1
+            return ()
+        if self._senders.current != before:
+            self._parser.begin()
+        return [row._replace(came_us=came.came_us) for row in self._rows(came.data + b"\n")]
+
+    def other_sender(self) -> str:
+        """Return a sentence on another sender of datagrams."""
+        other = self._senders.other(monotonic_ns() // 1000)
+        if other is None:
+            return ""
+        advice = "" if self._named else f', or choose one by `from = "{self._senders.current}"` in glove.toml'
+        return (
+            f"{other} sends, too, and its lines are left out: those of {self._senders.current} count; stop it{advice}"
+        )
 
     def counts(self) -> LineCounts:
         """Return the counts of input that was not a row."""
@@ -99,8 +144,8 @@ class LineReader(RowReader):
 
 
 def line_port_fault(port: str) -> str:
-    """Return why `port` cannot deliver lines, or ""."""
-    if port == "-":
+    """Return why `port` cannot deliver lines, or ""; streams of LSL and topics of ROS are other readers'."""
+    if port == "-" or port.startswith(("lsl:", "ros:")):
         return ""
     if port.startswith("unix:"):
         path = port.removeprefix("unix:")
@@ -125,7 +170,7 @@ def _is_web(port: str) -> bool:
         return False
 
 
-def _opened(port: str, baud: int) -> "SerialLine | _Descriptor | _WebSocket":
+def _opened(port: str, baud: int) -> "SerialLine | _Descriptor | _Datagrams | _WebSocket":
     if port == "-":
         return _Descriptor(port, None)
     if port.startswith(("ws:", "wss:")):
@@ -135,7 +180,9 @@ def _opened(port: str, baud: int) -> "SerialLine | _Descriptor | _WebSocket":
             return _Descriptor(port, _connected(socket.AF_UNIX, port.removeprefix("unix:")))
         if found := _NET.fullmatch(port):
             host, number = found[2].strip("[]"), int(found[3])
-            return _Descriptor(port, _bound(host, number) if found[1] == "udp" else _tcp(host, number))
+            return (
+                _Datagrams(port, _bound(host, number)) if found[1] == "udp" else _Descriptor(port, _tcp(host, number))
+            )
     except OSError as reason:
         raise DeviceError(f"{port}: {_advice(port, reason)}") from reason
     return SerialLine(port, baud)
@@ -175,6 +222,8 @@ def _bound(host: str, port: int) -> socket.socket:
     line = socket.socket(family, socket.SOCK_DGRAM)
     try:
         line.bind((host, port))
+        if _TIMESTAMPS is not None:
+            line.setsockopt(socket.SOL_SOCKET, _TIMESTAMPS, 1)
     except OSError:
         line.close()
         raise
@@ -182,14 +231,13 @@ def _bound(host: str, port: int) -> socket.socket:
 
 
 class _Descriptor(Closing):
-    """A socket, or standard input if there is none."""
+    """A stream socket, or standard input if there is none."""
 
     def __init__(self, port: str, line: socket.socket | None) -> None:
         self._port, self._line = port, line
         if line is None and sys.stdin is None:
             raise SettingError("standard input is closed: no lines can come from it")
         self._descriptor = sys.stdin.fileno() if line is None else line.fileno()
-        self._datagrams = line is not None and line.type == socket.SOCK_DGRAM
 
     def read(self, timeout_s: float) -> bytes:
         """Return the bytes received until the timeout. Raises DeviceError if the other end is gone."""
@@ -200,8 +248,6 @@ class _Descriptor(Closing):
             data = os.read(self._descriptor, _CHUNK)
         except (OSError, ValueError) as reason:  # ValueError: closed meanwhile
             raise DeviceError(f"{self._port}: it is gone ({reason})") from reason
-        if self._datagrams:
-            return data + b"\n"
         if not data:
             raise DeviceError(f"{self._port}: {'the input has ended' if self._line is None else 'the sender hung up'}")
         return data
@@ -210,6 +256,47 @@ class _Descriptor(Closing):
         """Close the socket; standard input stays open."""
         if self._line is not None:
             self._line.close()
+
+
+class _Datagram(NamedTuple):
+    """A datagram, the address that it came from, and when it came, by the monotonic clock."""
+
+    data: bytes
+    sender: Address
+    came_us: int
+
+
+class _Datagrams(Closing):
+    """A socket of datagrams."""
+
+    def __init__(self, port: str, line: socket.socket) -> None:
+        self._port, self._line = port, line
+
+    def read(self, timeout_s: float) -> _Datagram | None:
+        """Return the next datagram; None if none comes until the timeout."""
+        try:
+            ready, _, _ = select.select([self._line], [], [], max(0.0, timeout_s))
+            if not ready:
+                return None
+            data, notes, _, (host, port, *_) = self._line.recvmsg(_CHUNK, socket.CMSG_SPACE(_TIMESPEC.size))
+        except (OSError, ValueError) as reason:  # ValueError: closed meanwhile
+            raise DeviceError(f"{self._port}: it is gone ({reason})") from reason
+        waited_us = _waited_us(notes)
+        return _Datagram(data, address_of(host, port), monotonic_ns() // 1000 - waited_us)
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._line.close()
+
+
+def _waited_us(notes: Sequence[tuple[int, int, bytes]]) -> int:
+    """Return for how long a datagram has been waiting, as far as the system says when it came."""
+    for level, kind, data in notes:
+        if (level, kind, len(data)) == (socket.SOL_SOCKET, _TIMESTAMPS, _TIMESPEC.size):
+            seconds, nanoseconds = map(int, _TIMESPEC.unpack(data))
+            # The date may have been set since.
+            return max(0, time_ns() - seconds * 1_000_000_000 - nanoseconds) // 1000
+    return 0
 
 
 class _WebSocket(Closing):

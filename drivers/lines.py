@@ -29,12 +29,14 @@ _DIGITS = 400
 class Row(NamedTuple):
     """The content of one line: values, None where one is not a number; and names, None if only the order is known.
 
-    `time_s` is the sender's clock, if the transport carries it outside the columns.
+    time_s   the sender's clock, if the transport carries it outside the columns
+    came_us  when it came, by the monotonic clock, if the transport says so; None: when it was read
     """
 
     names: tuple[str, ...] | None
     values: tuple[float | None, ...]
     time_s: float | None = None
+    came_us: int | None = None
 
 
 class Header(NamedTuple):
@@ -44,9 +46,9 @@ class Header(NamedTuple):
 
 
 class Splitter:
-    """Splits a stream of bytes at line feeds.
+    """Splits a stream of bytes at line feeds and carriage returns.
 
-    A line of more than LONGEST bytes is dropped and counted in `overlong`, so a stream without line feeds cannot fill
+    A line of more than LONGEST bytes is dropped and counted in `overlong`, so a stream without line ends cannot fill
     the memory.
     """
 
@@ -56,7 +58,7 @@ class Splitter:
 
     def feed(self, chunk: bytes) -> list[bytes]:
         """Return the lines that `chunk` completes, without line ends and without empty lines."""
-        pieces = chunk.split(b"\n")
+        pieces = chunk.replace(b"\r", b"\n").split(b"\n")
         pieces[0] = self._rest + pieces[0]
         self._rest = pieces.pop()
         if self._dropping and pieces:
@@ -154,12 +156,14 @@ def _sound(names: Sequence[str]) -> bool:
 class LineCounts:
     """Counts of lines since the driver was made.
 
-    misfits   lines without a row: garbage, half a line, a debug message
+    misfits   lines without a row: garbage, half a line, a message, names of columns that no row has
     overlong  lines longer than any row
+    foreign   rows of another sender than the one that counts
     """
 
     misfits: int = 0
     overlong: int = 0
+    foreign: int = 0
 
 
 class LineParser:
@@ -176,25 +180,39 @@ class LineParser:
         """Reset: an incomplete line and the names of the columns are forgotten."""
         self._splitter = Splitter()
         self._names: tuple[str, ...] | None = None
+        # A header that no row has followed yet, and the misfit before it: it may be a message.
+        self._header, self._odd_before = (), ""  # type: tuple[str, ...], str
 
     def feed(self, chunk: bytes) -> list[Row]:
         """Return the rows whose lines `chunk` completes, with names if a header came before them."""
         rows = []
         before = self._splitter.overlong
         for line in self._splitter.feed(chunk):
-            named = len(self._names or ())
-            found = parsed(line, named if named > 1 else self._columns)
-            if isinstance(found, Header):
-                if len(found.names) > 1 or named < 2:  # a word alone is a message
-                    self._names = found.names
-            elif found is None:
-                self.counts.misfits += 1
-                self.odd = shortened(repr(line[: LONGEST_SHOWN + 1].decode("utf-8", "replace")))
-            else:
+            found = self._parsed(line)
+            if isinstance(found, Row):
                 rows.append(self._with_names(found))
+            elif found is None or found.names != self._names:
+                self._take_misfit(line, found)
         self.counts.overlong += self._splitter.overlong - before
         return rows
 
+    def _parsed(self, line: bytes) -> Row | Header | None:
+        found = parsed(line, len(self._names or ()) or self._columns)
+        return parsed(line, len(self._header)) if found is None and self._header else found
+
+    def _take_misfit(self, line: bytes, header: Header | None) -> None:
+        """Count a line that is no row, or not yet the header of one; a word alone is a message."""
+        self.counts.misfits += 1
+        if header is not None and len(header.names) > 1:
+            self._header, self._odd_before = header.names, self.odd
+        self.odd = shortened(repr(line[: LONGEST_SHOWN + 1].decode("utf-8", "replace")))
+
     def _with_names(self, row: Row) -> Row:
-        names = self._names
-        return row._replace(names=names) if row.names is None and names and len(names) == len(row.values) else row
+        if row.names is not None:
+            return row
+        if len(self._header) == len(row.values):
+            self._names, self.odd = self._header, self._odd_before
+            self.counts.misfits -= 1
+        self._header = ()
+        named = self._names is not None and len(self._names) == len(row.values)
+        return row._replace(names=self._names) if named else row

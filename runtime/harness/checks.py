@@ -5,8 +5,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from thenar.drivers.errors import SettingError
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.line_reader import line_port_fault
 from thenar.drivers.ports import device_fault, port_fault
 from thenar.drivers.scanner_datagrams import scanner_port_fault
+from thenar.drivers.senders import parse_address
 from thenar.drivers.spi.chips import SPI_CHIPS
 
 from ..names import fault, nearest, shortened
@@ -50,7 +52,7 @@ def _of_glove(glove: GloveWiring) -> Iterator[Fault]:
     yield from _of_names(named, "sensor")
 
 
-_FAULT_OF = {"scanner": scanner_port_fault}
+_FAULT_OF = {"scanner": scanner_port_fault, "stream": line_port_fault}
 
 
 def _of_devices(harness: Harness) -> Iterator[Fault]:
@@ -63,8 +65,7 @@ def _of_devices(harness: Harness) -> Iterator[Fault]:
     seen: dict[str, Place] = {}
     for place, device in places:
         fault_of = device_fault if place[-1] == "device" else _FAULT_OF.get(str(place[0]), port_fault)
-        # The source that opens a stream reports faults of its port.
-        if place[0] != "stream" and (reason := fault_of(device)):
+        if reason := fault_of(device):
             yield place, f"{shortened(repr(device))} {reason}"
         if device in seen:
             yield place, f"{device} is already {spelled(seen[device])}: name each device in one entry only"
@@ -122,9 +123,21 @@ def _of_stream(place: Place, stream: StreamWiring) -> Iterator[Fault]:
             yield (*place, *where), f"there is no column {shortened(repr(name))}{nearest(name, known)}"
         if stream.time == name and where != ("time",):
             yield (*place, *where), f"{name!r} is the sender's clock"
+    if stream.sender is not None and (reason := _sender_fault(stream.port, stream.sender)):
+        yield (*place, "from"), reason
     yield from _of_values(place, stream)
     columns = ((*place, "columns", number) for number in range(len(stream.columns)))
     yield from _of_names(((where, name) for where, name in zip(columns, stream.columns, strict=True) if name), "column")
+
+
+def _sender_fault(port: str, sender: str) -> str:
+    if not port.startswith("udp:"):
+        return "is for udp:// ports, to which several may send: leave it out"
+    try:
+        parse_address(sender)
+    except ValueError:
+        return f"{shortened(repr(sender))} is not the address of a sender, such as 192.168.4.7 or 192.168.4.7:5001"
+    return ""
 
 
 def _of_values(place: Place, stream: StreamWiring) -> Iterator[Fault]:

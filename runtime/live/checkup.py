@@ -29,6 +29,8 @@ from .quarantine import Chattering, numbers
 SLOW = 1.5
 _SCANS = 101
 _LISTEN_S = 1.0
+# A rate of rows is judged after two seconds: in the first one, rows may come that had been waiting.
+_ROWS_S = 2.5
 # Start-up time of a board that is reset when its port opens.
 _STARTS_S = 3.0
 # The part of a finding on the record time of all sensors.
@@ -145,18 +147,17 @@ def _stream(harness: Harness, number: int) -> tuple[Finding, ...]:
     streams = (source for source in made if isinstance(source, RowSource))
     device = next(source for source in streams if source.wiring is harness.streams[number])
     predicted, frames, rows = float(device.wiring.period_us), list[SwitchFrame](), 0
-    end = monotonic() + max(2 * _LISTEN_S, 5 * predicted / 1e6) + _STARTS_S
+    end = monotonic() + max(_ROWS_S, 5 * predicted / 1e6) + _STARTS_S
     try:
         device.open()
         while (now := monotonic()) < end:
             if (frame := device.read(_LISTEN_S / 10)) is not None:
                 frames += [frame] if isinstance(frame, SwitchFrame) else []
-                end = end if rows else now + max(2 * _LISTEN_S, 5 * predicted / 1e6)
+                end = end if rows else now + max(_ROWS_S, 5 * predicted / 1e6)
                 rows += 1
         measured = None if device.watch.hz is None else 1e6 / device.watch.hz
-        wrong = [f"{count.name} {count.value}" for count in device.counts()[2:] if count.value]
-        remarks = (*filter(None, [device.trouble()]), *([f"counted: {', '.join(wrong)}"] if wrong else []))
-        remarks = (*remarks, *_wrong(harness.switches, frames))
+        wrong = (device.trouble(), f"counted: {faults}" if (faults := device.faults()) else "")
+        remarks = (*filter(None, wrong), *_wrong(harness.switches, frames))
     except ThenarError as error:
         return (Finding(device.name, "", False, predicted, None, (str(error),)),)
     finally:

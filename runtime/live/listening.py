@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple
 from itertools import pairwise
-from math import ceil, floor, log10
+from math import ceil, floor, log10, pi
 from statistics import median
 
 import msgspec
@@ -15,10 +15,11 @@ from thenar.drivers.line_reader import RowReader
 from thenar.drivers.lines import Row
 
 from ..frames import now_us
-from ..harness.wiring import Range, StreamWiring
-from ..names import fault, nearest, shortened
+from ..harness.wiring import Harness, Range, StreamWiring
+from ..names import fault, list_names, nearest, shortened
+from ..scanning.ports import whole_scan
 from ..sources.base import SOURCES
-from ..sources.rows import RowKind
+from ..sources.rows import RowKind, RowSource
 
 # Boards that are reset when their port opens start their program within this time.
 _PATIENCE_US = 6_000_000
@@ -32,8 +33,11 @@ _TIME = re.compile(r"^(t|ts|ms|us|s)$|time|milli|micro|stamp|clock|(^|_)secs?$|s
 _UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 _HIGHEST = (255, 1023, 4095, 16_383, 32_767, 65_534)
 _PARTS = (1.0, 3.3, 5.0, 10.0, 100.0, 180.0, 360.0)
-# A joint that moved over this share of its converter's range was moved on purpose.
+# A joint or a taxel that moved over this share of its converter's range was moved on purpose.
 _MOVED = 0.1
+_KINDS, _STILL = ("switch", "joint", "taxel"), "nothing: it did not move"
+# The range of a joint in rad that did not move.
+_WHOLE_TURN = (-round(pi, 4), round(pi, 4))
 # In less time no rate can be measured: the rows had been waiting somewhere.
 _LEAST_S = 0.3
 _NO_RATE = "the rows came all at once: set rate_hz to the number of rows a second"
@@ -72,28 +76,36 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
 
     Raises SettingError for an invalid port, DeviceError if no rows come.
     """
-    bare = StreamWiring(port=port, baud=baud, columns=tuple(columns))
+    bare = StreamWiring(port=port, columns=tuple(columns))
+    if _is_serial(port):
+        bare = msgspec.structs.replace(bare, baud=baud)
     with reader_of(bare) as reader:
         reader.open()
         came = list(_listened(reader, listen_s))
-        counts, odd, kind = reader.counts(), reader.odd, reader.kind
-    wrong = counts.misfits + counts.overlong
+        counts, odd, other = reader.counts(), reader.odd, reader.other_sender()
     if not came:
-        raise DeviceError(f"{port}: {_no_rows(port, baud, odd) if wrong else 'nothing comes'}")
-    such = f", such as {odd}" if odd else ""
+        raise DeviceError(f"{port}: {_no_rows(bare, reader) or other or 'nothing comes'}")
+    wrong, such = counts.misfits + counts.overlong, f", such as {odd}" if odd else ""
     remarks = [f"{wrong} lines were not rows{such}" if wrong > 1 else f"1 line was not a row: {odd}"] if wrong else []
-    return _proposed(bare, came, kind, remarks)
+    remarks += [other] if other else []
+    remarks += [f"{counts.foreign} rows of another sender were left out"] if counts.foreign else []
+    return _proposed(bare, came, reader.kind, remarks)
 
 
-def _no_rows(port: str, baud: int, odd: str) -> str:
-    """Return the advice for lines none of which is a row."""
-    if not odd:
+def _is_serial(port: str) -> bool:
+    return port.startswith("rfc2217:") or not (port == "-" or re.match("[a-z0-9]+:", port))
+
+
+def _no_rows(bare: StreamWiring, reader: RowReader) -> str:
+    """Return the reason why no row came, and advice; "" if nothing came at all."""
+    baud = f"is {bare.baud} its baud rate? " if _is_serial(bare.port) else ""
+    if reader.odd:
+        wanted = "a row is numbers with commas between, name:value, or JSON"
+        more = "--names says how many columns rows with texts have"
+        return f"the data holds no rows: {reader.odd}; {baud}{wanted}; {more}"
+    if reader.counts().overlong:
         return "its lines are longer than any row: end each row with a line feed"
-    serial = port.startswith("rfc2217:") or not (port == "-" or re.match("[a-z0-9]+:", port))
-    wanted = (
-        "a row is numbers with commas between, name:value, or JSON; --names says how many columns rows with texts have"
-    )
-    return f"the data holds no rows: {odd}; {f'is {baud} its baud rate? ' if serial else ''}{wanted}"
+    return f"{reader.received} bytes came, but no line: {baud}end each row with a line feed" if reader.received else ""
 
 
 def _listened(reader: RowReader, listen_s: float) -> Iterator[tuple[int, Row]]:
@@ -105,7 +117,7 @@ def _listened(reader: RowReader, listen_s: float) -> Iterator[tuple[int, Row]]:
         try:
             rows = reader.read(0.0 if waited_us else _WAIT_S)
         except DeviceError:
-            if not count and not sum(astuple(reader.counts())):
+            if not (count or reader.received or sum(astuple(reader.counts()))):
                 raise
             return
         if rows and not count:
@@ -113,7 +125,7 @@ def _listened(reader: RowReader, listen_s: float) -> Iterator[tuple[int, Row]]:
         elif not rows or time_us - waited_us > _BACKLOG_US:
             waited_us = 0
         count += len(rows)
-        yield from ((waited_us or now_us(), row) for row in rows)
+        yield from ((row.came_us or waited_us or now_us(), row) for row in rows)
 
 
 def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], every: str, remarks: list[str]) -> Proposal:
@@ -126,22 +138,24 @@ def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], every: str, r
     values = {name: [row.values[place] for _, row in alike] for place, name in enumerate(columns)}
     timed = alike[sum(time_us == alike[0][0] for time_us, _ in alike) - 1 :]
     span_s = (timed[-1][0] - timed[0][0]) / 1e6
-    if span_s < _LEAST_S:
+    measured = span_s >= _LEAST_S
+    if not measured:
         timed = alike
     time, unit, by_clock_s = _clock({name: found[-len(timed) :] for name, found in values.items()}, span_s)
-    if span_s < _LEAST_S:
+    if not measured:
         span_s = by_clock_s
         remarks.append("the rows came all at once: rate_hz is by their clock" if by_clock_s else _NO_RATE)
     rate_hz = _rounded((len(timed) - 1) / span_s) if span_s > 0 and len(timed) > 1 else bare.rate_hz
     stamped = alike[0][1].time_s is not None
-    heard, kinds = [], {"switch": [], "joint": [], "taxel": []}  # type: tuple[list[Heard], dict[str, list[str]]]
+    numbers = {name: [value for value in found if value is not None] for name, found in values.items()}
+    kinds = {name: _kind(name, found, every) for name, found in numbers.items()}
+    kinds |= {name: "nothing: its name is not valid" for name in columns if names and name not in names}
+    if still := [name for name, found in numbers.items() if kinds[name] == _STILL or _is_still(kinds[name], found)]:
+        remarks.append(f"{list_names(still)} did not move: press every pad and bend every finger while doctor listens")
+    kinds |= {} if time is None else {time: f"the sender's clock, in {unit}"}
     for name, found in values.items():
-        numbers = [value for value in found if value is not None]
-        kind = f"the sender's clock, in {unit}" if name == time else _kind(name, numbers, every)
-        kinds.get(kind, []).append(name)
-        heard.append(Heard(name, min(numbers, default=None), max(numbers, default=None), kind))
-        if len(numbers) < len(found):
-            remarks.append(f"{name}: {len(found) - len(numbers)} of {len(found)} values were not numbers")
+        if missing := found.count(None):
+            remarks.append(f"{name}: {missing} of {len(found)} values were not numbers")
     gaps = [later - earlier for (earlier, _), (later, _) in pairwise(timed)]
     if gaps and max(gaps) > max(4 * median(gaps), 100_000):
         remarks.append(f"the longest break between two rows was {max(gaps) / 1000:.0f} ms")
@@ -149,17 +163,46 @@ def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], every: str, r
         remarks.append("no column is a clock, so rows are timed when they arrive: add a column of millis() if possible")
     stream = msgspec.structs.replace(
         bare,
-        columns=tuple(
-            name if name in (*kinds["switch"], *kinds["joint"], *kinds["taxel"], time) else "" for name in columns
-        ),
+        columns=tuple(name if name == time or kinds[name] in _KINDS else "" for name in columns),
         time=time,
         time_unit=unit,
         rate_hz=min(max(rate_hz, 0.1), 10_000.0),
-        switches=tuple(kinds["switch"]),
-        joints={name: _joint_range([value for value in values[name] if value is not None]) for name in kinds["joint"]},
-        taxels={name: _range([value for value in values[name] if value is not None]) for name in kinds["taxel"]},
+        switches=tuple(name for name, kind in kinds.items() if kind == "switch"),
+        joints={name: _joint_range(numbers[name]) for name, kind in kinds.items() if kind == "joint"},
+        taxels={name: _range(numbers[name]) for name, kind in kinds.items() if kind == "taxel"},
+    )
+    if measured and (faults := _faults(stream, timed)):
+        remarks.append(f"counted: {faults}")
+    heard = (
+        Heard(name, min(found, default=None), max(found, default=None), kinds[name]) for name, found in numbers.items()
     )
     return Proposal(stream, tuple(heard), len(came), tuple(remarks))
+
+
+class _Again(RowReader):
+    """Rows that came before."""
+
+    def __init__(self, came: Sequence[tuple[int, Row]]) -> None:
+        self._rows = [row._replace(came_us=time_us) for time_us, row in came]
+
+    def open(self) -> None:
+        """Do nothing."""
+
+    def read(self, timeout_s: float) -> Sequence[Row]:
+        """Return all rows."""
+        return self._rows
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+def _faults(stream: StreamWiring, came: Sequence[tuple[int, Row]]) -> str:
+    """Return the counts of faults that a run with this stream would have had with these rows."""
+    harness = Harness(name="glove", streams=(stream,))
+    scan = whole_scan(harness, harness.switches, every_taxel=True)
+    source = RowSource(_Again(came), harness, 0, harness.switches, scan)
+    source.read(0.0)
+    return source.faults()
 
 
 def _columns(given: tuple[str, ...], names: tuple[str, ...] | None, width: int, remarks: list[str]) -> tuple[str, ...]:
@@ -201,25 +244,38 @@ def _clock(values: dict[str, list[float | None]], span_s: float) -> tuple[str | 
 
 
 def _rises(numbers: Sequence[float]) -> bool:
-    """Return whether numbers rise from nearly every row to the next, as no finger does."""
+    """Return whether numbers rise from nearly every row to the next, as no finger does: but for a restart, or rows that
+    come late.
+    """
     steps = [later - earlier for earlier, later in pairwise(numbers)]
-    return len(steps) > 3 and sum(step < 0 for step in steps) < 2 and sum(step > 0 for step in steps) > 0.9 * len(steps)
+    rises, falls = [step for step in steps if step > 0], [-step for step in steps if step < 0]
+    return len(steps) > 3 and len(rises) > 0.9 * len(steps) and (len(falls) < 2 or sum(falls) < 0.1 * sum(rises))
 
 
 def _kind(name: str, numbers: Sequence[float], every: str) -> str:
     if not numbers:
         return "nothing: no number came"
-    if every:
-        return every
+    if every:  # in rad: what such a joint turns through is known without moving it
+        return _STILL if _is_still(every, numbers) and abs(numbers[0]) > pi else every
     if _rises(numbers):
         return "nothing: it only rises, as a count does"
     if _TIME.search(name) and not {0.0, 1.0} >= set(numbers) and sorted(numbers) == list(numbers):
         return "nothing: a clock that does not change from row to row"
     if _JOINT.search(name):
-        return "joint"
-    if _TAXEL.search(name):
-        return "taxel"
-    return "switch" if {0.0, 1.0} >= set(numbers) else "taxel"
+        kind = "joint"
+    elif _TAXEL.search(name) or not {0.0, 1.0} >= set(numbers):
+        kind = "taxel"
+    else:
+        kind = "switch"
+    return _STILL if _is_still(kind, numbers) else kind
+
+
+def _is_still(kind: str, numbers: Sequence[float]) -> bool:
+    """Return whether a switch, joint or taxel did not move: what it reads may be noise."""
+    if kind not in _KINDS:
+        return False
+    low, high = (0.0, 1.0) if kind == "switch" else _range(numbers)
+    return max(numbers) - min(numbers) < _MOVED * (high - low)
 
 
 def _range(numbers: Sequence[float]) -> Range:
@@ -234,12 +290,11 @@ def _range(numbers: Sequence[float]) -> Range:
 
 
 def _joint_range(numbers: Sequence[float]) -> Range:
-    """Return the range that a joint moved over, widened, or the whole range if it was not moved: it has 255 codes."""
+    """Return the range that a joint moved over, widened: it has 255 codes; a whole turn if it did not move."""
+    if _is_still("joint", numbers):
+        return _WHOLE_TURN
     low, high = _range(numbers)
-    least, greatest = min(numbers), max(numbers)
-    if greatest - least < _MOVED * (high - low):
-        return low, high
-    near = _widened(least, greatest)
+    near = _widened(min(numbers), max(numbers))
     return max(low, near[0]), min(high, near[1])
 
 

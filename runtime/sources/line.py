@@ -7,7 +7,7 @@ from .rows import row_kinds
 
 
 def _reader(wiring: StreamWiring) -> LineReader:
-    return LineReader(wiring.port, wiring.baud, len(wiring.columns))
+    return LineReader(wiring.port, wiring.baud, len(wiring.columns), wiring.sender or "")
 
 
 MEMBER = row_kinds(

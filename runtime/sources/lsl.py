@@ -1,7 +1,7 @@
 """Streams of the Lab Streaming Layer as rows (extra `lsl`): `port = "lsl:NAME"` of a [[stream]].
 
 Channels are columns, by the stream's labels, or in order; its time stamps are the sender's clock. Streams are searched
-for on this machine, unless LSL's configuration (LSLAPICFG) says otherwise.
+for on this machine, unless LSL's configuration (LSLAPICFG) says otherwise. Of several with this name, one is read.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from thenar.drivers.lsl import load_pylsl
 from ..harness.wiring import StreamWiring
 from .rows import row_kinds
 
-_RESOLVE_S = 1.0
+_RESOLVE_S, _FORGET_S = 1.0, 2.0
 _BUFFER_S = 10
 _MOST = 256
 
@@ -26,6 +26,7 @@ class LslReader(RowReader):
     def __init__(self, port: str) -> None:
         self._port, self._name = port, port.removeprefix("lsl:")
         self._inlet: Any = None
+        self._search: Any = None
         self._labels: tuple[str, ...] | None = None
 
     def open(self) -> None:
@@ -37,6 +38,7 @@ class LslReader(RowReader):
         if not found:
             raise DeviceError(f"{self._port}: there is no LSL stream of this name: is its program running?")
         self._inlet = lsl.StreamInlet(found[0], max_buflen=_BUFFER_S, recover=False)
+        self._search = lsl.ContinuousResolver("name", self._name, forget_after=_FORGET_S)
         self._lost = lsl.util.LostError
         try:
             info = self._inlet.info(_RESOLVE_S)
@@ -61,8 +63,15 @@ class LslReader(RowReader):
         samples = zip((first, *more), (stamp, *stamps), strict=True)
         return [Row(self._labels, tuple(finite(float(value)) for value in sample), time) for sample, time in samples]
 
+    def other_sender(self) -> str:
+        """Return a sentence on other streams of this name."""
+        search = self._search  # another thread may close it
+        number = 0 if search is None else len(search.results())
+        return "" if number < 2 else f"{number} LSL streams have this name, and one of them is read: rename the others"
+
     def close(self) -> None:
         """Leave the stream."""
+        self._search = None
         if self._inlet is not None:
             self._inlet.close_stream()
             self._inlet = None

@@ -5,7 +5,7 @@
     ros:/TOPIC?type=Float32MultiArray  the same
 
 A JointState's stamp is the sender's clock, unless it is zero. Nodes of this machine are received, others if
-CYCLONEDDS_URI or `&public` allows them; ROS_DOMAIN_ID sets the domain.
+CYCLONEDDS_URI or `&public` allows them; ROS_DOMAIN_ID sets the domain. Messages of a second publisher are left out.
 """
 
 import re
@@ -16,7 +16,9 @@ from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.line_reader import RowReader
 from thenar.drivers.lines import LineCounts, Row, finite
 from thenar.drivers.names import shortened
+from thenar.drivers.senders import FirstSender
 
+from ..frames import now_us
 from ..harness.wiring import StreamWiring
 from .rows import row_kinds
 
@@ -36,6 +38,7 @@ class RosReader(RowReader):
         self._reader: Any = None
         self._waiting: Any = None
         self._domain: Any = None
+        self._senders = FirstSender()
 
     def open(self) -> None:
         """Subscribe to the topic, which may not have a publisher yet."""
@@ -51,6 +54,7 @@ class RosReader(RowReader):
             raise SettingError(
                 f"{self._port}: ROS topics need a package: pip install 'thenar[ros]' ({reason})"
             ) from None
+        self._senders = FirstSender()
         number, name = domain.domain(), domain.namespace(found[1])
         try:
             self._domain, participant = domain.join(number, public=bool(found[3]))
@@ -71,7 +75,14 @@ class RosReader(RowReader):
             raise DeviceError(f"{self._port}: {reason}") from None
 
     def _rows(self, samples: Sequence[Any]) -> Iterator[Row]:
-        for sample in samples:
+        valid = [sample for sample in samples if sample.sample_info.valid_data]  # others say that a writer has gone
+        senders, time_us = [sample.sample_info.publication_handle for sample in valid], now_us()
+        if self._senders.current in senders:  # it was not silent, wherever its messages are among those that waited
+            self._senders.admits(self._senders.current, time_us)
+        for sample, sender in zip(valid, senders, strict=True):
+            if not self._senders.admits(sender, time_us):
+                self._counts.foreign += 1
+                continue
             if hasattr(sample, "position"):
                 names, stamp = tuple(sample.name), sample.header.stamp
                 if not names or len(names) != len(sample.position) or len(set(names)) < len(names):
@@ -80,12 +91,18 @@ class RosReader(RowReader):
                     continue
                 time_s = stamp.sec + stamp.nanosec / 1e9 if stamp.sec or stamp.nanosec else None
                 yield Row(names, tuple(map(finite, sample.position)), time_s)
-            elif hasattr(sample, "data"):  # not the notice of a writer that has gone
+            else:
                 yield Row(None, tuple(finite(float(value)) for value in sample.data))
 
     def counts(self) -> LineCounts:
         """Return the number of messages that were not rows."""
         return self._counts
+
+    def other_sender(self) -> str:
+        """Return a sentence on another publisher."""
+        if self._senders.other(now_us()) is None:
+            return ""
+        return "another publisher sends on this topic, too, and its messages are left out: stop it, or rename its topic"
 
     def close(self) -> None:
         """Leave the domain."""

@@ -1,5 +1,6 @@
 """Rows of numbers, over any transport, as frames: `[[stream]]` says which column is a switch, a joint or a taxel."""
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -7,6 +8,7 @@ from functools import partial
 
 from thenar.drivers.line_reader import RowReader
 from thenar.drivers.lines import Row
+from thenar.drivers.senders import SILENCE_US
 
 from ..frames import PERIODS, GloveFrame, Mask, Pauses, SwitchFrame, now_us
 from ..harness.wiring import Harness, Range, StreamWiring
@@ -21,43 +23,53 @@ from .base import SHORTEST_US, Source, SourceKind, counted, debouncer_of, pause_
 JOINT_CODES = (1, 255)
 _TAXEL_STEPS, _FEWEST_STEPS, _MOST_STEPS = 4095, 255, 65_534
 _UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0}
-# A clock that goes back further, or ahead of ours by more, has restarted.
+# A clock that goes back further, or ahead of ours by more, has restarted, or is another sender's.
 _BACK_US, _AHEAD_US = 1_000_000, 10_000_000
+# Boards count milliseconds and microseconds in 32 bits. Above the limit, a float has no whole microseconds.
+_TURN_US, _LATEST_US = {"s": math.inf, "ms": 2.0**32 * 1e3, "us": 2.0**32}, 2.0**53
 # The fastest row of this many periods, twice as many at most, sets a sender's clock against ours. Resonators of boards
 # are off by half a percent: over more rows that error alone would make new rows late.
 _WINDOW = 10
 # A shorter break between rows is not counted: serial adapters and radios deliver rows in bunches.
 _BUNCH_US = 50_000
-_SLOW = 0.75
+_SLOW, _FAST = 0.75, 1.5
 # What is wrong with a sender that is connected is reported after this time without a row, or since it was noticed.
 _NOTICE_US = 2_000_000
+_SILENT = f"connected, but no row has come for {_NOTICE_US / 1e6:g} s or longer: is its program running?"
+_NO_TIME = "leave out `time` in glove.toml"
 # A serial adapter, or a radio, may hold a row back for this long in normal operation.
 _WAY_US = 20_000
-# What a column may become in a frame.
-_LATE = -1
+# Rows that do not count: they come after a later one; their clock is not the one whose rows still come.
+_LATE, _JUMPED = -1, -2
 
 
 class SenderClock:
     """Converts a sender's time stamps to this computer's time: no later than the row came, and by the fastest of the
-    last rows, which come every `period_us`.
+    last rows, which come every `period_us`. The sender's clock begins again after `turn_us`.
     """
 
-    def __init__(self, period_us: int) -> None:
-        self._window_us = _WINDOW * period_us
+    def __init__(self, period_us: int, turn_us: float = math.inf) -> None:
+        self._window_us, self._turn_us = _WINDOW * period_us, turn_us
         self.last_us: float | None = None
         self._came_us = self._shown_us = self._until_us = 0
         self._offsets = [0.0, 0.0]
 
     def host_us(self, sent_us: float, came_us: int) -> int | None:
-        """Return the time of a row that its sender stamped `sent_us`; _LATE if it comes after a later one, None if the
+        """Return the time of a row that its sender stamped `sent_us`.
+
+        _LATE if it comes after a later one, _JUMPED if it has another clock than the rows that still come, None if the
         sender's clock has restarted, and this clock with it.
         """
         last = self.last_us
         if last is not None:
-            step = sent_us - last
+            step, longest_us = sent_us - last, came_us - self._came_us + _AHEAD_US
             if -_BACK_US < step < 0:
                 return _LATE
-            if step < 0 or step > came_us - self._came_us + _AHEAD_US:
+            if 0 <= step + self._turn_us <= longest_us:
+                self._offsets = [offset + self._turn_us for offset in self._offsets]
+            elif not 0 <= step <= longest_us:
+                if came_us - self._came_us < SILENCE_US:
+                    return _JUMPED
                 self.last_us = None
                 return None
         offset = came_us - sent_us
@@ -75,10 +87,12 @@ class RowCounts:
     """Counts of a sender's rows, since the source was made.
 
     wrong_columns  rows without the columns that are used, or of another number of them
-    missing        values of used columns that were not numbers; a row without its clock is left out
+    missing        values of used columns that were not there, or not numbers
     out_of_range   values beyond the range in glove.toml, clipped to it
     repeated       rows that came twice
+    untimed        rows whose clock was not there, not finite, or beyond all dates, and were left out
     late           rows that came after a later one, and were left out
+    jumped         rows of another clock than the one that was running, and were left out
     restarts       restarts of the sender's clock
     gaps, lost     breaks between two rows, and the rows that are missing there
     """
@@ -88,7 +102,9 @@ class RowCounts:
     missing: int = 0
     out_of_range: int = 0
     repeated: int = 0
+    untimed: int = 0
     late: int = 0
+    jumped: int = 0
     restarts: int = 0
     gaps: int = 0
     lost: int = 0
@@ -96,12 +112,18 @@ class RowCounts:
 
 @dataclass(slots=True)
 class RowWatch:
-    """The arrival of rows: gaps and the rate, by the sender's clock if there is one."""
+    """The arrival of rows: gaps, by the sender's clock if there is one, and the rate.
+
+    hz         rows a second over the last second or longer; None: not known yet
+    steady_hz  the lower of the last two such rates: rows that had been waiting for this program come all at once
+    """
 
     period_us: int
     counts: RowCounts = field(default_factory=RowCounts)
     hz: float | None = None
+    steady_hz: float = 0.0
     _last_us: float | None = None
+    _stamped: bool = False
     _since_us: int | None = None
     _rows: int = 0
 
@@ -112,6 +134,8 @@ class RowWatch:
     def row(self, came_us: int, sent_us: float | None) -> None:
         """Take a row that counts."""
         self.counts.rows += 1
+        if self._stamped != (sent_us is not None):  # times of two clocks have no gap between them
+            self._last_us, self._stamped = None, sent_us is not None
         time_us = came_us if sent_us is None else sent_us
         longest_us = 1.5 * self.period_us if sent_us is not None else max(2 * self.period_us, _BUNCH_US)
         if self._last_us is not None and time_us - self._last_us > longest_us:
@@ -123,18 +147,24 @@ class RowWatch:
             return
         self._rows += 1
         if came_us - self._since_us >= max(1_000_000, 4 * self.period_us):
-            self.hz = self._rows * 1e6 / (came_us - self._since_us)
+            hz = self._rows * 1e6 / (came_us - self._since_us)
+            self.hz, self.steady_hz = hz, min(hz, self.hz or 0.0)
             self._since_us, self._rows = came_us, 0
 
 
 class Columns:
-    """Finds the used columns in rows with names, or by the order in glove.toml."""
+    """Finds the used columns by the names that rows have, or by the order in glove.toml in rows without names.
+
+    found   the columns of the last row that is not from this glove; None: there was none
+    absent  the used columns that the last row with names lacks
+    """
 
     def __init__(self, wanted: Sequence[str], columns: Sequence[str], time: str | None) -> None:
         self._wanted, self._columns, self._time = tuple(wanted), tuple(columns), time
         self._names: tuple[str, ...] | None = None
         self._places: tuple[int | None, ...] | None = None
         self.found: tuple[str, ...] | None = None
+        self.absent: tuple[str, ...] = ()
 
     def of(self, row: Row) -> tuple[float | None, ...] | None:
         """Return the values of the wanted columns, None for a missing one; None for a row of other columns."""
@@ -146,14 +176,14 @@ class Columns:
         return None
 
     def _placed(self, names: tuple[str, ...] | None) -> tuple[int | None, ...] | None:
-        if names is not None and set(names).isdisjoint(self._wanted) and len(names) == len(self._columns):
-            names = None  # a header of other names, or a message mistaken for one: the order of columns counts
         order = self._columns if names is None else names
         places = {name: place for place, name in enumerate(order) if name}
         found = tuple(places.get(name) for name in self._wanted)
         # A row that lacks a sensor counts; one that lacks its clock, or most used columns, is not from this glove.
-        clocked = self._time is None or self._time in places
-        return found if clocked and 2 * found.count(None) < len(found) else None
+        if 2 * found.count(None) > len(found) or (self._time is not None and self._time not in places):
+            return None
+        self.absent = tuple(name for name in self._wanted if name not in places)
+        return found
 
 
 class RowSource(Source):
@@ -189,14 +219,16 @@ class RowSource(Source):
         self._debounce = harness.debounce
         self.watch = RowWatch(wiring.period_us)
         self._ready = deque[SwitchFrame | GloveFrame]()
-        self._wrong = (0, 0)
+        # Of the last row that counts: how many rows and lines had not counted before it, and bytes received.
+        self._before = (0, 0, 0)
         self._begin()
 
     def _begin(self) -> None:
-        self._clock = SenderClock(self.wiring.period_us)
-        # When a row came last; when the sender's clock changed last; until when it counts as stopped.
+        self._clock = SenderClock(self.wiring.period_us, _TURN_US[self.wiring.time_unit])
+        # When a row came last; when the sender's clock changed last.
         self._came_us = self._ticked_us = now_us()
-        self._still_until_us = -1
+        # A fault of single rows, and until when it is reported.
+        self._fault, self._fault_until_us = "", -1
         self._last: tuple[float, Sequence[float | None]] | None = None
         self._ready.clear()
         self.watch.begin()
@@ -215,9 +247,9 @@ class RowSource(Source):
         """Return the next frame; a row with joints and switches makes two."""
         if not self._ready:
             rows = self.reader.read(timeout_s)
-            came_us = now_us()
+            read_us = now_us()
             for row in rows:
-                self._take(row, came_us)
+                self._take(row, read_us if row.came_us is None else row.came_us)
         return self._ready.popleft() if self._ready else None
 
     def _take(self, row: Row, came_us: int) -> None:
@@ -225,35 +257,55 @@ class RowSource(Source):
         if values is None:
             counts.wrong_columns += 1
             return
-        self._came_us, self._wrong = came_us, self._wrong_rows()
-        counts.missing += values.count(None)
-        if self.wiring.time is not None and values[-1] is None:
-            return  # its time is unknown
-        time_us, sent_us = came_us, self._sent_us(row, values)
+        self._came_us, self._before = came_us, self._uncounted()
+        sent_us, time_us = self._sent_us(row, values), came_us
         if sent_us is not None:
-            if sent_us != self._clock.last_us:
-                self._ticked_us = came_us
-            elif came_us - self._ticked_us > self.longest_us:
-                self._still_until_us = came_us + _NOTICE_US
-            if (sent_us, values) == self._last:
-                counts.repeated += 1
-                return
-            known_us = self._clock.host_us(sent_us, came_us)
+            known_us = self._known_us(sent_us, came_us, values)
             if known_us is None:
-                counts.restarts += 1
-                self.watch.begin()
-                known_us = self._clock.host_us(sent_us, came_us)
-            if known_us is None or known_us == _LATE:
-                counts.late += 1
                 return
             time_us, self._last = known_us, (sent_us, values)
+        counts.missing += values.count(None)
         self.watch.row(came_us, sent_us)
         self._make_frames(time_us, values)
 
     def _sent_us(self, row: Row, values: Sequence[float | None]) -> float | None:
+        """Return the sender's time of a row, which may be anything; None: it has no clock."""
         if self.wiring.time is not None:
-            return None if (sent := values[-1]) is None else sent * _UNITS_US[self.wiring.time_unit]
+            return math.nan if values[-1] is None else values[-1] * _UNITS_US[self.wiring.time_unit]
         return None if row.time_s is None else row.time_s * 1e6
+
+    def _known_us(self, sent_us: float, came_us: int, values: Sequence[float | None]) -> int | None:
+        """Return our time of a row by its sender's clock; None if the row does not count, which is counted."""
+        counts = self.watch.counts
+        if not abs(sent_us) <= _LATEST_US:  # nan, too
+            counts.untimed += 1
+            self._report(came_us, f"rows whose clock is not a time ({sent_us / 1e6:g} s) are left out")
+            return None
+        if sent_us != self._clock.last_us:
+            self._ticked_us = came_us
+        elif came_us - self._ticked_us > self.longest_us:
+            self._report(came_us, "its clock does not change from row to row, so rows count as old: " + _NO_TIME)
+        if (sent_us, values) == self._last:
+            counts.repeated += 1
+            return None
+        known_us = self._clock.host_us(sent_us, came_us)
+        if known_us is None:
+            counts.restarts += 1
+            self._report(came_us, "its clock has restarted: was the board reset, or does another program send?")
+            self.watch.begin()
+            known_us = self._clock.host_us(sent_us, came_us)
+        if known_us == _LATE:
+            counts.late += 1
+            self._report(came_us, "rows come after later ones and are left out: do two programs send?")
+            return None
+        if known_us == _JUMPED:
+            counts.jumped += 1
+            self._report(came_us, "rows of another clock come and are left out: do two programs send?")
+            return None
+        return known_us
+
+    def _report(self, came_us: int, fault: str) -> None:
+        self._fault, self._fault_until_us = fault, came_us + _NOTICE_US
 
     def _make_frames(self, time_us: int, values: Sequence[float | None]) -> None:
         joints = values[self._first_joint : self._first_taxel]
@@ -298,31 +350,48 @@ class RowSource(Source):
         rate = Count("rows a second", 0 if self._silent else round(self.watch.hz or 0))
         return (rate, *counted(self.watch.counts), *counted(self.reader.counts()))
 
+    def faults(self) -> str:
+        """Return the counts of rows and lines that did not count, or lacked something: "late 3, gaps 1"."""
+        return ", ".join(f"{count.name} {count.value}" for count in self.counts()[2:] if count.value)
+
     def trouble(self) -> str:
         """Return the fault of arriving rows or lines; "" if there is none."""
-        found, hz, silent = self._columns.found, self.watch.hz, self._silent
         # Compared with the counts at the last row: what came since.
-        unlike, misfits = (
-            (0, 0) if self.watch.counts.rows and not silent else map(int.__sub__, self._wrong_rows(), self._wrong)
+        wrong, misfits, received = map(int.__sub__, self._uncounted(), self._before)
+        if other := self.reader.other_sender():
+            return other
+        if self._silent or not self.watch.counts.rows:
+            found = self._columns.found
+            if wrong and found is not None:
+                wanted = list_names([name for name in self.wiring.columns if name] or self.wiring.used)
+                has = list_names([shortened(name) for name in found])
+                return f"its rows have other columns than glove.toml: {has}, not {wanted}"
+            if misfits > 0 and (odd := self.reader.odd):
+                return f"the data holds no rows: {odd}"
+        if self._silent:
+            return f"{received} bytes have come, but no row" if received else _SILENT
+        if now_us() < self._fault_until_us:
+            return self._fault
+        if self._columns.absent:
+            return f"its rows lack {list_names(self._columns.absent)}: name columns in glove.toml as it does"
+        return self._wrong_rate() or self._faulty_taxels()
+
+    def _wrong_rate(self) -> str:
+        hz, stated = self.watch.hz, self.wiring.rate_hz
+        if hz is None or (hz >= _SLOW * stated and self.watch.steady_hz <= _FAST * stated):
+            return ""
+        two = "" if hz < stated else ", unless two programs send"
+        return (
+            f"{hz:.3g} rows a second arrive, but glove.toml says {stated:g}: set rate_hz = {float(f'{hz:.2g}'):g}{two}"
         )
-        if unlike and found is not None:
-            wanted = list_names([name for name in self.wiring.columns if name] or self.wiring.used)
-            has = list_names([shortened(name) for name in found])
-            return f"its rows have other columns than glove.toml: {has}, not {wanted}"
-        if misfits and (odd := self.reader.odd):
-            return f"the data holds no rows: {odd}"
-        if silent:
-            return f"connected, but no row has come for {_NOTICE_US / 1e6:g} s or longer: is its program running?"
-        if now_us() < self._still_until_us:
-            return "its clock does not change from row to row, so rows count as old: leave out `time` in glove.toml"
-        if hz is not None and hz < _SLOW * self.wiring.rate_hz:
-            return f"{hz:.3g} rows a second arrive, but glove.toml says {self.wiring.rate_hz:g}: set rate_hz = {hz:.2g}"
+
+    def _faulty_taxels(self) -> str:
         faulty = [f"{each.names[0]}: {each.faults[0]}" for each in self._taxels if each.faults[0] not in ("", "silent")]
         return f"taxels with faults: {list_names(faulty)}" if faulty else ""
 
-    def _wrong_rows(self) -> tuple[int, int]:
-        """Return how many rows had other columns, and how many lines were not rows."""
-        return self.watch.counts.wrong_columns, self.reader.counts().misfits
+    def _uncounted(self) -> tuple[int, int, int]:
+        """Return how many rows had other columns, how many lines were not rows, and how many bytes came."""
+        return self.watch.counts.wrong_columns, self.reader.counts().misfits, self.reader.received
 
     @property
     def _silent(self) -> bool:

@@ -228,6 +228,7 @@ def _moved(harness: Harness, folder: Path, ports: Sequence[str]) -> Harness:
             for number, wiring in enumerate(harness.scanners)
         ),
         streams=tuple(
-            msgspec.structs.replace(wiring, port=port) for wiring, port in zip(harness.streams, ports, strict=True)
+            msgspec.structs.replace(wiring, port=port, sender=None)
+            for wiring, port in zip(harness.streams, ports, strict=True)
         ),
     )

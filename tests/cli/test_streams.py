@@ -5,6 +5,7 @@ import json
 import math
 import os
 import pty
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -17,7 +18,7 @@ import pytest
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.graspset import Joint
-from thenar.drivers.emulated.lines import LineSender, SocketLines
+from thenar.drivers.emulated.lines import DatagramLines, LineSender, SocketLines
 from thenar.runtime import Build
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.live.replay import replayed
@@ -98,7 +99,9 @@ def test_doctor_shows_what_comes_and_proposes_a_harness_that_it_then_finds_sound
 
 def test_names_that_the_sender_gives_say_what_columns_are(thenar: Thenar, tmp_path: Path) -> None:
     rows = "".join(
-        json.dumps({"t_ms": 20 * n, "fsr_palm": 0, "flex_ring": 100 + n % 9, "thumb": n % 2, "off": None})
+        json.dumps(
+            {"t_ms": 20 * n, "fsr_palm": 80 * (n % 7), "flex_ring": 100 + 20 * (n % 9), "thumb": n % 2, "off": None}
+        )
         + "\nboot it\n"
         for n in range(30)
     )
@@ -129,11 +132,27 @@ def listened(rows: str, *options: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(command, input=rows, capture_output=True, text=True, check=False)
 
 
-def test_a_table_with_labels_coarse_times_and_a_constant_is_proposed_as_a_harness_that_loads(tmp_path: Path) -> None:
+def test_columns_that_did_not_move_are_said_and_get_no_range() -> None:
+    header = "ms,thumb,index,fsr_palm,fsr_tip,flex_mcp,flex_pip\n"
+    rows = (f"{20 * n},{n % 2},0,{90 + n % 3},{90 + 99 * (n % 7)},512,{512 + 99 * (n % 5)}\n" for n in range(99))
+    found = json.loads(listened(header + "".join(rows), "--json").stdout)
+    still = ["index", "fsr_palm", "flex_mcp"]
+    assert [one["column"] for one in found["columns"] if one["taken_for"] == "nothing: it did not move"] == still
+    stream = found["stream"]
+    assert (stream["switches"], list(stream["taxels"]), list(stream["joints"])) == (
+        ["thumb"],
+        ["fsr_tip"],
+        ["flex_pip"],
+    )
+    said = "index, fsr_palm, flex_mcp did not move: press every pad and bend every finger while doctor listens"
+    assert said in found["remarks"]
+
+
+def test_a_table_with_labels_and_coarse_times_is_proposed_as_a_harness_that_loads(tmp_path: Path) -> None:
     path = tmp_path / "glove.toml"
     header = "time,ms,thumb,flex,weight,label\n"
     rows = (
-        f"{1_700_000_000 + n // 50},{20 * n},{n % 2},{9 * n},123456.7,{'fist' if n % 9 else 'open'}\n"
+        f"{1_700_000_000 + n // 50},{20 * n},{n % 2},{9 * n},{123456.7 + 9e4 * (n % 2)},{'fist' if n % 9 else 'open'}\n"
         for n in range(99)
     )
     done = listened(header + "".join(rows), "--propose", str(path))
@@ -151,6 +170,9 @@ def test_a_table_with_labels_coarse_times_and_a_constant_is_proposed_as_a_harnes
         ("10:00:00.125 -> 1,0", "the data holds no rows: '10:00:00.125 -> 1,0'; a row is numbers"),
         ("5,1,fist", "--names says how many columns rows with texts have"),
         ("7" * 20_000, "its lines are longer than any row"),
+        ("A2000B1990C2047", "the data holds no rows: 'A2000B1990C2047'"),
+        ("A2000,B1990,C2047", "the data holds no rows: 'A2000,B1990,C2047'"),
+        ("", "9 bytes came, but no line: end each row with a line feed"),
         ('{"fingers": {"thumb": 1}}', "no column is a switch, a joint or a taxel, so no glove.toml is proposed"),
     ],
 )
@@ -173,6 +195,87 @@ def test_names_are_stripped_checked_and_left_to_a_sender_that_names_its_columns(
     found = json.loads(listened(f"t_ms,index\n{rows}", "--names", "ms,thumb", "--json").stdout)
     assert found["stream"]["columns"] == ["t_ms", "index"]
     assert "the sender names its columns itself, so --names is not used" in found["remarks"]
+
+
+@pytest.mark.parametrize("words", [True, False])
+def test_lines_of_one_word_are_shown_and_rows_that_end_with_carriage_returns_are_read(cases: Path, words: bool) -> None:
+    sender = [sys.executable, str(cases / "word_lines_silent" / "send.py"), *([] if words else ["cr"])]
+    with subprocess.Popen(sender, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        command = [sys.executable, "-m", "thenar.cli", "doctor", "--line", "-", "--seconds", "1", "--json"]
+        done = subprocess.run(command, stdin=process.stdout, capture_output=True, text=True, check=False)
+        process.kill()
+    if words:
+        assert done.returncode == 2
+        assert re.search(r"-: the data holds no rows: 'A\d{4}B\d{4}C\d{4}D\d{4}E\d{4}F2047G2047'", done.stderr)
+    else:
+        assert json.loads(done.stdout)["stream"]["columns"] == ["c1", "c2", "c3", "c4", "c5", "c6"]
+
+
+def test_two_senders_and_late_rows_are_said_and_datagrams_have_no_baud_rate(thenar: Thenar, tmp_path: Path) -> None:
+    path, done = tmp_path / "glove.toml", Event()
+    with DatagramLines() as first, DatagramLines() as second:
+        second.to = first.to
+
+        def send() -> None:
+            n = 0
+            while not done.wait(0.01):
+                n += 1
+                first.send(b"%d,%d,%d" % (10 * n, n % 2, 40 * (n % 9)))
+                if n % 20 == 0:
+                    first.send(b"%d,0,0" % (10 * n - 15))
+                second.send(b"%d,1,7" % (10 * n))
+
+        sender = Thread(target=send)
+        sender.start()
+        found = thenar("doctor", "--line", first.port, "--baud", "9600", "--seconds", "2", "--propose", path, "--json")
+        done.set()
+        sender.join()
+    assert found.returncode == 0, found.stderr
+    remarks = "\n".join(json.loads(found.stdout)["remarks"])
+    for said in (
+        r"127.0.0.1:\d+ sends, too, and its lines are left out",
+        r"\d+ rows of another sender",
+        r"counted: .*late \d",
+    ):
+        assert re.search(said, remarks), remarks
+    assert load_harness(path).streams[0].baud == 115_200
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "line", "said"),
+    [
+        (20, "{ms},0,1,0,1,0,1,60,35", "rows a second arrive, but glove.toml says 20: set rate_hz = "),
+        (90, "ms,s0,s1,s2,s3,s4,s5,j0,k1\n{ms},0,1,0,1,0,1,60,35", "its rows lack j1: name columns in glove.toml as"),
+        (
+            90,
+            "ms,t0,t1,t2,t3,t4,t5,k0,k1\n{ms},0,1,0,1,0,1,60,35",
+            "its rows have other columns than glove.toml: ms, t0",
+        ),
+        (90, "{ms},0,1,0,1,0,1,60,35\n{late},0,1,0,1,0,1,60,35", "rows come after later ones and are left out"),
+        (90, "{ms},0,1,0,1,0,1,60,35\n{other},0,1,0,1,0,1,60,35", "rows of another clock come and are left out"),
+        (90, "A512,B300,C200", "the data holds no rows: 'A512,B300,C200'"),
+    ],
+)
+def test_doctor_says_what_is_wrong_with_rows(
+    thenar: Thenar, tmp_path: Path, rate_hz: int, line: str, said: str
+) -> None:
+    path, done = tmp_path / "glove.toml", Event()
+    with SocketLines(tmp_path / "line") as lines:
+        text = STREAM.format(port=lines.port, joints="{ j0 = [0, 127.5], j1 = [0, 127.5] }")
+        path.write_text(text.replace("rate_hz = 100", f"rate_hz = {rate_hz}"))
+
+        def send() -> None:
+            began = monotonic()
+            while not done.wait(0.01):
+                ms = round(1000 * (monotonic() - began))
+                lines.send(line.format(ms=ms, late=ms - 50, other=ms + 60_000).encode() + b"\n")
+
+        sender = Thread(target=send)
+        sender.start()
+        found = thenar("doctor", path, "--json")
+        done.set()
+        sender.join()
+    assert said in json.loads(found.stdout)[0]["remarks"][0]
 
 
 @pytest.mark.slow
@@ -281,6 +384,42 @@ def test_a_broken_sender_spoils_no_answer_and_is_counted(thenar: Thenar, build_f
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("named", [False, True])
+def test_a_second_board_on_the_port_and_impossible_clocks_change_no_answer(
+    thenar: Thenar, build_folder: Path, tmp_path: Path, named: bool
+) -> None:
+    out, done, path = tmp_path / "out.jsonl", Event(), tmp_path / "mine.toml"
+    with DatagramLines() as first, DatagramLines() as second:
+        second.to = first.to
+        first._line.bind(("127.0.0.1", 0))
+        sender = f'from = "127.0.0.1:{first._line.getsockname()[1]}"\n' if named else ""
+        text = STREAM.format(port=first.port, joints="{ j0 = [0, 127.5], j1 = [0, 127.5] }")
+        path.write_text(text.replace("rate_hz = 100\n", f"rate_hz = 50\n{sender}"))
+
+        def send() -> None:
+            began = monotonic()
+            while not done.wait(0.015):
+                now = round(1000 * (monotonic() - began))
+                first.send(b"%d,0,1,0,1,0,1,60,35\nA512B300C200\n1e305,0,0,0,0,0,0,0,0" % now)
+                if named or (out.exists() and '"health":"ok"' in out.read_text()):
+                    second.send(b"%d,1,0,1,0,1,0,35,60" % (now + 5))
+
+        thread = Thread(target=send)
+        thread.start()
+        finished = thenar("run", build_folder, "--glove", path, "--frames", "200", "--status", "--sink", f"jsonl:{out}")
+        done.set()
+        thread.join()
+    assert finished.returncode == 0, finished.stderr
+    found = [json.loads(line) for line in out.read_text().splitlines()]
+    assert len({one["candidate"] for one in found if one["kind"] == "grasp" and one["health"] == "ok"}) == 1
+    (device,) = [one for one in found if one["kind"] == "health"][-1]["devices"]
+    assert re.match(r"127.0.0.1:\d+ sends, too, and its lines are left out: those of 127.0.0.1", device["error"])
+    counts = {count["name"]: count["value"] for count in device["counts"]}
+    assert min(counts[name] for name in ("rows", "foreign", "untimed", "misfits")) > 0
+    assert counts["program faults"] == counts["late"] == counts["restarts"] == 0
+
+
+@pytest.mark.slow
 def test_joints_alone_of_bytes_are_recognised_as_they_were_recorded(thenar: Thenar, tmp_path: Path) -> None:
     high = {"cup": (200, 30), "pen": (30, 200), "rod": (200, 200)}
     labels = np.arange(60) % 3
@@ -295,7 +434,8 @@ def test_joints_alone_of_bytes_are_recognised_as_they_were_recorded(thenar: Then
     recorded.save(tmp_path / "set.grasps")
     build = compile_build(recorded, tmp_path / "build", rounds=10, folds=0, inputs="joints").folder
     (tmp_path / "mine.toml").write_text(
-        '[[stream]]\nport = "udp://0.0.0.0:1"\nrate_hz = 100\njoints = { flex_1 = [0, 4095], flex_2 = [3000, 10] }\n'
+        '[[stream]]\nport = "udp://0.0.0.0:1"\nfrom = "192.168.4.7"\nrate_hz = 100\n'
+        "joints = { flex_1 = [0, 4095], flex_2 = [3000, 10] }\n"
         'columns = ["flex_1", "flex_2"]\n'
     )
     out, log = tmp_path / "out.jsonl", tmp_path / "log.jsonl"

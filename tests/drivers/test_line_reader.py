@@ -3,10 +3,11 @@
 import contextlib
 import os
 import socket
+import sys
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
-from time import monotonic
+from time import monotonic, monotonic_ns
 
 import pytest
 
@@ -58,6 +59,86 @@ def test_a_datagram_holds_several_lines_and_its_last_needs_no_end() -> None:
         sender.send(b"1,2\n3,4")
         sender.send(b"5,6")
         assert [row.values for row in heard(reader, 3)] == [(1, 2), (3, 4), (5, 6)]
+
+
+def datagrams(count: int) -> list[DatagramLines]:
+    """Return senders of datagrams to one port."""
+    senders = [DatagramLines() for _ in range(count)]
+    for sender in senders:
+        sender.to = senders[0].to
+    return senders
+
+
+def source_of(sender: DatagramLines) -> tuple[str, int]:
+    """Return the address of which its datagrams are, once it has sent one."""
+    return "127.0.0.1", int(sender._line.getsockname()[1])
+
+
+def test_datagrams_of_a_second_sender_are_left_out_and_said_until_the_first_is_silent() -> None:
+    with contextlib.ExitStack() as stack:
+        first, second = (stack.enter_context(sender) for sender in datagrams(2))
+        reader = stack.enter_context(LineReader(first.port))
+        reader.open()
+        for sender in (first, second, first):
+            sender.send(b"a,b\n1,2" if sender is first else b"c,d\n3,4\n5,6")
+        assert [row.names for row in heard(reader, 2)] == [("a", "b")] * 2
+        assert reader.counts().foreign == 3
+        ours, others = (f"127.0.0.1:{source_of(sender)[1]}" for sender in (first, second))
+        assert reader.other_sender() == (
+            f"{others} sends, too, and its lines are left out: those of {ours} count; stop it, "
+            f'or choose one by `from = "{ours}"` in glove.toml'
+        )
+        end, rows = monotonic() + LONG_S, list[Row]()
+        while not rows:
+            assert monotonic() < end
+            second.send(b"7,8")
+            rows += reader.read(0.05)
+        assert rows[0] == Row(None, (7, 8), None, rows[0].came_us)
+
+
+@pytest.mark.parametrize("with_port", [False, True])
+def test_the_sender_of_datagrams_that_is_named_counts_whoever_was_first(with_port: bool) -> None:
+    with contextlib.ExitStack() as stack:
+        first, named = (stack.enter_context(sender) for sender in datagrams(2))
+        named._line.bind(("127.0.0.2", 0))
+        host, port = named._line.getsockname()
+        reader = stack.enter_context(LineReader(first.port, sender=f"{host}:{port}" if with_port else host))
+        reader.open()
+        for number in range(3):
+            first.send(b"1,2")
+            named.send(b"3,%d" % number)
+        assert [row.values for row in heard(reader, 3)] == [(3, 0), (3, 1), (3, 2)]
+        assert reader.counts().foreign == 3
+        assert reader.other_sender().endswith("count; stop it")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux dates datagrams")
+def test_datagrams_are_dated_when_they_come_not_when_they_are_read() -> None:
+    with DatagramLines() as sender, LineReader(sender.port) as reader:
+        reader.open()
+        end, late_us = monotonic() + LONG_S, 20_000
+        while late_us >= 10_000:  # once is enough: this program may be interrupted while it reads two clocks
+            assert monotonic() < end
+            before_us = monotonic_ns() // 1000
+            sender.send(b"1,2")
+            sent_us = monotonic_ns() // 1000
+            while monotonic_ns() // 1000 < sent_us + 20_000:
+                pass
+            (row,) = heard(reader, 1)
+            assert row.came_us is not None
+            late_us = row.came_us - before_us
+            assert late_us > -1000  # the clock of the date may be slowed or sped up a little
+
+
+def test_bytes_without_a_row_are_counted() -> None:
+    with DatagramLines() as sender, LineReader(sender.port) as reader:
+        reader.open()
+        sender.send(b"A512B300")
+        end = monotonic() + LONG_S
+        while not reader.received:
+            assert monotonic() < end
+            assert not reader.read(0.1)
+        assert (reader.counts().misfits, reader.odd) == (1, "'A512B300'")
 
 
 def test_half_a_line_before_a_break_does_not_spoil_the_first_one_after_it(tmp_path: Path) -> None:

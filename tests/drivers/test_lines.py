@@ -32,7 +32,8 @@ def test_rows_that_name_their_values(values: list[float], called: list[str]) -> 
 
 @given(st.lists(st.one_of(st.binary(max_size=40), rows.map(lambda row: ",".join(map(repr, row)).encode()))), st.data())
 def test_where_chunks_end_changes_nothing(lines: list[bytes], data: st.DataObject) -> None:
-    stream = b"".join(line.replace(b"\n", b"") + b"\n" for line in lines)
+    ends = (b"\n", b"\r\n", b"\r")
+    stream = b"".join(line.replace(b"\n", b"") + ends[place % 3] for place, line in enumerate(lines))
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=10)))
     whole, parts = LineParser(), LineParser()
     pieces = [stream[a:b] for a, b in zip([0, *cuts], [*cuts, len(stream)], strict=True)]
@@ -75,6 +76,9 @@ def test_values_that_are_no_numbers_are_none(line: bytes, values: tuple[float | 
         b"a:1,a:2",
         b":1",
         b"9" * 401 + b"x",
+        b"ready",
+        b"A512B300C200",
+        b"A512,B300,C200",
     ],
 )
 def test_anything_else_is_a_misfit_and_is_shown(line: bytes) -> None:
@@ -93,8 +97,22 @@ def test_a_header_names_the_rows_after_it_until_the_line_begins_anew() -> None:
         Row(None, (5, 6, 7)),
     ]
     assert parsed(b"ms, thumb tip") == Header(("ms", "thumb tip"))
+    assert parser.counts.misfits == 0
+    assert parser.feed(b"saved,3 files\nno,more,words\n8,9\nms,thumb\n8,9\n") == 2 * [Row(("ms", "thumb"), (8, 9))]
+    assert (parser.counts.misfits, parser.odd) == (2, "'no,more,words'")
     parser.begin()
     assert parser.feed(b"1,2\n") == [Row(None, (1, 2))]
+
+
+def test_lines_of_words_alone_are_misfits_however_many_words_they_have() -> None:
+    parser = LineParser(3)
+    assert parser.feed(b"A512B300C200\nA513,B301,C201\nA514,B302,C202\nready\n") == []
+    assert (parser.counts.misfits, parser.odd) == (4, "'ready'")
+
+
+@pytest.mark.parametrize("end", [b"\r", b"\n", b"\r\n", b"\n\r"])
+def test_lines_end_with_carriage_returns_and_line_feeds(end: bytes) -> None:
+    assert LineParser().feed(b"1,2" + end + b"3,4" + end) == [Row(None, (1, 2)), Row(None, (3, 4))]
 
 
 def test_a_text_in_a_row_of_known_width_is_a_missing_value() -> None:

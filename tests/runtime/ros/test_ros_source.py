@@ -86,6 +86,39 @@ def hear(talk: Talk) -> Iterator[Hear]:
         yield heard
 
 
+def test_messages_of_a_second_publisher_are_left_out_and_said(talk: Talk) -> None:
+    topic = _topic()
+    harness = parse_harness(f'[[stream]]\nport = "ros:{topic}"\njoints = {{ ring = [1, 255] }}\n', "glove.toml")
+    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, (), whole_scan(harness, ())))
+    assert isinstance(source, RowSource)
+    source.open()
+    try:
+        first, second = talk(topic, "JointState"), talk(topic, "JointState")
+        end, frame = time.monotonic() + 20, None
+        for place in count():
+            assert time.monotonic() < end
+            sent = {"stamp": [1_800_000_000, 1000 * place], "name": ["ring"]}
+            first.write(json.dumps(sent | {"position": [40.0]}) + "\n")
+            if frame is not None:
+                second.write(json.dumps(sent | {"position": [200.0]}) + "\n")
+            new = source.read(0.05)
+            assert new is None or (isinstance(new, GloveFrame) and new.sensors == bytes((40,)))
+            frame = new or frame
+            if source.reader.counts().foreign:
+                break
+        assert source.trouble().startswith("another publisher sends on this topic, too, and its messages are left out")
+    finally:
+        source.close()
+
+
+def test_a_joint_that_is_renamed_is_lost_and_said(hear: Hear) -> None:
+    text = '[[stream]]\nport = "{port}"\njoints = {{ ring = [0, 2], index = [-1, 1] }}\n'
+    source, frames = hear("JointState", "", {"stamp": [0, 0], "name": ["idx", "ring"], "position": [1.0, 1.0]}, text)
+    assert isinstance(frames[0], GloveFrame)
+    assert frames[0].sensors == bytes((128, 0))
+    assert source.trouble() == "its rows lack index: name columns in glove.toml as it does"
+
+
 def test_positions_of_a_joint_state_are_joints_by_their_names(hear: Hear) -> None:
     text = '[[stream]]\nport = "{port}"\njoints = {{ ring = [0, 2], index = [-1, 1] }}\n'
     values = {"stamp": [1_800_000_000, 5], "name": ["index", "more", "ring"], "position": [1.0, 9.0, 1.0]}
@@ -102,7 +135,7 @@ def test_doctor_proposes_joints_for_a_joint_state_whatever_their_names_and_value
 
     def send() -> None:
         for place in count():
-            positions = [float(place % 2), 0.25 * (place % 5), 0.5]
+            positions = [float(place % 2), 0.25 * (place % 5), 0.5 if kind == "JointState" else 0.5 * (place % 2)]
             stamped = {"stamp": [1_800_000_000, place], "name": ["ring", "thumb", "fsr"], "position": positions}
             sending.write(json.dumps(stamped if kind == "JointState" else positions) + "\n")
             if done.wait(0.01):

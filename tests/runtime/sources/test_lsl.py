@@ -80,6 +80,56 @@ def test_samples_are_rows_on_their_senders_clock(
     source.close()
 
 
+def test_channels_with_other_labels_are_not_taken_by_their_order(outlet: Outlet, name: str) -> None:
+    sender = outlet(2, ["finger", "palm"])
+    harness = parse_harness(GLOVE.format(name=name), "glove.toml")
+    scan = whole_scan(harness, harness.switches, every_taxel=True)
+    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, harness.switches, scan))
+    source.open()
+    end = time.monotonic() + LONG_S
+    while not source.trouble():
+        assert time.monotonic() < end
+        sender.push_sample([1.0, 0.5])
+        assert source.read(0.05) is None
+    assert source.trouble() == "its rows have other columns than glove.toml: finger, palm, not thumb, pad"
+    source.close()
+
+
+def test_two_streams_of_one_name_are_said(outlet: Outlet, name: str) -> None:
+    first = outlet(2)
+    with LslReader(f"lsl:{name}") as reader:
+        reader.open()
+        assert reader.other_sender() == ""
+        second = outlet(2)
+        end = time.monotonic() + LONG_S
+        while not reader.other_sender():
+            assert time.monotonic() < end
+            reader.read(0.05)
+        assert reader.other_sender() == "2 LSL streams have this name, and one of them is read: rename the others"
+    del first, second
+
+
+@pytest.mark.parametrize("stamp", [float("nan"), float("inf"), 1e305])
+def test_a_sample_whose_stamp_is_no_time_is_left_out(lsl: ModuleType, outlet: Outlet, name: str, stamp: float) -> None:
+    sender = outlet(2)
+    harness = parse_harness(GLOVE.format(name=name), "glove.toml")
+    scan = whole_scan(harness, harness.switches, every_taxel=True)
+    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, harness.switches, scan))
+    source.open()
+    frames, end = 0, time.monotonic() + LONG_S
+    counts: dict[str, int] = {}
+    while not (frames and counts.get("untimed")):
+        assert time.monotonic() < end
+        sender.push_sample([0.0, 0.5], stamp)
+        sender.push_sample([1.0, 0.5], lsl.local_clock())
+        frame = source.read(0.05)
+        if isinstance(frame, SwitchFrame):
+            assert frame.closed == 1
+            frames += 1
+        counts = {count.name: count.value for count in source.counts()}
+    source.close()
+
+
 def test_a_stream_that_is_not_there_or_holds_texts_is_said(outlet: Outlet, name: str) -> None:
     with pytest.raises(DeviceError, match="no LSL stream of this name"):
         LslReader(f"lsl:{name}").open()

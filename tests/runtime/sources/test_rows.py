@@ -1,7 +1,6 @@
 """Rows as frames: what a column becomes, on which grid, at what time; and what a broken sender does."""
 
 from collections.abc import Callable, Sequence
-from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -40,14 +39,18 @@ NAMES = ("index", "pad>700", "thumb", "pad>300")
 class Script(RowReader):
     """Rows that come chunk by chunk, at times of a clock of the test's own."""
 
-    def __init__(self, chunks: Sequence[bytes]) -> None:
+    def __init__(self, chunks: Sequence[bytes | Row]) -> None:
         self._chunks, self._parser = list(chunks), LineParser()
 
     def open(self) -> None:
         self._parser.begin()
 
     def read(self, timeout_s: float) -> Sequence[Row]:
-        rows = self._parser.feed(self._chunks.pop(0))
+        chunk = self._chunks.pop(0)
+        if isinstance(chunk, Row):
+            return [chunk]
+        self.received += len(chunk)
+        rows = self._parser.feed(chunk)
         self.odd = self._parser.odd
         return rows
 
@@ -65,7 +68,7 @@ Play = Callable[..., tuple[RowSource, Frames]]
 @pytest.fixture
 def play(monkeypatch: pytest.MonkeyPatch) -> Play:
     def played(
-        chunks: Sequence[tuple[int, bytes]], text: str = GLOVE, names: Sequence[str] = NAMES
+        chunks: Sequence[tuple[int, bytes | Row]], text: str = GLOVE, names: Sequence[str] = NAMES
     ) -> tuple[RowSource, Frames]:
         harness = parse_harness(text, "glove.toml")
         source = RowSource(Script([chunk for _, chunk in chunks]), harness, 0, names, whole_scan(harness, names))
@@ -119,10 +122,19 @@ def test_columns_by_name_in_any_order_and_by_a_header(play: Play) -> None:
         b'{"bend": 0, "flex": 0, "index": 0, "thumb": true, "more": 7, "pad": 0, "ms": 1}\n',
         b"bend:0,flex:0,index:0,thumb:1,pad:0,ms:1\n",
         b"thumb;pad;index;flex;bend;ms\n1;0;0;0;0,0;1\n",
-        b"other,names,than,those,of,glove,toml\n1,1,7,0,0,0,0\n",
+        b"calibrated,ready\n1,1,7,0,0,0,0\n",
     ):
         _, frames = play([(0, line)])
         assert frames[0] == whole
+
+
+def test_a_sender_that_names_its_columns_is_read_by_name_or_not_at_all(play: Play) -> None:
+    source, frames = play([(0, b"ms,thumb,spare,idx,pad,flex,bend\n1,1,7,1023,0,0,0\n")])
+    assert frames[0] == SwitchFrame(0, 0b0100, 0b0001, 0, GloveFrame(0, b"\x01\x80"), (0,))
+    assert source.trouble() == "its rows lack index: name columns in glove.toml as it does"
+    source, frames = play([(0, b"a,b,c,d,e,f,g\n1,1,7,1023,0,0,0\n")])
+    assert frames == []
+    assert source.trouble().startswith("its rows have other columns than glove.toml: a, b, c, d, e and 2 more, not ms,")
 
 
 def test_the_senders_clock_times_rows_by_the_quickest_of_them(play: Play) -> None:
@@ -139,7 +151,7 @@ def test_no_frame_is_of_the_future_and_none_goes_back(steps: list[tuple[int, int
     for wait_ms, sent in steps:
         came_us += 1000 * wait_ms
         time_us = clock.host_us(float(sent), came_us)
-        if time_us is not None and time_us != module._LATE:
+        if time_us is not None and time_us not in (module._LATE, module._JUMPED):
             assert shown[-1] <= time_us <= came_us
             shown.append(time_us)
 
@@ -157,7 +169,7 @@ def test_a_row_without_its_clock_is_left_out_and_one_without_a_sensor_is_not(pla
     chunks = (b"1,1,0,0,0,0,0\n", b"nan,1,0,0,0,0,0\nms,thumb\n7,1\n", b'{"ms": 11, "thumb": 1}\n')
     last = b'{"ms": 11, "thumb": 1, "pad": 3, "flex": 7, "index": 0}\n'
     source, frames = play([(10_000, chunk) for chunk in (*chunks, last)])
-    assert counted(source) == {"rows": 2, "missing": 2, "wrong columns": 2}
+    assert counted(source) == {"rows": 2, "missing": 1, "untimed": 1, "wrong columns": 2}
     glove = GloveFrame(10_000, bytes((1, 0)))
     assert frames[-2:] == [SwitchFrame(10_000, 0b0100, 0, 0, glove, (3,)), glove]
 
@@ -167,12 +179,64 @@ def test_what_comes_twice_late_or_not_at_all_is_counted(play: Play) -> None:
         return b"%d,0,0,0,0,0,0\n" % ms
 
     sent = [0, 10, 20, 20, 40, 30, 50, 100, 110, 5, 15]
-    source, frames = play([(10_000 * n, row(ms)) for n, ms in enumerate(sent)])
+    source, _ = play([(10_000 * n, row(ms)) for n, ms in enumerate(sent)])
     assert counted(source) == {"rows": 7, "repeated": 1, "late": 3, "gaps": 2, "lost": 5}
-    source, frames = play([(10_000 * n, row(ms)) for n, ms in enumerate([5000, 5010, 0, 10, 20])])
-    assert counted(source) == {"rows": 5, "restarts": 1}
-    times = [frame.time_us for frame in frames if isinstance(frame, SwitchFrame)]
-    assert all(0 < later - earlier <= 10_000 for earlier, later in pairwise(times))
+    assert source.trouble() == "rows come after later ones and are left out: do two programs send?"
+
+
+@pytest.mark.parametrize("began_ms", [3_600_000, 100])
+def test_rows_of_another_clock_count_once_the_first_one_is_silent(play: Play, began_ms: int) -> None:
+    first = [(10_000 * n, b"%d,1,0,0,0,0,0\n" % (60_000 + 10 * n)) for n in range(100)]
+    other = [(10_000 * n + 5_000, b"%d,0,0,0,0,0,0\n" % (began_ms + 10 * n)) for n in range(50, 250)]
+    source, frames = play(sorted(first + other))
+    switches = [frame for frame in frames if isinstance(frame, SwitchFrame)]
+    assert [frame.closed for frame in switches[:100]] == [0b0100] * 100
+    assert {frame.closed for frame in switches[100:]} == {0}
+    found = counted(source)
+    assert (found["rows"], found["jumped"], found["restarts"]) == (len(switches), 300 - len(switches), 1)
+    assert switches[100].time_us == 10_000 * 99 + 1_005_000
+    source, _ = play(sorted(first + other[:50]))
+    assert source.trouble() == "rows of another clock come and are left out: do two programs send?"
+    source, _ = play([*first[:1], *other])
+    assert source.trouble() == "its clock has restarted: was the board reset, or does another program send?"
+
+
+@pytest.mark.parametrize(("unit", "ticks"), [("ms", 1), ("us", 1000)])
+def test_a_clock_of_32_bits_that_begins_again_costs_no_row(play: Play, unit: str, ticks: int) -> None:
+    stamps = [(ticks * (10 * n - 505)) % 2**32 for n in range(100)]
+    chunks = [(10_000 * n, b"%d,0,0,0,0,0,0\n" % stamp) for n, stamp in enumerate(stamps)]
+    source, frames = play(chunks, GLOVE.replace('time = "ms"', f'time = "ms"\ntime_unit = "{unit}"'))
+    assert counted(source) == {"rows": 100}
+    assert [frame.time_us for frame in frames if isinstance(frame, SwitchFrame)] == [10_000 * n for n in range(100)]
+
+
+@pytest.mark.parametrize("clock", [b"1e305", b"-1e305", b"nan", b"inf", b"1e17", b""])
+def test_a_row_whose_clock_is_no_time_is_left_out_and_said(play: Play, clock: bytes) -> None:
+    good = [(10_000 * n, b"%d,1,0,0,0,0,0\n" % (10 * n)) for n in range(4)]
+    odd = [(10_000 * n + 5_000, clock + b",0,0,0,0,0,0\n") for n in range(4)]
+    source, frames = play(sorted(good + odd), GLOVE.replace('time = "ms"', 'time = "ms"\ntime_unit = "s"'))
+    assert [frame.closed for frame in frames if isinstance(frame, SwitchFrame)] == [0b0100] * 4
+    assert counted(source)["untimed"] == 4
+    assert source.trouble().startswith("rows whose clock is not a time (")
+
+
+def test_more_rows_than_stated_are_said_unless_they_had_been_waiting(play: Play) -> None:
+    waiting = [(2_000_000, b"".join(b"%d,0,0,0,0,0,0\n" % (10 * n) for n in range(100)))]
+    paced = [(2_000_000 + 10_000 * n, b"%d,0,0,0,0,0,0\n" % (1000 + 10 * n)) for n in range(150)]
+    source, _ = play(waiting + paced)
+    assert source.trouble() == ""
+    source, _ = play([(5_000 * n, b"%d,0,0,0,0,0,0\n" % (5 * n)) for n in range(500)])
+    assert source.trouble() == (
+        "200 rows a second arrive, but glove.toml says 100: set rate_hz = 200, unless two programs send"
+    )
+
+
+def test_times_of_two_clocks_have_no_gap_between_them(play: Play) -> None:
+    text = '[[stream]]\nport = "x"\njoints = { flex = [0, 1] }\n'
+    rows = [Row(("flex",), (0.5,), stamp) for stamp in (None, 2.0**31, None, 2.0**31 + 0.04)]
+    source, frames = play([(20_000 * n, row) for n, row in enumerate(rows)], text, ())
+    assert len(frames) == 4
+    assert counted(source) == {"rows": 4}
 
 
 def test_garbage_loses_nothing_but_itself(play: Play) -> None:
