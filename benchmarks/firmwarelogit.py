@@ -199,9 +199,12 @@ def pruned(fold: Fold, share: float) -> tuple[Floats, Floats, Floats]:
     def loss(flat: Floats) -> tuple[float, Floats]:
         weights = flat.reshape(kept.shape) * kept
         scores = np.hstack([inputs @ weights, np.zeros((len(inputs), 1))])
-        whole, pull = logsumexp(scores, axis=1, keepdims=True), np.vstack([np.zeros_like(bias), weights[1:]])
+        whole = logsumexp(scores, axis=1, keepdims=True)
+        # scikit-learn's penalty, which does not depend on the class that the weights are relative to.
+        pull = weights - weights.sum(axis=1, keepdims=True) / scores.shape[1]
+        pull[0] = 0
         slope = inputs.T @ (np.exp(scores - whole) - hits)[:, :-1] + pull
-        return float((whole - scores)[hits > 0].sum() + (pull**2).sum() / 2), (slope * kept).ravel()
+        return float((whole - scores)[hits > 0].sum() + (pull * weights).sum() / 2), (slope * kept).ravel()
 
     start = np.vstack([bias, relative]).ravel()
     weights = minimize(loss, start, jac=True, method="L-BFGS-B", options={"maxiter": 1000}).x.reshape(kept.shape) * kept

@@ -100,6 +100,8 @@ class ClassifyModel:
                 f"on {self.target} times are instructions, counted by qemu, at {self.clock_hz / 1e6:g} MHz and one "
                 "cycle each: a lower bound, for many instructions take more cycles"
             )
+        if self.python is not None and not self.guessed:
+            return "times of classifying in Python leave out the check for unusual frames, which most builds make"
         if self.guessed:
             return (
                 f"Python on a Raspberry Pi is taken to be {self.factor:g} times as slow as on this machine, which is a "
