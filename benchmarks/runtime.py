@@ -3,6 +3,7 @@
     python benchmarks/runtime.py
 
 Classification is amortised over calls with one frame each: 33 switches + 16 joints, 14 grasp types, 100 rounds.
+Times are processor times, so that other work on the machine matters little.
 """
 
 import importlib.util
@@ -30,8 +31,8 @@ MICRO = 1e6
 
 
 def import_seconds(statement: str) -> float:
-    """Return the median time of an import statement in a fresh interpreter."""
-    program = f"import time; start = time.perf_counter(); {statement}; print(time.perf_counter() - start)"
+    """Return the median processor time of an import statement in a fresh interpreter."""
+    program = f"import time; start = time.process_time(); {statement}; print(time.process_time() - start)"
     command = [sys.executable, "-c", program]
     runs = [subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(IMPORTS + 1)]
     return statistics.median(map(float, runs[1:]))
@@ -41,10 +42,10 @@ def call_seconds(call: Callable[[], object], calls: int) -> float:
     """Return the best of several means over `calls` calls."""
 
     def once() -> float:
-        start = time.perf_counter()
+        start = time.process_time()
         for _ in range(calls):
             call()
-        return (time.perf_counter() - start) / calls
+        return (time.process_time() - start) / calls
 
     return min(once() for _ in range(REPEATS))
 

@@ -117,7 +117,7 @@ def test_every_time_names_its_machine_and_a_guess_says_so(
     assert f"on {there.machine}" == guess
     assert {each.how for point in there.points for each in (point.classify, point.frame)} == {"guess"}
     assert {point.scan.how for point in there.points if point.setting.wiring == "mcp23017"} <= {"guess"}
-    assert {row["frame_how"] for row in csv.DictReader((again / "frontier.csv").open(newline=""))} == {"guess"}
+    assert {row["frame_how"] for row in csv.DictReader((again / "frontier.csv").read_text().splitlines())} == {"guess"}
 
 
 @pytest.mark.parametrize("worth", ["best", "joints"])
