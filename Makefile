@@ -8,8 +8,10 @@ OUT    := out
 CORES = $(shell $(PYTHON) -c "import os; print(os.cpu_count())")
 WORKERS = $(shell expr $(CORES) \* 3 / 2)
 
-# The scene that `make demo` simulates: a shipped one by its name, or a file. With TABLE=table.csv it imports that.
-SCENE ?= quick
+# The scene that `make demo` simulates: a shipped one by its name, or a file. With TABLE=table.csv it imports that. Of the
+# crowd, four people: of two, the interval for a new person would say nothing.
+SCENE ?= crowd
+PEOPLE := $(if $(filter crowd,$(SCENE)),--subjects 4 --repetitions 6)
 
 PACKAGES := cli compiler drivers firmware_templates runtime simulator stability
 
@@ -24,12 +26,12 @@ $(VENV)/installed: pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable ".[compiler,cluster,sim,stability,ros,ws,lsl,web,foxglove]" --group dev
 	touch $@
 
-demo: $(VENV)/installed  ## recordings, rates, frontier, build, report, run: SCENE=quick, or TABLE=examples/home_glove.csv
+demo: $(VENV)/installed  ## recordings, rates, frontier, build, report, run: SCENE=crowd, or TABLE=examples/home_glove.csv
 	mkdir -p $(OUT)
 ifdef TABLE
 	$(BIN)/thenar import "$(TABLE)" -o $(OUT)/set.grasps --yes --overwrite
 else
-	$(BIN)/thenar simulate "$(SCENE)" -o $(OUT)/set.grasps --overwrite
+	$(BIN)/thenar simulate "$(SCENE)" $(PEOPLE) -o $(OUT)/set.grasps --overwrite
 	$(BIN)/thenar draw $(OUT)/set.grasps -o $(OUT)/contacts.svg --overwrite
 	$(BIN)/thenar draw $(OUT)/set.grasps --place -o $(OUT)/kept.svg --overwrite
 endif
@@ -100,6 +102,7 @@ mutants: $(VENV)/mutants  ## small deliberate faults in the numerical modules: h
 	cd .mutants && ../$(BIN)/python ../tests/mutants/report.py ../tests/mutants/README.md
 
 bench: $(VENV)/bench  ## the benchmarks, as ratios against a peer or a bound in the same run
+	@$(BIN)/python -c "from thenar.compiler.frontier.timing.machine import machine_name; print(machine_name())"
 	$(BIN)/python benchmarks/id3.py
 	$(BIN)/python benchmarks/boosting.py
 	$(BIN)/python benchmarks/runtime.py

@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cache, partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,8 @@ FEATURES = SWITCHES + JOINTS
 # Trees and leaves of the forests tried.
 FORESTS = ((10, 40), (10, 80), (15, 60), (20, 30), (20, 60), (30, 40), (60, 14))
 LOGITS = (Groups(1, 3), Groups(3, 3), Groups(4, 3), Groups(4, 4), Groups(5, 3), Groups(6, 3), Groups(8, 3))
+# Shares of the joints' weights.
+SHARES = (1.0, 0.4, 0.3)
 HIDDEN = 16
 _FLOATS = "float"
 
@@ -249,10 +252,12 @@ def _with(trees: int, leaves: int, features: Callable[[Rows], Any] = _plain) -> 
 
 def peers() -> Iterator[Peer]:
     """Yield the peers."""
-    for groups in LOGITS:
+    for groups, share in product(LOGITS, SHARES):
         switches = "single switches" if groups.size == 1 else f"groups of {groups.size}"
-        name = f"int8 logistic regression by hand, {switches}, joints {2**groups.shift} times finer"
-        yield Peer(name, partial(integer_logit, groups=groups), lambda made: {"peer.S": made.source}, lambda made: made)
+        kept = "" if share == 1 else f", {share:.0%} of the joints' weights"
+        name = f"int8 logistic regression by hand, {switches}, joints {2**groups.shift} times finer{kept}"
+        train = partial(integer_logit, groups=groups, share=share)
+        yield Peer(name, train, lambda made: {"peer.S": made.source}, lambda made: made)
     for kind, features, what in (("uint8_t", _coarse, "uint8, 2-degree steps"), ("int16_t", _doubled, "int16")):
         for trees, leaves in FORESTS:
             name = f"emlearn, forest {trees} x {leaves}, {what}"

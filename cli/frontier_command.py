@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 _SEARCHED = ("repeats", "finalists", "seed", "by")
 _WORDS = ("inputs", "placement", "rounds, bits", "wiring", "scan", "decision")
-_NUMBERS = ("frame", "latency, 99 %", "flash", "RAM")
+_TIMES, _SIZES = ("frame", "latency, 99 %"), ("flash", "RAM")
 
 
 def _timed() -> tuple[str, ...]:
@@ -208,10 +208,10 @@ def print_frontier(frontier: "Frontier") -> None:
 
 
 def _grid(frontier: "Frontier") -> "Table":
-    from thenar.compiler.frontier.words import elements_of, rates_of
+    from thenar.compiler.frontier.words import elements_of, of_time, rates_of
 
     counts, rates = ("point", elements_of(frontier)), rates_of(frontier)
-    numbers = (*(f"{what} %" for what in rates), *_NUMBERS)
+    numbers = (*(f"{what} %" for what in rates), *(of_time(frontier, what) for what in _TIMES), *_SIZES)
     grid = table((*counts, *_WORDS, *numbers), (*counts, *numbers), Text(_title(frontier)))
     for point in frontier.points:
         rated = [interval(rate(point)) for rate in rates.values()]
@@ -221,7 +221,7 @@ def _grid(frontier: "Frontier") -> "Table":
 
 def _title(frontier: "Frontier") -> str:
     wanted = f"; {frontier.wanted}: point {frontier.picked}" if frontier.picked is not None else ""
-    return f"The best of {frontier.combinations:,} combinations, {frontier.source} on {frontier.target}{wanted}"
+    return f"The best of {frontier.combinations:,} combinations, {frontier.source} on {frontier.machine}{wanted}"
 
 
 def _cells(point: "Point", rated: Sequence[str]) -> tuple[Text, ...]:

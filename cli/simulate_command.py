@@ -61,7 +61,8 @@ _OWN = "dim"  # style of the scene-independent steps
     type=seed_range,
     help="Redraw everything random: habits, calibrations, the glove's parts, all grasps. Hand sizes stay.",
 )
-@click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Simulate only this subject; repeatable.")
+@click.option("--subject", "names", multiple=True, metavar="NAME", help="Simulate only this subject; repeatable.")
+@click.option("--subjects", metavar="N", type=click.IntRange(1), help="Simulate only the first N subjects.")
 @click.option(
     "--rest",
     type=click.Choice(("relaxed", "flat")),
@@ -79,7 +80,8 @@ def command(
     repetitions: int | None,
     more: int | None,
     seed: int | None,
-    subjects: tuple[str, ...],
+    names: tuple[str, ...],
+    subjects: int | None,
     rest: "Rest | None",
     keep_unsettled: bool,
     jobs: int,
@@ -94,6 +96,7 @@ def command(
         thenar simulate quick --explain
         thenar simulate quick -o set.grasps
         thenar simulate quick --more 3 -o fresh.grasps
+        thenar simulate crowd --subjects 20 --repetitions 6 -o hands.grasps
         thenar simulate continuous --rest flat -o flat.grasps
     """
     from thenar.simulator.scenes.decode import load_scene, own_file, shipped_scenes
@@ -102,7 +105,7 @@ def command(
     if scene is None:
         show(shipped_scenes(), _print_scenes)
         return
-    loaded = load_scene(scene).varied(repetitions, seed, subjects, more, rest)
+    loaded = load_scene(scene).varied(repetitions, seed, names, more, rest, subjects)
     with _located(scene):
         if output is not None:
             keep_apart(own_file(scene), loaded.postures, output)

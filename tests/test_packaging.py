@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import tomllib
 import venv
 import zipfile
@@ -35,10 +36,11 @@ def test_every_room_is_marked_as_typed() -> None:
     assert all((ROOT / room / "py.typed").exists() for room in ROOMS)
 
 
-def base_distributions() -> set[str]:
-    """Return the names of thenar's base dependencies and of theirs."""
+def needed(extra: str = "") -> set[str]:
+    """Return the names of the dependencies of thenar and of an extra, and of theirs."""
     names: set[str] = set()
-    left = [re.split(r"[ <>=!~;\[]", requirement, maxsplit=1)[0] for requirement in PROJECT["project"]["dependencies"]]
+    listed = PROJECT["project"]["dependencies"] + PROJECT["project"]["optional-dependencies"].get(extra, [])
+    left = [re.split(r"[ <>=!~;\[]", requirement, maxsplit=1)[0] for requirement in listed]
     while left:
         name = left.pop()
         try:
@@ -51,21 +53,53 @@ def base_distributions() -> set[str]:
     return names
 
 
-@pytest.fixture(scope="module")
-def distributions(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of the sdist and of the wheel that is built from it, as `make dist` builds them."""
-    folder = tmp_path_factory.mktemp("distributions")
-    source = folder / "source"
+def checkout(source: Path) -> None:
+    """Copy what the distributions are built from."""
     for name in (*ROOMS, "src"):
         leave_out = shutil.ignore_patterns("__pycache__", "*.egg-info")
         shutil.copytree(ROOT / name, source / name, symlinks=True, ignore=leave_out)
-    for name in ("pyproject.toml", "README.md", "LICENSE", "MANIFEST.in"):
+    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE", "MANIFEST.in"):
         shutil.copy(ROOT / name, source / name)
-    # No isolation: that would fetch setuptools.
-    build = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(folder / "dist"), str(source)]
-    done = subprocess.run(build, capture_output=True, text=True, check=False)
+
+
+def built(source: Path, into: Path) -> subprocess.CompletedProcess[str]:
+    """Build as `make dist` does, but without isolation, which would fetch setuptools."""
+    build = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(into), str(source)]
+    return subprocess.run(build, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def distributions(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the sdist and of the wheel that is built from it."""
+    folder = tmp_path_factory.mktemp("distributions")
+    checkout(folder / "source")
+    done = built(folder / "source", folder / "dist")
     assert done.returncode == 0, done.stdout + done.stderr
     return folder / "dist"
+
+
+@pytest.mark.slow
+def test_the_sdist_has_no_links_and_builds_where_there_are_none(distributions: Path) -> None:
+    (sdist,) = distributions.glob("*.tar.gz")
+    with tarfile.open(sdist) as content:
+        members = content.getmembers()
+    assert not [member.name for member in members if member.issym() or member.islnk()]
+    names = {member.name.split("/", 1)[-1] for member in members}
+    assert {f"src/thenar/{room}/__init__.py" for room in ROOMS} <= names
+
+
+@pytest.mark.slow
+def test_a_checkout_without_links_says_what_to_do_and_builds_nothing(tmp_path: Path) -> None:
+    """As git makes it with core.symlinks=false: a link is a file that holds its target."""
+    checkout(tmp_path / "source")
+    for link in (tmp_path / "source" / "src" / "thenar").iterdir():
+        target = str(link.readlink())
+        link.unlink()
+        link.write_text(target)
+    done = built(tmp_path / "source", tmp_path / "dist")
+    assert done.returncode != 0
+    assert "this checkout has no symbolic links" in done.stdout + done.stderr
+    assert not list(tmp_path.glob("dist/*"))
 
 
 @pytest.mark.slow
@@ -84,10 +118,14 @@ def test_the_metadata_of_both_distributions_passes_a_strict_check(distributions:
 @pytest.fixture(scope="module")
 def board(distributions: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the Python of a virtual environment with the wheel and its base dependencies and nothing else."""
-    folder = tmp_path_factory.mktemp("board")
+    return environment(tmp_path_factory.mktemp("board"), distributions, needed())
+
+
+def environment(folder: Path, distributions: Path, names: set[str]) -> Path:
+    """Return the Python of a virtual environment with the wheel and the packages of these names."""
     venv.create(folder / "env", with_pip=False, symlinks=True)
     site = Path(sysconfig.get_path("purelib", "venv", {"base": str(folder / "env"), "platbase": str(folder / "env")}))
-    for name in base_distributions():
+    for name in names:
         for file in metadata.files(name) or []:
             top = file.parts[0]
             if top != ".." and not (site / top).exists():
@@ -143,3 +181,18 @@ def test_a_board_has_none_of_the_workstations_packages_and_imports_the_runtime(b
 @pytest.mark.slow
 def test_the_command_runs_on_a_board(board: Path) -> None:
     assert "compile" in on_board(board, "from thenar.cli import run; raise SystemExit(run(['--help']))")
+
+
+@pytest.mark.slow
+def test_an_installed_wheel_imports_compiles_and_replays(distributions: Path, tmp_path: Path) -> None:
+    python = environment(tmp_path, distributions, needed("compiler"))
+    table = ROOT / "examples" / "home_glove.csv"
+    for command in (
+        ["import", str(table), "-o", "set.grasps", "--yes"],
+        ["compile", "set.grasps", "-o", "build", "--prune", "200", "--trainer", "logit", "--folds", "0", "--no-report"],
+        ["run", "build", "--replay", "set.grasps"],
+    ):
+        run = [python, "-I", "-m", "thenar.cli", *command]
+        done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+    assert "2304 frames" in done.stderr

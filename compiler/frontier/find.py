@@ -334,6 +334,7 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
         n_joints=survey.n_joints,
         grasps=survey.samples.grasps,
         target=survey.equipment.model.target,
+        machine=survey.equipment.model.machine,
         folds=search.folds,
         repeats=len(survey.cuts.repeats),
         combinations=sum(len(design.decisions) for design in every) + len(tried),

@@ -15,7 +15,7 @@ from ..pictures import on_paper, painting, rendered
 from ..text import counted, duration, percent
 from .labels import FAINT, LINE, Label, Labels
 from .points import Curve, Frontier, Mark, Point, Tried, front
-from .words import counted_elements, elements_of, featured, inputs_of, shorten
+from .words import counted_elements, elements_of, featured, inputs_of, of_time, shorten
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -135,6 +135,7 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
         _scale_counts(axes, frontier.n_switches + frontier.n_levels)
     untimed = cost.is_time and any(point.transfer.how == "unknown" for _, point in points)
     axis = cost.axis.replace("switches", elements_of(frontier))
+    axis = of_time(frontier, axis) if cost.is_time else axis
     axes.set_xlabel(axis + "; reading the joints is left out" * untimed, color=_INK)
 
     labels, spoken_of = Labels(axes), featured(frontier)
@@ -184,7 +185,7 @@ def _sheet(frontier: Frontier, title: str) -> tuple["Figure", "Axes"]:
     left, right, bottom, top = _LEFT / _WIDTH, _RIGHT / _WIDTH, _BOTTOM / _HEIGHT, _TOP / _HEIGHT
     under = (
         f"{shorten(frontier.source)}: {frontier.trials:,} trials of {counted(frontier.subjects, 'person', 'people')}, "
-        f"{len(frontier.grasps)} types; {shorten(frontier.target)}; "
+        f"{len(frontier.grasps)} types; {shorten(frontier.machine)}; "
         f"placement inside the fold, corrected for luck, 95 % intervals"
     )
     figure.text(left, 1 - 0.30 / _HEIGHT, title, fontsize=13, fontweight="bold", color=_INK)

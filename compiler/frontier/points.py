@@ -17,8 +17,9 @@ MAX_BYTES = 64 << 20
 
 # measured: wall time on this machine. simulated: cycles of the real firmware in a simulator. wire: calculated from
 # clocks and baud rates, validated against an emulated bus. model: predicted by a model validated against measurements.
-# formula: the vendor's, from a single source. given: by the user. unknown: left out of every sum.
-How = Literal["measured", "simulated", "wire", "model", "formula", "given", "unknown"]
+# formula: the vendor's, from a single source. given: by the user. guess: measured elsewhere, times an assumed factor.
+# unknown: left out of every sum.
+How = Literal["measured", "simulated", "wire", "model", "formula", "given", "guess", "unknown"]
 Scan = Literal["full", "early", "demand"]
 DecisionKind = Literal["single", "dwell", "sequential", "segments"]
 # The population of a rate: left-out subjects, or rows of all subjects in random folds of whole trials.
@@ -185,6 +186,7 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The result of `thenar frontier`.
 
     by       the rate by which points are chosen, which is each `rate`; a point's `other_rate` is the other
+    machine  what classifies in the stated times, in words; measured ones are of this machine
     n_levels  most levels of the n_taxels to choose from, in addition to the switches
     picked   number of the point selected by the given budget or rate; None if neither was given
     skipped  sentences: measurements that were not possible here, and options that were left out
@@ -202,6 +204,7 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     n_joints: Count
     grasps: tuple[str, ...]
     target: str
+    machine: str
     folds: Count
     repeats: Count
     combinations: Count
@@ -220,6 +223,11 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     def trainers(self) -> tuple[str, ...]:
         """The trainers that were tried."""
         return tuple(dict.fromkeys(each.trainer for each in self.tried))
+
+    @property
+    def guessed(self) -> bool:
+        """Whether its times of frames are guesses."""
+        return any(point.frame.how == "guess" for point in self.points)
 
     @property
     def other(self) -> By | None:

@@ -136,7 +136,7 @@ def summary(frontier: Frontier) -> str:
     trained = f", trained by {trainer_of(point.setting)}," if len(frontier.trainers) > 1 else ","
     said = (
         f"Point {point.number}: {_inputs(frontier, point)}{trained} read and classified in "
-        f"{duration(point.frame.us)} on {frontier.target}, reach {interval(point.rate)} % accuracy ({point.rate.what})"
+        f"{duration(point.frame.us)} on {frontier.machine}, reach {interval(point.rate)} % accuracy ({point.rate.what})"
     )
     against = [_mark(mark, frontier) for mark in frontier.marks]
     return ". ".join(filter(None, (f"{said}, against {listed(against)}" if against else said, luck_of(point)))) + "."
@@ -192,6 +192,11 @@ def _mark(mark: Mark, frontier: Frontier) -> str:
     named = str(mark.n_switches) in mark.name
     name = mark.name if named else f"{counted_elements(frontier, mark.n_switches)} ({mark.name})"
     return f"{percent(mark.rate.mean)} in {duration(mark.frame_us)} with {name}"
+
+
+def of_time(frontier: Frontier, what: str) -> str:
+    """Return the name of a column or an axis of times: "frame", or "frame (guess)"."""
+    return f"{what} (guess)" if frontier.guessed else what
 
 
 def csv_bytes(frontier: Frontier) -> bytes:

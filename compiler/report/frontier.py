@@ -18,6 +18,7 @@ from ..frontier.words import (
     featured,
     folds_of,
     inputs_of,
+    of_time,
     rates_of,
     summary,
     training_of,
@@ -174,7 +175,7 @@ def _detail(point: Point, frontier: Frontier, hand: HandShape | None) -> Detail:
     words = ", ".join(filter(None, (*what, _wiring(point))))
     return Detail(
         number=point.number,
-        said=f"Point {point.number}: {words}; {point.rate} in {microseconds(point.frame.us)} µs.",
+        said=f"Point {point.number}: {words}; {point.rate} in {_time(point.frame)}.",
         facts=tuple(_facts(point, frontier)),
         switches=point.switches,
         on_hand=() if hand is None else tuple(hand.numbers_of(point.switches).tolist()),
@@ -203,7 +204,7 @@ def _facts(point: Point, frontier: Frontier) -> Iterable[tuple[str, str]]:
     yield "Frame", _time(point.frame)
     yield "Decision", setting.decision
     mean, late = _latency(point)
-    yield "Latency", DASH if mean == DASH else f"{mean} µs, 99th percentile {late} µs"
+    yield of_time(frontier, "Latency"), DASH if mean == DASH else f"{mean} µs, 99th percentile {late} µs"
     yield "Grasps missed", f"{100 * point.latency.missed:.1f} %"
     yield "Flash and RAM", f"{point.flash:,} and {point.ram:,} bytes"
     yield "To compile", f"{point.compile_s:.1f} s"
@@ -234,9 +235,7 @@ def _points(frontier: Frontier) -> PlainTable:
         "Inputs",
         "Method",
         *rates_of(frontier),
-        "Frame, µs",
-        "Latency, µs",
-        "99th pct., µs",
+        *(of_time(frontier, what) for what in ("Frame, µs", "Latency, µs", "99th pct., µs")),
     )
     rows = tuple(
         (
@@ -264,7 +263,7 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
             (mark.name, str(mark.n_switches), interval(mark.rate), microseconds(mark.frame_us))
             for mark in frontier.marks
         )
-        yield PlainTable("Reference points", ("What", kept, f"{frontier.by}, %", "Frame, µs"), marks)
+        yield PlainTable("Reference points", ("What", kept, f"{frontier.by}, %", of_time(frontier, "Frame, µs")), marks)
     if frontier.curves:
         sizes = sorted({size for curve in frontier.curves for size in curve.sizes})
         rows = []
@@ -287,7 +286,7 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
             )
             for each in frontier.tried
         )
-        columns = ("Placement", "Inputs", kept, "Rounds", f"{frontier.by}, %", "Frame, µs")
+        columns = ("Placement", "Inputs", kept, "Rounds", f"{frontier.by}, %", of_time(frontier, "Frame, µs"))
         yield PlainTable("Screened placements", columns, tried)
     if frontier.checks:
         checks = tuple(
@@ -309,8 +308,8 @@ def _notes(frontier: Frontier) -> Iterator[str]:
         f"{counted(frontier.trials, 'trial')}, "
         f"{counted(frontier.subjects, 'subject')}, {counted(frontier.n_switches, 'switch', 'switches')}, "
         f"{_taxels(frontier)}"
-        f"{counted(frontier.n_joints, 'joint')}; target {frontier.target}. {folds_of(frontier)}, placement inside the "
-        f"fold, with 95{NBSP}% intervals. {LUCK}"
+        f"{counted(frontier.n_joints, 'joint')}; times on {frontier.machine}. "
+        f"{folds_of(frontier)}, placement inside the fold, with 95{NBSP}% intervals. {LUCK}"
     )
     if frontier.wanted and frontier.picked is not None:
         yield f"Point {frontier.picked} was picked for {frontier.wanted}."

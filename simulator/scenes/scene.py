@@ -2,8 +2,6 @@
 
 A scene comes from a TOML file (decode.py) or is built here; lengths are in millimetres, times in milliseconds.
 
-A scene comes from a TOML file (decode.py) or is put together here; lengths are in millimetres, times in milliseconds.
-
 Every subject has separate draws, so that a larger count leaves the first subjects unchanged.
 """
 
@@ -133,12 +131,16 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         subjects: Sequence[str] = (),
         more: int | None = None,
         rest: Rest | None = None,
+        first: int | None = None,
     ) -> "Scene":
         """Return the scene with other repetitions, another seed, only the `subjects` of these names, or another `rest`.
 
-        With `more`, it has this many new repetitions instead, by the same hands, which follow its own. Another seed
-        changes all draws except the sizes of the hands. Raises SceneError if it has no such subject.
+        With `more`, it has this many new repetitions instead, by the same hands, which follow its own; with `first`,
+        only that many of these subjects. Another seed changes all draws except the sizes of the hands. Raises
+        SceneError if it has no such subject, or fewer.
         """
+        if first is not None and first > len(self.subjects):
+            raise SceneError(f"scene {self.name} has {len(self.subjects)} subject(s), {first} are requested")
         known = {subject.name: subject for subject in self.subjects}
         for subject in subjects:
             if subject not in known:
@@ -149,7 +151,7 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             repetitions=own if more is None else more,
             done=self.done if more is None else self.done + own,
             seed=self.seed if seed is None else seed,
-            subjects=tuple(known[name] for name in known if not subjects or name in subjects),
+            subjects=tuple(known[name] for name in known if not subjects or name in subjects)[:first],
             recording=msgspec.structs.replace(self.recording, rest=rest or self.recording.rest),
         )
 

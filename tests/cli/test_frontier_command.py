@@ -12,6 +12,7 @@ import pytest
 
 from thenar.compiler import GraspSet
 from thenar.compiler.frontier.points import Frontier, frontier_from_bytes
+from thenar.compiler.frontier.timing.machine import machine_name
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime import Build
 
@@ -99,6 +100,24 @@ def test_running_again_asks_nothing_twice_and_json_is_the_frontier(
     assert (again / "store.jsonl").read_bytes() == (found_folder / "store.jsonl").read_bytes()
     second = frontier_from_bytes((again / "frontier.json").read_bytes())
     assert second.points == found.points
+
+
+def test_every_time_names_its_machine_and_a_guess_says_so(
+    thenar: Thenar, set_file: Path, found_folder: Path, found: Frontier, tmp_path: Path
+) -> None:
+    assert found.machine == machine_name()
+    again = tmp_path / "again"
+    shutil.copytree(found_folder, again)
+    done = thenar("frontier", set_file, "-o", again, *QUICK, "--target", "pi")
+    assert done.returncode == 0, done.stderr
+    printed = " ".join(done.stdout.split())
+    guess = f"on Raspberry Pi, a guess: 4 times {machine_name()}"
+    assert printed.count(guess) == 2  # above the table, and in the sentence below it
+    there = frontier_from_bytes((again / "frontier.json").read_bytes())
+    assert f"on {there.machine}" == guess
+    assert {each.how for point in there.points for each in (point.classify, point.frame)} == {"guess"}
+    assert {point.scan.how for point in there.points if point.setting.wiring == "mcp23017"} <= {"guess"}
+    assert {row["frame_how"] for row in csv.DictReader((again / "frontier.csv").read_text().splitlines())} == {"guess"}
 
 
 @pytest.mark.parametrize("worth", ["best", "joints"])

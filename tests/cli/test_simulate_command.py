@@ -72,6 +72,14 @@ def test_a_scene_can_be_changed_on_the_way(tmp_path: Path, capsys: Captured) -> 
     assert json.loads(capsys.readouterr().out)["subjects"] == ["C"]
 
 
+def test_the_first_subjects_of_a_scene_are_those_that_their_names_give(tmp_path: Path, capsys: Captured) -> None:
+    first, named = tmp_path / "first.grasps", tmp_path / "named.grasps"
+    assert run(["simulate", "crowd", *SMALL, "--subjects", "2", "-o", str(first)]) == 0
+    assert run(["simulate", "crowd", *SMALL, "--subject", "P002", "--subject", "P001", "-o", str(named)]) == 0
+    assert "2 subject(s), 28 grasps" in capsys.readouterr().out
+    assert first.read_bytes() == named.read_bytes()
+
+
 def test_whole_movements_may_have_a_rest_between_them_and_the_summary_says_how_many_rows_are_none(
     tmp_path: Path, capsys: Captured
 ) -> None:
@@ -185,6 +193,7 @@ def test_shipped_scenes_are_listed_with_what_they_are(capsys: Captured) -> None:
         (["quik", "--explain"], "no shipped scene is called 'quik' (did you mean 'quick'?)"),
         (["no/such.toml", "--explain"], "such.toml"),
         (["quick", "--explain", "--subject", "Q"], "scene quick has no subject 'Q'"),
+        (["quick", "--explain", "--subjects", "3"], "scene quick has 2 subject(s), 3 are requested"),
         (["quick", "--explain", "--repetitions", "0"], "repetitions"),
         (["quick", "-o", "no/such/folder/set.grasps"], "There is no folder"),
         (

@@ -193,6 +193,7 @@ def _frontier() -> list[bytes]:
         n_joints=3,
         grasps=GRASPS,
         target="host",
+        machine="AMD EPYC, Python 3.11",
         folds=2,
         repeats=1,
         combinations=40,

@@ -55,7 +55,7 @@ def unchecked(model: ClassifyModel) -> str | None:
     """Return, in a sentence, why the model cannot be validated here; None if it can."""
     if model.part is None:
         other = "classify times on pi were not validated by measurement: this machine is no Raspberry Pi"
-        return other if model.factor != 1.0 else None
+        return other if model.guessed else None
     if lack := model.part.missing():
         return f"classify times on {model.target} were not validated in a simulator: {lack}"
     return None

@@ -8,10 +8,10 @@ from ...firmware import FirmwareError
 from ...firmware.choose import Option, choose, features, flash_shares
 from ...firmware.targets import TARGETS, Target, timed
 from ..points import FrontierError, How
+from .machine import machine_name, on_a_pi
 from .python_times import PythonCost, fit_here
-from .scan_times import on_a_pi
 
-# Python's time on a Raspberry Pi 4 relative to here. Doubtful: a guess, and "here" is any machine.
+# Python's time on a Raspberry Pi 4 relative to here: a guess, and "here" is any machine.
 PI_FACTOR = 4.0
 
 
@@ -67,7 +67,8 @@ class ClassifyModel:
         if self.part is None:
             assert self.python is not None
             size = len(tables_to_bytes(tables))
-            return (Classified("", self.python.us(tables) * self.factor, "model", size, size),)
+            how: How = "guess" if self.guessed else "model"
+            return (Classified("", self.python.us(tables) * self.factor, how, size, size),)
         return tuple(
             Classified(features(layout, self.part), self.us(cost.cycles), "model", cost.flash, cost.ram)
             for layout, cost in fitting(tables, self.part)
@@ -79,6 +80,19 @@ class ClassifyModel:
         return steps * 1e6 / self.clock_hz
 
     @property
+    def guessed(self) -> bool:
+        """Whether its times are guesses: of a Raspberry Pi, on another machine."""
+        return self.factor != 1.0
+
+    @property
+    def machine(self) -> str:
+        """The machine that its times are of."""
+        if self.part is not None and self.clock_hz is not None:
+            return f"{self.part.named} at {self.clock_hz / 1e6:g} MHz"
+        guess = f"Raspberry Pi, a guess: {self.factor:g} times "
+        return f"{guess if self.guessed else ''}{machine_name()}"
+
+    @property
     def note(self) -> str:
         """The caveat on its times, in a sentence; "" if there is none."""
         if self.part is not None and not self.part.avr and self.clock_hz is not None:
@@ -86,7 +100,9 @@ class ClassifyModel:
                 f"on {self.target} times are instructions, counted by qemu, at {self.clock_hz / 1e6:g} MHz and one "
                 "cycle each: a lower bound, for many instructions take more cycles"
             )
-        if self.target == "pi" and self.factor != 1.0:
+        if self.python is not None and not self.guessed:
+            return "times of classifying in Python leave out the check for unusual frames, which most builds make"
+        if self.guessed:
             return (
                 f"Python on a Raspberry Pi is taken to be {self.factor:g} times as slow as on this machine, which is a "
                 "guess: run thenar frontier --target pi on the Pi itself"

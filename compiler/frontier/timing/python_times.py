@@ -59,8 +59,8 @@ def fit_here() -> PythonCost:
 
 
 def classify_us(several: Sequence[IntegerTables], yardstick: float | None = None) -> list[float]:
-    """Return the time of classifying a frame here with each of the tables, as `Build.classify` does it: the mean over
-    random frames.
+    """Return the time of classifying a frame here with each of the tables, as `Build.classify` does it, but without the
+    check for unusual frames: the mean over random frames.
 
     yardstick  microseconds of tables of the shape YARDSTICK at the reference speed; None: at the current speed
 

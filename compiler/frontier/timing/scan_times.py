@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from fcntl import ioctl
 from math import fsum
-from pathlib import Path
 from statistics import median
 
 import numpy as np
@@ -25,6 +24,7 @@ from thenar.runtime.tables import IntegerTables
 
 from ...firmware.targets import TARGETS
 from ..points import How, Time
+from .machine import on_a_pi
 from .wirings import Wiring
 
 # Number of evenly spaced frames that decide the order of ports; all frames decide how often a scan then ends early.
@@ -35,7 +35,6 @@ ASKING_US = sending_us(len(POLL), 115_200)
 # Overhead of one transfer on a Raspberry Pi. Doubtful: a kernel trace of a Pi 3 has 20 us from the call to the adapter
 # and 6 us back; others measured 300 us (Pi Zero) with an older library.
 PI_CALL_US = 30.0
-MODEL_FILE = Path("/proc/device-tree/model")
 _CALLS, _BATCHES = 200, 9
 # Cycles of thenar's scanning firmware while no switch changes, fitted to libsimavr's counts (`simulated`) for 1 to 100
 # switches on chips of three kinds, within 5 %: per scan, key, reading, and byte of its reply. A change also needs to be
@@ -48,7 +47,7 @@ _BOARD = "avr328p"
 class Overhead:
     """Microseconds in addition to the wire: per transaction, byte read, scan, and key read.
 
-    what  a sentence on these and their source
+    what  a sentence on these and their source; how: the source of a scan's time with them
     """
 
     what: str
@@ -56,6 +55,7 @@ class Overhead:
     byte_us: float = 0.0
     scan_us: float = 0.0
     key_us: float = 0.0
+    how: How = "wire"
 
     def reading_us(self, reading: Reading) -> float:
         """Return the overhead of one transaction beyond its SCL periods."""
@@ -73,9 +73,10 @@ def overhead_of(target: str) -> Overhead:
         return Overhead(f"scans on {target} are those of the wire alone: thenar has no scanning firmware for it")
     if target == "pi" and not on_a_pi():
         return Overhead(
-            f"a transfer on a Raspberry Pi has {PI_CALL_US:g} us of overhead: doubtful, from a kernel trace of a "
-            "Pi 3; run thenar frontier on the Pi itself",
+            f"a transfer on a Raspberry Pi is taken to have {PI_CALL_US:g} us of overhead, which is a guess from a "
+            "kernel trace of a Pi 3: run thenar frontier on the Pi itself",
             call_us=PI_CALL_US,
+            how="guess",
         )
     measured = measured_call_us()
     return Overhead(
@@ -95,20 +96,13 @@ def firmware_overhead(target: str) -> Overhead:
         byte_us=_REPLY_BYTE * us,
         scan_us=_SCAN * us,
         key_us=_KEY * us,
+        how="model",
     )
 
 
 def board_overhead() -> Overhead:
     """Return the overhead of a scanner board with thenar's firmware before it sends."""
     return firmware_overhead(_BOARD)
-
-
-def on_a_pi() -> bool:
-    """Return whether this machine is a Raspberry Pi."""
-    try:
-        return "Raspberry Pi" in MODEL_FILE.read_text(errors="replace")
-    except OSError:
-        return False
 
 
 def measured_call_us() -> float:
@@ -148,7 +142,7 @@ class ScanTimes:
     early_us  the mean over recorded frames, each scan ended as soon as it is decided; early ends of separate buses are
               not modelled: they are read one after another, as `scan_us` of the runtime adds them up
     ports     transactions of a whole scan, where a board's frame is one; chips: a board is one
-    how       "wire", or "model" if firmware cycles are included
+    how       "wire", "model" if firmware cycles are included, or "guess" if a guess is
     early_ports  mean number of ports of chips read then, over the same frames: the scores are checked after each
     alone_us, alone_ports  the same if the joints are read after the switches, unless these decide
     asked     the share of frames in which they do not
@@ -206,7 +200,7 @@ def scan_times(
         early_us=max(early_us, board_us),
         ports=len(scan.ports) + len(boards) + len(streams),
         chips=len({(port.bus, port.chip) for port in scan.ports}) + len(boards),
-        how="model" if boards or overhead.scan_us else "wire",
+        how="model" if boards else overhead.how,
         early_ports=early_ports,
         alone_us=max(alone_us, board_us),
         alone_ports=alone_ports,

@@ -1,4 +1,5 @@
 from collections import Counter
+from pathlib import Path
 from random import Random
 
 import numpy as np
@@ -209,3 +210,22 @@ def test_of_several_repeats_a_trial_counts_once() -> None:
     paired = Paired.of(own, other, "another")
     assert (paired.better, paired.worse, paired.difference) == (2, 0, 2 / 9)
     assert str(paired) == "+22.2, p 0.5"
+
+
+def test_the_protocol_of_a_recording_day_shows_the_intervals_of_today() -> None:
+    """Of people, half with 85 % and half with 95 % of 80 trials (of an odd number, one with 90 %); of pooled trials."""
+    page = (Path(__file__).parents[3] / "docs" / "how-to" / "record.md").read_text(encoding="utf-8")
+    rows = {cells[1].strip(): cells[2:-1] for line in page.splitlines() if len(cells := line.split("|")) > 5}
+    lows, highs = list(map(float, rows["new subject, from"])), [line for line in page.splitlines() if "| to |" in line]
+    ends = [list(map(float, line.split("|")[2:-1])) for line in highs]
+    for people, low, high in zip(map(int, rows["people"]), lows, ends[0], strict=True):
+        right = [(68, 76)[number % 2] for number in range(people - people % 2)] + [72] * (people % 2)
+        hits = np.concatenate([np.arange(80) < count for count in right]).astype(int)
+        who = np.repeat(np.arange(people), 80)
+        rate = Rate.predicted(hits, np.ones_like(hits), np.arange(len(hits)), of="new subject", groups=who)
+        assert (round(100 * rate.low, 1), round(100 * rate.high, 1)) == (low, high)
+    for trials, low, high in zip(
+        map(int, rows["trials in all"]), map(float, rows["pooled, from"]), ends[1], strict=True
+    ):
+        rate = counted((round(0.9 * trials),), trials)
+        assert (round(100 * rate.low, 1), round(100 * rate.high, 1)) == (low, high)

@@ -121,6 +121,7 @@ def example_frontier(**changes: object) -> Frontier:
         n_joints=N_JOINTS,
         grasps=GRASPS,
         target="avr328p",
+        machine="ATmega328P at 16 MHz",
         folds=4,
         repeats=3,
         combinations=184_320,

@@ -180,7 +180,8 @@ def test_names_are_no_formulas_and_no_markup(examples: Any) -> None:
     curves = examples.example_frontier().curves
     frontier = examples.example_frontier(
         source=NASTY,
-        target=NASTY,
+        target="host",
+        machine=NASTY,
         marks=(mark,),
         curves=(msgspec.structs.replace(curves[0], method=NASTY), *curves[1:]),
     )

@@ -133,6 +133,21 @@ def test_a_point_that_misses_every_grasp_has_no_latency_to_show(frontier: Fronti
     assert 'data-point="1"' not in by_latency.drawing
 
 
+def test_the_section_names_the_machine_of_its_times_and_calls_a_guess_one(frontier: Frontier) -> None:
+    view = frontier_view(frontier, frontier.fingerprint, None)
+    assert any(f"times on {frontier.machine}." in note for note in view.notes)
+    assert "guess" not in repr(view)
+    guess, replaced = frontier.points[0].frame, msgspec.structs.replace
+    points = [replaced(point, frame=replaced(guess, us=point.frame.us, how="guess")) for point in frontier.points]
+    view = frontier_view(replaced(frontier, points=tuple(points)), frontier.fingerprint, None)
+    assert {"Frame, µs (guess)", "Latency, µs (guess)", "99th pct., µs (guess)"} <= {*view.points.columns}
+    timed = [column for each in view.tables for column in each.columns if column.startswith("Frame")]
+    assert len(timed) == 2
+    assert {*timed} == {"Frame, µs (guess)"}
+    assert all("µs (guess)" in detail.said for detail in view.details)
+    assert ["(guess)</text>" in chart.drawing for chart in view.charts] == [True, False, True]
+
+
 def test_the_point_that_the_build_is_comes_first(frontier: Frontier, hand: HandShape) -> None:
     for built in (frontier.points[0].number, frontier.points[-1].number):
         view = frontier_view(frontier, frontier.fingerprint, hand, built)
