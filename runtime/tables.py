@@ -25,6 +25,7 @@ The payload of `tables.bin`, inside the envelope of `sealed.py`, all little-endi
 
 Tables with n > 0 slopes are of format 2: offset 6 holds n, and these follow
 
+            2           grid, uint16: 256 if rows of switches and bins are multiples of 256, else 1
             8 n         joint, low, high, uint16, and gain, int16, of each slope
             K n         rows, int8, a row of K per slope
 
@@ -55,11 +56,13 @@ MAX_BYTES = 16 << 20
 # tolerance (stumps.TIE): a safe row is never one that the ensemble decided by the number of the class.
 COARSEST_SCALE, FINEST_SCALE = 2.0**-64, 2.0**30
 _COUNTS = struct.Struct("<HHHHd")
+_GRID = struct.Struct("<H")
 _SLOPE = struct.Struct("<HHHh")
 _PAIR = struct.Struct("<HHHH")
 HIGHEST_CODE = 65535
 # Largest scaled range of codes: a distance from its middle, and its negative, must fit one byte.
 WIDEST = 254
+# The grid of rows of which an entry of 8 bits holds the upper half.
 COARSE = 256
 LOST = -1
 # Largest number of bin combinations of a pair: no bound is calculated for more.
@@ -138,6 +141,9 @@ class IntegerTables:
     bias (K,), switch_rows (s, K), thresholds: j arrays uint16 (T_a,), joint_rows: j arrays (T_a + 1, K),
     switch_means (s, K), joint_means (j, K), scale in steps per unit of score; slopes of joints, at most one each, in
     the order of the joints; or pairs of joints, each joint in one at most, in the order of their first joints.
+
+    grid is 1, or 256 for tables with slopes whose rows of switches and bins were rounded to multiples of 256 steps, and
+    whose scores are relative to the last class.
     """
 
     bias: Rows
@@ -149,10 +155,12 @@ class IntegerTables:
     scale: float
     slopes: tuple[Slope, ...] = ()
     pairs: tuple[Pair, ...] = ()
+    grid: int = 1
 
     def __post_init__(self) -> None:
         _check_counts(self.n_classes, self.n_switches, self.n_joints)
         _check_shapes(self)
+        _check_grid(self)
         if not 0 < self.scale <= FINEST_SCALE:
             raise BuildError(f"the scale is {self.scale!r}, it must be above 0 and at most 2^30 steps per unit")
         for number, thresholds in enumerate(self.thresholds):
@@ -186,12 +194,6 @@ class IntegerTables:
         """The joints, with those of a pair together: the contributions of different units are independent."""
         paired = {joint: pair.joints for pair in self.pairs for joint in pair.joints}
         return tuple(sorted({paired.get(joint, (joint,)) for joint in range(self.n_joints)}))
-
-    @property
-    def grid(self) -> int:
-        """The common factor of all rows of switches and bins, if joints have slopes: 256 if they share it, else 1."""
-        rows = [self.switch_rows, *(rows for rows in self.joint_rows if len(rows) > 1)]
-        return COARSE if self.slopes and not any((each % COARSE).any() for each in rows) else 1
 
     @property
     def relative(self) -> bool:
@@ -340,6 +342,14 @@ def _check_pairs(tables: IntegerTables) -> None:
             raise BuildError(f"joints {pair.joints} have {one} and {other} bins: too many for a pair")
 
 
+def _check_grid(tables: IntegerTables) -> None:
+    if tables.grid not in ((1, COARSE) if tables.slopes else (1,)):
+        raise BuildError(f"rows on a grid of {tables.grid} steps: it is 1, or {COARSE} in tables with slopes")
+    rows = [tables.switch_rows, *(rows for rows in tables.joint_rows if len(rows) > 1)]
+    if tables.grid == COARSE and not (tables.relative and all(not (each % COARSE).any() for each in rows)):
+        raise BuildError(f"rows on a grid of {COARSE} steps must be multiples of it, and 0 for the last grasp type")
+
+
 def _check_stored_scale(scale: float) -> None:
     # Coarser tables are sound, but no ensemble that a build may hold is as large as that.
     if not scale >= COARSEST_SCALE:
@@ -358,7 +368,8 @@ def payload_bytes(
     """
     rows = 1 + 2 * n_switches + sum(2 + count for count in thresholds) + sum((a + 1) * (b + 1) for a, b in pairs)
     words = len(thresholds) + sum(thresholds) + sum(a + b for a, b in pairs) + n_classes * rows
-    return _COUNTS.size + 2 * words + n_slopes * (_SLOPE.size + n_classes) + len(pairs) * _PAIR.size
+    slopes = _GRID.size + n_slopes * (_SLOPE.size + n_classes) if n_slopes else 0
+    return _COUNTS.size + 2 * words + slopes + len(pairs) * _PAIR.size
 
 
 def tables_to_bytes(tables: IntegerTables) -> bytes:
@@ -371,6 +382,7 @@ def tables_to_bytes(tables: IntegerTables) -> bytes:
     parts = [header, counts, *(r.astype("<i2").tobytes() for r in rows)]
     parts += [t.astype("<u2").tobytes() for t in tables.thresholds]
     parts += [r.astype("<i2").tobytes() for r in tables.joint_rows]
+    parts += [_GRID.pack(tables.grid)] if tables.slopes else []
     parts += [_SLOPE.pack(slope.joint, slope.low, slope.high, slope.gain) for slope in tables.slopes]
     parts += [slope.row.astype("<i1").tobytes() for slope in tables.slopes]
     parts += [_PAIR.pack(*pair.joints, *map(len, pair.thresholds)) for pair in tables.pairs]
@@ -429,7 +441,8 @@ def _parse(payload: bytes, version: int) -> IntegerTables:
         switch_means=rows[1],
         joint_means=rows[2],
         scale=scale,
-        slopes=_parse_slopes(payload[own:], n, K) if version == SLOPED else (),
+        slopes=_parse_slopes(payload[own + _GRID.size :], n, K) if version == SLOPED else (),
+        grid=_GRID.unpack_from(payload, own)[0] if version == SLOPED else 1,
         pairs=_parse_pairs(payload[own + n * _PAIR.size :], pairs, K) if pairs else (),
     )
 

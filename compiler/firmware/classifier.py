@@ -63,7 +63,7 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
         "held": [[k for k, (each, _) in enumerate(lanes) if each == lane] for lane in range(n_lanes)],
         "takes": [(lane, 32 - bits - shift, k) for k, (lane, shift) in enumerate(lanes)],
         "word_macros": _narrow_macros(parts.width) if biased else _sum_macros(parts.width, bits),
-        "start": _start_lines(_in_parts(layout.start, parts), lanes),
+        "start": _start_lines(_in_parts(layout.start, parts), lanes, 32 // bits),
         "finds": [_find(name, layout, lookup) for lookup in layout.lookups],
         "batches": layout.batches,
         "entry_shift": layout.entry_shift,
@@ -124,14 +124,13 @@ def _in_parts(scores: NDArray[np.int64], parts: Parts) -> list[list[int]]:
     return [scores[first : first + parts.width].tolist() for first in parts.firsts]
 
 
-def _start_lines(starts: Sequence[Sequence[int]], lanes: Sequence[tuple[int, int]]) -> list[str]:
-    """Return the lines of the initialiser of the sums, in braces for each part."""
+def _start_lines(starts: Sequence[Sequence[int]], lanes: Sequence[tuple[int, int]], room: int) -> list[str]:
+    """Return the lines of the initialiser of the sums, in braces for each part, `room` sums to a word."""
     lines = []
     for start in starts:
         sums: dict[int, list[int]] = {}
         for (lane, _), value in zip(lanes, start, strict=True):
             sums.setdefault(lane, []).append(value)
-        room = 4 if any(shift == 8 for _, shift in lanes) else 2
         words = [f"START({', '.join(map(str, (sums[lane] + [0] * room)[:room]))})" for lane in sorted(sums)]
         held = [", ".join(words[at : at + _STARTS_PER_LINE]) for at in range(0, len(words), _STARTS_PER_LINE)]
         lines += ["{", *(f"    {line}," for line in held), "},"]

@@ -35,7 +35,7 @@ def on_bytes(tables: IntegerTables, codes: Sequence[Sequence[int]]) -> IntegerTa
         )
     # A slope is kept where bytes are codes; elsewhere each byte has the row of its code.
     kept = tuple(slope for slope in tables.slopes if np.array_equal(codes[slope.joint], np.arange(BYTES)))
-    of_bytes = replace(tables, slopes=tuple(slope for slope in tables.slopes if slope not in kept))
+    of_bytes = replace(tables, slopes=tuple(slope for slope in tables.slopes if slope not in kept), grid=1)
     pairs = [_joint(of_bytes, number, np.asarray(joint, np.uint16)) for number, joint in enumerate(codes)]
     return replace(
         tables,
@@ -43,6 +43,7 @@ def on_bytes(tables: IntegerTables, codes: Sequence[Sequence[int]]) -> IntegerTa
         joint_rows=tuple(rows for _, rows in pairs),
         slopes=kept,
         pairs=tuple(_pair(pair, codes) for pair in tables.pairs),
+        grid=tables.grid if kept == tables.slopes else 1,
     )
 
 

@@ -302,6 +302,7 @@ def quantise(
         joint_means=np.zeros((len(merged), len(tables.bias)), np.int16),
         scale=scale,
         slopes=tuple(replace(slope, row=row.astype(np.int8)) for slope, row in slopes),
+        grid=grid,
         pairs=tuple(replace(pair, rows=np.rint(pair.rows * scale).astype(np.int16)) for pair in balanced.pairs),
     )
     joint_means = []

@@ -71,7 +71,7 @@ def test_the_bytes_of_slopes_are_as_documented() -> None:
     slope = Slope(0, 258, 300, -1, np.array([7, -8], np.int8))
     tables = IntegerTables(row[0], none, (np.array([], np.uint16),), (row,), none, row, 1.0, (slope,))
     counts = bytes.fromhex("0200 0000 0100 0100 000000000000f03f 0000")
-    assert bytes(_payload(tables)) == counts + bytes(12) + bytes.fromhex("0000 0201 2c01 ffff 07f8")
+    assert bytes(_payload(tables)) == counts + bytes(12) + bytes.fromhex("0100 0000 0201 2c01 ffff 07f8")
     for version, wrong in ((PLAIN, counts), (SLOPED, counts.replace(b"\1\0\1\0", b"\1\0\0\0"))):
         with pytest.raises(BuildError, match="offset 6"):
             tables_from_bytes(seal(KIND, version, wrong + bytes(12)))

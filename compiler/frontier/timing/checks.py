@@ -92,6 +92,7 @@ def _smaller(several: Sequence[IntegerTables]) -> Iterator[IntegerTables]:
 
 def with_fewer(tables: IntegerTables, switches: int, joints: int) -> IntegerTables:
     """Return the tables of the first switches and joints alone."""
+    slopes = tuple(slope for slope in tables.slopes if slope.joint < joints)
     return replace(
         tables,
         switch_rows=tables.switch_rows[:switches],
@@ -99,8 +100,9 @@ def with_fewer(tables: IntegerTables, switches: int, joints: int) -> IntegerTabl
         thresholds=tables.thresholds[:joints],
         joint_rows=tables.joint_rows[:joints],
         joint_means=tables.joint_means[:joints],
-        slopes=tuple(slope for slope in tables.slopes if slope.joint < joints),
+        slopes=slopes,
         pairs=tuple(pair for pair in tables.pairs if max(pair.joints) < joints),
+        grid=tables.grid if slopes else 1,
     )
 
 

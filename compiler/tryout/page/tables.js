@@ -22,6 +22,7 @@ export function parseTables(bytes) {
   const thresholds = counts.map((count) => words(count, false)), jointRows = counts.map((count) => rows(count + 1));
   const slopes = [], pairs = [];
   if (format === 2) {
+    at += 2; // the grid, for firmware
     for (let each = 0; each < n; each++) {
       const [joint, low, high] = words(3, false), [gain] = words(1, true);
       slopes.push({ joint, low, high, gain });

@@ -81,7 +81,7 @@ def _relative(tables: IntegerTables) -> IntegerTables:
         name: without(getattr(tables, name)) for name in ("bias", "switch_rows", "switch_means", "joint_means")
     }
     slopes = tuple(replace(slope, row=without(slope.row)) for slope in tables.slopes)
-    return replace(tables, **held, joint_rows=tuple(map(without, tables.joint_rows)), slopes=slopes)
+    return replace(tables, **held, joint_rows=tuple(map(without, tables.joint_rows)), slopes=slopes, grid=COARSE)
 
 
 def _slope(random: np.random.Generator, joint: int, classes: int, top: int, share: int) -> Slope:
