@@ -35,7 +35,7 @@ class SensorCount:
         )
 
     def __str__(self) -> str:
-        """Return "3 of 8 switches, 6 of 24 pads (14 levels) and 5 of 5 joints", without kinds that there are none of."""
+        """Return "3 of 8 switches, 6 of 24 pads (14 levels) and 5 of 5 joints", without kinds that the set lacks."""
         return listed(list(self._kinds()))
 
     def _kinds(self) -> Iterator[str]:

@@ -424,6 +424,11 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     hand_sha256: Digest | None = None
 
     @property
+    def knows_none(self) -> bool:
+        """Whether rows in which nothing is held were trained on."""
+        return self.grasps[-1] == NONE
+
+    @property
     def classes(self) -> tuple[str, ...]:
         """The possible predictions for a frame: the grasps, and NONE if that is possible and not among them."""
         return self.grasps if self.rejection is None else (*self.grasps, NONE)

@@ -64,8 +64,10 @@ def test_a_replay_counts_trials_where_they_have_several_frames(
 def test_the_last_line_of_a_replay_says_which_trials_were_trained_on(
     thenar: Thenar, small_set: GraspSet, tmp_path: Path
 ) -> None:
-    """Six frames a trial; the build knows the first six trials. A part, other names and repeated rows change nothing."""
-    whole = replace(small_set, trials=np.arange(60) // 18, codes=small_set.codes + np.arange(60, dtype=np.uint16)[:, None])
+    """Six frames a trial; the build knows the first six trials. Parts, other names and repeated rows change nothing."""
+    whole = replace(
+        small_set, trials=np.arange(60) // 18, codes=small_set.codes + np.arange(60, dtype=np.uint16)[:, None]
+    )
     known, rate = whole.rows(np.arange(36)), "accuracy, within subject: "
     known.save(tmp_path / "known.grasps")
     build = tmp_path / "build"
