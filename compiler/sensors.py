@@ -47,10 +47,3 @@ class SensorCount:
         ):
             if every:
                 yield f"{kept} of {counted(every, one, many)}{more}"
-
-
-def counted_sensors(switches: int, pads: int) -> str:
-    """Return "3 switches and 8 pads"; a kind of which there are none is left out."""
-    return listed(
-        [words for n, words in ((switches, counted(switches, "switch", "switches")), (pads, counted(pads, "pad"))) if n]
-    )
