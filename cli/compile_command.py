@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from thenar.compiler.text import INDEPENDENT, counted, duration, listed
+from thenar.compiler.text import INDEPENDENT, duration
 from thenar.runtime.manifest import AUTO
 from thenar.runtime.published import NONE
 
@@ -344,13 +344,14 @@ def _propose(manifest: "Manifest", path: Path | None, chip: str | None) -> None:
 
 
 def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
+    from thenar.compiler.sensors import SensorCount
     from thenar.runtime.scanning.propose import own_joints
 
     manifest, proof = made.manifest, made.manifest.proof
     console = out()
     console.print(
-        f"{folder}: {len(manifest.grasps) - (manifest.grasps[-1] == NONE)} grasp types from {_kept(manifest, made)}; "
-        f"tables of {made.tables_bytes} bytes"
+        f"{folder}: {len(manifest.grasps) - (manifest.grasps[-1] == NONE)} grasp types from "
+        f"{SensorCount.of_build(manifest)}; tables of {made.tables_bytes} bytes"
     )
     _print_training(manifest)
     for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
@@ -376,26 +377,14 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
             console.print(joints)
 
 
-def _kept(manifest: "Manifest", made: "BuildReport") -> str:
-    """Return the numbers of kept switches, levels and joints: "3 of 8 switches and 18 joints"."""
-    taxels, total = len(made.grasp_set.taxel_columns), manifest.source.switches
-    levels = [switch.source for switch in manifest.switches if switch.threshold is not None]
-    found = []
-    if total > taxels or not taxels:
-        found.append(f"{len(manifest.switches) - len(levels)} of {total - taxels} switches")
-    if taxels:
-        found.append(f"{counted(len(levels), 'level')} of {len(set(levels))} of {counted(taxels, 'taxel')}")
-    several = manifest.options.keep_joints is not None
-    joints = f"{len(manifest.joints)} of {len(made.grasp_set.joints)}" if several else str(len(manifest.joints))
-    return listed([*found, f"{joints} joints"])
-
-
 def _print_training(manifest: "Manifest") -> None:
     from thenar.drivers.cyberglove_protocol import sensors_with, shortest_us
 
     console = out()
     if manifest.switches:
-        console.print(f"switches: {', '.join(switch.name for switch in manifest.switches)}", soft_wrap=True)
+        levels = any(switch.threshold is not None for switch in manifest.switches)
+        kept = ", ".join(switch.name for switch in manifest.switches)
+        console.print(f"{'switches and levels of pads' if levels else 'switches'}: {kept}", soft_wrap=True)
     for switch in manifest.switches:
         if switch.threshold is not None:
             console.print(f"{switch.name}: {switch.closed}, learnt")

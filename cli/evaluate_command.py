@@ -238,7 +238,7 @@ def _print_streams(study: "StreamStudy") -> None:
                     cells.append(DASH if value.mean is None else f"{times * value.mean:.1f}{ends}")
                 grid.add_row(Text(row.method), Text(row.what), *cells)
             console.print()
-            console.print(Text(f"inputs: {inputs}", "bold"))
+            console.print(Text(f"inputs: {inputs}; {study.recipe}", "bold"))
             console.print(grid)
     console.print(
         f"{counted(study.movements, 'movement')} of {counted(len(study.subjects), 'subject')}, {study.seconds:,.0f} s; "

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from thenar.compiler.text import counted
-
 from .common import (
     OutputFile,
     existing_file,
@@ -254,11 +252,11 @@ def _print(placement: "Placement") -> None:
     """Print the table of switches, their value, and remarks on how they were found."""
     title = "Placement" if placement.study is None else "Standard placement"
     if placement.tree is not None:
-        switches = table(("switch", "name", "gain, bits", "cumulative share"), title=title)
+        switches = table(("column", "name", "gain, bits", "cumulative share"), title=title)
         for kept in placement.switches:
             switches.add_row(str(kept.number), kept.name, f"{kept.gain_bits:.4f}", f"{kept.cumulative_share:.1%}")
     else:
-        switches = table(("order", "switch", "name"), title=title)
+        switches = table(("order", "column", "name"), title=title)
         for order, kept in enumerate(placement.switches, 1):
             switches.add_row(str(order), str(kept.number), kept.name)
     out().print(switches)
@@ -269,31 +267,23 @@ def _print(placement: "Placement") -> None:
 
 
 def _sentences(placement: "Placement") -> Iterator[str]:
-    kept = f"{len(placement.switches)} of {placement.n_switches} {_kind(placement)}"
-    share = f"({len(placement.switches) / placement.n_switches:.0%})"
+    kept = str(placement.sensors)
     if placement.study is not None:
         yield from _of_study(kept, placement.study)
     elif placement.tree is not None:
         tree, prune = placement.tree, placement.tree.min_samples
         yield (
-            f"{kept} {share} bring {placement.gain_bits:.3f} of {placement.entropy_bits:.3f} bits; the tree has "
+            f"{kept}: {placement.gain_bits:.3f} of {placement.entropy_bits:.3f} bits of the grasp type; the tree has "
             f"{len(tree.nodes) - tree.n_leaves} decisions, {tree.n_leaves} leaves, depth {tree.depth}"
             + (f", pruned at S = {prune}" if prune else "")
         )
         yield from _of_tree(placement, tree)
     else:
-        yield f"{kept} {share}{', in addition to the joints' if placement.joints else ''}. {placement.how}"
-    if taxels := {kept.number for kept in placement.switches if kept.above is not None}:
-        levels = sum(kept.above is not None for kept in placement.switches)
-        yield f"{counted(levels, 'level')} of {counted(len(taxels), 'taxel')}: a taxel is converted once"
+        yield f"{kept}{', in addition to the joints' if placement.joints else ''}. {placement.how}"
     if placement.kept_joints:
-        yield f"the best {counted(len(placement.kept_joints), 'joint')} in addition: {', '.join(placement.kept_joints)}"
+        yield f"the kept joints, in addition: {', '.join(placement.kept_joints)}"
     if placement.exact is not None:
-        yield from _of_exact(placement.exact, len(placement.switches))
-
-
-def _kind(placement: "Placement") -> str:
-    return "elements" if placement.n_levels else "switches"
+        yield from _of_exact(placement.exact, len(placement.switches), "elements" if placement.n_taxels else "switches")
 
 
 def _of_tree(placement: "Placement", tree: "Tree") -> Iterator[str]:
@@ -305,20 +295,20 @@ def _of_tree(placement: "Placement", tree: "Tree") -> Iterator[str]:
     yield from tree.remarks("switch")
 
 
-def _of_exact(exact: "Exactly", m: int) -> Iterator[str]:
+def _of_exact(exact: "Exactly", m: int, elements: str) -> Iterator[str]:
     if not exact.pairs:
         yield "all rows are of one grasp type: there is nothing to distinguish"
         return
     yield (
         f"of {exact.pairs:,} pairs of rows of different grasp types, {exact.alike / exact.pairs:.3%} look alike in "
-        f"these {m} switches: no classifier distinguishes them"
+        f"these {m} {elements}: no classifier distinguishes them"
     )
-    best = f"the best {m} switches"
+    best = f"the best {m} {elements}"
     if exact.proved:
         yield f"{best} leave {exact.best_found / exact.pairs:.3%}, which is proved optimal"
     else:
         yield (
-            f"{best} found leave {exact.best_found / exact.pairs:.3%}; no {m} switches leave less than "
+            f"{best} found leave {exact.best_found / exact.pairs:.3%}; no {m} {elements} leave less than "
             f"{exact.least / exact.pairs:.3%}"
         )
     yield f"so this placement is at most {100 * (exact.alike - exact.least) / exact.pairs:.3f} points from the best"

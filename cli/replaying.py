@@ -15,6 +15,9 @@ from .lines import echo
 from .sinks import say_what_was_lost, spoilt
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from thenar.runtime import Build
     from thenar.runtime.live.recogniser import Moment
     from thenar.runtime.policy import Policy
@@ -72,11 +75,11 @@ def replay_set(
     period_us: int,
 ) -> None:
     """Classify every row of a set of grasps alone and send it to each sink, or as a JSON line to stdout if there is
-    none; on stderr, print the accuracy.
+    none; on stderr, print the accuracy, and whether the build was trained on these trials.
     """
     import msgspec
 
-    from thenar.compiler.artifact.replay import replayed, trials_recognised
+    from thenar.compiler.artifact.replay import replayed, trained_on, trials_recognised
     from thenar.compiler.recordings.graspset import GraspSet
 
     whole, found = GraspSet.load(replay), list[str]()
@@ -100,9 +103,26 @@ def replay_set(
     rows = len(grasp_set)
     correct = sum(map(eq, found, grasp_set.grasps.tolist()))
     echo(f"{correct} of {rows} frames predicted correctly ({correct / max(rows, 1):.1%})", err=True)
-    if (trials := len(set(grasp_set.trial_ids.tolist()))) < rows:
-        correct = trials_recognised(grasp_set, found)
-        echo(f"{correct} of {trials} trials by majority of their frames ({correct / trials:.1%})", err=True)
+    if not rows:
+        return
+    hits = trials_recognised(grasp_set, found)
+    if len(hits) < rows:
+        echo(f"{hits.sum()} of {len(hits)} trials by majority of their frames ({hits.mean():.1%})", err=True)
+    # Of whole trials, even if the last one is replayed in part.
+    echo(_seen(build, hits, trained_on(build.manifest, whole)[: len(hits)]), err=True)
+
+
+def _seen(build: "Build", hits: "NDArray[np.bool_]", seen: "NDArray[np.bool_]") -> str:
+    """Return a sentence that says how many of the replayed trials (T,) the build was trained on."""
+    if not seen.any():
+        return "the build was trained on none of these trials"
+    new = ~seen
+    if new.any():
+        others = f"{hits[new].sum()} of the other {new.sum()} are predicted correctly ({hits[new].mean():.1%})"
+        return f"the build was trained on {seen.sum()} of these {len(seen)} trials; {others}"
+    rate = build.manifest.headline
+    expected = "their accuracy was not measured" if rate is None else f"accuracy, {rate}"
+    return f"the build was trained on these trials: new grasps are recognised less often ({expected})"
 
 
 @contextmanager

@@ -113,8 +113,8 @@ def _print(spec: "SpecSummary", written: str) -> None:
     console = out()
     hand = "" if spec.hand_length_mm is None else f", for a right hand of {spec.hand_length_mm:g} mm"
     wired = "a proposed wiring" if spec.proposed else f"wired as {spec.glove}"
-    console.print(f"{len(spec.switches)} switches, {wired}{hand}")
-    _print_switches(spec)
+    console.print(f"{spec.kept}; {wired}{hand}")
+    _print_sensors(spec)
     _print_wires(spec)
     _print_materials(spec)
     if spec.print_on:
@@ -125,18 +125,20 @@ def _print(spec: "SpecSummary", written: str) -> None:
         console.print(written, soft_wrap=True)
 
 
-def _print_switches(spec: "SpecSummary") -> None:
+def _print_sensors(spec: "SpecSummary") -> None:
+    from thenar.compiler.glove.layout import counted_sensors
+
     pins = {
         n: f"{reader.ref} {pin}" for reader in spec.readers for n, pin in zip(reader.switches, reader.pins, strict=True)
     }
-    switches = table(("switch", "name", "part", "side", "x, mm", "y, mm", "read by"), title="Switches")
-    for switch in spec.switches:
-        place = ("", "") if switch.x_mm is None or switch.y_mm is None else (f"{switch.x_mm:.1f}", f"{switch.y_mm:.1f}")
-        number = f"SW{switch.number}"
-        switches.add_row(number, switch.name, switch.part or "", switch.side or "", *place, pins[switch.number])
-    out().print(switches)
+    sensors = table(("sensor", "name", "part", "side", "x, mm", "y, mm", "read by"), title="Sensors")
+    for sensor in spec.sensors:
+        place = ("", "") if sensor.x_mm is None or sensor.y_mm is None else (f"{sensor.x_mm:.1f}", f"{sensor.y_mm:.1f}")
+        sensors.add_row(sensor.ref, sensor.name, sensor.part or "", sensor.side or "", *place, pins[sensor.number])
+    out().print(sensors)
     for reader in spec.readers:
-        out().print(f"{reader.ref}: {reader.place}, {len(reader.switches)} switches")
+        words = counted_sensors([spec.sensors[number - 1] for number in reader.switches])
+        out().print(f"{reader.ref}: {reader.place}, {words}")
 
 
 def _print_wires(spec: "SpecSummary") -> None:

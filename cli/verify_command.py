@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from thenar.compiler.text import INDEPENDENT
+from thenar.compiler.text import INDEPENDENT, counted
 
 from .common import ListOf, existing_file, existing_folder, json_flag, out, progress, show, table
 
@@ -81,8 +81,9 @@ def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bo
 
 def _print(found: "Verification") -> None:
     console = out()
+    trials = counted(found.trials, "trial")
     console.print(
-        f"{found.rows} rows, {'the' if found.same_recordings else 'not the'} ones that the build was made from"
+        f"{counted(found.rows, 'row')} of {trials}; the build was trained on {found.trained_on} of these trials"
     )
     console.print(
         f"ensemble to float tables: at most {found.collapse_difference:.3g} of a unit, "
@@ -100,12 +101,14 @@ def _print(found: "Verification") -> None:
             f"scan map: {found.scan.mean_read:.2f} of {found.scan.ports} ports read on average until a row is decided; "
             f"rows that change class because of that: {found.scan.changed}"
         )
-    whose = "rows trained on" if found.same_recordings else "rows of other recordings"
-    for counted in found.recognised:
-        rate = f"{100 * counted.rate:.1f} % [{100 * counted.low:.1f}, {100 * counted.high:.1f}]"
+    whose = {0: "trials not trained on", found.trials: "trials trained on"}.get(
+        found.trained_on, f"{found.trained_on} of {trials} trained on"
+    )
+    for each in found.recognised:
+        rate = f"{100 * each.rate:.1f} % [{100 * each.low:.1f}, {100 * each.high:.1f}]"
         console.print(
-            f"accuracy of the integers, {whose}: {rate}, {counted.integers:,} of {counted.total:,} {counted.unit}; "
-            f"of the ensemble {counted.ensemble:,}"
+            f"accuracy of the integers, {whose}: {rate}, {each.integers:,} of {each.total:,} {each.unit}; "
+            f"of the ensemble {each.ensemble:,}"
         )
     if (none := found.nothing_held) is not None:
         empty = f", and for {none.detected:,} of {none.empty:,} rows of nothing held" if none.empty else ""

@@ -46,6 +46,9 @@ def _written(default: _T) -> _T:
 class Origin(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """The recordings: SHA-256 of their content, number of rows, taxonomy, number of switches to choose from; the
     simulation that made them, absent for recordings; and whether each row is stated to be a separate trial.
+
+    taxels, joints  the numbers of those to choose from
+    trials          the first 32 bits of the digest of each trial, ascending: those of most trials, if there are many
     """
 
     fingerprint: Digest
@@ -54,6 +57,9 @@ class Origin(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     switches: Count
     simulated: str = ""
     independent: bool = False
+    taxels: Count = 0
+    joints: Count = 0
+    trials: Annotated[str, Meta(pattern="^([0-9a-f]{8})*$")] = ""
 
 
 class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -416,6 +422,11 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     rejection: Rejection | None = None
     segments: SegmentModel | None = None
     hand_sha256: Digest | None = None
+
+    @property
+    def knows_none(self) -> bool:
+        """Whether rows in which nothing is held were trained on."""
+        return self.grasps[-1] == NONE
 
     @property
     def classes(self) -> tuple[str, ...]:

@@ -107,11 +107,15 @@ def _wrong_columns(manifest: Manifest) -> Iterator[str]:
     if len(shares) > 1 or not shares <= {0, 2 * len(manifest.grasps)}:
         yield "says of other grasp types how often switches are closed"
     levels = [(switch.column, switch.threshold and switch.threshold.code) for switch in manifest.switches]
-    for columns in (levels, [joint.column for joint in manifest.joints]):
+    joints = [joint.column for joint in manifest.joints]
+    for columns in (levels, joints):
         if len(set(columns)) < len(columns):
             yield "takes two inputs from one column"
-    if max((column for column, _ in levels), default=-1) >= manifest.source.switches:
+    source = manifest.source
+    if max((column for column, _ in levels), default=-1) >= source.switches + source.taxels:
         yield "keeps a switch that the recordings do not have"
+    if max(joints, default=-1) >= source.joints:
+        yield "keeps a joint that the recordings do not have"
 
 
 def _wrong_segments(manifest: Manifest) -> Iterator[str]:

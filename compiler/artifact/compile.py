@@ -51,6 +51,7 @@ from . import CompileError
 from .documents import REPORT_NAME, SPEC_FOLDER, TRY_NAME, BuildReport, Documents, Progress
 from .drawn_hand import drawn_hand
 from .ensemble import ensemble_to_bytes
+from .replay import stored_digests
 from .training import (
     Tested,
     Trained,
@@ -358,9 +359,12 @@ class Making:
                 fingerprint=grasp_set.fingerprint(),
                 rows=len(grasp_set),
                 taxonomy=grasp_set.taxonomy.name,
-                switches=len(grasp_set.element_names),
+                switches=len(grasp_set.switch_names),
                 simulated=grasp_set.simulated,
                 independent=grasp_set.independent,
+                taxels=len(grasp_set.taxel_columns),
+                joints=len(grasp_set.joints),
+                trials=stored_digests(grasp_set),
             ),
             options=options,
             grasps=self.samples.grasps,

@@ -22,7 +22,8 @@ from thenar.runtime.segmenting.decoder import decode, emissions
 from thenar.runtime.segmenting.model import SegmentModel
 
 from ..evaluation.folds import Fold, leave_groups_out, trial_folds
-from ..evaluation.rates import student
+from ..evaluation.rates import RecipeWords, student
+from ..evaluation.study import recipe_words
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..segmenting.learning import LAG_TICKS, Counts, announced_live, live_states
@@ -72,9 +73,10 @@ class MethodRow(msgspec.Struct, frozen=True):
 
 
 class StreamStudy(msgspec.Struct, frozen=True):
-    """The result: the subjects, the number of movements, and the rows."""
+    """The result: what was trained, the subjects, the number of movements, and the rows."""
 
     fingerprint: str
+    recipe: RecipeWords
     subjects: tuple[str, ...]
     movements: int
     seconds: float
@@ -127,6 +129,7 @@ def study_streams(
             progress(done, len(tasks))
     return StreamStudy(
         fingerprint=grasp_set.fingerprint(),
+        recipe=recipe_words(options),
         subjects=subjects,
         movements=sum(len(segments_of(grasp_set.labels[each.rows], len(grasp_set.taxonomy.types))) for each in streams),
         seconds=sum(len(stream.rows) for stream in streams) * TICK_US / 1e6,

@@ -24,6 +24,7 @@ from ..tables.faults import count_faults, groups_of, worst_faults
 from . import CompileError
 from .documents import Progress
 from .ensemble import MAX_BYTES, ensemble_from_bytes, model_fault
+from .replay import trained_on
 from .training import predicted_classes
 from .verify_firmware import FirmwareVerification, select_inputs, verify_firmware
 
@@ -86,12 +87,13 @@ class Verification(Struct, frozen=True, kw_only=True):
     collapse_* compare the ensemble with the float tables, in units of score; integer_* the float tables with the
     integers, in steps. covered counts rows whose margin exceeds safe_margin, covered_changed those of them that change.
     recognised counts trials of grasps, and frames where trials have several; independent says that each recorded row is
-    a trial. nothing_held is present if the build can predict that nothing is held. worst looks beyond the rows; scan is
-    present if the build has a scan map, firmware if requested.
+    a trial. The build was trained on trained_on of the trials. nothing_held is present if the build can predict that
+    nothing is held. worst looks beyond the rows; scan is present if the build has a scan map, firmware if requested.
     """
 
-    same_recordings: bool
     rows: int
+    trials: int
+    trained_on: int
     independent: bool
     collapse_difference: float
     collapse_bound: float
@@ -168,9 +170,11 @@ def _verified(build: Build, model: Model, grasp_set: GraspSet, progress: Progres
     grasps, empty = np.array(build.grasps), grasp_set.is_none
     predicted = predicted_classes(build.tables, build.manifest.rejection, bits, codes)
     says = build.none if build.rejector is None else len(grasps)
+    seen = trained_on(build.manifest, grasp_set)
     return Verification(
-        same_recordings=grasp_set.fingerprint() == build.manifest.source.fingerprint,
         rows=len(grasp_set),
+        trials=len(seen),
+        trained_on=int(np.count_nonzero(seen)),
         independent=grasp_set.independent,
         collapse_difference=comparison.collapse_difference,
         collapse_bound=comparison.collapse_bound,

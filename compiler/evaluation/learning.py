@@ -19,7 +19,7 @@ from .folds import EvaluationError, Fold, Rows, leave_groups_out, trial_folds
 from .luck import Draws
 from .plan import CellPlan, Data, Planner, learners
 from .populations import NESTED, Population, Scheme
-from .rates import Rate
+from .rates import Rate, RecipeWords
 from .tables import Reader
 
 Floats = NDArray[np.float64]
@@ -61,11 +61,15 @@ class Learning:
     repetitions: tuple[int, ...]
     curves: tuple[LearningCurve, ...]
     note: str
+    recipe: RecipeWords
 
     @property
     def title(self) -> str:
         """The title of the curves."""
-        return f"Learning curves, {self.inputs}, nested: {self.of}, trials, by repetitions a grasp type and person"
+        return (
+            f"Learning curves, {self.inputs}, nested: {self.of}, trials, by repetitions a grasp type and person; "
+            f"{self.recipe}"
+        )
 
     @property
     def further(self) -> tuple[int, ...]:
@@ -87,7 +91,7 @@ class LearningPlan:
         """All cells."""
         return (cell for cells in self.cells.values() for cell in cells)
 
-    def read(self, reader: Reader, groups: NDArray[np.str_] | None, seed: int) -> Learning:
+    def read(self, reader: Reader, groups: NDArray[np.str_] | None, seed: int, recipe: RecipeWords) -> Learning:
         """Return the curves; groups (n,) are the subjects, if those are left out."""
         enough, curves = len(self.repetitions) >= LEAST, []
         for learner, cells in self.cells.items():
@@ -99,7 +103,7 @@ class LearningPlan:
             found = expected(self.repetitions, rates, hits, units, seed) if enough else ()
             curves.append(LearningCurve(learner, rates, found))
         note = f"The effect of more repetitions is not extrapolated from fewer than {LEAST} points: record more."
-        return Learning(self.inputs, self.of, self.repetitions, tuple(curves), "" if enough else note)
+        return Learning(self.inputs, self.of, self.repetitions, tuple(curves), "" if enough else note, recipe)
 
 
 def plan_learning(

@@ -13,6 +13,7 @@ from ..trainers.base import Training
 from ..workers import in_workers
 from .plan import ANGLE, ANGLE_SELECTED, SELECTED, Composition, Data, Planner, Progress, predictions
 from .populations import NESTED, OF, Population, Scheme, groups_of, populations
+from .rates import RecipeWords
 from .tables import Reader
 
 
@@ -30,6 +31,7 @@ class Permuted:
     """
 
     composition: str
+    recipe: RecipeWords
     of: Of
     unit: Unit
     rate: float
@@ -41,7 +43,8 @@ class Permuted:
     def __str__(self) -> str:
         """Return accuracy, chance level and p-value in a sentence."""
         return (
-            f"Permutation test of {self.composition}, {self.of}, {self.unit}, nested: {100 * self.rate:.1f} %; chance "
+            f"Permutation test of {self.composition}, {self.of}, {self.unit}, nested ({self.recipe}): "
+            f"{100 * self.rate:.1f} %; chance "
             f"{100 * self.chance:.1f} % (mean of {self.permutations} shuffles of labels within subjects, highest "
             f"{100 * self.highest:.1f} %); p = {self.p:.2g}"
         )
@@ -57,6 +60,7 @@ class Permutations:
     prune: int
     seed: int
     training: Training
+    recipe: RecipeWords
 
     def test(self, grasp_set: GraspSet, m: int, jobs: int, progress: Progress | None) -> Permuted:
         """Return the test with selected switches and joints, as far as the set has them; m > 0."""
@@ -71,6 +75,7 @@ class Permutations:
                 progress(len(shuffled), m)
         return Permuted(
             composition=f"{kind.name} {kind.what}",
+            recipe=self.recipe,
             of=OF[self.scheme],
             unit="trials",
             rate=correct / total,

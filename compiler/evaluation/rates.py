@@ -8,10 +8,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thenar.runtime.manifest import Of, Unit
+from thenar.runtime.manifest import Of, Options, Unit
 
 from ..samples import decided
-from ..text import interval
+from ..text import counted, interval
 
 UNITS: tuple[Unit, ...] = ("trials", "frames")
 
@@ -24,6 +24,18 @@ ALIKE: dict[Unit, float] = {"frames": 0.6, "trials": 0.3}
 WEIGHT = 0.5
 
 Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True)
+class RecipeWords:
+    """What rates are of: the placement method and the trainer, each with its settings, in words."""
+
+    method: str
+    trainer: str
+
+    def __str__(self) -> str:
+        """Return "placement: id3, S = 0; trainer: logit, penalty 1"."""
+        return f"placement: {self.method}; trainer: {self.trainer}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +162,13 @@ class Rate:
     def __str__(self) -> str:
         """Return "73.1 [55.2, 86.0] % new subject, trials"."""
         return f"{interval(self)} % {self.what}"
+
+
+def placement_words(options: Options) -> str:
+    """Return a placement method with its settings in words: "elimination, keep 16, the best 3 joints"."""
+    by = f"S = {options.prune}" if options.keep is None else f"keep {options.keep}"
+    joints = "" if options.keep_joints is None else f", the best {counted(options.keep_joints, 'joint')}"
+    return f"{options.placement}, {by}{joints}"
 
 
 def rated(

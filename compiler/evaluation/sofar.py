@@ -34,6 +34,8 @@ Floats = NDArray[np.float64]
 class TypeSoFar:
     """A grasp type, or none: the number of its trials, how many are correct, the 95 % interval of that accuracy in
     0..1, and the type most often predicted for the others ("" if there are none).
+
+    A type with a single trial has no accuracy (correct is 0, the interval 0..1): without its trial it is unknown.
     """
 
     grasp: str
@@ -46,7 +48,10 @@ class TypeSoFar:
 
 @dataclass(frozen=True, slots=True)
 class SoFar:
-    """The accuracy of a collection so far, and of each type, starting with those for which more trials help most."""
+    """The accuracy of a collection so far, and of each type, starting with those for which more trials help most.
+
+    Only the trials of types with two or more count in `total`; it may be 0, with an interval of 0..1.
+    """
 
     total: int
     correct: int
@@ -73,11 +78,19 @@ def recognition_so_far(grasp_set: GraspSet) -> SoFar:
     for number, name in enumerate(names[one] for one in classes):
         own = given[truth == number]
         wrong = np.bincount(own[own != number], minlength=len(classes))
-        rate = Rate.counted((int((own == number).sum()),), len(own), of="within subject")
-        taken_for = names[classes[wrong.argmax()]] if wrong.any() else ""
-        found.append(TypeSoFar(name, len(own), rate.correct[0], rate.low, rate.high, taken_for))
-    rate = Rate.counted((int((given == truth).sum()),), len(truth), of="within subject")
-    return SoFar(len(truth), rate.correct[0], rate.low, rate.high, tuple(sorted(found, key=lambda one: one.low)))
+        taken_for = names[classes[wrong.argmax()]] if wrong.any() and len(own) > 1 else ""
+        found.append(TypeSoFar(name, len(own), *_rate(own == number, len(own) > 1), taken_for))
+    counts = (np.bincount(truth) > 1)[truth]
+    types = tuple(sorted(found, key=lambda one: one.low))
+    return SoFar(int(counts.sum()), *_rate((given == truth)[counts], bool(counts.any())), types)
+
+
+def _rate(hits: NDArray[np.bool_], known: bool) -> tuple[int, float, float]:
+    """Return the correct trials and the interval of their share; of nothing known 0 and 0..1."""
+    if not known:
+        return 0, 0.0, 1.0
+    rate = Rate.counted((int(hits.sum()),), len(hits), of="within subject")
+    return rate.correct[0], rate.low, rate.high
 
 
 def left_out_scores(inputs: Floats, label: NDArray[np.intp], trial: NDArray[np.intp]) -> Floats:

@@ -5,11 +5,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
+from msgspec.structs import replace as replace_fields
 
 from thenar.runtime.manifest import Options as Manifested
+from thenar.runtime.manifest import fit_name
 
 from ..limits import check_memory, check_types
-from ..placement.methods.base import METHODS
+from ..placement.methods.base import METHODS, PAPERS
 from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
@@ -33,12 +35,12 @@ from .plan import (
     ways_of,
 )
 from .populations import NESTED, OF, PROTOCOLS, Population, ProtocolName, Scheme, concerns, populations
+from .rates import RecipeWords, placement_words
 from .tables import RateTable, Reader
 
 TABLES: tuple[TableName, ...] = ("compositions", "generality", "pruning", "baselines", "trainers")
 _NESTED: tuple[TableName, ...] = ("trainers", "joints")
 
-_ROUNDS = 100  # the paper's
 # Tables with a row that trains on all switches at once.
 _OF_ALL_SWITCHES: tuple[TableName, ...] = ("compositions", "pruning")
 
@@ -123,7 +125,7 @@ class Study:
         grasps = counted(len(self.grasps), "grasp type")
         frames = f" of {self.rows:,} frames" if self.rows > self.trials else ""
         size = f"{counted(self.trials, 'trial')}{frames}, {grasps}"
-        return f"{size}; {cut}; {options.rounds or _ROUNDS} rounds; accuracies in % with 95 % intervals"
+        return f"{size}; {cut}; accuracies in % with 95 % intervals"
 
 
 def evaluate(
@@ -176,7 +178,8 @@ def evaluate(
     predictions = run_fits(planned.data, planned.fits, training, jobs, before, ways)
     permuted = None
     if m := options.permute:
-        how = Permutations(planned.parts, options.scheme, options.folds, options.prune, options.seed, training)
+        recipe = _recipe_of("compositions", options)
+        how = Permutations(planned.parts, options.scheme, options.folds, options.prune, options.seed, training, recipe)
         permuted = how.test(chosen, m, jobs, None if progress is None else _after(progress, len(predictions)))
     return planned.study(grasp_set.fingerprint(), predictions, permuted)
 
@@ -186,8 +189,12 @@ def _trainers(options: Options) -> tuple[Training, Ways]:
     for name in options.baselines:
         if not METHODS.named(name).by_number:
             raise EvaluationError(f"{name} takes S: baselines must be methods that take a number of switches")
-    wanted = changed(Manifested(rounds=options.rounds, trainer=options.trainer), options.settings)
+    wanted = _asked(options)
     return Training.of(wanted), ways_of(wanted)
+
+
+def _asked(options: Options) -> Manifested:
+    return changed(Manifested(rounds=options.rounds, trainer=options.trainer), options.settings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,10 +260,32 @@ class _Planned:
             grasps=tuple(grasp_set.taxonomy.types[label] for label in grasps),
             warnings=concerns(grasp_set, self.parts, options.scheme, options.folds),
             left_out=self.left_out,
-            tables=tuple(reader.table(*which, rows) for which, rows in self.tables.items()),
+            tables=tuple(
+                reader.table(*which, rows, _recipe_of(which[0], options)) for which, rows in self.tables.items()
+            ),
             permuted=permuted,
-            learning=None if curves is None else curves.read(replace(reader, of=curves.of), data.groups, options.seed),
+            learning=None
+            if curves is None
+            else curves.read(replace(reader, of=curves.of), data.groups, options.seed, _recipe_of("trainers", options)),
         )
+
+
+def recipe_words(options: Manifested) -> RecipeWords:
+    """Return the recipe of classifiers that all have the same placement and trainer."""
+    training = Training.of(options)
+    return RecipeWords(placement_words(options), fit_name(training.trainer, training.settings))
+
+
+def _recipe_of(name: TableName, options: Options) -> RecipeWords:
+    """Return the recipe of a table."""
+    same = recipe_words(replace_fields(_asked(options), prune=options.prune, keep_joints=options.keep_joints))
+    methods: dict[TableName, str] = {
+        "pruning": f"{PAPERS}, S of the row, all subjects pooled",
+        "baselines": f"that of the row, as many elements as {same.method}",
+        "joints": "none, joints alone",
+    }
+    chosen = "that of the row, its settings chosen from the training rows"
+    return RecipeWords(methods.get(name, same.method), chosen if name == "trainers" else same.trainer)
 
 
 def _before(progress: Progress, permutations: int) -> Progress:

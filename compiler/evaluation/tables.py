@@ -15,7 +15,7 @@ from ..text import interval
 from .folds import Rows
 from .plan import REFERENCE, CellPlan, FoldFit, Labels, RowPlan, TableName
 from .populations import ProtocolName
-from .rates import Paired, Rate, rated
+from .rates import Paired, Rate, RecipeWords, rated
 
 Predictions = Mapping[FoldFit, Labels]
 Confusion = tuple[tuple[int, ...], ...]
@@ -101,13 +101,14 @@ class RateTable:
 
     name: TableName
     protocol: ProtocolName
+    recipe: RecipeWords
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
 
     @property
     def title(self) -> str:
-        """The title: what the table shows, and what its rates are of."""
-        return f"{_TITLES[self.name]}: {self.protocol} protocol, {self.rows[0].rate.what}"
+        """The title: what the table shows, what its rates are of, and by which recipe."""
+        return f"{_TITLES[self.name]}: {self.protocol} protocol, {self.rows[0].rate.what}; {self.recipe}"
 
     @property
     def note(self) -> str:
@@ -133,8 +134,10 @@ class Reader:
     of: Of
     groups: NDArray[np.str_] | None
 
-    def table(self, name: TableName, protocol: ProtocolName, plans: Sequence[RowPlan]) -> RateTable:
-        """Return the table for these rows."""
+    def table(
+        self, name: TableName, protocol: ProtocolName, plans: Sequence[RowPlan], recipe: RecipeWords
+    ) -> RateTable:
+        """Return the table for these rows, which were fitted by this recipe."""
         columns = tuple(cell.part.name for cell in plans[0].cells)
         rows = [self._row(plan, confusing=name == "compositions") for plan in plans]
         if name == "trainers":
@@ -144,7 +147,7 @@ class Reader:
                 row if row.name == REFERENCE else replace(row, paired=Paired.of(own, first[row.what], REFERENCE))
                 for row, own in zip(rows, hits, strict=True)
             ]
-        return RateTable(name, protocol, columns, tuple(rows))
+        return RateTable(name, protocol, recipe, columns, tuple(rows))
 
     def cell(self, plan: CellPlan, *, confusing: bool) -> Cell:
         """Return the cell of a plan, with its confusion matrix if `confusing`."""

@@ -8,6 +8,7 @@ from thenar.runtime.manifest import PAPERS_TRAINER, in_words
 from thenar.runtime.names import printable, taxel_and_code
 
 from ..evaluation.rates import Rate
+from ..sensors import SensorCount
 from ..text import cells, counted, duration, interval, listed, percent
 from .points import Frontier, Mark, Point, Recipe, Time
 
@@ -180,12 +181,10 @@ def rates_of(frontier: Frontier) -> dict[str, Callable[[Point], Rate | None]]:
 
 def _inputs(frontier: Frontier, point: Point) -> str:
     switches, levels, taxels = _kinds(point)
-    kept = [f"{switches} of {frontier.n_switches} switches"] if frontier.n_switches else []
-    kept += [f"{counted(levels, 'level')} of {taxels} of {frontier.n_taxels} taxels"] if frontier.n_taxels else []
-    some = listed(kept)
-    some_joints = f"{len(point.joints)} of {counted(frontier.n_joints, 'joint')}"
-    joints = some_joints if point.joints else counted(frontier.n_joints, "joint")
-    return {"switches": some, "joints": joints, "both": listed([*kept, joints])}[point.setting.inputs]
+    joints, none = (len(point.joints) or frontier.n_joints, frontier.n_joints), (0, 0)
+    elements, inputs = ((switches, frontier.n_switches), (taxels, frontier.n_taxels)), point.setting.inputs
+    kept = elements if inputs != "joints" else (none, none)
+    return str(SensorCount(*kept, joints if inputs != "switches" else none, levels))
 
 
 def _mark(mark: Mark, frontier: Frontier) -> str:

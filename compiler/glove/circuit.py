@@ -16,7 +16,7 @@ from thenar.drivers.i2c.chips.base import RESET, Package
 from thenar.drivers.i2c.chips.base import SUPPLY as SUPPLY_PINS
 from thenar.runtime.harness.wiring import ChipWiring, Harness, MuxChannel, SpiWiring
 
-from .layout import GROUND, PUSH_BUTTON, SUPPLY, End, PlacedSwitch, Unit, Wire, net_of
+from .layout import GROUND, PUSH_BUTTON, SUPPLY, End, PlacedSensor, Unit, Wire, net_of
 from .parts import Circuit, Kind, Terminal, capacitor, header, resistor, two_pins
 
 _HOST = ("VCC", "GND", "SDA", "SCL")
@@ -221,17 +221,17 @@ _PULL_UP = resistor("10k", "pulls up an input of a chip without pull-ups")
 
 
 def glove_circuit(
-    switches: Sequence[PlacedSwitch], ends: Sequence[End], wires: Sequence[Wire], harness: Harness, part_number: str
+    switches: Sequence[PlacedSensor], ends: Sequence[End], wires: Sequence[Wire], harness: Harness, part_number: str
 ) -> Circuit:
-    """Return the circuit in which switch n of the build is SWn and reaches its `end` through its bundle's connector.
+    """Return the circuit in which each sensor reaches its `end` through its bundle's connector.
 
-    part_number is that of the switches; "" if unknown.
+    part_number is that of the switches, or of the pads of a glove without switches; "" if unknown.
     """
     circuit = Circuit()
     kind = _BUTTON if part_number == PUSH_BUTTON else replace(_OWN_SWITCH, part=part_number)
-    taxels = {end.switch for end in ends if end.taxel}
-    for place, switch in enumerate(switches):
-        circuit.put(f"SW{switch.number}", _PAD if place in taxels else kind, on_board=False, name=switch.name)
+    pad = _PAD if any(sensor.kind == "switch" for sensor in switches) else replace(_PAD, part=part_number)
+    for sensor in switches:
+        circuit.put(sensor.ref, pad if sensor.kind == "pad" else kind, on_board=False, name=sensor.name)
     _add_connectors(circuit, wires)
     units = _units(ends)
     multiplexers = [unit for unit in units if unit.board]
@@ -272,10 +272,10 @@ def _add_board(circuit: Circuit, ref: str, ends: Sequence[End], multiplexers: Se
         circuit.join(f"{ref}_{end.pin}", ref, end.pad)
 
 
-def _add_signal(circuit: Circuit, end: End, switch: PlacedSwitch) -> None:
+def _add_signal(circuit: Circuit, end: End, switch: PlacedSensor) -> None:
     net = net_of(end, switch)
-    circuit.join(net, f"SW{switch.number}", "1")
-    circuit.join(end.other, f"SW{switch.number}", "2")
+    circuit.join(net, switch.ref, "1")
+    circuit.join(end.other, switch.ref, "2")
     if end.unit.diodes and not end.taxel:
         circuit.between("D", _DIODE, net, f"{end.unit.ref}_{end.pin}")
         return
@@ -326,6 +326,15 @@ def bill_of(circuit: Circuit, wires: Sequence[Wire]) -> tuple[BillLine, ...]:
     for component in circuit.components:
         groups.setdefault(component.kind, []).append(component.ref)
     return (*(_pieces(kind, refs) for kind, refs in groups.items()), *_wire_lines(wires))
+
+
+def bill_of_joints(joints: Sequence[str], cyberglove: bool) -> tuple[BillLine, ...]:
+    """Return the sensors of the joints, which are not on the board: those of a CyberGlove, or one for each joint."""
+    if not joints:
+        return ()
+    what, names = ("CyberGlove", ()) if cyberglove else ("your own joint sensor", tuple(joints))
+    note = "it measures the kept joints" if cyberglove else "such as a flex sensor along the joint"
+    return (BillLine(len(names) or 1, "pcs", what, "", "", "", names, True, note),)
 
 
 def _pieces(kind: Kind, refs: Sequence[str]) -> BillLine:

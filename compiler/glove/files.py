@@ -18,7 +18,7 @@ from thenar.runtime.scanning.scanmap import ScanMap
 from ..hand import HandShape
 from ..publication import check_folder, entries, publish_folder
 from .layout import BoardPins
-from .lists import materials_csv, readme_of, switches_csv, wiring_csv
+from .lists import materials_csv, readme_of, sensors_csv, wiring_csv
 from .parts import Circuit, Component, Kind
 from .pattern import LAYERS, Circle, Line, Pattern, Shape, Text
 from .spec import GloveSpec, SpecError, glove_spec
@@ -217,7 +217,7 @@ def _quoted(text: str) -> str:
 # All files that a spec may contain.
 NAMES = frozenset(
     {
-        *("README.txt", "bom.csv", "glove.net", "glove.toml", "spec.json", "switches.csv", "wiring.csv"),
+        *("README.txt", "bom.csv", "glove.net", "glove.toml", "sensors.csv", "spec.json", "wiring.csv"),
         *("cutting.dxf", "cutting.svg"),
     }
 )
@@ -247,7 +247,7 @@ def files_of(spec: GloveSpec) -> Mapping[str, bytes]:
         "glove.net": netlist_of(spec.circuit, summary.glove),
         "glove.toml": harness_to_toml(spec.harness).encode(),
         "spec.json": msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n",
-        "switches.csv": switches_csv(summary),
+        "sensors.csv": sensors_csv(summary),
         "wiring.csv": wiring_csv(summary),
     }
     if spec.pattern is None:

@@ -1,9 +1,10 @@
 """The positions of the kept switches on the hand, the pin or key of each wire, and the bundles in between."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from math import ceil, hypot
+from typing import Literal
 
 import numpy as np
 from msgspec import Struct
@@ -14,6 +15,7 @@ from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, Scanne
 from thenar.runtime.scanning.ports import levels_of
 
 from ..hand import HandShape
+from ..text import counted, listed
 
 # The switch of Murakami et al.'s glove, and its disc that touches the skin.
 PUSH_BUTTON, CONTACT_MM = "EVQPLDA15", 3.2
@@ -28,30 +30,39 @@ _LONGEST_HEADER = 40
 Place = tuple[float, float]
 
 
-class PlacedSwitch(Struct, frozen=True):
-    """A switch of the reduced glove, or a taxel with all its levels: number n is SWn everywhere.
+class PlacedSensor(Struct, frozen=True):
+    """A sensor of the reduced glove: a switch, or a pad with all its levels.
 
-    part is the digit, or "palm"; side is its side, left and right as drawn: palm up, thumb right. x_mm counts towards
-    the thumb and y_mm towards the fingertips on the flat pattern, from the middle of the wrist's crease. All are None
-    if the positions of the glove's switches are unknown.
+    ref is its designator everywhere, such as SW3 or PAD4: its number counts both. part is the digit, or "palm"; side is
+    its side, left and right as drawn: palm up, thumb right. x_mm counts towards the thumb and y_mm towards the
+    fingertips on the flat pattern, from the middle of the wrist's crease. All are None if the positions of the glove's
+    sensors are unknown.
     """
 
     number: int
     name: str
+    kind: Literal["switch", "pad"] = "switch"
     part: str | None = None
     side: str | None = None
     x_mm: float | None = None
     y_mm: float | None = None
 
+    @property
+    def ref(self) -> str:
+        """Its designator."""
+        return f"{'PAD' if self.kind == 'pad' else 'SW'}{self.number}"
 
-def place_switches(names: Sequence[str], hand: HandShape | None) -> tuple[PlacedSwitch, ...]:
-    """Return the switches called `names`, all known to `hand` if given; millimetres with one decimal."""
+
+def place_sensors(names: Sequence[str], pads: Container[str], hand: HandShape | None) -> tuple[PlacedSensor, ...]:
+    """Return the sensors called `names`, all known to `hand` if given; millimetres with one decimal."""
+    kinds: list[Literal["switch", "pad"]] = ["pad" if name in pads else "switch" for name in names]
     if hand is None:
-        return tuple(PlacedSwitch(number, name) for number, name in enumerate(names, start=1))
+        return tuple(map(PlacedSensor, range(1, len(names) + 1), names, kinds))
     return tuple(
-        PlacedSwitch(
+        PlacedSensor(
             number=number,
             name=name,
+            kind=kinds[number - 1],
             part=hand.part_names[hand.parts[mine]],
             side=None if hand.length_mm is None else _SIDES[int(hand.sides[mine])],
             x_mm=round(float(hand.places[mine, 0]), 1),
@@ -61,12 +72,19 @@ def place_switches(names: Sequence[str], hand: HandShape | None) -> tuple[Placed
     )
 
 
+def counted_sensors(sensors: Sequence[PlacedSensor]) -> str:
+    """Return "3 switches and 8 pads"; a kind of which there are none is left out."""
+    kinds = [sensor.kind for sensor in sensors]
+    words = {"switch": ("switch", "switches"), "pad": ("pad", "pads")}
+    return listed([counted(kinds.count(kind), *words[kind]) for kind in words if kind in kinds])
+
+
 def hole_mm(hand: HandShape) -> float:
     """Return the diameter of a switch's hole: the push button's disc, or the whole switch if its width is known."""
     return CONTACT_MM if hand.part_number == PUSH_BUTTON or not hand.body_mm else hand.body_mm
 
 
-def crowded(switches: Sequence[PlacedSwitch], body_mm: float) -> list[tuple[int, int, float]]:
+def crowded(switches: Sequence[PlacedSensor], body_mm: float) -> list[tuple[int, int, float]]:
     """Return pairs of switches whose centres are closer than the width of a switch, with their distance in mm."""
     places = np.array([(each.x_mm, each.y_mm) for each in switches if each.x_mm is not None]).reshape(-1, 2)
     apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
@@ -230,7 +248,7 @@ class Wire(Struct, frozen=True):
     length_mm: int | None
 
 
-def wires_of(switches: Sequence[PlacedSwitch], ends: Sequence[End], hand: HandShape | None) -> tuple[Wire, ...]:
+def wires_of(switches: Sequence[PlacedSensor], ends: Sequence[End], hand: HandShape | None) -> tuple[Wire, ...]:
     """Return all wires, bundle by bundle: the signals in the switches' order, then the returns chip by chip.
 
     A bundle holds the wires of one digit; or those of one unit, if the positions are unknown.
@@ -255,7 +273,7 @@ def marked(colour: str, times: int) -> str:
     return colour if not times else f"{colour}, {times} mark{'s' if times > 1 else ''}"
 
 
-def net_of(end: End, switch: PlacedSwitch) -> str:
+def net_of(end: End, switch: PlacedSensor) -> str:
     """Return the net of a switch's contact 1: a separate one, or its column's in a matrix without diodes.
 
     The stroke distinguishes it from GND and VCC, whatever a switch is called.
@@ -268,7 +286,7 @@ def _connected(wires: Sequence[Wire], connector: str) -> Iterator[Wire]:
     return (replace(wire, connector=connector, pin=pin) for pin, wire in enumerate(wires, start=1))
 
 
-def _signals(bundle: str, ends: Sequence[End], switches: Sequence[PlacedSwitch], home: Place | None) -> Iterator[Wire]:
+def _signals(bundle: str, ends: Sequence[End], switches: Sequence[PlacedSensor], home: Place | None) -> Iterator[Wire]:
     for number, end in enumerate(ends):
         switch = switches[end.switch]
         yield Wire(
@@ -284,8 +302,8 @@ def _signals(bundle: str, ends: Sequence[End], switches: Sequence[PlacedSwitch],
         )
 
 
-def _returns(bundle: str, ends: Sequence[End], switches: Sequence[PlacedSwitch], home: Place | None) -> Iterator[Wire]:
-    shared: dict[tuple[str, str], list[PlacedSwitch]] = {}
+def _returns(bundle: str, ends: Sequence[End], switches: Sequence[PlacedSensor], home: Place | None) -> Iterator[Wire]:
+    shared: dict[tuple[str, str], list[PlacedSensor]] = {}
     for end in ends:
         shared.setdefault((end.unit.ref, end.other), []).append(switches[end.switch])
     for number, ((_, net), group) in enumerate(shared.items()):
@@ -294,7 +312,7 @@ def _returns(bundle: str, ends: Sequence[End], switches: Sequence[PlacedSwitch],
         yield Wire(bundle, "", 0, colour, net, numbers, "", "", _length(group, home))
 
 
-def _length(group: Sequence[PlacedSwitch], home: Place | None) -> int | None:
+def _length(group: Sequence[PlacedSensor], home: Place | None) -> int | None:
     """Return the estimated length in mm of a wire from the wrist through all of `group`, the nearest first."""
     if home is None:
         return None

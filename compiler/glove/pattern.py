@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..hand import HandShape
-from .layout import PlacedSwitch, hole_mm
+from .layout import PlacedSensor, hole_mm
 
 # The margin that most printers leave white.
 MARGIN_MM = 5.0
@@ -99,7 +99,7 @@ class Pattern:
     shapes: tuple[Shape, ...]
 
 
-def pattern_of(switches: Sequence[PlacedSwitch], hand: HandShape, title: str) -> Pattern:
+def pattern_of(switches: Sequence[PlacedSensor], hand: HandShape, title: str) -> Pattern:
     """Return the pattern: title, hand, a bar of 50 mm to check the print, and the list of switches below."""
     extent = np.concatenate([hand.outline, *hand.strips, hand.labels, hand.places])
     low, high = extent.min(axis=0), extent.max(axis=0)
@@ -130,7 +130,7 @@ def _hand(hand: HandShape, move: Floats) -> Iterator[Shape]:
         yield Text("names", float(x), float(y), _TEXT_MM, name, centred=True)
 
 
-def _holes(switches: Sequence[PlacedSwitch], move: Floats, across_mm: float) -> Iterator[Shape]:
+def _holes(switches: Sequence[PlacedSensor], move: Floats, across_mm: float) -> Iterator[Shape]:
     for switch in switches:
         x, y = (switch.x_mm or 0.0) + float(move[0]), (switch.y_mm or 0.0) + float(move[1])
         yield Circle("holes", x, y, across_mm / 2)
@@ -144,7 +144,7 @@ def _bar(x: float, y: float) -> Iterator[Shape]:
     yield Text("names", x, y + _TICK_MM + 1.0, _TEXT_MM, "50 mm: measure it on paper, and print without scaling")
 
 
-def _legend(switches: Sequence[PlacedSwitch], rows: int, left: float) -> Iterator[Shape]:
+def _legend(switches: Sequence[PlacedSensor], rows: int, left: float) -> Iterator[Shape]:
     """Yield the list of switches, column by column."""
     for place, switch in enumerate(switches):
         column, row = divmod(place, rows)

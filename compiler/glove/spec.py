@@ -18,17 +18,19 @@ from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us, scanner_us, taxels_us
 
 from ..hand import HandShape
-from .circuit import BillLine, bill_of, glove_circuit
+from ..sensors import SensorCount
+from .circuit import BillLine, bill_of, bill_of_joints, glove_circuit
 from .layout import (
     BoardPins,
     End,
-    PlacedSwitch,
+    PlacedSensor,
     Wire,
     as_soldered,
+    counted_sensors,
     crowded,
     elements_of,
     ends_of,
-    place_switches,
+    place_sensors,
     wires_of,
 )
 from .parts import Circuit
@@ -84,7 +86,7 @@ def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected
 
 
 class SwitchReader(Struct, frozen=True):
-    """A reader of switches by its designator: an expander or a board, and the numbers of the switches on its pins."""
+    """A reader of sensors by its designator: a chip or a board, and the numbers of the sensors on its pins."""
 
     ref: str
     place: str
@@ -93,13 +95,17 @@ class SwitchReader(Struct, frozen=True):
 
 
 class SpecSummary(Struct, frozen=True):
-    """A spec as values: the content of `spec.json`. `remarks` are sentences for whoever builds the glove."""
+    """A spec as values: the content of `spec.json`. `remarks` are sentences for whoever builds the glove.
+
+    kept  the numbers of kept sensors, in words; sensors: those of them that are wired
+    """
 
     glove: str
+    kept: str
     proposed: bool
     hand_length_mm: float | None
     print_on: str
-    switches: tuple[PlacedSwitch, ...]
+    sensors: tuple[PlacedSensor, ...]
     readers: tuple[SwitchReader, ...]
     wires: tuple[Wire, ...]
     materials: tuple[BillLine, ...]
@@ -138,22 +144,27 @@ def glove_spec(
     read = whole_scan(wired, asked) if scan is None else scan
     names = elements_of(wired, asked)
     known = hand if hand is not None and hand.knows(names) else None
-    switches = place_switches(names, known)
     soldered = as_soldered(wired, boards)
     ends = ends_of(soldered, names, boards)
+    switches = place_sensors(names, {names[end.switch] for end in ends if end.taxel}, known)
     wires = wires_of(switches, ends, known)
     circuit = glove_circuit(switches, ends, wires, soldered, "" if known is None else known.part_number)
-    title = f"{wired.name}: {len(names)} switches{_size(known)}"
+    kept = str(SensorCount.of_build(manifest))
+    title = f"{wired.name}: {counted_sensors(switches)}{_size(known)}"
     pattern = None if known is None else pattern_of(switches, known, title)
     summary = SpecSummary(
         glove=wired.name,
+        kept=kept,
         proposed=harness is None,
         hand_length_mm=None if known is None else known.length_mm,
         print_on="" if pattern is None else pattern.page.hint,
-        switches=switches,
+        sensors=switches,
         readers=_readers(ends),
         wires=wires,
-        materials=bill_of(circuit, wires),
+        materials=(
+            *bill_of(circuit, wires),
+            *bill_of_joints([joint.name for joint in manifest.joints], wired.cyberglove is not None),
+        ),
         expected=expected_of(manifest, read, wired),
         remarks=(*_remarks(manifest, wired, switches, known), *_of_boards(boards)),
     )
@@ -216,33 +227,33 @@ def _size(hand: HandShape | None) -> str:
 
 
 def _remarks(
-    manifest: Manifest, harness: Harness, switches: Sequence[PlacedSwitch], hand: HandShape | None
+    manifest: Manifest, harness: Harness, switches: Sequence[PlacedSensor], hand: HandShape | None
 ) -> Iterator[str]:
     """Yield sentences for whoever builds the glove."""
     if hand is None:
         yield (
-            "the positions of this glove's switches are unknown (--layout names a drawing): there is no cutting "
+            "the positions of this glove's sensors are unknown (--layout names a drawing): there is no cutting "
             "pattern, and wire lengths are left out"
         )
     else:
         for first, second, apart in crowded(switches, hand.body_mm):
             yield (
-                f"SW{first} and SW{second} are {apart} mm apart and their bodies {hand.body_mm:g} mm wide: move one "
-                "of them aside"
+                f"{switches[first - 1].ref} and {switches[second - 1].ref} are {apart} mm apart and their bodies "
+                f"{hand.body_mm:g} mm wide: move one of them aside"
             )
-    numbers = {switch.name: switch.number for switch in switches}
+    refs = {sensor.name: sensor.ref for sensor in switches}
     measured: dict[str, list[Switch]] = {}
     for name, switch in zip(wired_names(harness, manifest.switches), manifest.switches, strict=True):
-        if switch.threshold is not None and name in numbers:
+        if switch.threshold is not None and name in refs:
             yield (
-                f"SW{numbers[name]} is a level of the taxel {switch.source}: set its comparator to "
+                f"{refs[name]} is a level of the pad {switch.source}: set its comparator to "
                 f"{switch.threshold.value:g} {switch.threshold.taxel.unit}; it is {switch.closed}"
             )
         elif switch.threshold is not None:
             measured.setdefault(switch.source, []).append(switch)
     for taxel, levels in measured.items():
         closed = list_names([level.closed for level in levels])
-        yield f"SW{numbers[taxel]} is the taxel {taxel}, whose counts thenar compares: {closed}"
+        yield f"{refs[taxel]} is the pad {taxel}, whose counts thenar compares: {closed}"
     joints = own_joints([joint.name for joint in manifest.joints])
     if joints and harness.cyberglove is None:
         yield joints

@@ -15,6 +15,7 @@ from ..elementary import LN_2
 from ..limits import check_types
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
+from ..sensors import SensorCount
 from .constraints import Bound, Limits
 from .cooccurrence import Cooccurrence
 from .elements import Elements, bits_of, columns_of, elements_of, names_of, ports_of
@@ -175,7 +176,8 @@ class Placement:
     """The kept switches of a set, and how they were found.
 
     parameter  S, or how many switches to keep at most; joints: whether the method used the joints
-    kept_joints  the names of the kept joints, if some were to be chosen; n_levels: how many elements are levels
+    kept_joints  the names of the kept joints, if some were to be chosen
+    n_switches, n_taxels, n_joints  the numbers of those in the set
     all_names  the names of all elements: switches, and levels of taxels; grasps: the types that occur, which the
                tree's classes index
     tree       of the paper's ID3; exact: the gap to the optimum, if requested; study: of many subjects
@@ -193,7 +195,9 @@ class Placement:
     exact: Exactly | None = None
     study: Standard | None = None
     kept_joints: tuple[str, ...] = ()
-    n_levels: int = 0
+    n_switches: int = 0
+    n_taxels: int = 0
+    n_joints: int = 0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -201,9 +205,15 @@ class Placement:
         return tuple(kept.name for kept in self.switches)
 
     @property
-    def n_switches(self) -> int:
-        """The number of elements that the method chose from."""
-        return len(self.all_names)
+    def sensors(self) -> SensorCount:
+        """The kept sensors, of all in the set."""
+        pads = [kept.number for kept in self.switches if kept.above is not None]
+        return SensorCount(
+            switches=(len(self.switches) - len(pads), self.n_switches),
+            pads=(len(set(pads)), self.n_taxels),
+            joints=(len(self.kept_joints), self.n_joints) if self.kept_joints else (0, 0),
+            levels=len(pads),
+        )
 
     @property
     def how(self) -> str:
@@ -232,7 +242,8 @@ class Placement:
             "parameter": self.parameter,
             "joints": self.joints,
             "switches": self.switches,
-            "n_switches": self.n_switches,
+            "n_elements": len(self.all_names),
+            "sensors": self.sensors,
             "rows": self.rows,
             "fingerprint": self.fingerprint,
             "exact": self.exact,
@@ -243,7 +254,7 @@ class Placement:
             found["kept_joints"] = self.kept_joints
         if self.tree is not None:
             found |= {
-                "kept_share": len(self.switches) / self.n_switches,
+                "kept_share": len(self.switches) / len(self.all_names),
                 "entropy_bits": self.entropy_bits,
                 "zero_gain_nodes": self.tree.n_zero_gain,
                 "undecided_leaves": self.tree.n_undecided,
@@ -322,7 +333,9 @@ def place(
         rows=len(grasp_set),
         fingerprint=fingerprint,
         all_names=names_of(grasp_set, elements),
-        n_levels=len(elements) - len(grasp_set.switch_names),
+        n_switches=len(grasp_set.switch_names),
+        n_taxels=len(grasp_set.taxel_columns),
+        n_joints=len(grasp_set.joints),
         grasps=samples.grasps,
         tree=chosen.tree,
         kept_joints=() if keep_joints is None else _joints_kept(grasp_set, read, chosen.columns, keep_joints, limits),

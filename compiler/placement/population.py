@@ -207,8 +207,10 @@ def place_for_population(
         switches=kept_of(grasp_set, study.elements, tuple(range(len(study.elements)))),
         rows=len(grasp_set),
         fingerprint=fingerprint,
-        all_names=names_of(grasp_set, every := elements_of(samples)),
-        n_levels=len(every) - len(grasp_set.switch_names),
+        all_names=names_of(grasp_set, elements_of(samples)),
+        n_switches=len(grasp_set.switch_names),
+        n_taxels=len(grasp_set.taxel_columns),
+        n_joints=len(grasp_set.joints),
         grasps=samples.grasps,
         study=study,
     )

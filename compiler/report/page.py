@@ -8,6 +8,7 @@ from markupsafe import Markup
 from ..pages import embedded, policy_hash, templates
 from ..pictures import colour_variables
 from ..segmenting.transitions import graph_of
+from ..sensors import SensorCount
 from ..text import sentence
 from . import results, sections
 from .content import ReportContent
@@ -71,9 +72,8 @@ def _tree(content: ReportContent) -> TreeView | None:
 def _hand(content: ReportContent) -> HandPicture | None:
     if content.hand is None or not content.sources:
         return None
-    kept, most = len(content.sources), len(content.hand.names)
     summary = (
-        f"{content.hand.view}; {kept} of {most} switches are kept and numbered in the order in which they were chosen. "
-        "The table lists them."
+        f"{content.hand.view}; {SensorCount.of_build(content.manifest)} are kept and numbered in the order in which "
+        "they were chosen. The table lists them."
     )
-    return hand_picture(content.hand, content.sources, "kept-hand", "Kept switches on the hand", sentence(summary))
+    return hand_picture(content.hand, content.sources, "kept-hand", "Kept sensors on the hand", sentence(summary))

@@ -12,6 +12,7 @@ from ..evaluation.tables import RateTable, both
 from ..segmenting.transitions import Transitions
 from ..text import NBSP, counted, percent, sentence
 from .content import PlainTable, ReportContent
+from .sections import recipe
 
 # Wider tables are illegible; the list of the most frequent mistakes is not.
 WIDEST = 40
@@ -39,7 +40,7 @@ def study_notes(study: Study) -> Iterator[str]:
 
 def _table(table: RateTable) -> PlainTable:
     several = len(table.columns) > 1
-    columns = ("Row", "What", "Switches", *table.columns, *(["all"] * several))
+    columns = ("Row", "What", "Elements", *table.columns, *(["all"] * several))
     rows = tuple(
         (row.name, row.what, str(row.switches), *map(str, row.cells), *([both(row.rate, row.frames)] * several))
         for row in table.rows
@@ -87,9 +88,8 @@ def confusions(content: ReportContent) -> Iterator[ConfusionView]:
     if content.confusion is not None:
         rate = content.manifest.headline
         folds = "" if rate is None else f", {rate.title}, {counted(rate.folds, 'nested fold')}"
-        yield confusion_view(
-            f"This build's recipe{folds}", content.manifest.classes[: len(content.confusion)], content.confusion
-        )
+        title = f"This build's recipe ({recipe(content.manifest)}){folds}"
+        yield confusion_view(title, content.manifest.classes[: len(content.confusion)], content.confusion)
     if content.study is None:
         return
     for table in content.study.tables:
@@ -99,7 +99,7 @@ def confusions(content: ReportContent) -> Iterator[ConfusionView]:
             for row in table.rows:
                 counts = [cell.confusion for cell in row.cells if cell.confusion is not None]
                 if counts:
-                    title = f"{row.name}: {row.what}, nested folds of {whose}"
+                    title = f"{row.name}: {row.what}, nested folds of {whose} ({table.recipe})"
                     yield confusion_view(title, content.study.grasps, np.sum(counts, axis=0))
 
 

@@ -11,8 +11,10 @@ from thenar.runtime.published import NONE
 from thenar.runtime.scanning.propose import own_joints
 from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us, scanner_us, taxels_us
 
+from ..evaluation.rates import RecipeWords, placement_words
 from ..placement.gain import entropy_bits
 from ..placement.methods.base import METHODS
+from ..sensors import SensorCount
 from ..tables.faults import FaultCounts
 from ..text import INDEPENDENT, NBSP, counted, microseconds, percent, sentence
 from ..trainers.base import TRAINERS
@@ -21,19 +23,35 @@ from .content import PlainTable, ReportContent
 Pairs = tuple[tuple[str, str], ...]
 
 
-def headline(manifest: Manifest) -> str:
-    """Return the build in one sentence."""
-    inputs = []
-    if manifest.switches:
-        inputs.append(f"{len(manifest.switches)} of {counted(manifest.source.switches, 'switch', 'switches')}")
-    if manifest.joints:
-        inputs.append(counted(len(manifest.joints), "joint"))
+def headline(content: ReportContent) -> str:
+    """Return the build in one sentence, with its accuracy, the interval, and what the choice of a point added to it."""
+    manifest = content.manifest
     types = len(manifest.grasps) - (manifest.grasps[-1] == NONE)
-    said = f"This build recognises {types} grasp types from {' and '.join(inputs)}"
+    said = f"This build recognises {types} grasp types from {SensorCount.of_build(manifest)}"
     rate = manifest.headline
     if rate is None:
         return f"{said}; the accuracy on new grasps was not measured."
-    return f"{said}; {rate.title}: {percent(rate.rate, NBSP)} of {rate.unit}."
+    known = f"{rate.title}: {_rate_in_words(rate.rate, rate.low, rate.high)} of {rate.unit}"
+    if content.frontier is None or content.point is None:
+        return f"{said}; {known}. No tested row took part in a choice, so no luck of choosing is in this rate."
+    tried, point = content.frontier.combinations, content.frontier.point(content.point)
+    right = _rate_in_words(point.rate.mean, point.rate.low, point.rate.high)
+    return (
+        f"{said}; {known}, and {right} ({point.rate.what}) when corrected for luck: this point was picked as one of "
+        f"the best of {tried:,} combinations by its rate, which is therefore expected to be {100 * point.luck:.1f} "
+        "points too high."
+    )
+
+
+def _rate_in_words(rate: float, low: float | None, high: float | None) -> str:
+    ends = "" if low is None or high is None else f" (95{NBSP}% interval {100 * low:.1f} to {100 * high:.1f})"
+    return f"{percent(rate, NBSP)}{ends}"
+
+
+def recipe(manifest: Manifest) -> RecipeWords:
+    """Return the recipe of a build."""
+    method = placement_words(manifest.options) if manifest.switches else "none, joints alone"
+    return RecipeWords(method, str(manifest.fit))
 
 
 def facts(content: ReportContent) -> Iterator[tuple[str, str, str]]:
@@ -53,9 +71,13 @@ def facts(content: ReportContent) -> Iterator[tuple[str, str, str]]:
                 percent(found.none.rate, NBSP),
                 f"recognised as none, {found.none.basis}",
             )
-    yield "Switches kept", f"{len(manifest.switches)}", f"of {manifest.source.switches}"
+    sensors, source = SensorCount.of_build(manifest), manifest.source
+    if source.switches:
+        yield "Switches kept", f"{sensors.switches[0]}", f"of {source.switches}"
+    if source.taxels:
+        yield "Pads kept", f"{sensors.pads[0]}", f"of {source.taxels}, with {counted(sensors.levels, 'level')}"
     whose = "from a custom source" if _unread(content) else "of the CyberGlove"
-    yield "Joints", f"{len(manifest.joints)}", whose if manifest.joints else "none are used"
+    yield "Joints kept", f"{sensors.joints[0]}", f"of {source.joints}, {whose}" if manifest.joints else "none are used"
     fit = manifest.fit
     yield "Trainer", fit.trainer, f"chosen among {counted(fit.tried, 'fit')}" if fit.compared else "given"
     if content.rounds:
@@ -74,6 +96,8 @@ def _unread(content: ReportContent) -> str:
 def warnings(content: ReportContent) -> Iterator[str]:
     """Yield warnings."""
     manifest = content.manifest
+    if not manifest.knows_none:
+        yield "No row of the recordings shows an empty hand: the build may announce a grasp where nothing is held."
     if unread := _unread(content):
         yield sentence(unread)
     if content.only_answer is not None:
@@ -105,9 +129,17 @@ def kept_table(content: ReportContent) -> PlainTable:
         rows.append((str(order), switch.name, part, str(switch.column), f"{switch.gain:.3f}", *together))
         if taxels:
             rows[-1] += (switch.closed,)
-    columns = ("Order", "Switch", "Part", "Column", "Bits", *(() if tree is None else ("Together",)))
-    columns += ("Taxel",) * taxels
-    caption = f"Kept {'switches and levels' if taxels else 'switches'}, in the order in which they were chosen"
+    columns = (
+        "Order",
+        "Element" if taxels else "Switch",
+        "Part",
+        "Column",
+        "Bits",
+        *(() if tree is None else ("Together",)),
+    )
+    columns += ("Level",) * taxels
+    what = "switches and levels of pads" if taxels else "switches"
+    caption = f"Kept {what}, in the order in which they were chosen: placement: {recipe(content.manifest).method}"
     return PlainTable(caption, columns, tuple(rows), words=(1, 2, *((len(columns) - 1,) * taxels)), head=1)
 
 
@@ -121,7 +153,7 @@ def placement_sentences(content: ReportContent) -> tuple[str, str]:
         bits = "provides alone, without the others"
     return (
         f"{how} (--method {method}).",
-        f"Columns count from 0 in the recordings. Bits are the information on the grasp type that a switch {bits}.",
+        f"Columns count from 0 in the recordings. Bits are the information on the grasp type that each {bits}.",
     )
 
 
@@ -153,7 +185,8 @@ def fit_table(manifest: Manifest) -> PlainTable | None:
         "Log-loss",
         "Rows of tables",
     )
-    return PlainTable("Fits in the inner folds, trials", columns, tuple(rows)) if rows else None
+    caption = f"Fits in the inner folds, trials (placement: {recipe(manifest).method})"
+    return PlainTable(caption, columns, tuple(rows)) if rows else None
 
 
 def no_tree(manifest: Manifest) -> str:
@@ -196,7 +229,8 @@ def guarantee_table(content: ReportContent) -> PlainTable | None:
         ("Largest loss of a lead, steps, all frames", f"{worst.loss:.3f}", f"{worst.bound:.3f}"),
         ("Largest magnitude of a sum, steps", f"{abs(worst.reach):,}", f"{most:,}"),
     )
-    return PlainTable("Differences and their bounds", ("What", "Found", "Bound"), rows)
+    caption = f"Differences and their bounds ({recipe(content.manifest)})"
+    return PlainTable(caption, ("What", "Found", "Bound"), rows)
 
 
 def fault_table(content: ReportContent) -> PlainTable | None:
@@ -212,7 +246,10 @@ def fault_table(content: ReportContent) -> PlainTable | None:
         less = f"{100 * (found.correct - found.lost[one]) / found.total:.1f}"
         lost, stuck = rates
         rows.append((names[one], lost, less, stuck, value))
-    caption = f"Accuracy with one input lost or stuck, % of {counted(found.total, 'trial')} trained on"
+    caption = (
+        f"Accuracy with one input lost or stuck, % of {counted(found.total, 'trial')} trained on "
+        f"({recipe(content.manifest)})"
+    )
     return PlainTable(caption, ("Input", "Lost", "Points less", "Stuck", "At"), tuple(rows), words=(0, 4))
 
 

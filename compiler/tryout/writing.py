@@ -21,7 +21,7 @@ from thenar.runtime.sources.rows import steps_of
 from thenar.runtime.taxels import TaxelSettings, calibration_of, count_limit
 
 from ..pages import embedded, policy_hash, templates
-from ..text import counted, listed
+from ..sensors import SensorCount
 
 MOST_BYTES = 500_000
 _MOST_ROWS = 400
@@ -169,13 +169,6 @@ def _stream(stream: StreamWiring) -> Json:
 
 def _rendered(manifest: Manifest, data: Json) -> bytes:
     style, script = _style(), _script()
-    levels = sum(switch.threshold is not None for switch in manifest.switches)
-    inputs = (
-        (len(manifest.switches) - levels, "switch", "switches"),
-        (levels, "level of taxels", "levels of taxels"),
-        (len(manifest.joints), "joint"),
-    )
-    read = [counted(*each) for each in inputs if each[0]]
     page = (
         _environment()
         .get_template("try.html.j2")
@@ -184,8 +177,9 @@ def _rendered(manifest: Manifest, data: Json) -> bytes:
             style_sha256=policy_hash(style),
             script=Markup(script),
             script_sha256=policy_hash(script),
-            sentence=f"It distinguishes {len(manifest.classes)} classes by {listed(read)}.",
-            levels=levels,
+            sentence=f"It distinguishes {len(manifest.classes)} classes by {SensorCount.of_build(manifest)}.",
+            levels=any(switch.threshold is not None for switch in manifest.switches),
+            knows_none=manifest.knows_none,
             checksum=manifest.checksum[:16],
             version=manifest.thenar,
             data=embedded(data),

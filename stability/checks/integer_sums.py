@@ -36,7 +36,7 @@ def bare_build(tables: IntegerTables) -> Build:
             thenar="",
             tables_sha256=_NO_DIGEST,
             ensemble_sha256=_NO_DIGEST,
-            source=Origin(_NO_DIGEST, 0, "none", tables.n_switches),
+            source=Origin(_NO_DIGEST, 0, "none", tables.n_switches, joints=tables.n_joints),
             options=Options(0, 1, "both", 1.0, 0, 1),
             grasps=tuple(str(number) for number in range(tables.n_classes)),
             switches=tuple(Switch(number, str(number), 0.0) for number in range(tables.n_switches)),

@@ -17,7 +17,7 @@ def test_compile_writes_a_build_and_says_what_it_is(thenar: Thenar, set_file: Pa
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     assert "3 grasp types from" in done.stdout
-    assert "of 6 switches and 2 joints" in done.stdout
+    assert "of 6 switches and 2 of 2 joints" in done.stdout
     assert re.search(
         r"^accuracy, within subject: \d+\.\d % \[\d+\.\d, \d+\.\d\], \d+ of 60 trials in 4 nested folds$",
         done.stdout,

@@ -73,6 +73,30 @@ def test_the_papers_tables_are_printed_with_both_protocols_explained(
     assert not complaints
 
 
+def test_every_table_names_its_method_and_its_trainer_with_their_settings(
+    grasps: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    tables = "compositions,pruning,baselines,joints"
+    logit = ("--trainer", "logit", "--penalty", "2", "--smoothness", "3", "--prune", "4")
+    asked = ("--repeats", "1", "--jobs", "1", "--tables", tables, "--protocol", "nested")
+    assert run(["evaluate", grasps, *asked, *logit, "-o", str(tmp_path / "result.json")]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    methods = {
+        "compositions": "id3, S = 4",
+        "pruning": "id3, S of the row, all subjects pooled",
+        "baselines": "that of the row, as many elements as id3, S = 4",
+        "joints": "none, joints alone",
+    }
+    written = json.loads((tmp_path / "result.json").read_text())["tables"]
+    assert {table["name"]: table["recipe"]["method"] for table in written} == methods
+    for table in written:
+        assert table["recipe"]["trainer"].startswith("logit, ")
+        assert {"penalty 2", "smoothness 3"} <= set(table["recipe"]["trainer"].split(", "))
+        assert f"placement: {table['recipe']['method']}; trainer: {table['recipe']['trainer']}" in printed
+    # Rounds are LogitBoost's.
+    assert "rounds" not in printed
+
+
 def test_every_rate_has_its_interval_in_percent(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["evaluate", grasps, *QUICK, "--tables", "compositions", "--protocol", "paper", "--json"]) == 0
     result = json.loads(capsys.readouterr().out)["tables"][0]["rows"][0]

@@ -1,8 +1,10 @@
 """A glove of one's own, with pads and flex sensors, through every command: nothing says that it is another glove."""
 
+import csv
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from shutil import copy
 from typing import Any
@@ -91,10 +93,54 @@ def test_a_build_its_report_and_its_spec_are_of_this_glove(
     assert "your own switch or pad" in said
     assert "need a source of your own" in said
     kept = [switch.name for switch in manifest_from_bytes((build / "build.json").read_bytes()).switches]
-    places = {each["name"]: (each["x_mm"], each["y_mm"]) for each in json.loads(_spec(tmp_path))["switches"]}
+    places = {each["name"]: (each["x_mm"], each["y_mm"]) for each in json.loads(_spec(tmp_path))["sensors"]}
     assert places == {name: (40.0 + 30 * (n % 3), 190.0 - 40 * (n // 3)) for n, name in enumerate(PADS) if name in kept}
     assert "<svg" in (tmp_path / "spec" / "cutting.svg").read_text()
     assert foreign(tmp_path) == []
+
+
+def test_pads_and_joints_are_counted_as_sensors_everywhere(thenar: Thenar, grasps: Path, tmp_path: Path) -> None:
+    """Each pad is analog, with several levels: what is bought is a pad, and a flex sensor for each joint."""
+    plain = GraspSet.load(grasps)
+    random = np.random.default_rng(4)
+    pressed = np.where(
+        plain.switches, random.normal(2500, 500, plain.switches.shape), random.normal(700, 400, plain.switches.shape)
+    )
+    analog = replace(
+        plain,
+        switches=np.zeros((len(plain), 0), bool),
+        switch_names=(),
+        taxels=np.clip(pressed, 0, 4095).astype(np.uint16),
+        taxel_columns=tuple(Joint(name, "counts", 0, 0.0, 4095, 4095.0) for name in PADS),
+    )
+    analog.save(path := tmp_path / "analog.grasps")
+    layout = tmp_path / "glove.toml"
+    places = "".join(f"{name} = [{30 * n}, {20 * (n % 2)}]\n" for n, name in enumerate(PADS))
+    layout.write_text(f'part_number = "FSR 402"\n[places]\n{places}')
+    asked, build = ("--method", "elimination", "--keep", 7), tmp_path / "build"
+    said = worked(thenar("compile", path, "-o", build, "--rounds", 5, "--folds", 0, *asked, "--layout", layout))
+    manifest = manifest_from_bytes((build / "build.json").read_bytes())
+    kept = {switch.source for switch in manifest.switches}
+    assert len(kept) < len(manifest.switches) == 7
+    pads = f"{len(kept)} of 9 pads (7 levels)"
+    sensors = f"{pads} and 2 of 2 joints"
+    assert f"3 grasp types from {sensors};" in said
+    assert re.search(r"\d of 9 pads \(7 levels\)", worked(thenar("place", path, *asked)))
+    report = (build / "report.html").read_text()
+    assert f"recognises 3 grasp types from {sensors};" in report
+    assert "of 9 switches" not in report
+    told = worked(thenar("spec", build, "--layout", layout, "-o", tmp_path / "spec"))
+    assert f"{sensors}; a proposed wiring" in told
+    readme = (tmp_path / "spec" / "README.txt").read_text()
+    assert readme.startswith(f"proposed: a glove with {sensors}\n")
+    for words in (readme, told):
+        assert "switch" not in words
+        assert "bounce" not in words
+    with (tmp_path / "spec" / "bom.csv").open() as file:
+        bill = {row["what"]: row for row in csv.DictReader(file)}
+    fsr, flex = bill["your own force sensing pad"], bill["your own joint sensor"]
+    assert (fsr["quantity"], fsr["part_number"]) == (str(len(kept)), "FSR 402")
+    assert (flex["quantity"], flex["designators"]) == ("2", "flex_thumb flex_index")
 
 
 def _spec(folder: Path) -> str:

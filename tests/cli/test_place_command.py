@@ -28,7 +28,7 @@ def test_the_placement_is_printed_for_machines_and_stored(
     assert [chosen["name"] for chosen in placement["switches"]] == [f"s{number}" for number in tree.inputs]
     assert [chosen["gain_bits"] for chosen in placement["switches"]] == list(tree.gains)
     assert placement["switches"][-1]["cumulative_share"] == pytest.approx(sum(tree.gains) / np.log2(3))
-    assert (placement["prune"], placement["n_switches"], placement["rows"]) == (5, 6, 60)
+    assert (placement["prune"], placement["n_elements"], placement["rows"]) == (5, 6, 60)
     assert placement["fingerprint"] == small_set.fingerprint()
 
 

@@ -59,7 +59,8 @@ def test_a_spec_is_printed_and_written(thenar: Thenar, hand_build: Path, tmp_pat
     told = said(thenar("spec", hand_build, "-o", folder))
     manifest = Build.load(hand_build).manifest
     names = [switch.name for switch in manifest.switches]
-    assert f"{len(names)} switches, a proposed wiring, for a right hand of 190 mm" in told
+    sensors = f"{len(names)} of {manifest.source.switches} switches"
+    assert f"{sensors}; a proposed wiring, for a right hand of 190 mm" in told
     assert all(name in told for name in names)
     assert "us on the wire, in 1 transaction." in told
     written = {path.name: path.read_bytes() for path in folder.iterdir()}
@@ -132,7 +133,7 @@ def test_a_board_is_described_by_its_pins_or_its_expanders(
 
 def test_a_glove_of_ones_own_has_no_pattern_and_no_length(thenar: Thenar, build_folder: Path, tmp_path: Path) -> None:
     told = said(thenar("spec", build_folder, "-o", tmp_path / "spec"))
-    assert "the positions of this glove's switches are unknown" in told
+    assert "the positions of this glove's sensors are unknown" in told
     assert not (tmp_path / "spec" / "cutting.svg").exists()
     assert "use --layout instead" in refused(thenar("spec", build_folder, "--hand-length", 180))
 

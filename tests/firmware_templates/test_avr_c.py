@@ -98,7 +98,7 @@ def manifest_of(joints: tuple[str, ...]) -> Manifest:
         thenar="0.1.0",
         tables_sha256="0" * 64,
         ensemble_sha256="0" * 64,
-        source=Origin("1" * 64, 10, "own", 20),
+        source=Origin("1" * 64, 10, "own", 20, joints=22),
         options=Options(0, 100, "both", 1.0, 4, 1),
         grasps=GRASPS,
         switches=tuple(Switch(number, name, 0.5) for number, name in enumerate(SWITCHES)),

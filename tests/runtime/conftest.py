@@ -60,7 +60,7 @@ def _describe(tables: IntegerTables) -> Manifest:
         thenar="0.1.0",
         tables_sha256=hashlib.sha256(data).hexdigest(),
         ensemble_sha256="0" * 64,
-        source=Origin("1" * 64, 10, "own", 20),
+        source=Origin("1" * 64, 10, "own", 20, joints=22),
         options=Options(0, 100, "both", 1.0, 4, 1),
         grasps=tuple(f"grasp {number}" for number in range(tables.n_classes)),
         switches=tuple(Switch(number, f"s{number}", 0.5) for number in range(tables.n_switches)),

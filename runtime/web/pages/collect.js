@@ -136,7 +136,10 @@ function studied(received) {
     return;
   }
   const ends = `${percent(received.low)} to ${percent(received.high)} %`;
-  say($("study"), `${received.correct} of ${received.total} trials (${percent(received.correct / received.total)} %; 95 % interval ${ends}), each from all others, by a quick model`);
+  const single = received.types.filter((type) => type.total === 1).length;
+  const rest = single ? `; ${single} type${single > 1 ? "s" : ""} with one trial not counted` : "";
+  const share = `${received.correct} of ${received.total} trials (${percent(received.correct / received.total)} %; 95 % interval ${ends}), each from all others, by a quick model`;
+  say($("study"), received.total ? `${share}${rest}` : "no accuracy yet: no grasp type has two trials");
   const weak = received.types.filter((type) => type.correct < type.total).slice(0, 3);
   const why = weak.length ? weak : received.types.slice(0, 1);
   say($("more"), `More trials help most with: ${why.map((type) => type.grasp).join(", ")}`);
@@ -144,7 +147,8 @@ function studied(received) {
   $("types").replaceChildren(
     ...received.types.map((type) => {
       const row = document.createElement("tr");
-      const cells = [type.grasp, `${type.correct} of ${type.total}`, `${percent(type.low)} to ${percent(type.high)} %`, type.taken_for];
+      const judged = [`${type.correct} of ${type.total}`, `${percent(type.low)} to ${percent(type.high)} %`, type.taken_for];
+      const cells = [type.grasp, ...(type.total > 1 ? judged : ["one trial: not counted", "", ""])];
       cells.forEach((text, at) => {
         const cell = document.createElement(at ? "td" : "th");
         if (!at) cell.scope = "row";

@@ -50,7 +50,7 @@ def padded(make_set: Make) -> GraspSet:
 def test_a_build_says_at_which_value_each_kept_pad_switches(padded: GraspSet, tmp_path: Path) -> None:
     manifest = compile_build(padded, tmp_path / "build", rounds=5, documents=Documents()).manifest
     elements = elements_of(Samples.of(padded))
-    assert manifest.source.switches == 6
+    assert (manifest.source.switches, manifest.source.taxels, manifest.source.joints) == (2, 4, 2)
     pads = [switch for switch in manifest.switches if switch.threshold is not None]
     assert len(pads) > len({pad.column for pad in pads})
     for pad in pads:
@@ -172,19 +172,18 @@ def test_commands_choose_levels_and_joints(padded: GraspSet, tmp_path: Path, cap
     few = ["--method", "elimination-cost", "--keep", "4", "--keep-joints", "1"]
     assert run(["compile", str(path), "-o", str(tmp_path / "build"), "--rounds", "4", "--folds", "0", *few]) == 0
     said = capfd.readouterr().out
-    assert re.search(r"from \d of 2 switches, \d levels? of \d of 4 taxels and 1 of \d joints;", said)
+    assert re.search(r"from \d of 2 switches, \d of 4 pads \(\d levels?\) and 1 of \d joints;", said)
     assert re.search(
         rf"\njoints: ({'|'.join(padded.joint_names)})(; a CyberGlove's record of them takes .* ms)?\n", said
     )
     assert run(["place", str(path), "--levels", "1", *few, "--json"]) == 0
     placed = json.loads(capfd.readouterr().out)
-    assert (placed["n_switches"], len(placed["kept_joints"])) == (6, 1)
+    assert (placed["sensors"]["switches"][1] + placed["sensors"]["pads"][1], len(placed["kept_joints"])) == (6, 1)
     assert all(("above" in kept) == (kept["number"] > 1) for kept in placed["switches"])
     assert run(["place", str(path), *few, "--exact"]) == 0
     said = " ".join(capfd.readouterr().out.split())
-    assert " of 4 taxels" not in said
-    assert re.search(r"\d levels? of \d taxels?: a taxel is converted once", said)
-    assert "elements" in said
+    assert re.search(r"\d of 2 switches, \d of 4 pads \(\d levels?\) and 1 of \d joints", said)
+    assert "the best 4 elements" in said
     cut = ["--tables", "joints", "--folds", "2", "--repeats", "1", "--rounds", "3", "--jobs", "1"]
     assert run(["evaluate", str(path), *cut, "--json"]) == 0
     (table,) = json.loads(capfd.readouterr().out)["tables"]

@@ -83,6 +83,19 @@ def test_of_equally_good_types_that_with_fewer_trials_comes_first() -> None:
     assert [(one.grasp, one.correct, one.total) for one in found.types] == [("cup", 3, 3), ("pen", 10, 10)]
 
 
+def test_a_type_with_one_trial_has_no_accuracy_and_does_not_count() -> None:
+    whole = grasps(6, noise=3)
+    rods = np.flatnonzero(whole.grasps == "rod")
+    found = recognition_so_far(whole.rows(np.setdiff1d(np.arange(18), rods[1:])))
+    rod = next(one for one in found.types if one.grasp == "rod")
+    assert (rod.total, rod.correct, rod.low, rod.high, rod.taken_for) == (1, 0, 0.0, 1.0, "")
+    assert found.types[0] is rod
+    assert found.total == 12 == sum(one.total for one in found.types if one is not rod)
+    assert found.correct == sum(one.correct for one in found.types)
+    first = recognition_so_far(whole.rows(np.arange(3)))
+    assert (first.total, first.correct, first.low, first.high) == (0, 0, 0.0, 1.0)
+
+
 def test_rows_of_a_trial_are_one_trial_and_an_input_that_never_changes_is_none() -> None:
     whole = grasps(6, noise=3)
     thrice = whole.rows(np.repeat(np.arange(len(whole)), 3))

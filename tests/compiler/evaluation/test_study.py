@@ -9,7 +9,7 @@ from thenar.compiler.evaluation.baselines import CLASSIFIERS
 from thenar.compiler.evaluation.folds import EvaluationError, Fold
 from thenar.compiler.evaluation.plan import REFERENCE, CellPlan, FoldFit, RowPlan, learners
 from thenar.compiler.evaluation.populations import Population, Scheme
-from thenar.compiler.evaluation.rates import Rate
+from thenar.compiler.evaluation.rates import Rate, RecipeWords
 from thenar.compiler.evaluation.study import TABLES, Options, Study, evaluate
 from thenar.compiler.evaluation.tables import RateTable, Reader, Row
 from thenar.compiler.placement.elements import Element
@@ -67,13 +67,14 @@ def test_a_row_counts_all_its_subjects_and_only_compositions_carry_confusions() 
     reader = replace(READER, labels=np.tile(LABELS, 2), trials=np.arange(12), predictions=answers)
     other = Population("B", np.arange(6, 12), (2, 5), (folds, folds))
     row = RowPlan("VI", "Sel-Co", (CellPlan(PART, (FIRST, FIRST)), CellPlan(other, (theirs, theirs))))
-    table = reader.table("pruning", "paper", (row,))
+    recipe = RecipeWords("id3, S = 0", "logitboost, rounds 5")
+    table = reader.table("pruning", "paper", (row,), recipe)
     assert table.columns == ("A", "B")
     assert table.rows[0].rate.total == 12
     assert table.rows[0].rate.mean == pytest.approx((5 / 6 + 4 / 6) / 2)
     assert (table.rows[0].switches.least, table.rows[0].switches.most) == (0, 3)
     assert table.rows[0].cells[0].confusion is None
-    assert reader.table("compositions", "paper", (row,)).rows[0].cells[0].confusion is not None
+    assert reader.table("compositions", "paper", (row,), recipe).rows[0].cells[0].confusion is not None
 
 
 Make = Callable[..., GraspSet]

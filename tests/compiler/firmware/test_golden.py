@@ -97,7 +97,7 @@ def small_build() -> Build:
         thenar="0.1.0",
         tables_sha256="0123456789abcdef" * 4,
         ensemble_sha256="0" * 64,
-        source=Origin("1" * 64, 60, "own", 160),
+        source=Origin("1" * 64, 60, "own", 160, joints=22),
         options=Options(13, 100, "both", 1.0, 4, 1),
         grasps=GRASPS,
         switches=tuple(Switch(number, name, 0.5) for number, name in enumerate(SWITCHES)),

@@ -38,8 +38,10 @@ def test_rates_are_named_by_what_they_are_of_and_their_unit(examples: Any) -> No
 
 
 def test_joints_are_told_too(examples: Any) -> None:
-    assert summary(examples.example_frontier(picked=8)).startswith("Point 8: 8 of 160 switches and 16 joints, read")
-    assert summary(examples.example_frontier(picked=7)).startswith("Point 7: 16 joints, read")
+    assert summary(examples.example_frontier(picked=8)).startswith(
+        "Point 8: 8 of 160 switches and 16 of 16 joints, read"
+    )
+    assert summary(examples.example_frontier(picked=7)).startswith("Point 7: 16 of 16 joints, read")
 
 
 def test_without_marks_and_without_points_it_is_still_a_summary(examples: Any) -> None:

@@ -106,7 +106,7 @@ def manifest_of() -> Callable[..., Manifest]:
             thenar="0",
             tables_sha256="0" * 64,
             ensemble_sha256="0" * 64,
-            source=Origin("0" * 64, 10, "own", 160),
+            source=Origin("0" * 64, 10, "own", 160, joints=22),
             options=Options(0, 1, "both", 1.0, 0, 1),
             grasps=("cup", "pen"),
             switches=tuple(Switch(number, name, 0.1) for number, name in enumerate(names)),

@@ -15,7 +15,7 @@ from thenar.compiler.hand import HandShape
 from thenar.runtime.manifest import Manifest
 
 Manifests = Callable[..., Manifest]
-ALWAYS = {"README.txt", "bom.csv", "glove.net", "glove.toml", "spec.json", "switches.csv", "wiring.csv"}
+ALWAYS = {"README.txt", "bom.csv", "glove.net", "glove.toml", "spec.json", "sensors.csv", "wiring.csv"}
 
 DIGEST = """
 import hashlib, sys
@@ -56,17 +56,17 @@ def test_the_same_build_gives_the_same_bytes_in_any_process(manifest_of: Manifes
 def test_lists_summary_and_netlist_agree(manifest_of: Manifests, hand: HandShape) -> None:
     files = spec_files(manifest_of(hand.names[:40]), hand=hand)
     summary = msgspec.json.decode(files["spec.json"], type=SpecSummary)
-    switches, wires = rows(files["switches.csv"]), rows(files["wiring.csv"])
+    switches, wires = rows(files["sensors.csv"]), rows(files["wiring.csv"])
     assert [row["name"] for row in switches] == list(hand.names[:40])
     assert len(wires) == len(summary.wires)
-    ends = {row["switches"]: (row["read_by"], row["input"]) for row in wires if row["read_by"]}
-    assert {row["switch"]: (row["read_by"], row["pin"]) for row in switches} == ends
+    ends = {row["sensors"]: (row["read_by"], row["input"]) for row in wires if row["read_by"]}
+    assert {row["sensor"]: (row["read_by"], row["pin"]) for row in switches} == ends
     assert {row["contact"] for row in wires} == {"1", "2"}
     assert sum(float(row["quantity"]) for row in rows(files["bom.csv"])) > 40
 
 
 def test_places_in_the_list_are_those_of_the_hand(manifest_of: Manifests, hand: HandShape) -> None:
-    for number, row in enumerate(rows(spec_files(manifest_of(hand.names), hand=hand)["switches.csv"])):
+    for number, row in enumerate(rows(spec_files(manifest_of(hand.names), hand=hand)["sensors.csv"])):
         assert float(row["x_mm"]) == pytest.approx(hand.places[number, 0], abs=0.051)
         assert float(row["y_mm"]) == pytest.approx(hand.places[number, 1], abs=0.051)
         assert row["part"] == hand.part_names[hand.parts[number]]

@@ -23,7 +23,7 @@ def summary(request: pytest.FixtureRequest, manifest_of: Manifests, hand: HandSh
 def test_every_switch_has_one_signal_and_one_return(summary: SpecSummary) -> None:
     signals = Counter(n for wire in summary.wires if wire.unit for n in wire.switches)
     returns = Counter(n for wire in summary.wires if not wire.unit for n in wire.switches)
-    assert signals == returns == Counter(range(1, len(summary.switches) + 1))
+    assert signals == returns == Counter(range(1, len(summary.sensors) + 1))
     assert all(len(wire.switches) == 1 for wire in summary.wires if wire.unit)
 
 
@@ -39,7 +39,7 @@ def test_the_signals_of_a_bundle_come_in_the_switches_order(manifest_of: Manifes
 def test_a_return_is_shared_within_one_digit_and_one_chip(summary: SpecSummary) -> None:
     read_by = {n: reader.ref for reader in summary.readers for n in reader.switches}
     for wire in summary.wires:
-        assert {summary.switches[n - 1].part for n in wire.switches} == {wire.bundle}
+        assert {summary.sensors[n - 1].part for n in wire.switches} == {wire.bundle}
         assert len({read_by[n] for n in wire.switches}) == 1
 
 
@@ -59,7 +59,7 @@ def test_connectors_have_pins_from_one_on_and_no_more_than_headers_have(summary:
 def test_a_wire_is_longer_than_the_way_to_its_farthest_switch(summary: SpecSummary, hand: HandShape) -> None:
     home = hand.wrist
     for wire in summary.wires:
-        places = [(summary.switches[n - 1].x_mm, summary.switches[n - 1].y_mm) for n in wire.switches]
+        places = [(summary.sensors[n - 1].x_mm, summary.sensors[n - 1].y_mm) for n in wire.switches]
         straight = max(dist(home, (x, y)) for x, y in places if x is not None and y is not None)
         assert wire.length_mm is not None
         assert 1.25 * straight + 40 <= wire.length_mm

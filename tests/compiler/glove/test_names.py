@@ -63,9 +63,9 @@ def test_every_file_is_well_formed_and_gives_the_names_back(
     files = spec_files(manifest_of(names), None, harness)  # type: ignore[arg-type]  # both return a Harness
     assert parse_harness(files["glove.toml"].decode(), "x") == harness
     assert json.loads(files["spec.json"])["glove"] == glove
-    rows = list(csv.DictReader(io.StringIO(files["switches.csv"].decode())))
+    rows = list(csv.DictReader(io.StringIO(files["sensors.csv"].decode())))
     assert [text_of(row["name"]) for row in rows] == names
-    for file in ("switches.csv", "wiring.csv", "bom.csv"):
+    for file in ("sensors.csv", "wiring.csv", "bom.csv"):
         cells = [cell for row in csv.reader(io.StringIO(files[file].decode())) for cell in row]
         assert not [cell for cell in cells if cell.startswith(("=", "+", "-", "@", "\t", "\r"))]
     components = read_netlist(files["glove.net"]).components

@@ -27,9 +27,9 @@ Reader = Callable[[bytes], "Netlist"]
 Manifests = Callable[..., Manifest]
 
 
-def reached(netlist: "Netlist", switch: int) -> list[tuple[str, str]]:
-    """Return (designator, name of the pin) of what reads contact 1 of a switch."""
-    nodes = netlist.nets[netlist.net_of(f"SW{switch}", "1")]
+def reached(netlist: "Netlist", number: int, kind: str = "SW") -> list[tuple[str, str]]:
+    """Return (designator, name of the pin) of what reads contact 1 of a sensor."""
+    nodes = netlist.nets[netlist.net_of(f"{kind}{number}", "1")]
     readers = [(ref, pin) for ref, pin in nodes if ref[0] in "UA"]
     return [(ref, netlist.pin_names[netlist.components[ref]["part"], pin]) for ref, pin in readers]
 
@@ -233,16 +233,16 @@ def test_every_taxel_is_half_a_divider_at_the_channel_that_measures_it(
         manifest_of(["s0"]), switches=(Switch(0, "s0", 0.1), level("t0", 7), *(level(f"t{n}", 9) for n in range(8)))
     )
     spec = glove_spec(manifest, None, harness)
-    assert [switch.name for switch in spec.summary.switches] == ["s0", *(f"t{n}" for n in range(8))]
+    assert [switch.name for switch in spec.summary.sensors] == ["s0", *(f"t{n}" for n in range(8))]
     netlist = read_netlist(spec_files(manifest, None, harness)["glove.net"])
     wanted = [
         *(("A1", "channel 1"), ("A1", "channel 2"), ("U5", "I0"), ("U6", "I1")),
         *(("U1", "AIN2"), ("U2", "CH7"), ("U3", "CH1"), ("U4", "CH3")),
     ]
     for number, channel in enumerate(wanted, start=2):
-        assert reached(netlist, number) == [channel]
-        assert netlist.net_of(f"SW{number}", "2") == "VCC"
-        (divider,) = [ref for ref, _ in netlist.nets[netlist.net_of(f"SW{number}", "1")] if ref[0] == "R"]
+        assert reached(netlist, number, "PAD") == [channel]
+        assert netlist.net_of(f"PAD{number}", "2") == "VCC"
+        (divider,) = [ref for ref, _ in netlist.nets[netlist.net_of(f"PAD{number}", "1")] if ref[0] == "R"]
         assert netlist.net_of(divider, "2") == "GND"
     assert netlist.net_of("U1", netlist.pin_of("U1", "ADDR")) == "SDA0"
     assert {netlist.net_of(ref, netlist.pin_of(ref, "CS")) for ref in ("U3", "U4")} == {"CS1_0", "CS1_1"}
@@ -259,10 +259,11 @@ def test_every_taxel_is_half_a_divider_at_the_channel_that_measures_it(
     pins = BoardPins(signals=("PD2",), lows=("",), channels=("ADC0", "ADC1", "ADC2"))
     muxed = BoardPins(channels=("ADC0", "ADC1"), selects=("PB0", "PB1", "PB2", "PB3"))
     named = read_netlist(spec_files(manifest, None, harness, None, (pins, muxed))["glove.net"])
-    assert [reached(named, number)[0] for number in (1, 2, 3)] == [("A1", "PD2"), ("A1", "ADC1"), ("A1", "ADC2")]
+    read = [reached(named, number, kind)[0] for number, kind in ((1, "SW"), (2, "PAD"), (3, "PAD"))]
+    assert read == [("A1", "PD2"), ("A1", "ADC1"), ("A1", "ADC2")]
     remarks = glove_spec(manifest, None, harness, None, (pins, muxed)).summary.remarks
     assert remarks[-1] == "A2: S0 to S3 of its multiplexers go to PB0, PB1, PB2, PB3, their commons to ADC0, ADC1"
-    (said,) = [remark for remark in spec.summary.remarks if "taxel t0," in remark]
-    assert said.startswith("SW2 ")
+    (said,) = [remark for remark in spec.summary.remarks if "pad t0," in remark]
+    assert said.startswith("PAD2 ")
     assert "codes above 7" in said
     assert "codes above 9" in said

@@ -89,15 +89,16 @@ def test_switches_closer_than_their_bodies_are_told(manifest_of: Manifests, hand
 def test_a_strange_glove_is_described_without_places(manifest_of: Manifests, hand: HandShape) -> None:
     summary = glove_spec(manifest_of(["index_distal_2", "mine"]), hand=hand).summary
     assert summary.hand_length_mm is None
-    assert {(s.part, s.side, s.x_mm, s.y_mm) for s in summary.switches} == {(None, None, None, None)}
-    assert summary.remarks[-1].startswith("the positions of this glove's switches are unknown")
+    assert {(s.part, s.side, s.x_mm, s.y_mm) for s in summary.sensors} == {(None, None, None, None)}
+    assert summary.remarks[-1].startswith("the positions of this glove's sensors are unknown")
 
 
 @pytest.mark.parametrize("kind", sorted(expanders()))
 def test_the_bill_counts_what_the_circuit_holds(manifest_of: Manifests, hand: HandShape, kind: str) -> None:
     names = hand.names[:30]
     spec = glove_spec(manifest_of(names), None, propose_harness(names, kind), hand)
-    pieces = [line for line in spec.summary.materials if line.unit == "pcs"]
+    *pieces, joint = [line for line in spec.summary.materials if line.unit == "pcs"]
+    assert (joint.quantity, joint.designators) == (1, ("thumb_mpj",))
     assert sorted(ref for line in pieces for ref in line.designators) == sorted(c.ref for c in spec.circuit.components)
     assert all(line.quantity == len(line.designators) for line in pieces)
     (switches,) = [line for line in pieces if line.part == "EVQPLDA15"]

@@ -77,6 +77,47 @@ def test_every_section_is_there_and_has_something_to_say(page: Page) -> None:
     assert "No frontier was given" not in page.text
 
 
+def sentence_of(content: ReportContent) -> str:
+    (said,) = re.findall(r'<p class="sentence">(.*?)</p>', report_html(content).decode())
+    return said.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_the_first_sentence_has_the_interval_and_says_what_luck_is_in_the_rate(whole: ReportContent) -> None:
+    rate, sensors = whole.manifest.headline, f"{len(whole.manifest.switches)} of 160 switches and 2 of 2 joints"
+    assert rate is not None
+    assert rate.low is not None
+    assert rate.high is not None
+    said = sentence_of(whole)
+    interval = f"{100 * rate.rate:.1f} % (95 % interval {100 * rate.low:.1f} to {100 * rate.high:.1f}) of trials"
+    assert f"recognises 4 grasp types from {sensors}; new subject: {interval}" in said
+    assert said.endswith("No tested row took part in a choice, so no luck of choosing is in this rate.")
+    assert whole.frontier is not None
+    point = max(whole.frontier.points, key=lambda point: point.luck)
+    said = sentence_of(replace(whole, point=point.number))
+    assert point.luck > 0
+    low, high = 100 * point.rate.low, 100 * point.rate.high
+    right = f"{100 * point.rate.mean:.1f} % (95 % interval {low:.1f} to {high:.1f}) ({point.rate.what})"
+    assert f"{interval}, and {right} when corrected for luck" in said
+    assert f"best of {whole.frontier.combinations:,} combinations" in said
+
+
+def test_every_table_of_rates_names_its_recipe(whole: ReportContent) -> None:
+    captions = re.findall(r"<caption>(.*?)</caption>", report_html(whole).decode())
+    titles = [caption for caption in captions if " protocol, " in caption]
+    assert whole.study is not None
+    assert len(titles) == len(whole.study.tables)
+    for caption in titles:
+        assert re.search(r"; placement: .+; trainer: (logitboost, .*rounds 2|that of the row)", caption), caption
+    confusions = [caption for caption in captions if "rows are true grasp types" in caption]
+    assert all(re.search(r"\(placement: id3, S = 8; trainer: logitboost, .*rounds \d", each) for each in confusions)
+    (kept,) = (caption for caption in captions if caption.startswith("Kept "))
+    assert kept.endswith("placement: id3, S = 8")
+
+
+def test_a_build_that_never_saw_an_empty_hand_says_so(whole: ReportContent) -> None:
+    assert "No row of the recordings shows an empty hand" in Page(report_html(whole)).text
+
+
 def test_the_page_names_no_other_file(whole: ReportContent) -> None:
     without = re.sub(rb"<script>.*?</script>", b"", report_html(whole), flags=re.S)
     assert not re.search(rb"https?:|//[a-z]|@import|url\((?!#)", without)
@@ -148,7 +189,7 @@ def test_what_was_not_asked_for_is_said_with_the_command_that_makes_it(bare: Rep
     text = Page(report_html(little)).text
     for command_line in ("thenar evaluate", "thenar frontier", "--glove glove.toml"):
         assert command_line in text
-    assert "The positions of these switches on the hand are not known" in text
+    assert "The positions of these sensors on the hand are not known" in text
 
 
 def test_a_frontier_without_points_is_shown_as_such(whole: ReportContent, frontier: Frontier) -> None:
