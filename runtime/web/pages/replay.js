@@ -4,7 +4,7 @@ import { View } from "./view.js";
 import { connect, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
-const view = new View();
+const view = new View({ live: false });
 const LANES = [["truth", "truth"], ["prediction", "predictions"]];
 const LETTERS = 14;
 let state = null;
@@ -13,8 +13,8 @@ let held = false; // while the slider is dragged, messages do not move it
 let wanted = null;
 
 const send = connect({
-  open: () => view.link(true),
-  closed: () => view.link(false),
+  open: () => view.state.link(true),
+  closed: () => view.state.link(false),
   build: (build) => view.build(build),
   hand: (hand) => view.setHand(hand),
   past: (past) => view.past(past),
