@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
+from thenar.drivers.extras import optional
+
 from .cells import MISSING_NUMBERS
 from .columns import TextFormat
 from .errors import TableError
@@ -75,12 +77,8 @@ def _encoding(path: Path) -> tuple[str, str]:
 
 def _dialect(sample: str) -> tuple[str, str]:
     """Return the delimiter, "" for none, and the quote."""
-    try:
+    with optional(TableError, "finding how a table is written (a columns.toml says it, too)"):
         from clevercsv import Detector, Error
-    except ImportError:
-        raise TableError(
-            "finding how a table is written needs clevercsv: pip install 'thenar[compiler]', or write a columns.toml"
-        ) from None
     try:
         found = Detector().detect(sample.replace("\0", ""), delimiters=list(_DELIMITERS))
     except Error:

@@ -8,10 +8,9 @@ from importlib.resources import files
 
 import msgspec
 import numpy as np
-from jinja2 import Environment
-from markupsafe import Markup
 from numpy.typing import NDArray
 
+from thenar.drivers.extras import optional
 from thenar.runtime.errors import ThenarError
 from thenar.runtime.hand import HandDrawing
 from thenar.runtime.harness.wiring import Harness, StreamWiring
@@ -22,6 +21,10 @@ from thenar.runtime.taxels import TaxelSettings, calibration_of, count_limit
 
 from ..pages import embedded, policy_hash, templates
 from ..text import counted, listed
+
+with optional():
+    from jinja2 import Environment
+    from markupsafe import Markup
 
 MOST_BYTES = 500_000
 _MOST_ROWS = 400
