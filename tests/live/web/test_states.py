@@ -163,3 +163,30 @@ def test_a_past_that_ends_a_little_after_the_moment_is_kept(page: Callable[..., 
     now = replace(GRASP, time_us=4_990_000, state="held", segment=4, segment_type="Add", segment_us=4_000_000)
     run.server.publish("frame", message("frame", now, **DETAIL))
     browser.wait(lambda: len(browser.texts("#segments li")) == 5)
+
+
+def test_a_wrong_prediction_of_a_recording_is_marked_by_a_sign_and_in_words(browser: Any) -> None:
+    state = {"first_us": 0, "last_us": 9_000_000, "playing": False, "speed": 1.0, "share": 1.0, "faults": []}
+    predictions = [(0, "none"), (1_000_000, "Add"), (2_000_000, "unknown"), (5_000_000, "PoS")]
+    truth = [(500_000, 3_000_000, "Add"), (4_000_000, 8_000_000, "Add")]
+    with Server("replay", "127.0.0.1:0", token=None, hello=lambda: [message("build", BUILD)]) as server:
+        server.publish("overview", message("overview", predictions=predictions, truth=truth, marks=[]))
+        browser.open(server.url)
+        for grasp, label, said in (
+            ("Add", "Add", "Truth: Add"),
+            ("PoS", "Add", "✗ Truth: Add, predicted: PoS"),
+            ("unknown", "Add", "Truth: Add"),
+            ("PoS", None, "Truth: no label"),
+        ):
+            server.publish("frame", message("frame", replace(GRASP, grasp=grasp), **DETAIL))
+            server.publish("replay", message("replay", state, at_us=6_000_000, truth=label))
+            browser.wait(lambda said=said: browser.text("truth") == said)
+            sign = "return getComputedStyle(document.getElementById('grasp'), '::after').content"
+            assert ("✗" in browser.script(sign)) == said.startswith("✗")
+            if said.startswith("✗"):
+                browser.wait(lambda: browser.text("grasp") == "PoS")
+                browser.picture("wrong")
+        # Of the first label half a second of none, of the second all of PoS.
+        whole = browser.script("return document.getElementById('whole').getAttribute('aria-label')")
+        assert whole.endswith("2 labelled spans, 4 predictions, wrong in 2 spans")
+        browser.driver.get("about:blank")
