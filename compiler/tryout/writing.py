@@ -15,6 +15,7 @@ from thenar.runtime.errors import ThenarError
 from thenar.runtime.hand import HandDrawing
 from thenar.runtime.harness.wiring import Harness, StreamWiring
 from thenar.runtime.manifest import Calibration, Manifest, Threshold
+from thenar.runtime.published import NONE
 from thenar.runtime.rejection import none_leads
 from thenar.runtime.sources.rows import steps_of
 from thenar.runtime.taxels import TaxelSettings, calibration_of, count_limit
@@ -178,6 +179,9 @@ def _rendered(manifest: Manifest, data: Json) -> bytes:
         (levels, "level of taxels", "levels of taxels"),
         (len(manifest.joints), "joint"),
     )
+    # What the page's first state is, too.
+    open_all = ["All switches open"] if manifest.switches else []
+    neutral = ", ".join([*open_all, *(["joints at the medians of the rows"] if manifest.joints else [])])
     read = [counted(*each) for each in inputs if each[0]]
     page = (
         _environment()
@@ -189,6 +193,8 @@ def _rendered(manifest: Manifest, data: Json) -> bytes:
             script_sha256=policy_hash(script),
             sentence=f"It distinguishes {len(manifest.classes)} classes by {listed(read)}.",
             levels=levels,
+            neutral=neutral[:1].upper() + neutral[1:],
+            empty_hand=NONE in manifest.grasps,
             checksum=manifest.checksum[:16],
             version=manifest.thenar,
             data=embedded(data),
