@@ -88,6 +88,7 @@ def command(
         thenar calibrate /dev/ttyUSB0 -o anna.toml --web
     """
     from thenar.drivers.cyberglove import CyberGlove
+    from thenar.runtime.frames import old_after_us
     from thenar.runtime.names import fault, shortened
 
     wearer = subject or output.stem
@@ -111,12 +112,14 @@ def command(
     written = partial(_written, output, wearer)
     try:
         info = glove.open()
+        old_us = old_after_us(glove.period_us if isinstance(glove, StreamedJoints) else None)
         if web is None:
-            said = written(Guide(glove, info, hold).lead())
+            said = written(Guide(glove, info, hold, old_us).lead())
         else:
             from .posed_web import calibrate_on_page
 
-            said = calibrate_on_page(partial(raw_of, glove), info, hold, wearer, web, token_for(web_token), written)
+            read, token = partial(raw_of, glove), token_for(web_token)
+            said = calibrate_on_page(read, info, hold, old_us, wearer, web, token, written)
     finally:
         glove.close()
     echo(said)
@@ -167,10 +170,12 @@ def _keep_stdin(ports: list[str]) -> None:
 class Guide:
     """Leads through the poses on stderr, showing the sensor bytes live on a terminal; the user types the replies."""
 
-    def __init__(self, glove: "CyberGlove | StreamedJoints", info: "GloveInfo | StreamedJoints", hold_s: float) -> None:
+    def __init__(
+        self, glove: "CyberGlove | StreamedJoints", info: "GloveInfo | StreamedJoints", hold_s: float, old_us: int
+    ) -> None:
         from thenar.runtime.posing import PoseGuide
 
-        self._posing = PoseGuide(info.names, round(hold_s * 1e6))
+        self._posing = PoseGuide(info.names, round(hold_s * 1e6), old_us)
         self._glove = glove
         self._console = err()
         self._typed = TypedLines(sys.stdin.fileno())
@@ -203,6 +208,10 @@ class Guide:
                     PoseKey.BACK,
                 )
             reply = self._asked(question, other)
+            if posing.silent(now_us()):
+                self._say("The glove is silent: waiting until it sends.")
+                while posing.silent(now_us()):
+                    self._take()
             posing.press(now_us(), PoseKey.ACCEPT if reply == "" else meant)
         return posing
 
@@ -301,6 +310,11 @@ class StreamedJoints:
         arrived = self._sources.take(round(timeout_s * 1e6)).arrived
         whole = [frame.sensors for frame in arrived if isinstance(frame, GloveFrame) and 0 not in frame.sensors]
         return whole[-1] if whole else None
+
+    @property
+    def period_us(self) -> int | None:
+        """The stated period of the rows."""
+        return self._sources.glove_period_us
 
     def close(self) -> None:
         """Close the devices."""

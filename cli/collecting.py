@@ -15,7 +15,7 @@ from thenar.compiler.recordings.taxonomy import Taxonomy
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.errors import HarnessError
-from thenar.runtime.frames import SwitchFrame, now_us
+from thenar.runtime.frames import SwitchFrame, now_us, old_after_us
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.sources import NOT_YET, DeviceState, Sources, Taken
 from thenar.runtime.names import list_names
@@ -101,7 +101,8 @@ def collect(
             recorder = entered.enter_context(Recorder(recording, session, tail=tail))
             if typed:
                 faces.append(entered.enter_context(Terminal(taxonomy)))
-            guide = Guide(trials, recorder, round(countdown_s * 1e6), accepted)
+            old_us = old_after_us(sources.switch_period_us, sources.glove_period_us)
+            guide = Guide(trials, recorder, round(countdown_s * 1e6), accepted, old_us)
             lead(guide, sources, recorder, faces, stop)
     if recorder.failure is not None:
         raise click.ClickException(f"{recorder.failure}; free some space, and the same command goes on")
@@ -173,7 +174,7 @@ def lead(guide: Guide, devices: Devices, recorder: Recorder, faces: Sequence[Fac
     while guide.stage is not Stage.OVER and recorder.failure is None and not stop.is_set():
         arrived = devices.take(_WAIT_US).arrived
         devices.raise_settings()
-        guide.take(now_us(), arrived)
+        guide.take(now_us(), arrived, [device.name for device in devices.devices() if not device.connected])
         for face in faces:
             face.press(now_us(), guide)
             face.show(now_us(), guide, devices.devices())

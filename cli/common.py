@@ -19,9 +19,9 @@ from rich.segment import Segment
 from rich.table import Column, Table
 from rich.text import Text, TextType
 
-from thenar.drivers.names import shortened
+from thenar.drivers.names import shortened, shown
 
-from .lines import echo, echo_json, shown
+from .lines import echo, echo_json
 
 if TYPE_CHECKING:
     from thenar.runtime.harness.wiring import Harness

@@ -7,13 +7,14 @@ silently with click's exit code 1.
 import os
 import tempfile
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor
 from importlib import import_module
 
 import click
 
 from thenar.drivers.errors import ThenarError
+from thenar.drivers.extras import missing
 from thenar.drivers.names import shortened
 
 from .lines import echo
@@ -23,23 +24,6 @@ COMMANDS = (
     *("evaluate", "frontier", "compile", "verify", "segment", "teach"),
     *("firmware", "spec", "run", "monitor", "calibrate", "record", "emulate", "doctor", "stability"),
 )
-
-# The packages that the extras of pyproject.toml install, by import name.
-EXTRAS: Mapping[str, tuple[str, ...]] = {
-    "compiler": (
-        *("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "ezdxf", "clevercsv"),
-        *("python_calamine", "pyarrow", "pandas", "h5py", "defusedxml", "svgelements"),
-    ),
-    "cluster": ("dask", "distributed"),
-    "sim": ("mujoco",),
-    "stability": ("mpmath", "jinja2"),
-    "ros": ("cyclonedds",),
-    "ws": ("websockets",),
-    "lsl": ("pylsl",),
-    "web": ("aiohttp",),
-    "foxglove": ("foxglove",),
-}
-
 
 # Options that were renamed, for the hint.
 RENAMED = {"--placement": "--method"}
@@ -120,16 +104,8 @@ def _sentence(fault: BaseException, arguments: Sequence[str]) -> str:
         case SystemExit():
             return f"the module {_raised_in(fault)} called sys.exit({fault.code!r}): fix or uninstall its package"
         case ModuleNotFoundError():
-            return f"{fault.name} is not installed: pip install '{_brought_by(fault, arguments)}'"
+            return missing(fault.name or "", *arguments[:1])
     return _kept(fault)
-
-
-def _brought_by(lack: ModuleNotFoundError, arguments: Sequence[str]) -> str:
-    """Return the requirement to install: thenar with an extra that has the package (the command's first), or thenar."""
-    package = (lack.name or "").partition(".")[0]
-    bringing = [extra for extra, packages in EXTRAS.items() if package in packages]
-    bringing.sort(key=lambda extra: extra not in arguments[:1])
-    return f"thenar[{bringing[0]}]" if bringing else "thenar"
 
 
 def _raised_in(fault: BaseException) -> str:

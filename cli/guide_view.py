@@ -52,7 +52,8 @@ class GuideView:
         errors = "; ".join(device.error for device in devices if not device.connected)
         why = f" ({errors})" if errors else ""
         problem = f"not captured: {guide.problem}{why}; " if guide.problem else ""
-        line = f"{self._task(guide)}: {problem}{_keys(guide)}"
+        waits = f"the countdown waits: {guide.lost}{why}; " if _waits(guide) else ""
+        line = f"{self._task(guide)}: {problem}{waits}{_keys(guide)}"
         if line != self._said and guide.stage is not Stage.OVER:
             self._said = line
             self._console.print(line, soft_wrap=True)
@@ -79,6 +80,8 @@ class GuideView:
         return f"{place}: {name}, object {trial.object}"
 
     def _standing(self, now_us: int, guide: Guide) -> str:
+        if _waits(guide):
+            return f"the countdown waits: {guide.lost}"
         if guide.stage is Stage.PAUSED:
             return "paused; nothing is recorded meanwhile"
         if guide.problem:
@@ -94,6 +97,11 @@ class GuideView:
         closed = "" if switches is None else f"{switches.closed.bit_count()} switches closed"
         sensors = "" if glove is None else "glove " + " ".join(map(str, glove.sensors))
         return "captured: " + ", ".join(filter(None, (closed, sensors)))
+
+
+def _waits(guide: Guide) -> bool:
+    """Return whether no countdown can start, because something is not read."""
+    return bool(guide.lost) and guide.stage in (Stage.READY, Stage.PAUSED)
 
 
 def _keys(guide: Guide) -> str:

@@ -7,19 +7,10 @@ from io import TextIOWrapper
 
 import click
 
-from thenar.drivers.names import printable
+from thenar.drivers.names import shown
 
-# Left as it is: text may have several lines, and tabs separate columns.
-_LAYOUT = re.compile(r"([\n\t])")
 # Left unescaped by JSON, but perhaps unsafe for a terminal or an encoding.
 _DOUBTFUL = re.compile(r"[^\n -~]")
-
-
-def shown(text: str) -> str:
-    """Return `text` for a terminal, with characters without a glyph escaped as in Python, except newlines and tabs."""
-    if text.isprintable():
-        return text
-    return "".join(part if part in ("\n", "\t") else printable(part) for part in _LAYOUT.split(text))
 
 
 def echo(text: str, *, err: bool = False) -> None:

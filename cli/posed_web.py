@@ -34,6 +34,7 @@ def calibrate_on_page(
     read: Callable[[], bytes | None],
     info: Sensors,
     hold_s: float,
+    old_us: int,
     subject: str,
     address: str,
     token: str | None,
@@ -46,7 +47,7 @@ def calibrate_on_page(
     """
     for note in info.notes:
         err().print(note, soft_wrap=True)
-    guide = PoseGuide(info.names, round(hold_s * 1e6))
+    guide = PoseGuide(info.names, round(hold_s * 1e6), old_us)
     hand, pictures = drawn_poses()
     page = PosePage(address, token=token, guide=guide, hand=hand, pictures=pictures, subject=subject)
     with ended_by_signals() as stop, page:

@@ -6,6 +6,8 @@ Every name below is loaded when it is first used, so that `thenar.compiler.recor
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from thenar.drivers.extras import optional
+
 if TYPE_CHECKING:
     from thenar.drivers.errors import ThenarError
     from thenar.runtime.manifest import Options
@@ -109,7 +111,8 @@ def __getattr__(name: str) -> Any:
         return import_module("importlib.metadata").version("thenar")
     if name not in _HOME_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_HOME_OF[name], __name__), name)
+    with optional():
+        return getattr(import_module(_HOME_OF[name], __name__), name)
 
 
 def __dir__() -> list[str]:

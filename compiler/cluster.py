@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.drivers.errors import ThenarError
+from thenar.drivers.extras import optional
 
 if TYPE_CHECKING:
     from distributed import Client, Future, Security
@@ -143,12 +144,8 @@ def on_cluster(work: Callable[[Task], Result], tasks: Iterable[Task], address: s
 
 @contextmanager
 def _connected(address: str) -> "Iterator[Client]":
-    try:
+    with optional(ClusterError, "work on a cluster"):
         from distributed import Client
-    except ImportError:
-        raise ClusterError(
-            "work on a cluster requires Dask, which is not installed: pip install 'thenar[cluster]'"
-        ) from None
     try:
         security = _security(address)
         # A separate event loop: the caller's thread may run one.

@@ -4,8 +4,12 @@ import base64
 import hashlib
 
 import msgspec
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+
+from thenar.drivers.extras import optional
+
+with optional():
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
 
 
 def templates(package: str, folder: str) -> Environment:

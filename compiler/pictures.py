@@ -10,6 +10,7 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING
 
+from thenar.drivers.extras import missing
 from thenar.runtime.errors import ThenarError
 
 if TYPE_CHECKING:
@@ -98,7 +99,7 @@ def _matplotlib() -> ModuleType:
     """
     found = find_spec("matplotlib")
     if found is None or found.origin is None:
-        raise PictureError("drawing needs matplotlib: pip install 'thenar[compiler]'")
+        raise PictureError(f"drawing: {missing('matplotlib')}")
     # On import it reads the file of that name in the current folder first: point that at its bundled one.
     with chdir(Path(found.origin).with_name("mpl-data")):
         return import_module("matplotlib")

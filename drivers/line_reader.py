@@ -26,6 +26,7 @@ from urllib.parse import urlsplit
 
 from .closing import Closing
 from .errors import DeviceError, SettingError
+from .extras import optional
 from .lines import LONGEST, LineCounts, LineParser, Row
 from .names import shortened
 from .ports import port_fault
@@ -303,10 +304,8 @@ class _WebSocket(Closing):
     """The messages of a WebSocket; the end of each ends a line."""
 
     def __init__(self, port: str) -> None:
-        try:
+        with optional(SettingError, port):
             from websockets.sync.client import connect
-        except ImportError:
-            raise SettingError(f'{port}: WebSockets need a package: pip install "thenar[ws]"') from None
         self._port = port
         try:
             self._open = ExitStack()

@@ -4,6 +4,7 @@ import os
 from typing import TYPE_CHECKING
 
 from .errors import SettingError
+from .extras import optional
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -14,10 +15,11 @@ _THIS_MACHINE = b"[multicast]\nResolveScope=machine\nListenAddress=127.0.0.1\n[p
 def load_pylsl(place: str) -> "ModuleType":
     """Return pylsl. Raises SettingError if it, or the library that it wraps, is not installed."""
     try:
-        import pylsl
-        import pylsl.util
-    except (ImportError, RuntimeError, OSError) as reason:  # the library itself may be missing
-        raise SettingError(f'{place}: LSL needs a package: pip install "thenar[lsl]" ({reason})') from None
+        with optional(SettingError, place):
+            import pylsl
+            import pylsl.util
+    except (ImportError, RuntimeError, OSError) as reason:  # the library that pylsl wraps is missing
+        raise SettingError(f"{place}: pylsl cannot load its library: {reason}") from None
     if "LSLAPICFG" not in os.environ:
         pylsl.lib.lib.lsl_set_config_content(_THIS_MACHINE)  # effective only before the first stream of a process
     return pylsl  # type: ignore[no-any-return]

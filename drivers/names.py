@@ -3,6 +3,7 @@
 It is in `drivers` for the same reason as `errors`: every package uses names, and this one imports none.
 """
 
+import re
 import unicodedata
 
 LONGEST_NAME = 200
@@ -16,6 +17,8 @@ _UNSOUND = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 _UNPRINTABLE = _UNSOUND | {"Co", "Cn"}
 # Persian, Hindi and many other languages spell words with these two, and emoji are joined by one.
 _JOINERS = frozenset("\u200c\u200d")
+# What a message of several lines has on purpose.
+_LAYOUT = re.compile(r"([\n\t])")
 
 
 def fault(name: str, longest: int = LONGEST_NAME) -> str:
@@ -49,6 +52,13 @@ def printable(text: str) -> str:
         letter.encode("unicode_escape").decode() if unicodedata.category(letter) in _UNPRINTABLE else letter
         for letter in text
     )
+
+
+def shown(text: str) -> str:
+    """Return `text` of several lines for a terminal: as `printable`, but with its newlines and tabs."""
+    if text.isprintable():
+        return text
+    return "".join(part if part in ("\n", "\t") else printable(part) for part in _LAYOUT.split(text))
 
 
 def shortened(text: str, longest: int = LONGEST_SHOWN) -> str:

@@ -57,6 +57,16 @@ class SwitchFrame:
     taxels: tuple[int | None, ...] | None = None
 
 
+# Data of this age is no longer shown, or used, as if it were of now; slow sources have three periods.
+OLD_US = 500_000
+_OLD_PERIODS = 3
+
+
+def old_after_us(*periods_us: int | None) -> int:
+    """Return the age from which data of sources with these periods is old; None: there is no such source."""
+    return max(OLD_US, *(_OLD_PERIODS * (period or 0) for period in periods_us))
+
+
 # A frame is current for this many of its periods: one more may be late, two may not.
 PERIODS = 2
 F = TypeVar("F", SwitchFrame, GloveFrame)

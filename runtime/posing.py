@@ -17,6 +17,8 @@ from thenar.drivers.calibration import (
     problems,
 )
 
+from .frames import OLD_US
+
 # Pressing the key shakes the hand, and earlier records are still on their way.
 SETTLE_US = 150_000
 # A byte at an end of its range does not show how far the joint went beyond.
@@ -46,22 +48,24 @@ class PoseGuide:
     """Leads through the poses of sensors called `names`.
 
     stage     the current stage; `left`: whether it is over because the user left
-    raw       the newest bytes of the sensors; None before the first
+    raw       the newest bytes of the sensors, read at `raw_us`; None before the first
     problems  the objections to the last pose, in sentences
     taken     the results of the poses
     step      counts every change of stage
     """
 
-    def __init__(self, names: Sequence[str], hold_us: int) -> None:
+    def __init__(self, names: Sequence[str], hold_us: int, old_us: int = OLD_US) -> None:
+        """Take the sensors, the time to hold a pose, and the age from which a record is old."""
         self.names = tuple(names)
         self.poses = poses_of(self.names)
         self.stage = PoseStage.READY
         self.left = False
         self.step = 0
         self.raw: bytes | None = None
+        self.raw_us: int | None = None
         self.problems: list[str] = []
         self.taken: list[Held] = []
-        self._hold_us = hold_us
+        self._hold_us, self._old_us = hold_us, old_us
         self._settled_us = 0
         self._samples: list[bytes] = []
         self._found: Held | None = None
@@ -72,14 +76,19 @@ class PoseGuide:
         """The pose that is next or held; when all are taken, the last."""
         return self.poses[min(len(self.taken), len(self.poses) - 1)]
 
-    def offered(self) -> dict[PoseKey, str]:
+    def silent(self, now_us: int) -> bool:
+        """Return whether there is no record of now: then no pose can be taken."""
+        return self.raw_us is None or now_us - self.raw_us > self._old_us
+
+    def offered(self, now_us: int) -> dict[PoseKey, str]:
         """Return the keys that are active now, and their effects."""
         words: dict[PoseStage, dict[PoseKey, str]] = {
             PoseStage.READY: {PoseKey.ACCEPT: "I hold it: take it"},
             PoseStage.DOUBTED: {PoseKey.ACCEPT: "hold it again", PoseKey.KEEP: "keep it anyway"},
             PoseStage.DONE: {PoseKey.ACCEPT: "write the calibration"},
         }
-        found = dict(words.get(self.stage, {}))
+        waits = self.stage is PoseStage.READY and self.silent(now_us)
+        found = {} if waits else dict(words.get(self.stage, {}))
         if self.taken and self.stage in (PoseStage.READY, PoseStage.DONE):
             found[PoseKey.BACK] = "back to the previous pose"
         if self.stage is not PoseStage.OVER:
@@ -92,7 +101,7 @@ class PoseGuide:
 
     def take(self, now_us: int, raw: bytes) -> None:
         """Take a record, one byte per sensor; if the pose has been held long enough, judge it."""
-        self.raw = raw
+        self.raw, self.raw_us = raw, now_us
         for place, byte in enumerate(raw):
             self._low[place], self._high[place] = min(self._low[place], byte), max(self._high[place], byte)
         if self.stage is not PoseStage.HELD or now_us < self._settled_us:
@@ -109,7 +118,7 @@ class PoseGuide:
 
     def press(self, now_us: int, key: PoseKey) -> None:
         """Carry out `key`, if it is active now."""
-        if key not in self.offered():
+        if key not in self.offered(now_us):
             return
         if key is PoseKey.QUIT:
             self.left = True

@@ -6,6 +6,8 @@ The names below are loaded on first use: drawing a glove needs no simulation.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from thenar.drivers.extras import optional
+
 if TYPE_CHECKING:
     from .running.simulation import Simulated, simulate
     from .scenes.decode import load_scene
@@ -18,4 +20,5 @@ _HOMES = {"Simulated": ".running.simulation", "load_scene": ".scenes.decode", "s
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name], __name__), name)
+    with optional():
+        return getattr(import_module(_HOMES[name], __name__), name)

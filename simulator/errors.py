@@ -2,7 +2,7 @@
 
 from thenar.drivers.errors import ThenarError
 
-__all__ = ["PlanError", "SceneError", "SimMissingError", "ThenarError"]
+__all__ = ["PlanError", "SceneError", "ThenarError"]
 
 
 class SceneError(ThenarError, ValueError):
@@ -11,7 +11,3 @@ class SceneError(ThenarError, ValueError):
 
 class PlanError(ThenarError, ValueError):
     """No posture of a hand can hold an object with a grasp type."""
-
-
-class SimMissingError(ThenarError, ImportError):
-    """An effect needs a package of the extra `sim` that is not installed."""

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
-from sklearn.base import clone
 
+from thenar.drivers.extras import optional
 from thenar.runtime.build import Build as LoadedBuild
 from thenar.runtime.manifest import By, Inputs, Options, TableBits
 from thenar.runtime.published import NONE
@@ -38,6 +38,9 @@ from .compile import Making, Wired, check_target
 from .documents import BuildReport, Documents, Progress
 from .ensemble import model_fault
 from .training import Scores, Trained, cross_validated, cuts_of, integers_of
+
+with optional():
+    from sklearn.base import clone
 
 # The score of a class that is absent from a fold's training rows.
 _UNSEEN = -1e6

@@ -1,11 +1,14 @@
 """The files of a spec, for cutting, sewing, soldering and running the reduced glove, and their folder."""
 
 import io
+import os
 import uuid
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -97,6 +100,7 @@ def _add_text(group: ET.Element, text: Text, height_mm: float) -> None:
 
 def dxf_of(pattern: Pattern) -> bytes:
     """Return the DXF (AutoCAD 2000, millimetres), which cutters and CAD programs read."""
+    _load_ezdxf()
     from ezdxf.filemanagement import new
     from ezdxf.units import MM
 
@@ -110,6 +114,21 @@ def dxf_of(pattern: Pattern) -> bytes:
             _add_to_dxf(space, shape)
         document.write(text)
     return text.getvalue().encode(document.output_encoding, "dxfreplace")
+
+
+def _load_ezdxf() -> None:
+    """Import ezdxf, which then reads settings and a list of fonts in the user's home, also where that is unreadable."""
+    try:
+        import_module("ezdxf")
+    except OSError:
+        before = dict(os.environ)
+        with TemporaryDirectory() as empty:
+            os.environ.update(HOME=empty, XDG_CONFIG_HOME=empty, XDG_CACHE_HOME=empty)
+            try:
+                import_module("ezdxf")
+            finally:
+                os.environ.clear()
+                os.environ.update(before)
 
 
 def _add_to_dxf(space: "Modelspace", shape: Shape) -> None:

@@ -4,11 +4,8 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator
-from sklearn.feature_selection import SelectorMixin
-from sklearn.utils import Tags
-from sklearn.utils.multiclass import check_classification_targets
-from sklearn.utils.validation import check_is_fitted, validate_data
+
+from thenar.drivers.extras import optional
 
 from ..samples import Samples
 from .constraints import Limits
@@ -17,6 +14,13 @@ from .inputs import check_bits
 from .methods.base import BEST, METHODS, PAPERS
 from .placement import choose
 from .ports import PortCosts
+
+with optional():
+    from sklearn.base import BaseEstimator
+    from sklearn.feature_selection import SelectorMixin
+    from sklearn.utils import Tags
+    from sklearn.utils.multiclass import check_classification_targets
+    from sklearn.utils.validation import check_is_fitted, validate_data
 
 
 class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.drivers.extras import missing
 from thenar.runtime.files import open_file
 from thenar.runtime.names import list_names, shortened
 
@@ -332,8 +333,8 @@ def main(source: str, skip: str, parent: str) -> int:
     try:
         for name in {package, "h5py"} if path.suffix == ".mat" else {package}:
             import_module(name)
-    except ImportError:
-        print(f"reading {what} needs {package.partition('.')[0]}: pip install 'thenar[compiler]'")
+    except ModuleNotFoundError as lack:
+        print(f"reading {what}: {missing(lack.name or package)}")
         return _REFUSED
     _limit(path.stat().st_size)
     try:

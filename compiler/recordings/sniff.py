@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 
+from thenar.drivers.extras import optional
+
 from .columns import TextFormat
 from .errors import TableError
 from .headers import NUMBER, has_names, preface, skipped
@@ -79,12 +81,8 @@ def _encoding(path: Path) -> tuple[str, str]:
 
 def _dialect(lines: Iterable[str]) -> tuple[str, str]:
     """Return the delimiter, "" for none, and the quote."""
-    try:
+    with optional(TableError, "finding how a table is written (a columns.toml says it, too)"):
         from clevercsv import Detector, Error
-    except ImportError:
-        raise TableError(
-            "finding how a table is written needs clevercsv: pip install 'thenar[compiler]', or write a columns.toml"
-        ) from None
     # Runs of blanks are one delimiter; of other delimiters they are no part.
     sample = "".join(re.sub(" +", " ", line[:_SEEN].strip(" \r\n")) + "\n" for line in islice(lines, _SEEN_LINES))
     try:

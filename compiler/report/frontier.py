@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 import msgspec
-from markupsafe import Markup
 from msgspec import Struct
+
+from thenar.drivers.extras import optional
 
 from ..frontier.plots import POINT_ID, RING_ID, pictures
 from ..frontier.points import Frontier, Point, Time
@@ -30,6 +31,9 @@ from ..pictures import PALETTE
 from ..text import DASH, NBSP, counted, interval, microseconds, percent, sentence
 from .content import PlainTable
 from .hand import HandPicture, hand_picture
+
+with optional():
+    from markupsafe import Markup
 
 _FOREIGN = "This frontier belongs to other recordings than the build."
 _CAPTIONS = {

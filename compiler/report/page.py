@@ -2,8 +2,7 @@
 
 from functools import lru_cache
 
-from jinja2 import Environment
-from markupsafe import Markup
+from thenar.drivers.extras import optional
 
 from ..pages import embedded, policy_hash, templates
 from ..pictures import colour_variables
@@ -15,6 +14,10 @@ from .content import ReportContent
 from .frontier import frontier_view
 from .hand import HandPicture, hand_picture
 from .tree import LINE, STEP, WORDS, TreeView, tree_view
+
+with optional():
+    from jinja2 import Environment
+    from markupsafe import Markup
 
 
 def report_html(content: ReportContent) -> bytes:

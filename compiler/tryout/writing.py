@@ -8,10 +8,9 @@ from importlib.resources import files
 
 import msgspec
 import numpy as np
-from jinja2 import Environment
-from markupsafe import Markup
 from numpy.typing import NDArray
 
+from thenar.drivers.extras import optional
 from thenar.runtime.errors import ThenarError
 from thenar.runtime.hand import HandDrawing
 from thenar.runtime.harness.wiring import Harness, StreamWiring
@@ -22,6 +21,10 @@ from thenar.runtime.taxels import TaxelSettings, calibration_of, count_limit
 
 from ..pages import embedded, policy_hash, templates
 from ..sensors import SensorCount
+
+with optional():
+    from jinja2 import Environment
+    from markupsafe import Markup
 
 MOST_BYTES = 500_000
 _MOST_ROWS = 400
@@ -169,6 +172,10 @@ def _stream(stream: StreamWiring) -> Json:
 
 def _rendered(manifest: Manifest, data: Json) -> bytes:
     style, script = _style(), _script()
+    levels = sum(switch.threshold is not None for switch in manifest.switches)
+    # What the page's first state is, too.
+    open_all = ["All switches open"] if manifest.switches else []
+    neutral = ", ".join([*open_all, *(["joints at the medians of the rows"] if manifest.joints else [])])
     page = (
         _environment()
         .get_template("try.html.j2")
@@ -178,7 +185,8 @@ def _rendered(manifest: Manifest, data: Json) -> bytes:
             script=Markup(script),
             script_sha256=policy_hash(script),
             sentence=f"It distinguishes {len(manifest.classes)} classes by {SensorCount.of_build(manifest)}.",
-            levels=any(switch.threshold is not None for switch in manifest.switches),
+            levels=levels,
+            neutral=neutral[:1].upper() + neutral[1:],
             knows_none=manifest.knows_none,
             checksum=manifest.checksum[:16],
             version=manifest.thenar,

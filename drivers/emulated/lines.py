@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..closing import Closing
 from ..errors import DeviceError, SettingError
+from ..extras import optional
 
 if TYPE_CHECKING:
     from websockets.sync.server import ServerConnection
@@ -137,10 +138,8 @@ class WebLines(Closing):
     """A WebSocket on loopback for all clients."""
 
     def __init__(self) -> None:
-        try:
+        with optional(SettingError):
             from websockets.sync.server import serve
-        except ImportError:
-            raise SettingError('WebSockets need a package: pip install "thenar[ws]"') from None
         self._clients: set[ServerConnection] = set()
         self._lock, self._closing = Lock(), Event()
         self._server = serve(self._serve, "127.0.0.1", 0, compression=None)

@@ -91,6 +91,7 @@ class Stepper:
         self.session: Session | None = None
         self.switches: SwitchFrame | None = None
         self.glove: GloveFrame | None = None
+        self._now_us = 0
 
     def take(self, entry: Entry) -> Moment | None:
         """Return the moment of an entry: for a run at each grasp, for other recordings at each frame."""
@@ -106,13 +107,15 @@ class Stepper:
         if isinstance(entry, LiveGrasp):
             return self._recognizer.step(entry.time_us, entry.unix_us, self.switches, self.glove)
         if isinstance(entry, SwitchFrame | GloveFrame) and not session.build:
-            unix_us = session.clock_ns // 1000 + entry.time_us
-            return self._recognizer.step(entry.time_us, unix_us, self.switches, self.glove)
+            # Frames of several devices are not always in the order of their times.
+            self._now_us = max(self._now_us, entry.time_us)
+            unix_us = session.clock_ns // 1000 + self._now_us
+            return self._recognizer.step(self._now_us, unix_us, self.switches, self.glove)
         return None
 
     def _begin(self, session: Session) -> None:
         """Begin with a session, which has another clock: earlier entries are from another time."""
-        self.session, self.switches, self.glove = session, None, None
+        self.session, self.switches, self.glove, self._now_us = session, None, None, 0
         if session.build == self._build.manifest.checksum:
             self._inputs: _Inputs | None = None
             self._recognizer = _system(self._build, session, self._name, None).recognizer()

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from thenar.drivers.errors import SettingError
 
-from ..frames import GloveFrame, SwitchFrame
+from ..frames import OLD_US, GloveFrame, SwitchFrame
 from ..names import list_names
 from ..published import NONE
 from .layout import Tail
@@ -140,13 +140,20 @@ class Guide:
     done          number of accepted trials, those of earlier sittings included
     skipped       number of trials skipped here; they come again in another sitting
     problem       why nothing could be captured, as a sentence; "" without a problem
+    lost          what the trials need and is not read now, as a sentence: until it is back, no countdown starts
     step          counts every change of stage or trial
     """
 
     def __init__(
-        self, trials: Sequence[Trial], recorder: Recorder, countdown_us: int, accepted: Sequence[int] = ()
+        self,
+        trials: Sequence[Trial],
+        recorder: Recorder,
+        countdown_us: int,
+        accepted: Sequence[int] = (),
+        old_us: int = OLD_US,
     ) -> None:
-        """Lead through the `trials` whose numbers are not `accepted`; these are in the order of acceptance.
+        """Lead through the `trials` whose numbers are not `accepted`; these are in the order of acceptance. A device
+        whose newest frame has an age of `old_us` is silent.
 
         The recorder's session must have a collection.
         """
@@ -154,8 +161,9 @@ class Guide:
         assert collection is not None
         self.subject = collection.subject
         self.total = len(trials)
-        self.problem = ""
+        self.problem = self.lost = ""
         self.step = 0
+        self.old_us = old_us
         by_number, before = {trial.number: trial for trial in trials}, frozenset(accepted)
         self._past = [(by_number[number], True) for number in accepted]
         self._left = [trial for trial in reversed(trials) if trial.number not in before]
@@ -164,6 +172,8 @@ class Guide:
         self._zero_us = 0
         self._switches: SwitchFrame | None = None
         self._glove: GloveFrame | None = None
+        self._captured: tuple[SwitchFrame | None, GloveFrame | None] = (None, None)
+        self._whole_us: int | None = None
         self.stage = Stage.READY if self._left else Stage.DONE
 
     @property
@@ -184,13 +194,18 @@ class Guide:
     @property
     def captured(self) -> tuple[SwitchFrame | None, GloveFrame | None]:
         """The newest frames; in review, those that were captured."""
-        return self._switches, self._glove
+        return self._captured if self.stage is Stage.REVIEW else (self._switches, self._glove)
+
+    @property
+    def newest_us(self) -> int | None:
+        """When the newest frame was read; None before the first."""
+        return max((frame.time_us for frame in (self._switches, self._glove) if frame is not None), default=None)
 
     def offered(self) -> dict[Key, str]:
         """Return the keys that are active now, and their effects."""
         if self.stage is Stage.OVER:
             return {}
-        found = dict(_OFFERED[self.stage])
+        found = {} if self.lost and self.stage in _WAITING else dict(_OFFERED[self.stage])
         if self._left:
             found[Key.SKIP] = "skip this one"
         if self._past:
@@ -203,12 +218,20 @@ class Guide:
         """Return the time left of the countdown, or of the movement."""
         return max(0, self._zero_us - now_us) / 1e6
 
-    def take(self, now_us: int, arrived: Sequence[SwitchFrame | GloveFrame]) -> None:
+    def take(self, now_us: int, arrived: Sequence[SwitchFrame | GloveFrame], disconnected: Sequence[str] = ()) -> None:
         """Record the arrived frames, except in a pause; after the countdown, capture the grasp, or begin the movement
-        of the empty hand, which is captured when its time has passed. Raises FrameError.
+        of the empty hand, which is captured when its time has passed. `disconnected` are names of devices. Raises
+        FrameError.
         """
         for frame in arrived:
             self._record(frame)
+        lack = self._lack(now_us, self.old_us)
+        if not lack or self._whole_us is None:
+            self._whole_us = now_us
+        if disconnected:
+            self.lost = f"not connected: {list_names(disconnected)}"
+        else:
+            self.lost = lack if now_us - self._whole_us > self.old_us else ""
         if self.stage not in (Stage.COUNTDOWN, Stage.MOVING) or now_us < self._zero_us:
             return
         if self.stage is Stage.COUNTDOWN and self._left[-1].grasp == NONE:
@@ -264,6 +287,9 @@ class Guide:
 
     def _begin(self, now_us: int) -> None:
         self.problem = ""
+        if self._left and self.lost:
+            self._become(Stage.READY)
+            return
         self._zero_us = now_us + self._countdown_us
         self._become(Stage.COUNTDOWN if self._left else Stage.DONE)
         if self._left and self._left[-1].grasp != NONE:
@@ -278,26 +304,26 @@ class Guide:
         if isinstance(frame, SwitchFrame):
             if recorded:
                 self._recorder.switches(frame)
-            if self.stage is not Stage.REVIEW:
-                self._switches = frame
+            self._switches = frame
         else:
             if recorded:
                 self._recorder.glove(frame)
-            if self.stage is not Stage.REVIEW:
-                self._glove = frame
+            self._glove = frame
 
     def _capture(self, now_us: int) -> None:
-        self.problem = self._lack(now_us)
+        self.problem = self._lack(now_us, FRESH_US)
         if self.problem:
             self._become(Stage.READY)
             return
+        self._captured = self._switches, self._glove
         self._label(now_us, "captured")
         self._become(Stage.REVIEW)
 
-    def _lack(self, now_us: int) -> str:
+    def _lack(self, now_us: int, oldest_us: int) -> str:
+        """Return what is not read in frames of at most this age, as a sentence; "" if all is."""
         session = self._recorder.session
         if session.switches or session.taxels:
-            if self._switches is None or now_us - self._switches.time_us > FRESH_US:
+            if self._switches is None or now_us - self._switches.time_us > oldest_us:
                 return f"the {'switches' if session.switches else 'taxels'} are silent"
             if lost := self._switches.lost | self._switches.unread:
                 names = [name for place, name in enumerate(session.switches) if lost >> place & 1]
@@ -305,7 +331,7 @@ class Guide:
             codes = self._switches.taxels or (None,) * len(session.taxels)
             if names := [name for name, code in zip(session.taxels, codes, strict=True) if code is None]:
                 return f"taxels cannot be read: {list_names(names)}"
-        if session.sensors and (self._glove is None or now_us - self._glove.time_us > FRESH_US):
+        if session.sensors and (self._glove is None or now_us - self._glove.time_us > oldest_us):
             return "the CyberGlove is silent"
         if self._glove is not None and not self._glove.plugged:
             return "the CyberGlove is not plugged into its box"

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from thenar.drivers.errors import SettingError
+from thenar.drivers.extras import optional
 
 from ..names import shortened
 from ..preshape.selector import Preshape
@@ -298,10 +299,8 @@ def _open(where: SinkPlace) -> Sink:
             f"{where.text}: other machines could read it there: use 127.0.0.1, or write "
             f"foxglove:{where.place}?public to let them"
         )
-    try:
+    with optional(SinkError, where.text):
         return FoxgloveServer(*address[:2], rate=int(rate), where=where.text)
-    except ImportError as reason:
-        raise SinkError(f"{where.text} needs Foxglove's SDK: pip install 'thenar[foxglove]' ({reason})") from None
 
 
 MEMBER = SinkKind(

@@ -19,6 +19,7 @@ from collections.abc import Callable
 from msgspec import json
 
 from thenar.drivers.errors import SettingError
+from thenar.drivers.extras import optional
 
 from ..names import shortened
 from ..preshape.selector import Preshape
@@ -149,10 +150,8 @@ def _open(where: SinkPlace) -> Sink:
         raise SettingError(
             f"ros:{where.place}: a rate of {shortened(repr(rate))} is not possible: use 1 to {_FASTEST_HZ} a second"
         )
-    try:
+    with optional(SinkError, f"ros:{where.place}"):
         return RosTopics(where.place, public="public" in where.options, rate=int(rate))
-    except ImportError as reason:
-        raise SinkError(f"ros:{where.place} needs Cyclone DDS: pip install 'thenar[ros]' ({reason})") from None
 
 
 MEMBER = SinkKind(

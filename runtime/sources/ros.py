@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from thenar.drivers.errors import DeviceError, SettingError
+from thenar.drivers.extras import optional
 from thenar.drivers.line_reader import RowReader
 from thenar.drivers.lines import LineCounts, Row, finite
 from thenar.drivers.names import shortened
@@ -46,14 +47,10 @@ class RosReader(RowReader):
         if found is None:
             ways = f"ros:/TOPIC, optionally followed by ?type= one of {', '.join(_TYPES)}, or ?public"
             raise SettingError(f"{shortened(repr(self._port))} names no topic: write {ways}")
-        try:
+        with optional(SettingError, self._port):
             from cyclonedds.core import DDSException, ReadCondition, WaitSet
 
             from ..ros import domain, messages
-        except ImportError as reason:
-            raise SettingError(
-                f"{self._port}: ROS topics need a package: pip install 'thenar[ros]' ({reason})"
-            ) from None
         self._senders = FirstSender()
         number, name = domain.domain(), domain.namespace(found[1])
         try:

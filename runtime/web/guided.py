@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 
 from thenar.drivers.closing import Closing
 
-from ..frames import GloveFrame, Mask, SwitchFrame
+from ..frames import Mask, SwitchFrame
 from ..live.sources import DeviceState
 from ..published import NONE
-from ..recording.guide import Guide, Key, Trial
+from ..recording.guide import Guide, Key, Stage, Trial
 from ..recording.session import Session
 from .presses import Presses
 from .server import Server, message
@@ -80,8 +80,7 @@ class GuidePage(Closing):
         if now_us < self._due_us and guide.step == self._step:
             return
         self._due_us, self._step = now_us + _PERIOD_US, guide.step
-        switches, glove = guide.captured
-        trial = guide.trial
+        trial, newest_us = guide.trial, guide.newest_us
         self._server.publish(
             "guide",
             message(
@@ -94,12 +93,15 @@ class GuidePage(Closing):
                 total=guide.total,
                 left_s=guide.seconds_left(now_us),
                 problem=guide.problem,
+                lost=guide.lost,
+                time_us=newest_us,
+                age_us=newest_us and now_us - newest_us,
                 offered={key.value: what for key, what in guide.offered().items()},
                 trial=trial and {"grasp": trial.grasp, "none": trial.grasp == NONE, **self._shown(trial)},
                 devices=[
                     {"name": device.name, "connected": device.connected, "error": device.error} for device in devices
                 ],
-                **self._seen(switches, glove),
+                **self._seen(now_us, guide),
             ),
         )
 
@@ -111,12 +113,15 @@ class GuidePage(Closing):
         """Close the page."""
         self._server.close()
 
-    def _seen(self, switches: SwitchFrame | None, glove: GloveFrame | None) -> dict[str, object]:
-        """Return the glove's readings: one character per switch, "1" closed, "0" open, "x" not read; the joint values,
-        in degrees if calibrated, null if not measured; how far each taxel is pressed, 0 to 1.
+    def _seen(self, now_us: int, guide: Guide) -> dict[str, object]:
+        """Return the glove's readings, or those that were captured: one character per switch, "1" closed, "0" open, "x"
+        not read; the joint values, in degrees if calibrated, null if not measured, none if the newest record is old;
+        how far each taxel is pressed, 0 to 1.
         """
+        switches, glove = guide.captured
+        captured = guide.stage is Stage.REVIEW
         joints: list[float | None] = []
-        if glove is not None and glove.plugged:
+        if glove is not None and glove.plugged and (captured or now_us - glove.time_us <= guide.old_us):
             joints = [
                 None if not raw else float(raw) if line is None else round(line.value(raw), 1)
                 for raw, line in zip(glove.sensors, self._lines, strict=True)

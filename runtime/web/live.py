@@ -14,10 +14,12 @@ from thenar.drivers.closing import Closing
 
 from ..build import Build
 from ..detail import Details
+from ..frames import now_us
 from ..glove import Glove
 from ..hand import load_hand
 from ..harness.wiring import Harness
 from ..live.recogniser import Moment
+from ..manifest import Manifest
 from ..published import HealthReport, LiveGrasp
 from ..recording.writer import LiveRecorder
 from ..taxels import calibration_of
@@ -63,19 +65,10 @@ class LivePage(Closing):
         self._progress: object = None
         self._past = Past()
         self._recordings = Recordings(glove, recordings, self._tell_recording)
-        build, hand = glove.system.build, load_hand(folder, glove.system.build.manifest)
+        manifest, name = glove.system.build.manifest, glove.system.harness.name
         self._first = (
-            message(
-                "build",
-                name=glove.system.harness.name,
-                grasps=build.manifest.classes,
-                switches=[switch.name for switch in build.manifest.switches],
-                joints=[joint.name for joint in build.manifest.joints],
-                taxels=glove.system.harness.taxel_names,
-                preshapes=glove.has_preshapes,
-                records=True,
-            ),
-            message("hand", hand),
+            build_message(folder, manifest, name, preshapes=glove.has_preshapes, records=True),
+            message("hand", load_hand(folder, manifest)),
         )
         self.server = Server("live", address, token=token, on_message=self._recordings.take, hello=self._hello)
         self._tell_recording()
@@ -111,6 +104,24 @@ class LivePage(Closing):
         return (*self._first, self._past.text())
 
 
+def build_message(
+    folder: Path | None, manifest: Manifest | None, name: str, *, preshapes: bool = False, records: bool = False
+) -> bytes:
+    """Return the message on the build of a page called `name`: which one it is, None where it is not known; its types,
+    switches and joints; whether it knows an empty hand; and what else the page can show and do.
+    """
+    known: dict[str, object] = {"grasps": (), "switches": (), "joints": (), "partial": True}
+    if folder is not None and manifest is not None:
+        known = {
+            "build": f"{folder.resolve().name} {manifest.checksum[:8]}",
+            "grasps": manifest.classes,
+            "switches": [switch.name for switch in manifest.switches],
+            "joints": [joint.name for joint in manifest.joints],
+            "empty_hand": manifest.knows_none,
+        }
+    return message("build", known, name=name, preshapes=preshapes, records=records)
+
+
 class Past:
     """The latest predictions, for pages opened later. `add` and `text` may be called on two threads."""
 
@@ -141,8 +152,9 @@ class Past:
 
 
 class FrameText:
-    """Makes the text of a moment: the fields of its grasp, preshape and angles as in sinks, those of `Detail`, and
-    `taxels`: by name, how far each read and calibrated taxel is pressed, from 0 at rest to 1 at its press.
+    """Makes the text of a moment: the fields of its grasp, preshape and angles as in sinks, those of `Detail`,
+    `late_us`: its age now, and `taxels`: by name, how far each read and calibrated taxel is pressed, from 0 at rest to
+    1 at its press.
     """
 
     def __init__(self, build: Build, harness: Harness) -> None:
@@ -156,6 +168,7 @@ class FrameText:
         more = {
             "preshape": moment.preshape,
             "angles": moment.angles,
+            "late_us": now_us() - moment.grasp.time_us,
             "taxels": {} if frame is None or frame.taxels is None else self._pressed(frame.taxels),
         }
         parts = map(_inside, (moment.grasp, self._details(moment), more))

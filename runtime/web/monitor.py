@@ -18,11 +18,12 @@ from thenar.drivers.errors import DeviceError, SettingError
 
 from ..build import load_manifest
 from ..detail import Detail
+from ..frames import now_us
 from ..hand import load_hand
 from ..names import shortened
 from ..sinks.jsonl import DetailLine, HealthLine, Line
 from ..task import ProgressLine
-from .live import Past
+from .live import Past, build_message
 from .server import Server, message
 
 RETRY_S, _WAIT_S = 1.0, 0.2
@@ -72,6 +73,7 @@ class StreamMonitor(Closing):
         self._build, self._first = _first(where, build)
         self._past = Past()
         self._line: Line | None = None
+        self._line_us = 0
         self._detailed_us: int | None = None
         self._source = Source(where, connected=False, error="not connected yet")
         self.server = Server("live", address, token=token, hello=self._hello)
@@ -104,9 +106,9 @@ class StreamMonitor(Closing):
             raise DeviceError(f"the data is not a stream of thenar: {shortened(str(wrong), 120)}") from None
         if isinstance(line, Line):
             self._past.add(line)
-            self._line = line
+            self._line, self._line_us = line, now_us()
             if self._detailed_us is None or not 0 <= line.time_us - self._detailed_us < _DETAILED_US:
-                self.server.publish("frame", partial(message, "frame", line))
+                self.server.publish("frame", partial(_frame, line, self._line_us))
         elif isinstance(line, DetailLine):
             self._detail(line)
         elif isinstance(line, HealthLine):
@@ -124,7 +126,7 @@ class StreamMonitor(Closing):
         if line is not None and line.number == detail.number:
             self._detailed_us = line.time_us
             more = {name: getattr(detail, name) for name in Detail.__struct_fields__}
-            self.server.publish("frame", partial(message, "frame", line, taxels={}, **more))
+            self.server.publish("frame", partial(_frame, line, self._line_us, taxels={}, **more))
 
     def _tell(self, source: Source) -> None:
         self.server.publish("source", message("source", source))
@@ -138,13 +140,16 @@ class StreamMonitor(Closing):
 
 def _first(where: str, folder: Path | None) -> tuple[str, tuple[bytes, ...]]:
     """Return the checksum of the build in a folder, "" without one, and the first messages for a page."""
-    known = {"name": where, "preshapes": True, "records": False}
     if folder is None:
-        return "", (message("build", known, grasps=(), switches=(), joints=(), partial=True),)
+        return "", (build_message(None, None, where, preshapes=True),)
     manifest = load_manifest(folder)
-    names = {"switches": [each.name for each in manifest.switches], "joints": [each.name for each in manifest.joints]}
-    build = message("build", known, grasps=manifest.classes, partial=False, **names)
+    build = build_message(folder, manifest, where, preshapes=True)
     return manifest.checksum, (build, message("hand", load_hand(folder, manifest)))
+
+
+def _frame(line: Line, arrived_us: int, **more: object) -> bytes:
+    """Return the message of a moment, with its age since it arrived here."""
+    return message("frame", line, late_us=now_us() - arrived_us, **more)
 
 
 def _place(where: str) -> str | tuple[str, int]:

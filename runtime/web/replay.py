@@ -26,7 +26,7 @@ from ..live.replay import Stepper, periods_us
 from ..published import LiveGrasp
 from ..recording.index import Index
 from ..recording.session import Label, Mark, Session
-from .live import PAST_US, FrameText
+from .live import PAST_US, FrameText, build_message
 from .server import Server, message
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -188,23 +188,8 @@ class ReplayPage(Closing):
     def _described(self, name: str, folder: Path | None) -> Sequence[bytes]:
         build = self._build
         if build is None or folder is None:
-            return (
-                message(
-                    "build", name=name, grasps=(), switches=(), joints=(), preshapes=False, records=False, partial=True
-                ),
-            )
-        names = [switch.name for switch in build.manifest.switches]
-        joints = [joint.name for joint in build.manifest.joints]
-        described = message(
-            "build",
-            name=name,
-            grasps=build.manifest.classes,
-            switches=names,
-            joints=joints,
-            preshapes=False,
-            records=False,
-        )
-        return described, message("hand", load_hand(folder, build.manifest))
+            return (build_message(None, None, name),)
+        return build_message(folder, build.manifest, name), message("hand", load_hand(folder, build.manifest))
 
     def _scan(self) -> None:
         """Scan the whole recording for its overview."""

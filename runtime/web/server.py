@@ -2,7 +2,8 @@
 
 It runs on a separate thread. A publisher leaves a reference and goes on; a message is made when it is sent, and none is
 made while no page is open. Every browser gets the newest message of each topic, at most 100 times a second. Only the
-system buffers for a browser: a slow one sees fewer moments, and one that reads nothing for five seconds is dropped.
+system buffers for a browser: a slow one sees fewer moments, and one that reads nothing, or does not reply to a ping,
+for five seconds is dropped.
 """
 
 import asyncio
@@ -39,6 +40,8 @@ MOST_PAGES, MOST_CONNECTIONS = 32, 96
 _FETCH_S = 20.0
 # A page that takes no byte for this long hangs.
 HANGING_S = 5.0
+# A silent page is pinged after this time; every browser replies by itself, and has half as long for that.
+PING_S = HANGING_S / 1.5
 _SEND_BUFFER = 65_536
 # The system notices one that vanished.
 _GONE_MS = 20_000
@@ -229,7 +232,12 @@ class Server(Closing):
         if transport is None or len(self._pages) >= MOST_PAGES:
             return _said(503, f"{MOST_PAGES} pages are already open: close one.")
         live = web.WebSocketResponse(
-            autoping=False, compress=False, max_msg_size=MOST_BYTES, timeout=_CLOSING_S, decode_text=False
+            autoping=False,
+            compress=False,
+            max_msg_size=MOST_BYTES,
+            timeout=_CLOSING_S,
+            decode_text=False,
+            heartbeat=PING_S,
         )
         live.headers.update(HEADERS)
         await live.prepare(request)
@@ -244,6 +252,8 @@ class Server(Closing):
             await self._listen(page)
         finally:
             self._pages.remove(page)
+            if live.exception() is not None:
+                transport.abort()  # a page that hangs would keep what was not sent yet
         return live
 
     async def _listen(self, page: "_Page") -> None:

@@ -10,16 +10,19 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
 from thenar.compiler.elementary import Floats
+from thenar.drivers.extras import optional
 
 from ..body.condition import Thing
 from ..body.hand import CAPSULES, DOF, LIMITS_DEG, Hand, Skeleton
 from ..body.layout import Patch, Switches
 from ..body.shapes import Box, Cylinder, Pose, Shape, Sphere
 from .model import GRAVITY, STIFFNESS, Contact, Load, split, torques
+
+with optional():
+    import mujoco
 
 JOINTS = len(DOF)
 OBJECT = "object"

@@ -5,9 +5,10 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from thenar.drivers.extras import optional
+
 from ..body.layout import murakami160
 from ..contact.model import ContactModel
-from ..errors import SimMissingError
 from ..pipeline.effect import CONTACT_READS, CONTACT_WRITES, Effect, EffectParameters, Setting
 
 
@@ -35,11 +36,9 @@ class Parameters(EffectParameters, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 def model(parameters: Parameters, setting: Setting) -> ContactModel:
-    """Return the contact model. Raises SimMissingError if MuJoCo is not installed; reading a scene does not need it."""
-    try:
+    """Return the contact model. Raises MissingPackageError without MuJoCo; reading a scene does not need it."""
+    with optional(place="contact.mujoco"):
         from ..contact.mujoco import Dynamics, MujocoContact
-    except ImportError as missing:
-        raise SimMissingError(f"contact.mujoco needs MuJoCo ({missing}): pip install 'thenar[sim]'") from missing
     given = msgspec.structs.asdict(parameters)
     del given["after"]
     return MujocoContact(Dynamics(**given), murakami160())

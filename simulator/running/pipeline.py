@@ -137,7 +137,7 @@ def compile_pipeline(scene: Scene, without: str | None = None) -> Pipeline:
     """Return the steps of `scene`, except for the listed effect `without`.
 
     Raises SceneError if effects conflict, wait for each other in a circle, or have impossible parameters;
-    SimMissingError if one needs a package that is not installed.
+    MissingPackageError if one needs a package that is not installed.
     """
     listed = list(_listed(scene, without))
     setting = scene.setting(place.effect for place in listed)

@@ -13,12 +13,15 @@ from tempfile import TemporaryDirectory
 
 import msgspec
 import numpy as np
-from threadpoolctl import threadpool_info
 
 from thenar.compiler.artifact.compile import compile_build
+from thenar.drivers.extras import optional
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME
 from thenar.simulator.running.simulation import simulate
 from thenar.simulator.scenes.decode import load_scene
+
+with optional():
+    from threadpoolctl import threadpool_info
 
 SCENE = "quick"  # 160 switches, 16 joints, 14 grasp types, two hands
 SMALL = 3, 20, 2  # repetitions, rounds, folds: about half a second

@@ -4,10 +4,13 @@ import re
 from dataclasses import dataclass
 from importlib.resources import files
 
-from jinja2 import Environment, StrictUndefined
-from markupsafe import Markup
+from thenar.drivers.extras import optional
 
 from ..report import Report, bound_of, error_of, failures, legend, summary, verdict, weka_lines
+
+with optional():
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
 
 
 @dataclass(frozen=True, slots=True)

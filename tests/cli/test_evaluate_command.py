@@ -219,7 +219,7 @@ def test_an_install_without_the_extra_says_what_is_missing(
 ) -> None:
     monkeypatch.setitem(sys.modules, "joblib", None)
     assert run(["evaluate", grasps, *QUICK, "--jobs", "2"]) == 2
-    assert capsys.readouterr().err == "thenar: joblib is not installed: pip install 'thenar[compiler]'\n"
+    assert capsys.readouterr().err == 'thenar: joblib is not installed: pip install "thenar[compiler]"\n'
 
 
 def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from thenar.cli.group import COMMANDS, EXTRAS
+from thenar.cli.group import COMMANDS
+from thenar.drivers.extras import EXTRAS
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 HEAVY = ("sklearn", "scipy", "joblib", "matplotlib", "numpy")
@@ -151,20 +152,30 @@ def test_ctrl_c_while_the_libraries_load_is_one_like_any_other() -> None:
 # A base install: of the packages of all extras, none can be imported but those in EXCEPT.
 BASE = """
 import os, sys
-from thenar.cli.group import EXTRAS
+from thenar.drivers.extras import EXTRAS
 lacking = {package for packages in EXTRAS.values() for package in packages} - set(os.environ["EXCEPT"].split())
 class Lacking:
     def find_spec(self, name, path=None, target=None):
         if name.partition(".")[0] in lacking:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 sys.meta_path.insert(0, Lacking())
-from thenar.cli import main
-main()
+"""
+RUN = "from thenar.cli import main; main()"
+# Every module, by its name; what its import says on a base install is printed.
+IMPORT_ALL = """
+import importlib, pkgutil, thenar
+for module in pkgutil.walk_packages(thenar.__path__, "thenar.", onerror=lambda _: None):
+    if module.name.rpartition(".")[2] in ("__main__", "i2c_server"):  # one runs, the other needs a system's package
+        continue
+    try:
+        importlib.import_module(module.name)
+    except ImportError as lack:
+        print(f"{module.name}: {lack}")
 """
 
 
 def _on_a_base_install(*arguments: object, but: str = "") -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-c", BASE, *map(str, arguments)]
+    command = [sys.executable, "-c", BASE + RUN, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, "EXCEPT": but})
 
 
@@ -181,6 +192,27 @@ def test_the_extras_in_hints_are_those_of_the_project() -> None:
         for extra, packages in project["optional-dependencies"].items()
     }
     assert {extra: set(packages) for extra, packages in EXTRAS.items()} == needed
+
+
+def test_an_import_without_its_extra_says_which_one_it_needs() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", BASE + IMPORT_ALL],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "EXCEPT": ""},
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    said = dict(line.split(": ", 1) for line in done.stdout.splitlines())
+    hint = re.compile(r'\S+ is not installed: pip install "thenar\[(\w+)\]"')
+    extras = {name: found[1] if (found := hint.fullmatch(text)) else text for name, text in said.items()}
+    assert set(extras.values()) <= EXTRAS.keys(), extras
+    for name, extra in (
+        ("compiler.boosting.classifier", "compiler"),
+        ("runtime.web", "web"),
+        ("stability", "stability"),
+    ):
+        assert extras[f"thenar.{name}"] == extra
 
 
 @pytest.mark.slow
@@ -206,7 +238,7 @@ def test_what_is_not_installed_is_named_with_the_extra_that_brings_it(
     words = line.format(set=set_file, build=build_folder, new=tmp_path / "new").split()
     done = _on_a_base_install(*words, but=but)
     assert done.returncode == 2
-    assert done.stderr.endswith(f": pip install 'thenar[{extra}]'\n")
+    assert done.stderr.endswith(f': pip install "thenar[{extra}]"\n')
 
 
 @pytest.mark.slow

@@ -1,7 +1,9 @@
 """`thenar spec`: the reduced glove of a build, printed and written."""
 
 import json
+import os
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -66,6 +68,17 @@ def test_a_spec_is_printed_and_written(thenar: Thenar, hand_build: Path, tmp_pat
     written = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert written == spec_files(manifest, hand=hand_map().fitted(names))
     assert load_harness(folder / "glove.toml").switches == tuple(names)
+
+
+def test_a_home_that_cannot_be_read_ends_nothing(hand_build: Path, tmp_path: Path) -> None:
+    """No name of a file is that long, so its folders can no more be searched than those of somebody else."""
+    command = [sys.executable, "-m", "thenar.cli", "spec", str(hand_build), "-o", str(tmp_path / "spec")]
+    home = "/" + 300 * "a"
+    away = {**os.environ, "HOME": home, "XDG_CONFIG_HOME": f"{home}/config", "XDG_CACHE_HOME": f"{home}/cache"}
+    said(subprocess.run(command, capture_output=True, text=True, check=False, env=away))
+    hand = hand_map().fitted([switch.name for switch in Build.load(hand_build).manifest.switches])
+    written = {path.name: path.read_bytes() for path in (tmp_path / "spec").iterdir()}
+    assert written == spec_files(Build.load(hand_build).manifest, hand=hand)
 
 
 def test_without_a_folder_nothing_is_written(thenar: Thenar, hand_build: Path) -> None:

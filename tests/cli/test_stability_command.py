@@ -148,7 +148,7 @@ def test_a_missing_package_is_one_sentence_with_what_to_install(missing: str, tm
     command = [sys.executable, "-c", program, "stability", "-o", str(tmp_path / "page.html")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == f"thenar: {missing} is not installed: pip install 'thenar[stability]'\n"
+    assert done.stderr == f'thenar: {missing} is not installed: pip install "thenar[stability]"\n'
 
 
 def test_a_reader_that_goes_away_ends_it_in_silence() -> None:

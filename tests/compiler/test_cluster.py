@@ -155,7 +155,7 @@ def test_a_cluster_works_for_who_runs_a_loop_of_their_own(scheduler: str) -> Non
 
 def test_without_dask_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(ClusterError, match=r"pip install 'thenar\[cluster\]'"):
+    with pytest.raises(ClusterError, match=r'pip install "thenar\[cluster\]"'):
         list(in_workers(operator.neg, [1], 1, "tcp://127.0.0.1:1"))
 
 

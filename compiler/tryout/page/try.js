@@ -144,7 +144,7 @@ function showRow() {
   if (!row) return;
   for (const key of ["bits", "codes", "lostSwitches", "lostJoints"]) state[key] = row[key].slice();
   const { grasp } = show(), of = `Row ${slider.valueAsNumber + 1} of ${rows.length}`;
-  at("truth").textContent = row.truth === null ? `${of}.` : `${of}: was ${row.truth}, ${grasp === row.truth ? "recognised" : "mistaken"}.`;
+  at("truth").textContent = row.truth === null ? `${of}.` : `${of}: was ${row.truth}, ${grasp === row.truth ? "recognised" : "mistaken ✗"}.`;
 }
 
 function pause() {

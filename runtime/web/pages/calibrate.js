@@ -1,6 +1,7 @@
 // The page of a guided calibration: the pose to hold, the live value of each sensor, and the keys.
 import { drawHand } from "./hand.js";
 import { keys, leaving } from "./keys.js";
+import { counted, State } from "./state.js";
 import { connect, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
@@ -13,13 +14,13 @@ const STAGES = {
   over: "the calibration has ended",
 };
 
+const current = new State();
 let pose = null, now = null, rows = [], read = -1, end = "";
 
 const send = connect({
-  open: () => link("connected", "good"),
+  open: () => current.link(true),
   closed: () => {
-    if (end) link("ended", "good");
-    else link("not connected", "bad");
+    current.link(false, Boolean(end));
     offer({});
   },
   sensors: (received) => {
@@ -43,11 +44,6 @@ const press = (key) => now && send({ do: key, step: now.step });
 const offer = keys($("keys"), LETTERS, (key) => (key === "quit" ? $("leaving").showModal() : press(key)));
 leaving($("leaving"), $("leave"), $("stay"), () => press("quit"));
 
-function link(words, is) {
-  say($("link"), words);
-  $("link").dataset.is = is;
-}
-
 function row(name) {
   const made = document.createElement("tr"), head = document.createElement("th");
   head.scope = "row";
@@ -64,6 +60,8 @@ function row(name) {
 
 function show(received) {
   now = received;
+  current.data(received.time_us, received.age_us);
+  current.devices([]);
   const done = received.stage === "done" || received.stage === "over";
   say($("count"), done ? `${received.total} of ${received.total} poses taken` : `pose ${received.number} of ${received.total}`);
   $("progress").max = received.total;
@@ -71,7 +69,8 @@ function show(received) {
   $("task").dataset.step = received.step;
   say($("title"), done ? "All poses are taken" : received.name);
   say($("detail"), done ? "" : received.instruction);
-  say($("stage"), end || STAGES[received.stage]);
+  const waits = received.stage === "ready" && received.silent;
+  say($("stage"), end || (waits ? "the glove is silent: no pose can be taken until it sends" : STAGES[received.stage]));
   if (pose && received.picture) {
     pose.setPose(received.picture);
     $("pose").setAttribute("aria-label", `picture of the hand: ${received.name}`);
@@ -94,7 +93,8 @@ function show(received) {
     state.dataset.is = received.states[at] ? "bad" : "";
   });
   const wrong = received.states.filter((state) => state).length;
-  say($("sees"), wrong ? `${wrong} of ${rows.length} sensors: see State` : `all ${rows.length} sensors are measured`);
+  const all = rows.length, known = received.bytes.length && !received.silent;
+  say($("sees"), !known ? counted(0, all, all, "sensors measured") : wrong ? `${wrong} of ${all} sensors: see State` : `all ${all} sensors are measured`);
   offer(received.offered);
   $("task").dataset.stage = received.stage;
 }

@@ -1,6 +1,7 @@
 // The page of a guided collection: the next grasp, the countdown, the glove's readings, and the keys.
 import { drawHand } from "./hand.js";
 import { keys, leaving } from "./keys.js";
+import { counted, State } from "./state.js";
 import { connect, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
@@ -8,6 +9,7 @@ const LETTERS = { accept: "Enter", redo: "r", undo: "u", skip: "s", pause: "p", 
 const SHOWN = 5;
 
 let names = { switches: [], sensors: [], taxels: [] };
+const current = new State();
 let glove = null, pose = null, now = null, shown = "", ended = false, read = "";
 
 function percent(share) {
@@ -19,10 +21,9 @@ function listed(words, most = SHOWN) {
 }
 
 const send = connect({
-  open: () => link("connected", "good"),
+  open: () => current.link(true),
   closed: () => {
-    if (ended) link("ended", "good");
-    else link("not connected", "bad");
+    current.link(false, ended);
     offer({});
   },
   collection: (received) => {
@@ -43,13 +44,10 @@ const press = (key) => now && send({ do: key, step: now.step });
 const offer = keys($("keys"), LETTERS, (key) => (key === "quit" ? $("leaving").showModal() : press(key)));
 leaving($("leaving"), $("leave"), $("stay"), () => press("quit"));
 
-function link(words, is) {
-  say($("link"), words);
-  $("link").dataset.is = is;
-}
-
 function show(guide) {
   ended = guide.stage === "over";
+  current.data(guide.time_us, guide.age_us);
+  current.devices(guide.devices);
   const skipped = guide.skipped ? `, ${guide.skipped} skipped` : "";
   say($("count"), `${guide.done} of ${guide.total} trials done${skipped}`);
   $("progress").max = guide.total;
@@ -58,11 +56,11 @@ function show(guide) {
   task(guide);
   const doing = guide.trial?.none ? "move so" : "hold it";
   const stages = {
-    ready: "Enter starts the countdown",
+    ready: guide.lost ? `the countdown waits: ${guide.lost}` : "Enter starts the countdown",
     countdown: `take the grasp: ${doing} in`,
     moving: "move so for",
     review: "captured: keep it?",
-    paused: "paused; nothing is recorded meanwhile",
+    paused: `paused; nothing is recorded meanwhile${guide.lost ? `; the countdown waits: ${guide.lost}` : ""}`,
     done: "all trials are done",
     over: "the collection has ended",
   };
@@ -110,17 +108,18 @@ function sees(guide) {
     glove.setPose(guide.joints);
   }
   if (names.switches.length) {
-    parts.push(`${closed.filter((letter) => letter === "1").length} of ${names.switches.length} switches closed`);
-    const lost = names.switches.filter((_, bit) => closed[bit] === "x");
-    if (lost.length) parts.push(`not read: ${listed(lost)}`);
+    const lost = names.switches.filter((_, bit) => (closed[bit] ?? "x") === "x");
+    parts.push(readings(closed.filter((letter) => letter === "1").length, names.switches, lost, "switches closed"));
   }
   if (names.taxels.length) {
     const pressed = guide.taxels.filter((share) => share !== null && share >= 0.5).length;
-    parts.push(`${pressed} of ${names.taxels.length} taxels pressed`);
     const lost = names.taxels.filter((_, at) => (guide.taxels[at] ?? null) === null);
-    if (lost.length) parts.push(`not read: ${listed(lost)}`);
+    parts.push(readings(pressed, names.taxels, lost, "taxels pressed"));
   }
-  if (names.sensors.length) parts.push(guide.joints.length ? `${guide.joints.filter((value) => value !== null).length} of ${names.sensors.length} joints measured` : "no joint measured");
+  if (names.sensors.length) {
+    const lost = names.sensors.filter((_, at) => (guide.joints[at] ?? null) === null);
+    parts.push(readings(names.sensors.length - lost.length, names.sensors, lost, "joints measured"));
+  }
   say($("sees"), parts.join("; "));
   while ($("devices").children.length > guide.devices.length) $("devices").lastChild.remove();
   guide.devices.forEach((device, at) => {
@@ -128,6 +127,10 @@ function sees(guide) {
     row.dataset.is = device.connected ? "good" : "bad";
     say(row, `${device.connected ? "✓" : "✗"} ${device.name}${device.connected ? "" : `: ${device.error}`}`);
   });
+}
+
+function readings(count, all, lost, verb) {
+  return `${counted(count, all.length, lost.length, verb)}${lost.length ? ` (${listed(lost)})` : ""}`;
 }
 
 function studied(received) {

@@ -7,8 +7,11 @@ const view = new View();
 let recording = null;
 
 const send = connect({
-  open: () => view.link(true),
-  closed: () => view.link(false),
+  open: () => view.state.link(true),
+  closed: () => {
+    view.state.link(false);
+    say($("source"), "");
+  },
   source: (source) => view.source(source),
   build: (build) => {
     view.build(build);

@@ -4,23 +4,26 @@ import { View } from "./view.js";
 import { connect, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
-const view = new View();
-const LANES = [["truth", "truth"], ["prediction", "predictions"]];
+const view = new View({ live: false });
+const LANES = [["truth", "truth"], ["prediction", "predictions"], ["wrong: another type than the truth", "wrong"]];
 const LETTERS = 14;
 let state = null;
-let overview = { predictions: [], truth: [], marks: [] };
+let overview = { predictions: [], truth: [], marks: [], wrong: [] };
 let held = false; // while the slider is dragged, messages do not move it
 let wanted = null;
 
 const send = connect({
-  open: () => view.link(true),
-  closed: () => view.link(false),
+  open: () => view.state.link(true),
+  closed: () => view.state.link(false),
   build: (build) => view.build(build),
   hand: (hand) => view.setHand(hand),
   past: (past) => view.past(past),
-  frame: (frame) => view.take(frame),
+  frame: (frame) => {
+    view.take(frame);
+    judge();
+  },
   overview: (whole) => {
-    overview = whole;
+    overview = { ...whole, wrong: wrong(whole) };
     draw();
   },
   replay: show,
@@ -29,7 +32,7 @@ const send = connect({
 
 function show(received) {
   state = received;
-  const { at_us, first_us, last_us, playing, speed, share, truth, faults } = received;
+  const { at_us, first_us, last_us, playing, speed, share, faults } = received;
   const slider = $("at"), length = (last_us - first_us) / 1e6;
   slider.max = String(length);
   if (!held) slider.value = String((at_us - first_us) / 1e6);
@@ -37,11 +40,34 @@ function show(received) {
   say($("place"), `${clock((at_us - first_us) / 1e6)} of ${clock(length)}, ${new Date(at_us / 1000).toLocaleString()}`);
   say($("play"), playing ? "Pause" : "Play");
   $("speed").value = String(speed);
-  say($("truth"), truth === null ? "Truth: no label" : `Truth: ${truth}`);
+  judge();
   say($("scanned"), share < 1 ? `${Math.floor(100 * share)} % of the file is read` : "");
   if ($("faults").textContent !== faults.join(" ")) say($("faults"), faults.join(" "));
-  $("grasp").dataset.truth = truth === null ? "" : truth === $("grasp").textContent ? "same" : "other";
   draw();
+}
+
+// "unknown" is no prediction, so it is not wrong.
+const differs = (grasp, truth) => grasp !== truth && grasp !== "unknown";
+
+// Compare the prediction with the label, in words and by a sign.
+function judge() {
+  const truth = state?.truth ?? null, grasp = view.frame?.grasp ?? "unknown", bad = truth !== null && differs(grasp, truth);
+  say($("truth"), truth === null ? "Truth: no label" : bad ? `✗ Truth: ${truth}, predicted: ${grasp}` : `Truth: ${truth}`);
+  for (const id of ["truth", "grasp"]) $(id).classList.toggle("wrong", bad);
+}
+
+// The spans in which a label has another prediction.
+function wrong({ predictions, truth }) {
+  const found = [];
+  let first = 0;
+  for (const [from, to, name] of truth) {
+    while (predictions[first + 1]?.[0] <= from) first++;
+    for (let at = first; predictions[at]?.[0] < to; at++) {
+      const [begin, grasp] = predictions[at], end = Math.min(predictions[at + 1]?.[0] ?? to, to);
+      if (differs(grasp, name)) found.push([Math.max(begin, from), end, "✗"]);
+    }
+  }
+  return found;
 }
 
 const clock = (seconds) => {
@@ -123,7 +149,7 @@ function span() {
 }
 
 function spans(kind) {
-  if (kind === "truth") return overview.truth;
+  if (kind !== "predictions") return overview[kind];
   return overview.predictions.map(([from, name], at) => [from, overview.predictions[at + 1]?.[0] ?? state.last_us, name]);
 }
 
@@ -149,11 +175,11 @@ function draw() {
     for (const [begin, end, name] of spans(kind)) {
       const left = Math.max(x(begin), 0), right = Math.min(x(end), wide), number = types.indexOf(name);
       if (right <= 0 || left >= wide) continue;
-      const fill = number < 0 ? colour("--line") : COLOURS[number % COLOURS.length];
+      const fill = kind === "wrong" ? colour("--bad") : number < 0 ? colour("--line") : COLOURS[number % COLOURS.length];
       pen.fillStyle = fill;
       pen.fillRect(left, top, Math.max(right - left, 1), deep);
       if (pen.measureText(name).width + 8 > right - left) continue;
-      pen.fillStyle = number < 0 ? colour("--text") : DARK_ON.has(fill) ? "#000000" : "#ffffff";
+      pen.fillStyle = kind === "wrong" ? colour("--page") : number < 0 ? colour("--text") : DARK_ON.has(fill) ? "#000000" : "#ffffff";
       pen.fillText(name, left + 4, top + deep / 2);
     }
   });
@@ -161,6 +187,6 @@ function draw() {
   for (const [us] of overview.marks) pen.fillRect(x(us) - 1, 0, 2, 6);
   pen.fillStyle = colour("--text");
   pen.fillRect(x(state.at_us) - 1, 0, 2, high);
-  const counts = `${overview.truth.length} labelled spans, ${overview.predictions.length} predictions`;
+  const counts = `${overview.truth.length} labelled spans, ${overview.predictions.length} predictions, wrong in ${overview.wrong.length} spans`;
   canvas.setAttribute("aria-label", `Truth and prediction from ${clock((from - state.first_us) / 1e6)} to ${clock((to - state.first_us) / 1e6)}: ${counts}`);
 }

@@ -25,6 +25,7 @@ export class Timeline {
     this.entries = [];
     this.colours = new Map();
     this.untilUs = 0;
+    this.edge = "now"; // the name of its right end
     this.style = null;
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => (this.style = null));
   }
@@ -42,8 +43,13 @@ export class Timeline {
 
   /** Take the prediction at entry.time_us. */
   add(entry) {
-    const last = this.entries.at(-1);
-    if (last && entry.time_us < last.time_us) this.clear(); // another run
+    let last = this.entries.at(-1);
+    if (last && entry.time_us < last.time_us) {
+      // Another run has another clock; a moment that is only a little older was passed by the changes sent before it.
+      if (last.time_us - entry.time_us < GAP_US) return;
+      this.clear();
+      last = undefined;
+    }
     // A time without frames is unknown.
     const silent = last && entry.time_us - this.untilUs > GAP_US;
     if (silent) this.entries.push({ ...last, time_us: this.untilUs, over: true });
@@ -135,7 +141,7 @@ export class Timeline {
     pen.fillStyle = this.style.soft;
     const seconds = this.spanUs / 1e6, step = wide < 500 ? 10 : 5;
     for (let ago = seconds; ago >= 0; ago -= step) {
-      const at = wide - (ago / seconds) * wide, text = ago ? `−${ago} s` : "now";
+      const at = wide - (ago / seconds) * wide, text = ago ? `−${ago} s` : this.edge;
       const half = pen.measureText(text).width / 2;
       pen.fillText(text, Math.min(Math.max(at - half, 0), wide - 2 * half), high - foot / 2);
     }

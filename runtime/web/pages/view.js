@@ -1,5 +1,6 @@
 // The view of a run on the live page, wherever its moments come from.
 import { drawHand } from "./hand.js";
+import { counted, State } from "./state.js";
 import { Timeline } from "./timeline.js";
 import { say } from "./wire.js";
 
@@ -9,15 +10,20 @@ const SETTLED_MS = 1000; // a text must be stable this long before it is read ou
 const QUIET_MS = 3000; // minimum time between two texts
 const SHOWN = 8;
 
-const MEANS = {
-  ok: "everything is read",
-  changing: "everything is read, and the hand changes",
-  degraded: "means replace lost inputs, or a record is late",
-  unknown: "too little can be read",
+// Of each health: its colour and sign, and what it means.
+const HEALTHS = {
+  ok: ["good", "everything is read"],
+  changing: ["changing", "everything is read, and the hand changes"],
+  degraded: ["warn", "means replace lost inputs, or a record is late"],
+  unknown: ["bad", "too little can be read"],
+  "no data": ["bad", ""],
 };
 
 export class View {
-  constructor() {
+  /** @param {boolean} live whether moments are shown as they happen: those of a recording have no age */
+  constructor({ live = true } = {}) {
+    this.live = live;
+    this.state = new State((old) => this.#aged(old));
     this.timeline = new Timeline($("past"));
     this.frame = null;
     this.shown = null;
@@ -47,6 +53,8 @@ export class View {
     for (const grasp of build.grasps) this.#row(grasp);
     $("preshape").hidden = !build.preshapes;
     $("hand-panel").hidden = Boolean(build.partial);
+    say($("build-state"), `build: ${build.build || "not named"}`);
+    $("empty-hand").hidden = build.empty_hand ?? true;
     this.classes = build.grasps;
   }
 
@@ -72,11 +80,16 @@ export class View {
     this.frame = frame;
     this.count.frames += 1;
     this.latencies.push(frame.latency_us);
+    const ages = [frame.switch_age_us, frame.glove_age_us].filter((age) => age !== null);
+    const age = ages.length ? Math.min(...ages) : null;
+    if (!this.live) this.state.data(frame.time_us, 0);
+    else if (age !== null) this.state.data(frame.time_us - age, age + (frame.late_us ?? 0));
     this.timeline.add(frame);
   }
 
   /** Take the health of devices and inputs. */
   health(report) {
+    this.state.devices(report.devices);
     const rows = report.devices.map((device) => {
       const row = document.createElement("tr"), head = cell("th", device.name);
       head.scope = "row";
@@ -104,23 +117,22 @@ export class View {
     say($("task"), `Task: ${text}`);
   }
 
-  /** Show whether the server is connected, and the state of the source of its moments. */
-  link(connected) {
-    this.connected = connected;
-    this.#link();
-  }
-
+  /** Show the state of the source of the server's moments. */
   source(source) {
-    this.from = source;
-    this.#link();
+    this.state.source(source.connected);
+    say($("source"), source.error);
   }
 
-  #link() {
-    const there = this.connected && (this.from?.connected ?? true);
-    $("link").dataset.is = there ? "ok" : "unknown";
-    say($("link"), there ? "connected" : "not connected");
-    say($("source"), (this.connected && this.from?.error) || "");
-    if (!there) this.#announce("not connected", performance.now(), true);
+  #aged(old) {
+    this.timeline.edge = old ? "last" : "now";
+    this.shown = null; // everything is drawn again
+    this.#title();
+    if (old) this.#announce("no data", performance.now(), true);
+  }
+
+  #title() {
+    const words = this.state.old ? "no data" : this.frame?.grasp;
+    document.title = words ? `${words} · thenar` : "thenar";
   }
 
   #row(grasp) {
@@ -149,13 +161,12 @@ export class View {
     // Some streams lack the switches and the probabilities of the other types.
     $("types-say").hidden = frame.closed !== undefined;
     this.#hand(frame);
-    this.#bars(frame);
     this.timeline.draw();
     if (news || now - this.words >= WORDS_MS) {
       this.words = now;
       this.#numbers(frame, now);
     }
-    this.#announce(frame.grasp, now);
+    this.#announce(this.state.old ? "no data" : frame.grasp, now);
   }
 
   #now(frame) {
@@ -163,15 +174,13 @@ export class View {
     if (grasp.textContent !== frame.grasp) {
       grasp.textContent = frame.grasp;
       grasp.style.setProperty("--letters", String([...frame.grasp].length));
-      document.title = `${frame.grasp} · thenar`;
+      this.#title();
     }
     grasp.classList.toggle("unsure", frame.grasp === "unknown");
-    const health = $("health");
-    if (health.dataset.is !== frame.health || !health.textContent) {
-      health.dataset.is = frame.health;
-      say(health, frame.health);
-      say($("why"), MEANS[frame.health] ?? "");
-    }
+    const health = this.state.old ? "no data" : frame.health, [is, means] = HEALTHS[health] ?? ["bad", ""];
+    $("health").dataset.is = is;
+    say($("health"), health);
+    say($("why"), means);
   }
 
   #hand(frame) {
@@ -180,7 +189,12 @@ export class View {
     for (const [name, bit] of this.bits) {
       gone[bit] = lost.has(name);
       // Unread switches keep their last state.
-      if (frame.unread[bit] !== "1") this.closed[bit] = frame.closed[bit] === "1";
+      if (frame.unread[bit] !== "1") this.closed[bit] = !gone[bit] && frame.closed[bit] === "1";
+    }
+    if (this.bits.size) {
+      const names = [...this.bits].filter(([, bit]) => this.closed[bit]).map(([name]) => name);
+      const said = counted(names.length, this.bits.size, gone.filter(Boolean).length, "switches closed");
+      say($("hand-says"), `${said}${listed(names)}`);
     }
     this.drawing.setClosed(this.closed, gone);
     this.drawing.setPose((frame.joints ?? this.joints.map(() => null)).map((value, at) => (lost.has(this.joints[at]) ? null : value)));
@@ -199,6 +213,7 @@ export class View {
   }
 
   #numbers(frame, now) {
+    this.#bars(frame);
     for (const [grasp, { share }] of this.rows) {
       const at = this.classes.indexOf(grasp);
       const value = frame.probabilities?.[at] ?? (grasp === frame.grasp ? frame.probability : null);
@@ -208,17 +223,12 @@ export class View {
     const held = frame.segment_us === null ? "" : `segment ${frame.segment}, ${frame.state} for ${((frame.time_us - frame.segment_us) / 1e6).toFixed(1)}\u00a0s`;
     say($("segment"), [sure, held].filter(Boolean).join(" · "));
     if (!$("preshape").hidden) say($("preshape"), `Preshape: ${frame.preshape?.name ?? "none yet"}`);
-    const closed = this.closed.filter(Boolean).length;
-    if (this.bits.size && frame.closed !== undefined) {
-      const names = [...this.bits].filter(([, bit]) => this.closed[bit]).map(([name]) => name);
-      say($("hand-says"), `${closed} of ${this.bits.size} closed${listed(names)}`);
-    }
     this.#times(frame, now);
     this.#wrong();
     const segments = this.timeline.segments().slice(0, SHOWN);
-    list($("segments"), segments.map(({ number, type, seconds, lasts }) => `${number}: ${type}, ${seconds.toFixed(1)} s${lasts ? ", now" : ""}`));
+    list($("segments"), segments.map(({ number, type, seconds, lasts }) => `${number}: ${type}, ${seconds.toFixed(1)} s${lasts && !this.state.old ? ", now" : ""}`));
     const types = segments.length ? segments.map(({ type }) => type).reverse().join(", ") : "none";
-    const label = `Predictions of the last 30 seconds: this frame ${frame.candidate}, announced ${frame.grasp}, segments: ${types}`;
+    const label = `Predictions of the last 30 seconds${this.state.old ? ", which have ended" : ""}: this frame ${frame.candidate}, announced ${frame.grasp}, segments: ${types}`;
     if ($("past").getAttribute("aria-label") !== label) $("past").setAttribute("aria-label", label);
   }
 

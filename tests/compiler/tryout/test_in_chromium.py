@@ -229,6 +229,8 @@ def test_a_build_with_a_class_of_none_and_one_that_refuses_say_none_as_python_do
         build = compiled(grasp_set, tmp_path / name, rounds=8)
         assert (build.rejector is None) == (name == "class")
         trier.open(tmp_path / name / "try.html")
+        warned = trier.script("return document.getElementById('empty-hand')?.checkVisibility() ?? false")
+        assert warned == (name == "refusing")
         frames = frames_of(build, grasp_set, lossy=True)
         # Nothing closed, everything closed: unlike all grasps.
         s, j = build.tables.n_switches, build.tables.n_joints

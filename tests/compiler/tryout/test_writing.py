@@ -52,6 +52,16 @@ def test_the_page_holds_the_very_tables_and_rows_of_every_type(build: Path) -> N
     assert '<a href="try.html">' in (build / "report.html").read_text()
 
 
+def test_the_page_says_what_its_first_state_is_and_whether_the_build_knows_an_empty_hand(
+    build: Path, make_set: Make, with_none: Callable[[GraspSet], GraspSet], tmp_path: Path
+) -> None:
+    page, warning = (build / "try.html").read_text(), "This build was trained without an empty hand"
+    assert ">All switches open, joints at the medians of the rows</button>" in page
+    assert warning in page
+    compile_build(with_none(make_set()), tmp_path / "none", rounds=3, folds=0)
+    assert warning not in (tmp_path / "none" / "try.html").read_text()
+
+
 def test_rows_are_fewer_where_there_is_no_room_and_a_page_that_is_too_large_is_none(
     make_set: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -42,7 +42,7 @@ class Browser(PageBrowser):
     def see(self, url: str, *, width: int = 1400, scheme: str = "light") -> "Browser":
         """Open a page, and wait until it is connected."""
         self.open(url, width=width, scheme=scheme)
-        self.wait(lambda: self.text("link") == "connected")
+        self.wait(lambda: self.text("link").startswith("page: connected since"))
         return self
 
     def stage(self) -> str:
@@ -76,11 +76,6 @@ class Browser(PageBrowser):
     def overflow(self) -> object:
         """Return by how many pixels the page is wider than its window."""
         return self.script("return document.documentElement.scrollWidth - innerWidth")
-
-    def picture(self, name: str) -> None:
-        """Keep a picture of the page where THENAR_PICTURES names a folder for them."""
-        if folder := os.environ.get("THENAR_PICTURES"):
-            self.driver.save_screenshot(f"{folder}/{name}.png")
 
 
 ENTER = Keys.ENTER

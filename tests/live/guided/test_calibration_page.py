@@ -55,7 +55,7 @@ def test_all_poses_make_the_calibration_that_the_terminal_makes(
     assert page.text("title") == "All poses are taken"
     page.press(ENTER)
     assert going.finish() == 0, going.said
-    page.wait(lambda: page.text("link") == "ended")
+    page.wait(lambda: page.text("link").startswith("page: ended since"))
     assert page.text("stage").endswith("anna.toml: 18 sensors of <b>Anna</b>")
     calibration = load_calibration(tmp_path / "anna.toml")
     assert tuple(sensor.name for sensor in calibration.sensors) == SENSORS_18
@@ -101,6 +101,6 @@ def test_saturated_and_dead_sensors_are_told_and_nothing_is_written_by_who_leave
     page.wait(lambda: page.script("return document.getElementById('leaving').open"))
     page.type(ENTER)
     assert going.finish() == 130, going.said
-    page.wait(lambda: page.text("link") == "ended")
+    page.wait(lambda: page.text("link").startswith("page: ended since"))
     assert page.text("stage") == "left; nothing is written"
     assert (tmp_path / "anna.toml").read_text() == "old"

@@ -1,5 +1,6 @@
 """A run in this process on emulated serial devices, its page, and a browser that has it open."""
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from importlib.resources import files
@@ -63,6 +64,11 @@ class Browser:
     def complaints(self) -> list[dict[str, Any]]:
         entries: list[dict[str, Any]] = self.driver.get_log("browser")  # type: ignore[no-untyped-call]
         return entries
+
+    def picture(self, name: str) -> None:
+        """Keep a picture of the page where THENAR_PICTURES names a folder for them."""
+        if folder := os.environ.get("THENAR_PICTURES"):
+            self.driver.save_screenshot(f"{folder}/{name}.png")
 
     def axe(self) -> list[str]:
         """Return what axe-core finds of serious and critical faults: the rule, and where."""

@@ -41,7 +41,7 @@ def test_the_page_shows_what_is_published(run: Callable[[], Any], browser: Any) 
         shown(browser, scene, row)
         answers.add(browser.text("grasp"))
         names = [name for name, bit in zip(truth.switch_names, truth.bits[row], strict=True) if bit]
-        said = f"{len(names)} of {len(truth.switch_names)} closed"
+        said = f"{len(names)} of {len(truth.switch_names)} switches closed"
         browser.wait(lambda said=said: browser.text("hand-says").startswith(said))
         assert browser.text("hand-says").removeprefix(said).strip(": ").startswith(", ".join(names[:8]))
         browser.wait(lambda: bars_are(browser, scene))

@@ -102,7 +102,7 @@ def test_wherever_the_slider_stands_the_page_shows_what_was_there(
         browser.script(_SEEK, seconds)
         found, closed = recorded.at(seconds), int(truth.bits[row].sum())
         browser.wait(lambda grasp=found.grasp: browser.text("grasp") == grasp)
-        said = f"{closed} of {len(truth.switch_names)} closed"
+        said = f"{closed} of {len(truth.switch_names)} switches closed"
         browser.wait(lambda said=said: browser.text("hand-says").startswith(said))
         browser.wait(lambda label=found.candidate: browser.text("truth") == f"Truth: {label}")
         assert place(browser) == pytest.approx(seconds, abs=0.02)

@@ -174,6 +174,8 @@ def test_an_empty_hand_moves_after_the_countdown_and_is_captured_then(tmp_path: 
         guide.take(now, whole(now))
         guide.take(now + MOVING_US, [])
         assert (guide.stage, guide.problem) == (Stage.READY, "the switches are silent")
+        now += MOVING_US
+        guide.take(now, whole(now))
         guide.press(now, Key.ACCEPT)
         now += COUNTDOWN_US
         for moment in (now, now + MOVING_US):

@@ -303,6 +303,43 @@ def test_who_only_holds_a_place_loses_it(
         assert live.recv(timeout=PATIENCE_S) == '{"topic":"frame"}'
 
 
+def upgrade(client: Any) -> bytes:
+    """Return the request that opens a WebSocket as the page does."""
+    key = b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
+    ask = f"GET /live HTTP/1.1\r\nHost: 127.0.0.1:{client.port}\r\nOrigin: {client.origin}\r\n".encode()
+    return ask + b"Connection: Upgrade\r\nUpgrade: websocket\r\n" + key + b"\r\n"
+
+
+PING, PONG = b"\x89\x00", b"\x8a\x80\x00\x00\x00\x00"
+
+
+def test_silent_pages_lose_their_places(serve: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "PING_S", 0.3)
+    client = serve()
+    with ExitStack() as stack:
+        silent = [stack.enter_context(connection(client, upgrade(client))) for _ in range(server.MOST_PAGES)]
+        assert all(one.recv(12) == b"HTTP/1.1 101" for one in silent)
+        eventually(lambda: client.server.pages == 0 and not client.server._server.connections)
+        with client.open() as live:
+            client.server.publish("frame", message("frame"))
+            assert live.recv(timeout=PATIENCE_S) == '{"topic":"frame"}'
+
+
+def test_a_page_that_replies_to_pings_keeps_its_place(
+    serve: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "PING_S", 1.0)
+    client = serve()
+    with connection(client, upgrade(client)) as page:
+        found = b""
+        for _ in range(2):
+            while not found.endswith(PING):
+                found += page.recv(4096)
+            page.sendall(PONG)
+            found = b""
+        assert client.server.pages == 1
+
+
 def test_a_browser_that_stops_reading_is_dropped_and_others_see_all(
     serve: Callable[..., Any], hear: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -310,9 +347,7 @@ def test_a_browser_that_stops_reading_is_dropped_and_others_see_all(
     # Not by the system, which notices it later.
     monkeypatch.setattr(server, "_GONE_MS", 600_000)
     client = serve()
-    key = b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
-    ask = f"GET /live HTTP/1.1\r\nHost: 127.0.0.1:{client.port}\r\nOrigin: {client.origin}\r\n".encode()
-    with connection(client, ask + b"Connection: Upgrade\r\nUpgrade: websocket\r\n" + key + b"\r\n") as hanging:
+    with connection(client, upgrade(client)) as hanging:
         assert hanging.recv(12) == b"HTTP/1.1 101"
         eventually(lambda: client.server.pages == 1)
         with client.open() as live:

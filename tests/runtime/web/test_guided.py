@@ -62,8 +62,8 @@ def told(page: GuidePage, *topics: str) -> dict[str, Any]:
     return found
 
 
-def frames(time_us: int, taxels: tuple[int | None, ...]) -> list[SwitchFrame | GloveFrame]:
-    return [SwitchFrame(time_us, 0b101, lost=0b010, taxels=taxels), GloveFrame(time_us, bytes((70, 0)), 3)]
+def frames(time_us: int, taxels: tuple[int | None, ...], lost: int = 0b010) -> list[SwitchFrame | GloveFrame]:
+    return [SwitchFrame(time_us, 0b101, lost=lost, taxels=taxels), GloveFrame(time_us, bytes((70, 0)), 3)]
 
 
 def test_what_the_glove_sees(page: GuidePage, guide: Guide) -> None:
@@ -105,7 +105,7 @@ def test_a_new_stage_is_told_at_once_and_a_hand_that_moves_twenty_times_a_second
     published: list[Any] = []
     monkeypatch.setattr(page._server, "publish", lambda _topic, text: published.append(text))
     for time_us in range(0, 1_000_000, 2_000):
-        guide.take(time_us, frames(time_us, (500, 40)))
+        guide.take(time_us, frames(time_us, (500, 40), lost=0))
         page.show(time_us, guide, DEVICES)
     assert len(published) == 20
     guide.press(999_000, Key.ACCEPT)

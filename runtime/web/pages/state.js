@@ -1,0 +1,98 @@
+// Whether what a page shows is current: the age of its data, its link to the server, and the devices of the glove.
+import { say } from "./wire.js";
+
+const LEAST_MS = 500, PERIODS = 3, INTERVALS = 9, LOOK_MS = 100;
+
+/** Return the time of day of a moment of performance.now(): "10:24:07". */
+const clock = (at) => new Date(Date.now() - performance.now() + at).toTimeString().slice(0, 8);
+
+/**
+ * Watches the age of the data, and says it in #age; the page's link in #link, the devices in #glove-state.
+ *
+ * Data is old after half a second, or after three periods of its source if these are longer. Old data, and all data while
+ * the link is down, is greyed: the root element has the class "old".
+ */
+export class State {
+  #readAt = null;
+  #dataUs = null;
+  #intervals = [];
+  #link = null;
+  #up = true;
+  #devices = null;
+  #lostAt = new Map();
+
+  /** @param {function(boolean): void} changed called with whether the data is old, when that changes */
+  constructor(changed = () => {}) {
+    this.changed = changed;
+    this.old = false;
+    setInterval(() => this.#look(), LOOK_MS);
+  }
+
+  /**
+   * Take the moment at which the newest data was read, on any clock, and its age now, both in microseconds; null: none
+   * was read yet. Data of a recording has no age: 0.
+   */
+  data(timeUs, ageUs) {
+    if (timeUs === null) return;
+    this.#readAt = performance.now() - ageUs / 1000;
+    if (this.#dataUs !== null && timeUs > this.#dataUs) this.#intervals.push((timeUs - this.#dataUs) / 1000);
+    if (this.#intervals.length > INTERVALS) this.#intervals.shift();
+    this.#dataUs = timeUs;
+    this.#look();
+  }
+
+  /** Take the state of the connection to the server; `ended`: it closed because the command is complete. */
+  link(up, ended = false) {
+    const words = up ? "connected" : ended ? "ended" : "not connected";
+    if (this.#link?.words !== words) this.#link = { words, up, ended, since: performance.now() };
+    const link = document.getElementById("link");
+    link.dataset.is = up || ended ? "good" : "bad";
+    say(link, `page: ${words} since ${clock(this.#link.since)}`);
+    this.#look();
+  }
+
+  /** Take whether the server itself is connected to the run. */
+  source(up) {
+    this.#up = up;
+    this.#look();
+  }
+
+  /** Take the devices: name, and whether each is connected. */
+  devices(devices) {
+    for (const { name, connected } of devices) {
+      // Of a device that was lost before this page was opened, the time is not known.
+      if (connected) this.#lostAt.delete(name);
+      else if (!this.#lostAt.has(name)) this.#lostAt.set(name, this.#devices === null ? null : performance.now());
+    }
+    this.#devices = devices;
+    this.#look();
+  }
+
+  #look() {
+    const up = Boolean(this.#link?.up) && this.#up, age = this.#readAt === null ? 0 : performance.now() - this.#readAt;
+    const middle = [...this.#intervals].sort((one, other) => one - other)[this.#intervals.length >> 1] ?? 0;
+    const silent = age > Math.max(LEAST_MS, PERIODS * middle), old = !up || silent;
+    const since = this.#readAt === null ? "" : ` since ${clock(this.#readAt)}`;
+    const words = this.#link === null ? "" : !up ? `no data${since || " yet"}` : silent ? `this is ${(age / 1000).toFixed(1)} s old` : "";
+    say(document.getElementById("age"), this.#link?.ended ? "" : words);
+    this.#glove(up, silent ? since : "");
+    document.documentElement.classList.toggle("old", old);
+    if (old === this.old) return;
+    this.old = old;
+    this.changed(old);
+  }
+
+  #glove(up, silent) {
+    const element = document.getElementById("glove-state");
+    if (element === null) return;
+    const lost = [...this.#lostAt].map(([name, at]) => `${name} lost${at === null ? "" : ` since ${clock(at)}`}`).join(", ");
+    const words = !up ? "not known" : lost || (silent ? `silent${silent}` : this.#devices === null ? "not reported" : "connected");
+    element.dataset.is = words === "connected" ? "good" : up && (lost || silent) ? "bad" : "warn";
+    say(element, `glove: ${words}`);
+  }
+}
+
+/** Return a count of what can be read: "5 of 31 switches closed", "5 of 20 readable switches closed; 11 lost". */
+export function counted(count, total, lost, what) {
+  return lost ? `${count} of ${total - lost} readable ${what}; ${lost} lost` : `${count} of ${total} ${what}`;
+}
