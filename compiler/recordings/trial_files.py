@@ -65,8 +65,9 @@ def find_files(pattern: Path) -> tuple[list[TrialFile], list[str]]:
     kinds = sorted({file.path.suffix.lower() for file in found})
     if len(kinds) > 1:
         raise TableError(f"{pattern} matches files of several kinds, {list_names(kinds)}: name one")
+    found.sort(key=lambda file: natural_key(file.name))
     _check_distinct(found)
-    return sorted(found, key=lambda file: natural_key(file.name)), others
+    return found, sorted(others)
 
 
 def _expression(part: str, pattern: Path) -> re.Pattern[str]:
