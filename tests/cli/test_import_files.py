@@ -3,6 +3,7 @@
 import json
 import os
 import shlex
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -145,11 +146,23 @@ def test_numbers_of_trials_in_the_files_are_of_one_file() -> None:
     assert len(np.unique(imported("{subject}_{session}.csv", "--yes").sessions)) == 2
 
 
-def test_spreadsheets_are_read_as_well(capsys: pytest.CaptureFixture[str]) -> None:
+def test_spreadsheets_are_read_as_well(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     for path in write("{label}/{subject}_{trial}.xlsx"):
         if "2" in path.stem or "10" in path.stem:
             path.unlink()
     assert len(np.unique(imported("{label}/{subject}_{trial}.xlsx", "--yes").trial_ids)) == 6
+    # Some are read by one process; what ends it is one of them, and is named.
+    crash = Path("crash")
+    crash.write_text(f'#!/bin/sh\ncase "$*" in *pen/ben_1*) kill -SEGV $$;; esac\nexec "{sys.executable}" "$@"\n')
+    crash.chmod(0o755)
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "executable", str(crash.absolute()))
+        said = refused(capsys, "{label}/{subject}_{trial}.xlsx", "--yes")
+        assert said.startswith("thenar: pen/ben_1.xlsx: its reader gave up: the file is damaged")
+    Path("pen/ben_1.xlsx").write_bytes(b"PK no spreadsheet")
+    assert "pen/ben_1.xlsx: cannot be read as a spreadsheet" in refused(
+        capsys, "{label}/{subject}_{trial}.xlsx", "--yes"
+    )
     Path("cup/anna_7.csv").write_text("f1,f2\n1,2\n")
     assert "matches files of several kinds, .csv, .xlsx: name one" in refused(capsys, "{label}/{subject}_{trial}.*")
 
