@@ -82,7 +82,7 @@ def read_foreign(paths: Sequence[Path], skip: int | None = 0) -> Iterator[Foreig
 def _run(paths: Sequence[Path], skip: int | None, seconds: int, made: IO[bytes]) -> str:
     """Read tables in a process, up to the first that it refuses, into `made`; return why it refuses that, or "".
 
-    Raises TableError if the process crashes, or takes longer than so many `seconds` of processor time.
+    Raises TableError if the process crashes, or takes longer than `seconds` of processor time.
     """
     command = [sys.executable, "-P", "-m", __name__, str(skip), str(os.getpid()), *map(os.path.abspath, paths)]
     what = f"{paths[0].name}: its reader"
