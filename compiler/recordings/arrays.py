@@ -159,16 +159,16 @@ def read_arrays(path: Path) -> dict[str, AnyArray]:
         return arrays_in(path.name, file)
 
 
-def arrays_in(what: str, file: BinaryIO) -> dict[str, AnyArray]:
-    """Return the columns of the npz in `file`, which messages call `what`, as `read_arrays` does."""
+def arrays_in(what: str, file: BinaryIO, most: int = COLUMNS) -> dict[str, AnyArray]:
+    """Return the columns, at most `most`, of the npz in `file`, which messages call `what`, as `read_arrays` does."""
     try:
-        return _columns(file)
+        return _columns(file, most)
     except UNREADABLE as reason:
         why = shortened(str(reason), 300) or "it is cut off or altered"
         raise TableError(f"{what} cannot be read as npz: {why}") from reason
 
 
-def _columns(file: BinaryIO) -> dict[str, AnyArray]:
+def _columns(file: BinaryIO, most: int) -> dict[str, AnyArray]:
     size = os.fstat(file.fileno()).st_size
     if size > LARGEST:
         raise TableError(f"it is larger than {LARGEST} bytes, the most that is read of a table")
@@ -195,8 +195,8 @@ def _columns(file: BinaryIO) -> dict[str, AnyArray]:
             if twice := columns.keys() & found.keys():
                 raise TableError(f"two arrays make a column {shortened(repr(min(twice)))}")
             columns |= found
-            if len(columns) > COLUMNS:
-                raise TableError(f"it has more than {COLUMNS} columns, the most that are read of a table")
+            if len(columns) > most:
+                raise TableError(f"it has more than {most} columns, the most that are read of a table")
     return columns
 
 

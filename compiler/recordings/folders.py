@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from thenar.runtime.names import list_names, shortened
+from thenar.runtime.names import SHOWN, list_names, shortened
 
 from .columns import PLAIN
 from .errors import TableError
@@ -15,6 +15,7 @@ from .sniff import sniff
 from .table import SUFFIXES, is_text, read_table
 from .taxonomy import plain, published_for
 from .trial_files import FILES
+from .trials import natural_key
 
 _DEPTH = 8
 _LETTERS_DIGITS = re.compile(r"([^\W\d_]*)(\d+)")
@@ -68,8 +69,8 @@ def propose_pattern(folder: Path) -> tuple[Path, list[str]]:
     )
     remarks = [f"{len(paths)} files as {folder / pattern}"]
     for texts, name in names.items():
-        different = sorted({*texts})
-        shown = list_names([shortened(text) for text in different[:5]], len(different))
+        different = sorted({*texts}, key=natural_key)
+        shown = list_names([shortened(text) for text in different[:SHOWN]], len(different))
         remarks.append(f"{name}: {len(different)} different, {shown}")
     remarks += [f"left out: {most} tables of another kind or depth, or with other names"] * bool(most)
     return folder / pattern, remarks

@@ -13,10 +13,11 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,46 +43,67 @@ _REFUSED = 3
 _PR_SET_PDEATHSIG = 1
 
 Columns = dict[str, AnyArray]
+# The columns of a table, the numbers of its rows, and how many rows precede its header.
+Foreign = tuple[Columns, NDArray[np.int64], int]
 
 
-def read_foreign(path: Path, skip: int | None = 0) -> tuple[Columns, NDArray[np.int64], int]:
-    """Return the columns of a foreign table, text or numbers, the numbers of its rows for the user, and `skip`.
+def read_foreign(paths: Sequence[Path], skip: int | None = 0) -> Iterator[Foreign]:
+    """Yield the columns of foreign tables, text or numbers, the numbers of their rows for the user, and `skip`.
 
-    skip  how many rows of a spreadsheet precede its header; None: find it
+    paths  tables of one kind, read in one process
+    skip   how many rows of a spreadsheet precede its header; None: find it
 
-    Raises TableError with the reason.
+    Raises TableError with the reason, for the first table that was not yielded.
     """
-    with open_file(path, TableError) as file:
-        size = os.fstat(file.fileno()).st_size
-    if size > LARGEST:
-        raise TableError(f"{path.name} is larger than {LARGEST} bytes, the most that is read of a table")
-    seconds = _cpu_s(size)
+    size = 0
+    for path in paths:
+        with open_file(path, TableError) as file:
+            size += (length := os.fstat(file.fileno()).st_size)
+        if length > LARGEST:
+            raise TableError(f"{path.name} is larger than {LARGEST} bytes, the most that is read of a table")
     with TemporaryFile() as made:
-        command = [sys.executable, "-P", "-m", __name__, str(path.absolute()), str(skip), str(os.getpid())]
         try:
-            done = subprocess.run(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=made,
-                stderr=subprocess.PIPE,
-                timeout=WALL * seconds,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            raise TableError(f"{path.name}: its reader took longer than {WALL * seconds} s: save it as CSV") from None
-        if done.returncode == _REFUSED:
-            reason = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
-            raise TableError(f"{path.name}: {shortened(reason, 600)}")
-        if done.returncode == -signal.SIGXCPU:
-            raise TableError(f"{path.name}: its reader took longer than {seconds} s of processor time: save it as CSV")
-        if done.returncode:
-            raise TableError(
-                f"{path.name}: its reader gave up: the file is damaged, or larger inside than is read: save it as CSV"
-            )
-        columns = arrays_in(path.name, made)
-    names, rows, skipped = (columns.pop(name) for name in ("names", "rows", "skip"))
-    found = {str(name): columns[str(number)] for number, name in enumerate(names)}
-    return found, rows.astype(np.int64), int(skipped.astype(np.int64)[0])
+            refusal = _run(paths, skip, _cpu_s(size), made)
+        except TableError:
+            if len(paths) == 1:
+                raise
+            for path in paths:  # to know which
+                yield from read_foreign([path], skip)
+            return
+        columns = arrays_in(paths[0].name, made, len(paths) * (COLUMNS + 3)) if os.fstat(made.fileno()).st_size else {}
+    count = len([name for name in columns if name.endswith(".rows")])
+    for number in range(count):
+        names, rows, skipped = (columns.pop(f"{number}.{name}") for name in ("names", "rows", "skip"))
+        found = {str(name): columns.pop(f"{number}.{place}") for place, name in enumerate(names)}
+        yield found, rows.astype(np.int64), int(skipped.astype(np.int64)[0])
+    if refusal:
+        raise TableError(f"{paths[count].name}: {refusal}")
+
+
+def _run(paths: Sequence[Path], skip: int | None, seconds: int, made: IO[bytes]) -> str:
+    """Read tables in a process, up to the first that it refuses, into `made`; return why it refuses that, or "".
+
+    Raises TableError if the process crashes, or takes longer than `seconds` of processor time.
+    """
+    command = [sys.executable, "-P", "-m", __name__, str(skip), str(os.getpid()), *map(os.path.abspath, paths)]
+    what = f"{paths[0].name}: its reader"
+    try:
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=made,
+            stderr=subprocess.PIPE,
+            timeout=WALL * seconds,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise TableError(f"{what} took longer than {WALL * seconds} s: save it as CSV") from None
+    if done.returncode == -signal.SIGXCPU:
+        raise TableError(f"{what} took longer than {seconds} s of processor time: save it as CSV")
+    if done.returncode not in (0, _REFUSED):
+        raise TableError(f"{what} gave up: the file is damaged, or larger inside than is read: save it as CSV")
+    said = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
+    return shortened(said, 600) if done.returncode else ""
 
 
 def _spreadsheet(path: Path, skip: int | None) -> tuple[Columns, Sequence[int], int]:
@@ -318,44 +340,56 @@ def _end_with(parent: int) -> None:
         os._exit(1)
 
 
-def main(source: str, skip: str, parent: str) -> int:
-    """Read the table in file `source` and write its columns as npz to stdout; return the exit code.
+def main(skip: str, parent: str, *sources: str) -> int:
+    """Read the tables in files `sources`, of one kind, and write their columns as npz to stdout; return the exit code.
 
     skip    rows before the header of a spreadsheet, or "None"
     parent  the number of the process that waits for this one
+
+    What was read before an error is written as well.
     """
     _end_with(int(parent))
-    path = Path(source)
+    paths = [Path(source) for source in sources]
     # What a library prints is no part of the npz.
     output = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    what, package, read = READERS[path.suffix.lower()]
+    what, package, read = READERS[paths[0].suffix.lower()]
     try:
-        for name in {package, "h5py"} if path.suffix == ".mat" else {package}:
+        for name in {package, "h5py"} if paths[0].suffix == ".mat" else {package}:
             import_module(name)
     except ModuleNotFoundError as lack:
         print(f"reading {what}: {missing(lack.name or package)}")
         return _REFUSED
-    _limit(path.stat().st_size)
+    _limit(sum(path.stat().st_size for path in paths))
+    made: dict[str, AnyArray] = {}
+    code = 0
+    for number, path in enumerate(paths):
+        if reason := _read(made, number, what, partial(read, path, None if skip == "None" else int(skip))):
+            print(reason)
+            code = _REFUSED
+            break
+    np.savez(output, **made)  # type: ignore[arg-type]
+    output.flush()
+    return code
+
+
+def _read(made: Columns, number: int, what: str, read: Callable[[], tuple[Columns, Sequence[int], int]]) -> str:
+    """Add what `read` returns to `made` under a table's number; return why that is impossible, or ""."""
     try:
-        columns, rows, skipped = read(path, None if skip == "None" else int(skip))
+        columns, rows, skipped = read()
         if not columns:
-            raise TableError("it holds no columns of numbers or text")
-        numbered = {str(number): column for number, column in enumerate(columns.values())}
-        described = {"names": np.array(list(columns)), "rows": np.array(rows, np.int64), "skip": np.array([skipped])}
-        np.savez(output, **described, **numbered)  # type: ignore[arg-type]
-        output.flush()
+            return "it holds no columns of numbers or text"
     except TableError as reason:
-        print(reason)
+        return str(reason)
     except MemoryError:
-        print(f"it needs more than {MEMORY} bytes of memory: save it as CSV")
+        return f"it needs more than {MEMORY} bytes of memory: save it as CSV"
     except Exception as reason:
         # Whatever a library raises for bytes that it cannot read.
-        why = " ".join(str(reason).split()) or type(reason).__name__
-        print(f"cannot be read as {what}: {shortened(why, 300)}")
-    else:
-        return 0
-    return _REFUSED
+        return f"cannot be read as {what}: {shortened(' '.join(str(reason).split()) or type(reason).__name__, 300)}"
+    described = {"names": np.array(list(columns)), "rows": np.array(rows, np.int64), "skip": np.array([skipped])}
+    numbered = {str(place): column for place, column in enumerate(columns.values())}
+    made |= {f"{number}.{name}": array for name, array in (described | numbered).items()}
+    return ""
 
 
 if __name__ == "__main__":

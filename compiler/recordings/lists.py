@@ -27,7 +27,8 @@ def unlisted(what: str, columns: Mapping[str, Column], rows: NDArray[np.int64]) 
     what  the table in messages
     rows  (n,) the numbers of its rows in messages
 
-    Raises TableError if a column holds lists that are unequally long or cut short, or lists and other cells.
+    Raises TableError if a column holds lists that are unequally long, or lists and other cells; RecordingError if two
+    columns get one name.
     """
     made: list[tuple[str, Column]] = []
     for name, column in columns.items():
@@ -40,7 +41,7 @@ def unlisted(what: str, columns: Mapping[str, Column], rows: NDArray[np.int64]) 
         many = values.shape[1] > 1
         made += [(f"{name}.{place}" if many else name, part) for place, part in enumerate(values.T)]
     if len(made) != len(columns):
-        check_names(f"{what}: column", [name for name, _ in made])
+        check_names("column", [name for name, _ in made])
         if len(made) > COLUMNS:
             raise TableError(f"{what} has more than {COLUMNS} columns, the most that are read of a table")
     return dict(made)

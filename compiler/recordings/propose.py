@@ -84,9 +84,9 @@ def _by_file(table: Table, proposal: Proposal) -> Proposal:
     columns, rows = proposal.columns, table.rows
     if not isinstance(rows, FileRows) or (columns.frames == "restart" and columns.none):
         return proposal
-    told = [name for key in ("label", "subject", "object", "session", "trial") for name in columns.parts(key)]
+    given = [name for key in ("label", "subject", "object", "session", "trial") for name in columns.parts(key)]
     file = groups(_texts(table, [rows.column]))
-    trial = groups(*(_texts(table, [name]) for name in told))
+    trial = groups(*(_texts(table, [name]) for name in given))
     if columns.frames is None and columns.parts("trial") and len(np.unique(groups(trial, file))) == trial.max() + 1:
         return proposal
     parts = (rows.column, *columns.parts("trial"))

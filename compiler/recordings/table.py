@@ -255,33 +255,52 @@ def is_text(path: Path) -> bool:
     return path.name.lower().endswith(_TEXTS)
 
 
+# Binary tables that one process reads: starting it takes much longer than a small table.
+_TOGETHER = 16
+
+
 def read_table(path: Path, text: TextFormat = PLAIN) -> Table:
     """Read a table by its suffix; delimited text in the format `text`.
 
     Raises TableError naming the file, the row and the fault, and OSError from the operating system.
     """
+    return next(read_tables([path], text))
+
+
+def read_tables(paths: Sequence[Path], text: TextFormat = PLAIN) -> Iterator[Table]:
+    """Yield the tables in `paths`, of one kind, as `read_table` does; an error is one of the first not yielded."""
+    for start in range(0, len(paths), _TOGETHER):
+        batch = paths[start : start + _TOGETHER]
+        is_foreign = batch[0].name.lower().endswith(tuple(READERS))
+        foreign = read_foreign(batch, text.skip) if is_foreign else None
+        for path in batch:
+            try:
+                table = _read_ours(path, text) if foreign is None else _of_foreign(path, *next(foreign))
+                columns = unlisted(table.what, table.columns, table.rows)
+            except RecordingError as reason:
+                raise TableError(f"{path.name}: {reason}") from reason
+            if not len(table.rows):
+                raise TableError(f"{path.name} has no rows")
+            yield replace(table, columns=columns, size=path.stat().st_size)
+
+
+def _of_foreign(path: Path, columns: dict[str, AnyArray], rows: NDArray[np.int64], skip: int) -> Table:
+    check_names("column", columns)
+    return Table(path.name, columns, rows, skip=skip)
+
+
+def _read_ours(path: Path, text: TextFormat) -> Table:
     name = path.name.lower()
-    try:
-        if is_text(path):
-            with open_lines(path, text.encoding) as lines:
-                tabs = name.removesuffix(".gz").endswith(".tsv")
-                table = _read_csv(path.name, lines, text, text.delimiter or ("\t" if tabs else ","))
-        elif name.endswith((".arff", ".arff.gz")):
-            with open_lines(path) as lines:
-                table = read_arff(path.name, lines)
-        elif name.endswith(".npz"):
-            table = _read_npz(path)
-        elif name.endswith(tuple(READERS)):
-            columns, rows, skip = read_foreign(path, text.skip)
-            check_names("column", columns)
-            table = Table(path.name, columns, rows, skip=skip)
-        else:
-            raise TableError(f"{path.name}: a table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
-    except RecordingError as reason:
-        raise TableError(f"{path.name}: {reason}") from reason
-    if not len(table.rows):
-        raise TableError(f"{path.name} has no rows")
-    return replace(table, columns=unlisted(table.what, table.columns, table.rows), size=path.stat().st_size)
+    if is_text(path):
+        with open_lines(path, text.encoding) as lines:
+            tabs = name.removesuffix(".gz").endswith(".tsv")
+            return _read_csv(path.name, lines, text, text.delimiter or ("\t" if tabs else ","))
+    if name.endswith((".arff", ".arff.gz")):
+        with open_lines(path) as lines:
+            return read_arff(path.name, lines)
+    if name.endswith(".npz"):
+        return _read_npz(path)
+    raise TableError(f"{path.name}: a table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
 
 
 def csv_rows(lines: Iterable[str], delimiter: str, quote: str, *, strict: bool) -> "Reader":

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from thenar.runtime.names import list_names, shortened
 
 from .columns import TextFormat
-from .errors import LARGEST, ROWS, FileRows, RecordingError, TableError, check_room
-from .table import SUFFIXES, Column, Table, TextColumn, read_table
+from .errors import LARGEST, ROWS, FileRows, TableError, check_room
+from .table import SUFFIXES, Column, Table, TextColumn, read_tables
 from .trials import natural_key
 
 # The most files of a set.
@@ -65,8 +65,9 @@ def find_files(pattern: Path) -> tuple[list[TrialFile], list[str]]:
     kinds = sorted({file.path.suffix.lower() for file in found})
     if len(kinds) > 1:
         raise TableError(f"{pattern} matches files of several kinds, {list_names(kinds)}: name one")
+    found.sort(key=lambda file: natural_key(file.name))
     _check_distinct(found)
-    return sorted(found, key=lambda file: natural_key(file.name)), others
+    return found, sorted(others)
 
 
 def _expression(part: str, pattern: Path) -> re.Pattern[str]:
@@ -118,8 +119,14 @@ def read_files(files: Sequence[TrialFile], text: TextFormat, report: Report) -> 
         raise TableError(f"{len(files)} files have more than {LARGEST} bytes, the most that are read of a set")
     tables: list[Table] = []
     rows = 0
+    reading = read_tables([file.path for file in files], text)
     for number, file in enumerate(files, start=1):
-        tables.append(_read(file, text))
+        try:
+            tables.append(next(reading))
+        except TableError as reason:
+            # Messages begin with the name of the file: complete its path.
+            above = file.name.rpartition("/")[0]
+            raise TableError(f"{above}/{reason}" if above else str(reason)) from reason
         rows += len(tables[-1].rows)
         if rows > ROWS:
             raise TableError(f"the files up to {file.name} have more than {ROWS} rows, the most that are read of a set")
@@ -145,15 +152,6 @@ def read_files(files: Sequence[TrialFile], text: TextFormat, report: Report) -> 
         decimal=tables[0].decimal,
         skip=tables[0].skip,
     )
-
-
-def _read(file: TrialFile, text: TextFormat) -> Table:
-    try:
-        return read_table(file.path, text)
-    except (TableError, RecordingError) as reason:
-        # Messages begin with the name of the file: complete its path.
-        folder = file.name.rpartition("/")[0]
-        raise TableError(f"{folder}/{reason}" if folder else str(reason)) from reason
 
 
 def _check_alike(first: str, table: Table, other: str, its: Table) -> None:

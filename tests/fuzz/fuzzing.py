@@ -1,7 +1,9 @@
 """Mutants by the thousand, each read within its budget of time and memory; what fails is kept and replayed for ever.
 
 A mutant may be read or refused: with a ThenarError or an OSError, within 2 s of processor time and 200 MB + 20 times
-its length. All else is a failure. It is told with the numbers that make it again, and saved in the corpus.
+its length. All else is a failure. It is reported with the numbers that make it again, and saved in the corpus. What
+takes longer is read a second time, and may then take as long as a known piece of work WORKS times over: on a slow or
+busy machine that takes longer as well.
 """
 
 import hashlib
@@ -10,6 +12,7 @@ import mmap
 import os
 import resource
 import signal
+import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -26,6 +29,8 @@ from material import Format
 from thenar.drivers.errors import ThenarError
 
 CPU_S = 2.0
+# So many times the reference work takes CPU_S on a machine that is idle.
+WORKS = 80
 # By the clock on the wall, for what no handler of Python's can end.
 STUCK_S = 120
 MEMORY = 200 << 20
@@ -79,6 +84,14 @@ def fault(form: Format, data: bytes, folder: Path, cpu_s: float) -> tuple[str, s
     except Exception as wrong:
         return f"{type(wrong).__name__}: {_place(wrong)}", _trace(wrong)
     return None
+
+
+def reference_s() -> float:
+    """Return the seconds of processor time that a fixed piece of work takes now, on this machine."""
+    begun, number = time.process_time(), 0
+    for step in range(400_000):
+        number = (31 * number + step) & 0xFFFF
+    return time.process_time() - begun
 
 
 @contextmanager
@@ -213,17 +226,22 @@ class Fuzzer:
                 self._tell, self._folder = mouth, Path(folder)
                 for numbers, data in work() or ():
                     signal.setitimer(signal.ITIMER_REAL, STUCK_S)
-                    self.read(form, numbers, data, CPU_S)
+                    self.read(form, numbers, data)
             code = 0
         except BaseException:
             traceback.print_exc()
         finally:
             os._exit(code)
 
-    def read(self, form: Format, numbers: str, data: bytes, cpu_s: float) -> None:
-        """Read one mutant; save it, and tell of it, if it is the first to fail in its place."""
+    def read(self, form: Format, numbers: str, data: bytes, slower: float = 1.0) -> None:
+        """Read one mutant; save it, and report it, if it is the first to fail in its place.
+
+        slower  how many times as long it may take
+        """
         self._set_count(self._count() + 1)
-        found = fault(form, data, self._folder, cpu_s)
+        found = fault(form, data, self._folder, slower * CPU_S)
+        if found is not None and found[0].startswith("time: "):
+            found = fault(form, data, self._folder, slower * WORKS * reference_s())
         if found is None or found[0] in self.failures:
             return
         place, trace = found
@@ -251,7 +269,7 @@ class Fuzzer:
 
         def one_input(data: bytes) -> None:
             # Instrumented code is several times slower.
-            self.read(form, "", data, 5 * CPU_S)
+            self.read(form, "", data, slower=5)
 
         def mutator(data: bytes, largest: int, seed: int) -> bytes:
             return form.mutate(data, Random(seed))[:largest]

@@ -54,6 +54,15 @@ def _csv() -> bytes:
 
 
 @cache
+def _strange() -> bytes:
+    """Return lines before the header, a list in each row, and blanks as delimiter."""
+    values = np.random.default_rng(2).normal(0, 9, (9, len(GRASPS), 2)).round(2)
+    lists = [[f"[{first},{second}]" for first, second in row] for row in values.tolist()]
+    rows = [f"{grasp}   {trial} {lists[trial][n]}" for trial in range(9) for n, grasp in enumerate(GRASPS)]
+    return "\n".join(["nRows=27", "endheader", "# grasp trial data", *rows]).encode()
+
+
+@cache
 def _arff() -> bytes:
     return to_arff(grasp_set(), meta=True).encode()
 
@@ -175,7 +184,7 @@ def _of(suffix: str) -> Format:
 
 
 FORMATS = (
-    Format("csv without columns.toml", lambda: [_csv(), _latin()], table_file, _proposed),
+    Format("csv without columns.toml", lambda: [_csv(), _latin(), _strange()], table_file, _proposed),
     *map(_of, (".xlsx", ".parquet", ".h5", ".mat")),
     Format("csv", lambda: [_csv()], table_file, _table(".csv")),
     Format("csv.gz", lambda: [gzip.compress(_csv(), mtime=0)], zipped(table_file), _table(".csv.gz")),

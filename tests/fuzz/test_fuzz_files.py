@@ -31,6 +31,16 @@ def endless(data, folder):
         pass
 
 
+def late_once(data, folder):
+    # The first time, as on a machine that is busy for a moment.
+    try:
+        Path(folder, "late").touch(exist_ok=False)
+    except FileExistsError:
+        raise SettingError("refused in time") from None
+    while True:
+        pass
+
+
 def greedy(data, folder):
     try:
         bytearray(1 << 30)
@@ -48,7 +58,7 @@ def sound(data, folder):
     raise SettingError("refused") if data[0] % 2 else FileNotFoundError(data)
 
 
-readers = (unexpected, endless, greedy, dead, sound)
+readers = (unexpected, endless, late_once, greedy, dead, sound)
 formats = [Format(read.__name__, lambda: [b"seed"], lambda data, random: random.randbytes(9), read) for read in readers]
 fuzzer = Fuzzer(formats, Path(sys.argv[1]), Path(sys.argv[1]), 1)
 for form in formats:

@@ -207,7 +207,7 @@ def test_a_killed_import_leaves_no_reader_and_no_folder(tmp_path: Path) -> None:
     reader.write_text(
         "import os, signal, sys\n"
         "from thenar.compiler.recordings import foreign\n"
-        "foreign._end_with(int(sys.argv[-1]))\n"
+        "foreign._end_with(int(sys.argv[-2]))\n"
         "print(os.getpid(), file=open(os.environ['TOLD'], 'w'), flush=True)\n"
         "signal.pause()\n"
     )

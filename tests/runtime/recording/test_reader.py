@@ -319,7 +319,10 @@ def test_records_without_measurements_are_read_up_to_a_limit(
     data = recording.read_bytes()
     ends = [place for place in ends_of_records(data) if data[place] in (Opcode.DATA_END, Opcode.FOOTER)]
     place = ends[-1] if behind_the_data else ends[0]
-    content = {Opcode.CHANNEL: pack("<HHIII", 90, 0, 0, 0, 0), Opcode.SCHEMA: pack("<HIII", 90, 0, 0, 0)}
+    content: dict[int, bytes] = {
+        Opcode.CHANNEL: pack("<HHIII", 90, 0, 0, 0, 0),
+        Opcode.SCHEMA: pack("<HIII", 90, 0, 0, 0),
+    }
     record = pack("<BQ", opcode, len(content.get(opcode, b""))) + content.get(opcode, b"")
     recording.write_bytes(data[:place] + record * (OTHER_RECORDS + 1) + data[place:])
     with pytest.raises(McapError, match=r"is one of more than 100000 that hold no measurements, the most that are"):
