@@ -96,7 +96,8 @@ class Study:
     """The result: the options and the set, the grasp types that occur, warnings, and the tables.
 
     left_out names requested tables that have no meaning here, with the reason; permuted is the permutation test,
-    learning the learning curves; each is None if not requested.
+    learning the learning curves; each is None if not requested. rests is the number of trials in which nothing is held;
+    they are left out.
     """
 
     fingerprint: str
@@ -109,6 +110,7 @@ class Study:
     tables: tuple[RateTable, ...]
     permuted: Permuted | None = None
     learning: Learning | None = None
+    rests: int = 0
 
     def __str__(self) -> str:
         """Return the numbers of trials and frames, and the scheme of the folds."""
@@ -122,7 +124,8 @@ class Study:
         }[options.scheme]
         grasps = counted(len(self.grasps), "grasp type")
         frames = f" of {self.rows:,} frames" if self.rows > self.trials else ""
-        size = f"{counted(self.trials, 'trial')}{frames}, {grasps}"
+        rests = f"; {counted(self.rests, 'rest')} left out" if self.rests else ""
+        size = f"{counted(self.trials, 'trial')}{frames}, {grasps}{rests}"
         return f"{size}; {cut}; {options.rounds or _ROUNDS} rounds; accuracies in % with 95 % intervals"
 
 
@@ -178,7 +181,9 @@ def evaluate(
     if m := options.permute:
         how = Permutations(planned.parts, options.scheme, options.folds, options.prune, options.seed, training)
         permuted = how.test(chosen, m, jobs, None if progress is None else _after(progress, len(predictions)))
-    return planned.study(grasp_set.fingerprint(), predictions, permuted)
+    found = planned.study(grasp_set.fingerprint(), predictions, permuted)
+    empty = grasp_set.is_none & np.isin(grasp_set.subjects, np.unique(chosen.subjects))
+    return replace(found, rests=len(np.unique(grasp_set.trial_ids[empty])))
 
 
 def _trainers(options: Options) -> tuple[Training, Ways]:
