@@ -261,3 +261,29 @@ def test_text_that_is_constant_within_trials_is_a_subject_or_session(import_cell
         "text, constant within trials: name it (subject, object, session) if it is one",
     ):
         assert words in said
+
+
+def test_every_command_counts_trials_grasps_rests_and_frames_alike(
+    tmp_path: Path, import_cells: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    random = np.random.default_rng(5)
+    trial, _ = np.indices((24, 5)).reshape(2, -1)
+    kind = np.where(trial % 2, 1 + trial // 2 % 3, 0)
+    bend = np.array([5, 30, 55, 80])[kind] + random.normal(0, 2, len(kind)).round(1)
+    cells = {"ms": 50 * np.arange(len(kind)), "grasp": [("rest", *TYPES)[number] for number in kind], "bend": bend}
+    path, folder = str(tmp_path / "set.grasps"), str(tmp_path)
+    _, said, _ = import_cells(cells)
+    size = "24 trials (12 grasps, 12 rests) of 120 frames"
+    assert f"{path}: {size}, 3 grasp types (own); subjects 1" in said
+    assert "Coding" not in said
+    for arguments in (
+        ("info", path),
+        ("export", path, "-o", f"{folder}/again.csv"),
+        ("merge", path, "-o", f"{folder}/merged.grasps"),
+        ("split", path, "--by", "subject", "-o", f"{folder}/parts"),
+    ):
+        assert run([*arguments]) == 0
+        assert size in capsys.readouterr().out
+    quick = ("--folds", "2", "--repeats", "1", "--rounds", "2", "--tables", "compositions", "--baselines", "none")
+    assert run(["evaluate", path, *quick, "--jobs", "1"]) == 0
+    assert "12 trials of 60 frames, 3 grasp types; 12 rests left out;" in " ".join(capsys.readouterr().out.split())

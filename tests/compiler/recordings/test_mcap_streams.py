@@ -164,7 +164,7 @@ def test_a_hand_that_never_moves_is_empty_where_the_guide_said_so(tmp_path: Path
             patched.setitem(POSES, "PoS", (0, tuple(OPEN)))
             patched.setitem(POSES, "Tip", (0, tuple(OPEN)))
             wearer.collect()
-    grasp_set, report = import_recordings([recorder.path], stream=True)
+    grasp_set, _ = import_recordings([recorder.path], stream=True)
     assert np.count_nonzero(grasp_set.is_none) == 2 * MOVING_US // 10_000
     assert len(np.unique(grasp_set.trial_ids)) == 6
 
