@@ -51,7 +51,7 @@ def hand(closing: bool = False, numbered: bool = True, seed: int = 1) -> dict[st
     return cells | {f"f{number}": values[:, number].round(2) for number in range(3)}
 
 
-def clocks() -> dict[str, NDArray[np.generic]]:
+def clocks() -> dict[str, NDArray[np.float64]]:
     """Return the clocks and counters of boards and programs for the rows of `hand`, with pauses and jitter."""
     random = np.random.default_rng(2)
     trials = len(TYPES) * REPETITIONS
@@ -64,10 +64,10 @@ def clocks() -> dict[str, NDArray[np.generic]]:
         "secs": ms // 1000 + 1_700_000_000,
         "nsecs": np.rint(ms * 1e6) % 1e9,
         "unix_time": 1.7e9 + ms / 1000,
-        "seq": (row + 17) % 256,
-        "counter": 2 * row,
-        "Nr": row // FRAMES + 1,
-        "frame": row % FRAMES,
+        "seq": (row + 17.0) % 256,
+        "counter": 2.0 * row,
+        "Nr": row // FRAMES + 1.0,
+        "frame": row % FRAMES + 0.0,
     }
 
 

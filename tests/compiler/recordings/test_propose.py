@@ -16,7 +16,8 @@ from thenar.compiler.recordings.columns import Columns, TextFormat, read_columns
 from thenar.compiler.recordings.errors import TableError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_table
-from thenar.compiler.recordings.propose import Proposal, listed, propose, propose_file
+from thenar.compiler.recordings.inputs import listed
+from thenar.compiler.recordings.propose import Proposal, propose, propose_file
 from thenar.compiler.recordings.table import Column, Table
 from thenar.drivers.errors import ThenarError
 
