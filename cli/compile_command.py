@@ -272,12 +272,16 @@ def _documents(hand: "HandShape | None", hand_length: float | None, chosen: "Pic
 
 
 def _warn(made: "BuildReport", chosen: "Picked | None", given: "Harness | None", glove: Path | None) -> None:
-    """Warn of a build that always predicts the same, and of one that is not wired as `glove`, the file of `given`."""
+    """Warn of a build that always predicts the same, whose joints the glove does not measure, or that is not wired as
+    `glove`, the file of `given`.
+    """
     if made.only_answer is not None:
         warning(
             f"the build predicts {made.only_answer} for every row: no single input distinguishes grasp types, and the "
             "model looks at one input at a time"
         )
+    if made.unread:
+        warning(made.unread)
     if chosen is not None and given is not None and made.harness != given:
         warning(
             f"the scan map uses the wiring that point {chosen.point.number} was found with, not {glove}: to run on "

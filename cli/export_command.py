@@ -10,11 +10,12 @@ from .lines import echo
 
 
 class Exported(Struct, frozen=True):
-    """The written table, the columns.toml that reads it back if requested, and the number of grasps."""
+    """The written table, the columns.toml that reads it back if requested, and the numbers of trials and frames."""
 
     output: str
     columns: str | None
-    grasps: int
+    trials: int
+    frames: int
 
 
 @click.command("export")
@@ -49,5 +50,6 @@ def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path |
     grasp_set = GraspSet.load(grasps)
     with progress(f"exporting {grasps.name}"):
         export(grasp_set, output, codes, meta, columns)
-    written = Exported(str(output), None if columns is None else str(columns), len(grasp_set))
-    show(written, lambda _: echo(f"{output}: {len(grasp_set)} grasps"))
+    kept = None if columns is None else str(columns)
+    written = Exported(str(output), kept, grasp_set.n_trials, len(grasp_set))
+    show(written, lambda _: echo(f"{output}: {grasp_set.size}"))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from thenar.compiler.text import inputs_read, none_words
+from thenar.compiler.text import counted, inputs_read, trials_of_frames
 
 from .common import (
     OutputFile,
@@ -155,16 +155,16 @@ def _print(report: "ImportReport", output: Path) -> None:
         warning(finding.message)
     for note in report.notes:
         echo(note)
-    if report.coding:
+    if rounded := [cost for cost in report.coding if cost.rounds]:
         numbers = ("step", "largest error", "rms error", "values before", "after")
         coding = table(("joint", "unit", *numbers), numbers, "Coding")
-        for cost in report.coding:
+        for cost in rounded:
             errors = (f"{cost.step:g}", f"{cost.largest_error:.3g}", f"{cost.rms_error:.3g}")
             coding.add_row(cost.joint, cost.unit, *errors, str(cost.distinct_before), str(cost.distinct_after))
         out().print(coding)
     echo(
-        f"{output}: {report.rows} grasps of {report.grasp_types} types ({report.taxonomy}){none_words(report.none)}; "
+        f"{output}: {trials_of_frames(report.frames, report.trials, report.rests)}, "
+        f"{counted(report.grasp_types, 'grasp type')} ({report.taxonomy}); "
         f"subjects {report.subjects}, objects {report.objects}, "
-        f"{inputs_read(report.switches, report.taxels, report.joints)}, "
-        f"trials {report.trials}"
+        f"{inputs_read(report.switches, report.taxels, report.joints)}"
     )

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from thenar.compiler.text import INDEPENDENT, inputs_read, none_words
+from thenar.compiler.text import INDEPENDENT, counted, inputs_read, trials_of_frames
 from thenar.runtime.published import NONE
 
 from .common import existing_file, json_flag, keep_apart, out, overwrite_flag, picture_file, progress, show, table
@@ -26,9 +26,10 @@ if TYPE_CHECKING:
 def command(grasps: Path, plot: Path | None) -> None:
     """Summarise GRASPS, a .grasps file: counts, balance, odd columns and rows, and how separable it is.
 
-    Rows with nothing held count in no accuracy. The ceiling is the accuracy of a perfect memory: no classifier that
-    sees only these inputs is more accurate on these rows. The nearest-neighbour accuracy classifies each frame by the
-    nearest frame of another trial, with joints in standard deviations.
+    A trial is one recorded grasp or rest, a frame one reading. Rests count in no accuracy. The ceiling is the accuracy
+    of a perfect memory: no classifier that sees only these inputs is more accurate on these frames. The
+    nearest-neighbour accuracy classifies each frame by the nearest frame of another trial, with joints in standard
+    deviations.
 
     \b
     Example:
@@ -57,8 +58,8 @@ def _draw(grasp_set: "GraspSet", path: Path) -> None:
 
 def _print(summary: "Summary", path: Path) -> None:
     echo(
-        f"{path}: {summary.rows} grasps of {len(summary.grasps)} types ({summary.taxonomy})"
-        f"{none_words(summary.none)}; "
+        f"{path}: {trials_of_frames(summary.frames, summary.trials, summary.rests)}, "
+        f"{counted(len(summary.grasps), 'grasp type')} ({summary.taxonomy}); "
         f"subjects {len(summary.subjects)}, objects {len(summary.objects)}, "
         f"{inputs_read(len(summary.switches), len(summary.taxels), len(summary.joints))}"
     )
@@ -77,15 +78,15 @@ def _print(summary: "Summary", path: Path) -> None:
 
 
 def _print_counts(summary: "Summary") -> None:
-    grasps = table(("grasp type", "rows", "share"), ("rows", "share"), "Grasp types")
+    grasps = table(("grasp type", "frames", "share"), ("frames", "share"), "Grasp types")
     for grasp in summary.grasps:
-        grasps.add_row(grasp.name, str(grasp.rows), f"{grasp.rows / summary.rows:.1%}")
+        grasps.add_row(grasp.name, str(grasp.frames), f"{grasp.frames / summary.frames:.1%}")
     if summary.none:
-        grasps.add_row(NONE, str(summary.none), f"{summary.none / summary.rows:.1%}")
+        grasps.add_row(NONE, str(summary.none), f"{summary.none / summary.frames:.1%}")
     out().print(grasps)
     echo(f"balance (rarest type over commonest): {summary.balance:.2f}")
     for what, counts in (("subjects", summary.subjects), ("objects", summary.objects)):
-        echo(f"{what}: " + ", ".join(f"{count.name} ({count.rows})" for count in counts))
+        echo(f"{what}: " + ", ".join(f"{count.name} ({count.frames})" for count in counts))
 
 
 def _print_ranges(kind: str, ranges: "Sequence[JointRange]") -> None:

@@ -5,6 +5,8 @@ from pathlib import Path
 import click
 from msgspec import Struct
 
+from thenar.compiler.text import trials_of_frames
+
 from .common import OutputFile, existing_file, json_flag, keep_apart, overwrite_flag, progress, show
 from .lines import echo
 
@@ -14,8 +16,9 @@ class Merged(Struct, frozen=True):
 
     output: str
     sets: int
-    grasps: int
+    frames: int
     trials: int
+    rests: int
     subjects: int
     sessions: int
 
@@ -51,14 +54,14 @@ def command(sets: tuple[Path, ...], output: Path, each: str | None) -> None:
     trials, subjects, sessions = (
         len({*column.tolist()}) for column in (merged.trial_ids, merged.subjects, merged.sessions)
     )
-    written = Merged(str(output), len(sets), len(merged), trials, subjects, sessions)
+    written = Merged(str(output), len(sets), len(merged), trials, merged.rests, subjects, sessions)
     show(written, _print, merged.simulated)
 
 
 def _print(merged: Merged, simulated: str) -> None:
     echo(
-        f"{merged.output}: {merged.grasps} grasps of {merged.sets} sets; "
-        f"trials {merged.trials}, subjects {merged.subjects}, sessions {merged.sessions}"
+        f"{merged.output}: {trials_of_frames(merged.frames, merged.trials, merged.rests)} from {merged.sets} sets; "
+        f"subjects {merged.subjects}, sessions {merged.sessions}"
     )
     if simulated:
         echo(f"simulated: {simulated}")

@@ -145,7 +145,6 @@ def _both(begun: object, wanted: object) -> str:
 
 def _write(recording: Path, output: Path, accepted: int, planned: int) -> None:
     from thenar.compiler.recordings.mcap_recording import import_recordings
-    from thenar.compiler.text import none_words
 
     if not accepted:
         echo(f"no trial was accepted: {output} is not written; run the same command to continue")
@@ -156,4 +155,4 @@ def _write(recording: Path, output: Path, accepted: int, planned: int) -> None:
     for finding in report.warnings:
         warning(finding.message)
     rest = "" if accepted == planned else "; run the same command to continue"
-    echo(f"{output}: {len(grasp_set)} grasps{none_words(report.none)}; {accepted} of {planned} trials are done{rest}")
+    echo(f"{output}: {grasp_set.size}; {accepted} of {planned} trials are done{rest}")

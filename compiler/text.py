@@ -65,9 +65,10 @@ def inputs_read(switches: int, taxels: int, joints: int) -> str:
     return f"switches {switches}, {f'taxels {taxels}, ' if taxels else ''}joints {joints}"
 
 
-def none_words(rows: int) -> str:
-    """Return the clause that follows a number of rows, in `rows` of which nothing is held."""
-    return f", in {rows} of which nothing is held" if rows else ""
+def trials_of_frames(frames: int, trials: int, rests: int = 0) -> str:
+    """Return "360 trials (180 grasps, 180 rests) of 2,880 frames"; in a rest, nothing is held."""
+    kinds = f" ({counted(trials - rests, 'grasp')}, {counted(rests, 'rest')})" if rests else ""
+    return f"{counted(trials, 'trial')}{kinds} of {counted(frames, 'frame')}"
 
 
 def sentence(words: str) -> str:

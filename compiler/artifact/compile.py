@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
 from thenar.runtime.hand import HAND_NAME, HandDrawing, hand_from_bytes, hand_to_bytes
 from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.live.system import unread_joints
 from thenar.runtime.manifest import (
     AUTO,
     PAPERS_TRAINER,
@@ -173,8 +174,8 @@ def compile_build(
     ------
     CompileError
         If the recordings, the options or the folder do not allow a build.
-    HarnessError
-        If the harness lacks a kept switch.
+    HarnessError, SettingError
+        If the harness lacks a kept switch, or one of the joints while it measures others.
 
     Notes
     -----
@@ -269,9 +270,11 @@ class Making:
         self.integers = built_tables(trained, samples, options)
         names = names_of(grasp_set, trained.kept)
         self.harness = harness(names) if callable(harness) else harness
-        self.scan = None
+        self.scan, self.unread = None, ""
         if self.harness is not None:
             self.scan = plan_scan(names, self.integers, self.harness, kept.switches, kept.codes)
+            joints = [grasp_set.joint_names[joint] for joint in trained.joints]
+            self.unread = unread_joints(self.harness, self.scan, joints)
         self.comparison = compare(trained.model, self.integers, kept.switches, kept.codes)
         self.rejection = rejected_by(trained, samples, self.integers, options, groups_for(grasp_set, options))
         self._inputs = (*names, *(grasp_set.joint_names[joint] for joint in trained.joints))
@@ -314,6 +317,7 @@ class Making:
             comparison=self.comparison,
             faults=self.faults,
             has_page=page is not None,
+            unread=self.unread,
             confusion=None if tested is None else tested.confusion,
         )
         files |= {path: text.encode() for path, text in firmware.items()}

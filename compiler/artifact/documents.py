@@ -51,6 +51,8 @@ class BuildReport:
         A sentence: what the firmware is laid out for, or why there is none.
     scan, harness : ScanMap, Harness or None
         How to read the switches, and the wiring to read them from; None if it was compiled without a harness.
+    unread : str
+        A sentence on the joints if nothing in the harness reads them; empty otherwise.
     grasp_set, trained, comparison
         The training set, the trained model, and the training rows through the model, its tables and the integers.
     faults : FaultCounts
@@ -69,6 +71,7 @@ class BuildReport:
     firmware: str
     scan: ScanMap | None
     harness: Harness | None
+    unread: str
     grasp_set: GraspSet
     trained: Trained
     comparison: Comparison

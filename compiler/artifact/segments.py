@@ -82,8 +82,8 @@ def _of_movements(
     """Return the timelines of whole movements, with their recorded types as the truth."""
     if not len(grasp_set):
         raise SegmentingError("the set has no rows to find segments in")
-    streams = streams_of(grasp_set, build.manifest.segmenting.tick_us)
     bits, codes = select_inputs(grasp_set, build.manifest)
+    streams = streams_of(grasp_set, build.manifest.segmenting.tick_us)
     types = build.grasps[: build.manifest.segmenting.n_types]
     number = {name: place for place, name in enumerate(types)}
     known = np.array([number.get(name, len(types)) for name in grasp_set.taxonomy.names], np.intp)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from thenar.runtime.build import Build
 from thenar.runtime.files import read_file
 from thenar.runtime.manifest import Calibration, Manifest, Switch
-from thenar.runtime.names import list_names
+from thenar.runtime.names import list_names, nearest
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables
@@ -30,6 +30,7 @@ from ..firmware.probes import Lost, Predictions, Probes, extreme_frames, joined,
 from ..firmware.targets import TARGETS
 from ..firmware.targets import kinds as every_kind
 from ..recordings.graspset import GraspSet, Joint
+from ..text import counted
 from . import CompileError
 
 
@@ -38,8 +39,20 @@ def select_inputs(grasp_set: GraspSet, manifest: Manifest) -> tuple[NDArray[np.b
 
     Raises CompileError naming the inputs that the recordings lack, or joints whose codes have another meaning there.
     """
-    switches = _columns("switches", [switch.source for switch in manifest.switches], grasp_set.element_names)
-    joints = _columns("joints", [joint.name for joint in manifest.joints], grasp_set.joint_names)
+    there = {name: column for column, name in enumerate(grasp_set.element_names)}
+    measured = {name: column for column, name in enumerate(grasp_set.joint_names)}
+    wanted = [*dict.fromkeys(switch.source for switch in manifest.switches)]
+    missing = [name for name in wanted if name not in there]
+    missing += [joint.name for joint in manifest.joints if joint.name not in measured]
+    if missing:
+        names = (*grasp_set.element_names, *grasp_set.joint_names)
+        raise CompileError(
+            f"the recordings lack {counted(len(missing), 'input')} of the build: {list_names(missing)}"
+            f"{nearest(missing[0], names)}; import their table again, with [rename] in the columns.toml for a column "
+            "that has another name"
+        )
+    switches = [there[switch.source] for switch in manifest.switches]
+    joints = [measured[joint.name] for joint in manifest.joints]
     for calibration, column in zip(manifest.joints, joints, strict=True):
         _check_calibration("joint", calibration, grasp_set.joints[column])
     bits = np.empty((len(grasp_set), len(switches)), np.bool_)
@@ -60,14 +73,6 @@ def _bits(grasp_set: GraspSet, switch: Switch, column: int) -> NDArray[np.bool_]
         return grasp_set.switches[:, column]
     _check_calibration("taxel", switch.threshold.taxel, grasp_set.taxel_columns[taxel])
     return grasp_set.taxels[:, taxel] > switch.threshold.code
-
-
-def _columns(kind: str, wanted: list[str], there: tuple[str, ...]) -> list[int]:
-    number = {name: column for column, name in enumerate(there)}
-    missing = [name for name in wanted if name not in number]
-    if missing:
-        raise CompileError(f"the recordings lack {kind} of the build: {list_names(missing)}")
-    return [number[name] for name in wanted]
 
 
 def _check_calibration(kind: str, built: Calibration, recorded: Joint) -> None:

@@ -98,7 +98,8 @@ class Study:
     """The result: the options and the set, the grasp types that occur, warnings, and the tables.
 
     left_out names requested tables that have no meaning here, with the reason; permuted is the permutation test,
-    learning the learning curves; each is None if not requested.
+    learning the learning curves; each is None if not requested. rests is the number of trials in which nothing is held;
+    they are left out.
     """
 
     fingerprint: str
@@ -111,6 +112,7 @@ class Study:
     tables: tuple[RateTable, ...]
     permuted: Permuted | None = None
     learning: Learning | None = None
+    rests: int = 0
 
     def __str__(self) -> str:
         """Return the numbers of trials and frames, and the scheme of the folds."""
@@ -124,7 +126,8 @@ class Study:
         }[options.scheme]
         grasps = counted(len(self.grasps), "grasp type")
         frames = f" of {self.rows:,} frames" if self.rows > self.trials else ""
-        size = f"{counted(self.trials, 'trial')}{frames}, {grasps}"
+        rests = f"; {counted(self.rests, 'rest')} left out" if self.rests else ""
+        size = f"{counted(self.trials, 'trial')}{frames}, {grasps}{rests}"
         return f"{size}; {cut}; accuracies in % with 95 % intervals"
 
 
@@ -181,7 +184,9 @@ def evaluate(
         recipe = _recipe_of("compositions", options)
         how = Permutations(planned.parts, options.scheme, options.folds, options.prune, options.seed, training, recipe)
         permuted = how.test(chosen, m, jobs, None if progress is None else _after(progress, len(predictions)))
-    return planned.study(grasp_set.fingerprint(), predictions, permuted)
+    found = planned.study(grasp_set.fingerprint(), predictions, permuted)
+    empty = grasp_set.is_none & np.isin(grasp_set.subjects, np.unique(chosen.subjects))
+    return replace(found, rests=len(np.unique(grasp_set.trial_ids[empty])))
 
 
 def _trainers(options: Options) -> tuple[Training, Ways]:

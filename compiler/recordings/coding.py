@@ -30,6 +30,11 @@ class CodingCost(msgspec.Struct, frozen=True):
     distinct_before: int
     distinct_after: int
 
+    @property
+    def rounds(self) -> bool:
+        """Whether coding changes values by more than the arithmetic does, or makes some equal."""
+        return self.largest_error > 1e-6 * self.step or self.distinct_after < self.distinct_before
+
 
 def code_joint(
     name: str, entry: JointColumns, values: NDArray[np.float64], rows: NDArray[np.int64]

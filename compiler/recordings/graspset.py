@@ -29,7 +29,7 @@ from thenar.runtime.names import shortened
 from thenar.runtime.nesting import check_json
 from thenar.runtime.sealed import seal, unseal
 
-from ..text import none_words
+from ..text import counted, trials_of_frames
 from .arrays import AnyArray, pack, unpack
 from .errors import LARGEST, RecordingError, check_names, check_room, check_simulated
 from .taxonomy import Taxonomy
@@ -179,7 +179,7 @@ class GraspSet:
     ...     trials=np.array([1, 2]),
     ... )
     >>> grasp_set
-    GraspSet: 2 grasps of 2 types (own), 2 switches, 0 joints, 1 subjects, 2 objects
+    GraspSet: 2 trials of 2 frames, 2 grasp types (own), 2 switches, 0 joints, 1 subjects, 2 objects
     >>> grasp_set.rows(grasp_set.grasps == "hook").switches
     array([[False,  True]])
     """
@@ -253,17 +253,16 @@ class GraspSet:
         return len(self.grasps)
 
     def __repr__(self) -> str:
-        types, subjects, objects = (len(np.unique(each)) for each in (self.grasps, self.subjects, self.objects))
-        none = int(np.count_nonzero(self.is_none))
-        what = f"{len(self)} grasps of {types - (none > 0)} types ({shortened(self.taxonomy.name)})"
-        what += none_words(none)
+        subjects, objects = (len(np.unique(each)) for each in (self.subjects, self.objects))
+        types = len(np.unique(self.labels[~self.is_none]))
+        what = f"{self.size}, {counted(types, 'grasp type')} ({shortened(self.taxonomy.name)})"
         taxels = f"{len(self.taxel_columns)} taxels, " if self.taxel_columns else ""
         read = f"{len(self.switch_names)} switches, {taxels}{len(self.joints)} joints"
         who = f"{read}, {subjects} subjects, {objects} objects"
         return f"GraspSet: {what}, {who}" + (f"\nsimulated: {shortened(self.simulated)}" if self.simulated else "")
 
     def _repr_html_(self) -> str:
-        """Return the representation in a notebook: the line, and rows and trials of each grasp type."""
+        """Return the representation in a notebook: the line, and trials and frames of each grasp type."""
         first = np.unique(self.trial_ids, return_index=True)[1]
         counts = (
             np.bincount(labels, minlength=len(self.taxonomy.names)) for labels in (self.labels[first], self.labels)
@@ -273,7 +272,7 @@ class GraspSet:
             for name, trials, rows in zip(self.taxonomy.names, *counts, strict=True)
             if rows or name in self.taxonomy.types
         )
-        head = "<tr><th>grasp type</th><th>trials</th><th>rows</th></tr>"
+        head = "<tr><th>grasp type</th><th>trials</th><th>frames</th></tr>"
         return f"<p>{escape(repr(self)).replace(chr(10), '<br>')}</p><table>{head}{body}</table>"
 
     @property
@@ -297,6 +296,21 @@ class GraspSet:
         if self.independent:
             return np.arange(len(self))
         return groups(self.labels, self.subjects, self.objects, self.sessions, self.trials)
+
+    @property
+    def n_trials(self) -> int:
+        """The number of trials, grasps and rests."""
+        return int(self.trial_ids.max(initial=-1)) + 1
+
+    @property
+    def rests(self) -> int:
+        """The number of trials in which nothing is held."""
+        return len(np.unique(self.trial_ids[self.is_none]))
+
+    @property
+    def size(self) -> str:
+        """The numbers of trials and frames in words: "360 trials (180 grasps, 180 rests) of 2,880 frames"."""
+        return trials_of_frames(len(self), self.n_trials, self.rests)
 
     @property
     def is_none(self) -> NDArray[np.bool_]:
@@ -401,7 +415,7 @@ class GraspSet:
         >>> from thenar.compiler import Columns, GraspSet
         >>> frame = pd.DataFrame({"grasp": ["pinch", "hook"], "thumb": [True, False], "n": [1, 2]})
         >>> GraspSet.from_dataframe(frame, Columns(label="grasp", switches=("thumb",), trial="n"))
-        GraspSet: 2 grasps of 2 types (own), 1 switches, 0 joints, 1 subjects, 1 objects
+        GraspSet: 2 trials of 2 frames, 2 grasp types (own), 1 switches, 0 joints, 1 subjects, 1 objects
         """
         # Imported late: the modules that read and write tables import this one.
         found: GraspSet = import_module(".dataframes", __package__).from_dataframe(frame, columns)

@@ -386,13 +386,13 @@ class _Reader:
 class ImportReport(msgspec.Struct, frozen=True):
     """The report of `thenar import`: the content of the set, coding losses per joint, conversions, and oddities.
 
-    none  number of rows in which nothing is held
+    rests  number of trials in which nothing is held
     """
 
     table: str
-    rows: int
-    none: int
+    frames: int
     trials: int
+    rests: int
     subjects: int
     objects: int
     grasp_types: int
@@ -497,9 +497,9 @@ def report_of(
     """Return the report on `grasp_set`, which was imported from `what`."""
     return ImportReport(
         table=what,
-        rows=len(grasp_set),
-        none=int(grasp_set.is_none.sum()),
-        trials=int(grasp_set.trial_ids.max(initial=-1)) + 1,
+        frames=len(grasp_set),
+        trials=grasp_set.n_trials,
+        rests=grasp_set.rests,
         subjects=len(np.unique(grasp_set.subjects)),
         objects=len(np.unique(grasp_set.objects)),
         grasp_types=len(np.unique(grasp_set.labels[~grasp_set.is_none])),

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pictures import painting, rendered
-from ..text import none_words
 from .errors import RecordingError
 from .graspset import GraspSet, Joint
 from .summary import contacts
@@ -88,8 +87,8 @@ def _draw_balance(axes: "Axes", grasp_set: GraspSet) -> None:
     axes.set_yticks(np.arange(len(present)), _types(grasp_set))
     axes.set_ylim(len(present) - 0.5, -0.5)
     axes.margins(x=0.1)
-    axes.set_title(f"{len(grasp_set)} grasps{none_words(int(grasp_set.is_none.sum()))}")
-    axes.set_xlabel("rows")
+    axes.set_title(grasp_set.size)
+    axes.set_xlabel("frames")
 
 
 def _draw_contacts(axes: "Axes", grasp_set: GraspSet) -> None:
@@ -99,7 +98,7 @@ def _draw_contacts(axes: "Axes", grasp_set: GraspSet) -> None:
     axes.figure.colorbar(
         image,
         ax=axes,
-        label="share of rows "
+        label="share of frames "
         + " or ".join(["closed"] * bool(kinds["switches"]) + ["pressed"] * bool(kinds["taxels"])),
         pad=0.01,
     )

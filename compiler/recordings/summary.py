@@ -199,14 +199,14 @@ def _neighbour_rate(
 
 
 class Count(msgspec.Struct, frozen=True):
-    """The number of rows with `name`."""
+    """The number of frames with `name`."""
 
     name: str
-    rows: int
+    frames: int
 
 
 class SwitchUse(msgspec.Struct, frozen=True):
-    """The share of rows in which a switch is closed, 0 to 1."""
+    """The share of frames in which a switch is closed, 0 to 1."""
 
     name: str
     closed: float
@@ -225,7 +225,8 @@ class JointRange(msgspec.Struct, frozen=True):
 class Summary(msgspec.Struct, frozen=True):
     """A set in numbers.
 
-    none         number of rows in which nothing is held; they count in no rate
+    rests        number of trials in which nothing is held; they count in no rate
+    none         number of frames in which nothing is held
     movements    number of trials, including the rows around them in which nothing is held
     seconds      total duration of the recordings; None if times are unknown
     simulated    the simulator of the grasps; empty: they were recorded
@@ -233,7 +234,9 @@ class Summary(msgspec.Struct, frozen=True):
     balance      the rarest grasp type's count divided by the most frequent one's
     """
 
-    rows: int
+    frames: int
+    trials: int
+    rests: int
     none: int
     movements: int
     seconds: float | None
@@ -259,7 +262,9 @@ def summarise(grasp_set: GraspSet) -> Summary:
     grasps = [Count(name, int(rows)) for name, rows in zip(grasp_set.taxonomy.types, counts, strict=True)]
     present = counts[counts > 0]
     return Summary(
-        rows=len(grasp_set),
+        frames=len(grasp_set),
+        trials=grasp_set.n_trials,
+        rests=grasp_set.rests,
         none=int(grasp_set.is_none.sum()),
         movements=int(grasp_set.movement_ids.max(initial=-1)) + 1,
         seconds=_seconds(grasp_set),
@@ -267,8 +272,8 @@ def summarise(grasp_set: GraspSet) -> Summary:
         independent=grasp_set.independent,
         fingerprint=grasp_set.fingerprint(),
         taxonomy=grasp_set.taxonomy.name,
-        grasps=tuple(count for count in grasps if count.rows),
-        absent=tuple(count.name for count in grasps if not count.rows),
+        grasps=tuple(count for count in grasps if count.frames),
+        absent=tuple(count.name for count in grasps if not count.frames),
         balance=float(present.min() / present.max()) if present.size else 0.0,
         subjects=_counts(grasp_set.subjects),
         objects=_counts(grasp_set.objects),

@@ -7,7 +7,7 @@ from pathlib import Path
 from thenar.drivers.calibration import GloveCalibration
 
 from ..build import Build
-from ..calibration import Joints, Meaning, load_calibration, numbers_of
+from ..calibration import Joints, Meaning, load_calibration, numbers_of, place_of
 from ..frames import Mask
 from ..harness.wiring import Harness, StreamWiring
 from ..policy import Policy
@@ -21,6 +21,19 @@ from ..taxels import calibration_of, in_counts
 from .quarantine import WHOLE_US
 from .recogniser import LiveRecognizer
 from .sources import Sources
+
+
+def unread_joints(harness: Harness, scan: ScanMap, joints: Sequence[str]) -> str:
+    """Return a sentence on a build's `joints` if nothing in `harness` reads them; "" if all are read.
+
+    Raises SettingError if the harness reads joints, but lacks one of the build.
+    """
+    if not joints or slowest_us(harness, scan, "joints") is not None:
+        for joint in joints if harness.joint_device is not None else ():
+            place_of(joint, harness.sensor_names)
+        return ""
+    how = own_joints(list(joints)) or "add the [cyberglove] that measures them"
+    return f"nothing in {harness.name!r} reads the build's joints, and every grasp is degraded: {how}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,11 +75,7 @@ class System:
     @property
     def unread(self) -> str:
         """A sentence on the build's joints if nothing in the harness reads them; "" if everything is read."""
-        joints = [joint.name for joint in self.build.manifest.joints]
-        if not joints or slowest_us(self.harness, self.scan, "joints") is not None:
-            return ""
-        how = own_joints(joints) or "add the [cyberglove] that measures them"
-        return f"nothing in {self.harness.name!r} reads the build's joints, and every grasp is degraded: {how}"
+        return unread_joints(self.harness, self.scan, [joint.name for joint in self.build.manifest.joints])
 
     def recognizer(self) -> LiveRecognizer:
         """Return a recogniser for the frames of the devices.

@@ -2,6 +2,7 @@
 
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from thenar.compiler import GraspSet
@@ -132,3 +133,51 @@ def test_a_preset_sets_options_and_explicit_ones_win(thenar: Thenar, set_file: P
         assert thenar(*given, *more).returncode == 0
         options = Build.load(tmp_path / "build").manifest.options
         assert (options.placement, options.keep, options.rounds, options.table_bits) == expected
+
+
+def test_a_glove_that_lacks_a_joint_is_refused_by_compile_as_by_run(
+    thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path
+) -> None:
+    names = list(small_set.switch_names)
+    columns = ", ".join(f'"{name}"' for name in ["ms", *names, "j0"])
+    glove, build = tmp_path / "glove.toml", tmp_path / "build"
+    glove.write_text(
+        f'[[stream]]\nport = "-"\ncolumns = [{columns}]\ntime = "ms"\nrate_hz = 50\nswitches = {names}\n'
+        "joints = { j0 = [0, 255] }\n"
+    )
+    refused = thenar("compile", set_file, "-o", build, *FEW, "--no-report", "--glove", glove)
+    assert refused.returncode == 2
+    assert "the build needs joint 'j1', and the glove has no sensor of that name" in refused.stderr
+    assert not build.exists()
+    assert thenar("compile", set_file, "-o", build, *FEW, "--no-report").returncode == 0
+    assert thenar("run", build, "--glove", glove, "--frames", 1).stderr == refused.stderr
+    fewer = thenar("compile", set_file, "-o", build, *FEW, "--no-report", "--glove", glove, "--inputs", "switches")
+    assert (fewer.returncode, fewer.stderr) == (0, "")
+
+
+def test_a_glove_that_measures_no_joints_is_a_warning(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+    build, glove = tmp_path / "build", tmp_path / "glove.toml"
+    assert thenar("compile", set_file, "-o", build, *FEW, "--no-report", "--propose", glove).returncode == 0
+    done = thenar("compile", set_file, "-o", build, *FEW, "--no-report", "--glove", glove)
+    assert done.returncode == 0
+    assert "warning: nothing in 'glove' reads the build's joints, and every grasp is degraded" in done.stderr
+
+
+def test_verify_run_and_segment_say_the_same_of_inputs_that_a_set_lacks(
+    thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path
+) -> None:
+    build, other = tmp_path / "build", tmp_path / "other.grasps"
+    assert thenar("compile", set_file, "-o", build, *FEW, "--no-report").returncode == 0
+    kept = next(switch.name for switch in Build.load(build).manifest.switches)
+    replace(
+        small_set,
+        switch_names=tuple("renamed" if name == kept else name for name in small_set.switch_names),
+        joints=(small_set.joints[0], replace(small_set.joints[1], name="j_1")),
+    ).save(other)
+    verified = thenar("verify", build, other)
+    assert verified.returncode == 2
+    assert f"the recordings lack 2 inputs of the build: {kept}, j1" in verified.stderr
+    assert "with [rename] in the columns.toml for a column that has another name" in verified.stderr
+    for arguments in (("run", build, "--replay", other), ("segment", other, "-b", build)):
+        done = thenar(*arguments)
+        assert (done.returncode, done.stderr) == (2, verified.stderr)

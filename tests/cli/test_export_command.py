@@ -39,7 +39,7 @@ def test_an_exported_table_imports_again(grasps: Path, suffix: str, flags: list[
 def test_machines_are_told_what_was_written(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = grasps.with_name("t.csv")
     assert run(["export", str(grasps), "-o", str(table), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"output": str(table), "columns": None, "grasps": 2}
+    assert json.loads(capsys.readouterr().out) == {"output": str(table), "columns": None, "trials": 2, "frames": 2}
 
 
 def test_values_are_written_unless_codes_are_asked_for(grasps: Path) -> None:

@@ -40,7 +40,7 @@ def test_a_table_becomes_a_set(folder: Path, capsys: pytest.CaptureFixture[str])
     grasp_set = GraspSet.load(folder / "set.grasps")
     assert grasp_set.grasps.tolist() == ["mug", "ball", "mug"]
     said = capsys.readouterr()
-    assert "3 grasps of 2 types (own); subjects 2, objects 1, switches 2, joints 1" in said.out
+    assert "3 trials of 3 frames, 2 grasp types (own); subjects 2, objects 1, switches 2, joints 1" in said.out
     assert "j1" in said.out
     assert "warning: 1 switches never change: s2\n" in said.err
     assert (
@@ -52,7 +52,7 @@ def test_json_is_one_document_with_the_warnings_in_it(folder: Path, capsys: pyte
     assert thenar_import(folder, "--json") == 0
     said = capsys.readouterr()
     report = json.loads(said.out)
-    assert (report["rows"], report["grasp_types"], report["coding"][0]["joint"]) == (3, 2, "j1")
+    assert (report["frames"], report["grasp_types"], report["coding"][0]["joint"]) == (3, 2, "j1")
     assert [warning["kind"] for warning in report["warnings"]] == [
         "dropped rows",
         "constant switches",
@@ -154,7 +154,7 @@ def test_a_table_is_imported_without_a_columns_toml(glove: Path, capsys: pytest.
     ):
         assert words in said.out
     assert "numbered as trials in natural order: 'T1' is 1, 'T2' is 2, 'T10' is 3" in said.out
-    assert "24 grasps of 2 types (own); subjects 2, objects 1, switches 1, joints 1, trials 12" in said.out
+    assert "12 trials of 24 frames, 2 grasp types (own); subjects 2, objects 1, switches 1, joints 1" in said.out
     # What was written imports the same set; a second time it is there already.
     assert run(["import", "my glove.csv", "-o", "again.grasps", "--columns", "set.columns.toml"]) == 0
     assert (glove / "again.grasps").read_bytes() == (glove / "set.grasps").read_bytes()
@@ -185,7 +185,7 @@ def test_a_stream_with_rest_is_imported_as_it_comes(tmp_path: Path, capsys: pyte
     assert run(["import", str(tmp_path / "stream.csv"), "-o", str(tmp_path / "set.grasps"), "--yes"]) == 0
     said = capsys.readouterr().out
     assert "nothing is held where the label is 'rest' (45% of the rows): see `none`" in said
-    assert "400 grasps of 2 types (own), in 180 of which nothing is held; subjects 1" in said
+    assert "9 trials (4 grasps, 5 rests) of 400 frames, 2 grasp types (own); subjects 1" in said
     assert 'none = "rest"' in (tmp_path / "set.columns.toml").read_text()
     grasp_set = GraspSet.load(tmp_path / "set.grasps")
     assert grasp_set.times_us[-1] == 3_990_000
@@ -306,7 +306,10 @@ def test_a_recording_needs_no_columns(recording: Path, folder: Path, capsys: pyt
     output = folder / "set.grasps"
     assert run(["import", str(recording), "-o", str(output)]) == 0
     assert GraspSet.load(output).grasps.tolist() == ["cup", "pen"]
-    assert "2 grasps of 2 types (own); subjects 1, objects 1, switches 2, joints 0" in capsys.readouterr().out
+    assert (
+        "2 trials of 2 frames, 2 grasp types (own); subjects 1, objects 1, switches 2, joints 0"
+        in capsys.readouterr().out
+    )
 
 
 def test_a_cut_recording_is_imported_with_a_warning(

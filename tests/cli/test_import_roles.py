@@ -51,7 +51,7 @@ def hand(closing: bool = False, numbered: bool = True, seed: int = 1) -> dict[st
     return cells | {f"f{number}": values[:, number].round(2) for number in range(3)}
 
 
-def clocks() -> dict[str, NDArray[np.generic]]:
+def clocks() -> dict[str, NDArray[np.float64]]:
     """Return the clocks and counters of boards and programs for the rows of `hand`, with pauses and jitter."""
     random = np.random.default_rng(2)
     trials = len(TYPES) * REPETITIONS
@@ -64,10 +64,10 @@ def clocks() -> dict[str, NDArray[np.generic]]:
         "secs": ms // 1000 + 1_700_000_000,
         "nsecs": np.rint(ms * 1e6) % 1e9,
         "unix_time": 1.7e9 + ms / 1000,
-        "seq": (row + 17) % 256,
-        "counter": 2 * row,
-        "Nr": row // FRAMES + 1,
-        "frame": row % FRAMES,
+        "seq": (row + 17.0) % 256,
+        "counter": 2.0 * row,
+        "Nr": row // FRAMES + 1.0,
+        "frame": row % FRAMES + 0.0,
     }
 
 
@@ -261,3 +261,29 @@ def test_text_that_is_constant_within_trials_is_a_subject_or_session(import_cell
         "text, constant within trials: name it (subject, object, session) if it is one",
     ):
         assert words in said
+
+
+def test_every_command_counts_trials_grasps_rests_and_frames_alike(
+    tmp_path: Path, import_cells: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    random = np.random.default_rng(5)
+    trial, _ = np.indices((24, 5)).reshape(2, -1)
+    kind = np.where(trial % 2, 1 + trial // 2 % 3, 0)
+    bend = np.array([5, 30, 55, 80])[kind] + random.normal(0, 2, len(kind)).round(1)
+    cells = {"ms": 50 * np.arange(len(kind)), "grasp": [("rest", *TYPES)[number] for number in kind], "bend": bend}
+    path, folder = str(tmp_path / "set.grasps"), str(tmp_path)
+    _, said, _ = import_cells(cells)
+    size = "24 trials (12 grasps, 12 rests) of 120 frames"
+    assert f"{path}: {size}, 3 grasp types (own); subjects 1" in said
+    assert "Coding" not in said
+    for arguments in (
+        ("info", path),
+        ("export", path, "-o", f"{folder}/again.csv"),
+        ("merge", path, "-o", f"{folder}/merged.grasps"),
+        ("split", path, "--by", "subject", "-o", f"{folder}/parts"),
+    ):
+        assert run([*arguments]) == 0
+        assert size in capsys.readouterr().out
+    quick = ("--folds", "2", "--repeats", "1", "--rounds", "2", "--tables", "compositions", "--baselines", "none")
+    assert run(["evaluate", path, *quick, "--jobs", "1"]) == 0
+    assert "12 trials of 60 frames, 3 grasp types; 12 rests left out;" in " ".join(capsys.readouterr().out.split())

@@ -31,7 +31,7 @@ def test_a_set_is_described_for_people(grasps: Path, capsys: pytest.CaptureFixtu
     assert run(["info", str(grasps)]) == 0
     said = capsys.readouterr().out
     for words in (
-        "4 grasps of 2 types (own); subjects 2, objects 2, switches 2, joints 1",
+        "4 trials of 4 frames, 2 grasp types (own); subjects 2, objects 2, switches 2, joints 1",
         "50.0%",
         "balance (rarest type over commonest): 1.00",
         "subjects: A (3), B (1)",
@@ -48,7 +48,7 @@ def test_rows_in_which_nothing_is_held_are_shown_last(grasps: Path, capsys: pyte
     )
     assert run(["info", str(grasps)]) == 0
     said = capsys.readouterr().out
-    assert "4 grasps of 2 types (own), in 2 of which nothing is held; subjects 2" in said
+    assert "4 trials (2 grasps, 2 rests) of 4 frames, 2 grasp types (own); subjects 2" in said
     assert "movements 4, 0.0 s" in said
     assert [line.split()[1] for line in said.splitlines() if line.endswith("% │")] == ["mug", "ball", "none"]
 
@@ -57,7 +57,7 @@ def test_a_set_is_described_for_machines(grasps: Path, capsys: pytest.CaptureFix
     assert run(["info", str(grasps), "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert summary["fingerprint"] == GraspSet.load(grasps).fingerprint()
-    assert summary["grasps"] == [{"name": "mug", "rows": 2}, {"name": "ball", "rows": 2}]
+    assert summary["grasps"] == [{"name": "mug", "frames": 2}, {"name": "ball", "frames": 2}]
     assert [line["ceiling"] for line in summary["separability"]] == [1.0, 1.0, 1.0]
 
 

@@ -25,12 +25,12 @@ def test_two_sets_become_one_and_part_again(thenar: Thenar, files: tuple[Path, P
     whole = tmp_path / "all.grasps"
     done = thenar("merge", anna, ben, "-o", whole)
     assert (done.returncode, done.stderr) == (0, "")
-    assert f"{whole}: 120 grasps of 2 sets; trials 120, subjects 2, sessions 1" in done.stdout
+    assert f"{whole}: 120 trials of 120 frames from 2 sets; subjects 2, sessions 1" in done.stdout
     assert "simulated: recorded grasps; scene x" in done.stdout
     sets = {str(path): GraspSet.load(path) for path in files}
     assert GraspSet.load(whole).fingerprint() == merge(sets).fingerprint()
     done = thenar("split", whole, "--by", "subject", "-o", tmp_path / "people", "--json")
-    assert [(part["name"], part["grasps"]) for part in json.loads(done.stdout)] == [("A", 60), ("B", 60)]
+    assert [(part["name"], part["frames"]) for part in json.loads(done.stdout)] == [("A", 60), ("B", 60)]
     again = {name: GraspSet.load(tmp_path / "people" / f"subject-{name}.grasps") for name in "AB"}
     assert merge(again).fingerprint() == GraspSet.load(whole).fingerprint()
     done = thenar("split", whole, "--by", "subject", "-o", tmp_path / "people")
@@ -50,8 +50,8 @@ def test_files_of_one_name_of_trials_are_told_apart_by_their_session(
     assert "add --each session" in done.stderr
     assert not (tmp_path / "all.grasps").exists()
     done = thenar("merge", *both, "--each", "session", "--json")
-    found = {"output": str(tmp_path / "all.grasps"), "sets": 2, "grasps": 120, "trials": 120, "subjects": 1}
-    assert json.loads(done.stdout) == {**found, "sessions": 2}
+    found = {"output": str(tmp_path / "all.grasps"), "sets": 2, "frames": 120, "trials": 120, "rests": 0}
+    assert json.loads(done.stdout) == {**found, "subjects": 1, "sessions": 2}
     assert {*GraspSet.load(tmp_path / "all.grasps").sessions.tolist()} == {"anna", "friday"}
 
 

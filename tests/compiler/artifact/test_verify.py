@@ -150,7 +150,7 @@ def test_every_changed_row_is_told(folder: Path, grasp_set: GraspSet) -> None:
 
 
 def test_missing_inputs_are_named(folder: Path, make_set: Make) -> None:
-    with pytest.raises(CompileError, match="lack joints of the build: j2"):
+    with pytest.raises(CompileError, match="lack 1 input of the build: j2"):
         verify(folder, make_set(joints=2))
 
 

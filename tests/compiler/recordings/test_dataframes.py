@@ -141,7 +141,7 @@ def test_what_cannot_be_read_is_one_sentence(
 def test_a_notebook_shows_rows_and_trials_of_each_type(small: GraspSet) -> None:
     odd = replace(small, trials=np.array([0, 1, 1, 0, 1, 1]), simulated="a <b>")
     shown = odd._repr_html_()
-    assert "GraspSet: 6 grasps of 3 types (kamakura14), 4 switches" in shown
+    assert "GraspSet: 5 trials of 6 frames, 3 grasp types (kamakura14), 4 switches" in shown
     assert "<br>simulated: a &lt;b&gt;" in shown
     for name, trials, rows in (("PoS", 2, 2), ("PoH", 1, 2), ("Tip", 2, 2), ("Add", 0, 0)):
         assert f"<tr><td>{name}</td><td>{trials}</td><td>{rows}</td></tr>" in shown

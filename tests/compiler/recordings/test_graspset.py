@@ -206,7 +206,7 @@ def test_a_simulated_set_says_so_and_is_another_set_than_the_same_recorded(small
 
 
 def test_a_set_prints_in_two_lines_what_it_is(small: GraspSet) -> None:
-    assert repr(small).startswith(f"GraspSet: {len(small)} grasps of ")
+    assert repr(small).startswith(f"GraspSet: {small.size}, ")
     simulated = replace(small, simulated="scene quick, seed 1" * 9)
     lines = repr(simulated).splitlines()
     assert len(lines) == 2

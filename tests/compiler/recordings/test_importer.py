@@ -27,7 +27,7 @@ def test_a_taxonomy_of_ones_own_is_the_labels_sorted() -> None:
     )
     assert grasp_set.taxonomy.types == ("ball", "mug")
     assert grasp_set.labels.tolist() == [1, 0, 1, 0]
-    assert (report.rows, report.grasp_types, report.subjects, report.joints, report.switches) == (4, 2, 1, 1, 0)
+    assert (report.frames, report.grasp_types, report.subjects, report.joints, report.switches) == (4, 2, 1, 1, 0)
 
 
 def test_a_list_of_names_is_a_taxonomy_in_its_order() -> None:

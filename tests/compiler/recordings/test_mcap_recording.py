@@ -74,7 +74,7 @@ def test_every_accepted_trial_is_a_row_of_what_was_captured(write: Write) -> Non
     assert grasp_set.trials.tolist() == [1, 2, 3]
     assert grasp_set.taxonomy == KAMAKURA_14
     assert grasp_set.joints == tuple(Joint(name, "raw", 1, 1.0, 255, 255.0) for name in SENSORS[:2])
-    assert (report.table, report.rows, report.joints) == ("a.mcap", 3, 2)
+    assert (report.table, report.frames, report.joints) == ("a.mcap", 3, 2)
 
 
 def test_what_was_redone_or_never_judged_is_no_row(tmp_path: Path) -> None:

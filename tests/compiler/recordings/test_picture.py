@@ -49,13 +49,13 @@ def test_a_set_of_switches_of_joints_or_of_both_is_drawn(small: GraspSet, switch
 def test_an_svg_names_grasp_types_and_joints_and_is_the_same_every_time(small: GraspSet) -> None:
     picture = draw(small, "svg")
     assert picture == draw(small, "svg")
-    for words in ("PoS", "Tip", "palm copy", "wrist", "6 grasps"):
+    for words in ("PoS", "Tip", "palm copy", "wrist", "6 trials of 6 frames"):
         assert f"<!-- {words} -->".encode() in picture
 
 
 def test_rows_in_which_nothing_is_held_are_drawn_last(small: GraspSet) -> None:
     drawn = draw(replace(small, grasps=np.array(["none", *small.grasps[1:]])), "svg").decode()
-    assert "6 grasps, in 1 of which nothing is held" in drawn
+    assert "1 rest) of 6 frames" in drawn
     assert [name for name in re.findall(r"<!-- (\w+) -->", drawn) if name in ("PoS", "PoH", "Tip", "none")][:4] == [
         "PoS",
         "PoH",

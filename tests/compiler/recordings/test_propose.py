@@ -16,7 +16,8 @@ from thenar.compiler.recordings.columns import Columns, TextFormat, read_columns
 from thenar.compiler.recordings.errors import TableError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_table
-from thenar.compiler.recordings.propose import Proposal, listed, propose, propose_file
+from thenar.compiler.recordings.inputs import listed
+from thenar.compiler.recordings.propose import Proposal, propose, propose_file
 from thenar.compiler.recordings.table import Column, Table
 from thenar.drivers.errors import ThenarError
 
@@ -86,7 +87,7 @@ def test_the_table_of_a_home_made_glove_is_imported_as_it_comes(
     expected = dict(zip(HEAD, ["subject", "label", "object", "trial", "time"], strict=False))
     expected |= {column: "taxels" if column.startswith("pad") else "joints" for column in HEAD[5:]}
     assert roles(proposal) == expected
-    assert (report.rows, report.trials, report.subjects, report.grasp_types) == (810, 54, 6, 3)
+    assert (report.frames, report.trials, report.subjects, report.grasp_types) == (810, 54, 6, 3)
     assert grasp_set.taxels.shape == (810, 24)
     assert {(taxel.unit, taxel.code_a, taxel.code_b, taxel.value_b) for taxel in grasp_set.taxel_columns} == {
         ("counts", 0, 4095, 4095.0)
@@ -111,7 +112,13 @@ def test_trials_of_a_published_set_are_found_over_two_columns(r2g_table: Path, t
         "subject",
     )
     assert (proposal.columns.time, proposal.columns.frames) == ("t_ms", None)
-    assert (report.rows, report.trials, report.subjects, report.objects, report.grasp_types) == (16119, 1370, 29, 4, 6)
+    assert (report.frames, report.trials, report.subjects, report.objects, report.grasp_types) == (
+        16119,
+        1370,
+        29,
+        4,
+        6,
+    )
     # The same trials, told apart by hand.
     with gzip.open(r2g_table, "rt") as file:
         rows = list(csv.DictReader(file))

@@ -100,7 +100,7 @@ def test_a_stream_is_imported_without_knowledge(tmp_path: Path, rest: str, hz: i
     check(made, grasp_set, rest)
     assert proposal.lacks == ""
     assert (report.grasp_types, report.trials, report.subjects) == (3, 26, 2)
-    assert report.none == sum(row[2] == rest for row in made.rows)
+    assert np.count_nonzero(grasp_set.is_none) == sum(row[2] == rest for row in made.rows)
     assert grasp_set.taxonomy.types == ("cup", "pen", "rod")
     assert grasp_set.joint_names == tuple(f"sensor_{number}" for number in range(JOINTS))
     times = np.array([float(row[0]) for row in made.rows]) / per_second * 1e6
@@ -204,7 +204,7 @@ def test_labels_that_mean_that_nothing_is_held_are_told_by_their_words(
 def test_labels_that_nothing_means_are_told_of() -> None:
     table = Table("t.csv", {"g": ["a", "b"], "s": ["0", "1"]}, np.arange(2))
     _, report = import_table(table, Columns("g", switches=("s",), none=("b", "idle")))
-    assert (report.none, report.grasp_types) == (1, 1)
+    assert (report.rests, report.grasp_types) == (1, 1)
     assert [finding.message for finding in report.warnings if finding.kind == "unused aliases"] == [
         "1 entries of [labels] and `none` occur in no row: idle"
     ]
@@ -215,9 +215,9 @@ def test_a_taxonomy_that_lists_none_takes_it_for_a_type() -> None:
     taxonomies: list[Any] = [("a", "none"), {"lab": ("a", "none")}]
     for taxonomy in taxonomies:
         grasp_set, report = import_table(table, Columns("g", switches=("s",), taxonomy=taxonomy))
-        assert (report.none, report.grasp_types, grasp_set.labels.tolist()) == (0, 2, [0, 1])
+        assert (report.rests, report.grasp_types, grasp_set.labels.tolist()) == (0, 2, [0, 1])
     assert import_table(table, Columns("g", switches=("s",)))[0].labels.tolist() == [0, 1]
-    assert import_table(table, Columns("g", switches=("s",)))[1].none == 1
+    assert import_table(table, Columns("g", switches=("s",)))[1].rests == 1
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from thenar.compiler.recordings.summary import Count, JointRange, contacts, summ
 
 def test_a_set_is_counted(small: GraspSet) -> None:
     summary = summarise(small)
-    assert (summary.rows, summary.taxonomy, summary.fingerprint) == (6, "kamakura14", small.fingerprint())
+    assert (summary.frames, summary.taxonomy, summary.fingerprint) == (6, "kamakura14", small.fingerprint())
     assert summary.grasps == (Count("PoS", 2), Count("PoH", 2), Count("Tip", 2))
     assert len(summary.absent) == 11
     assert summary.balance == 1.0
@@ -33,7 +33,7 @@ def test_counts_add_up_for_any_set(data: st.DataObject, grasp_sets: st.SearchStr
     grasp_set = data.draw(grasp_sets)
     summary = summarise(grasp_set)
     for counts in ((*summary.grasps, Count("none", summary.none)), summary.subjects, summary.objects):
-        assert sum(count.rows for count in counts) == len(grasp_set)
+        assert sum(count.frames for count in counts) == len(grasp_set)
     assert len(summary.grasps) + len(summary.absent) == len(grasp_set.taxonomy.types)
     assert (summary.balance > 0) == (summary.none < len(grasp_set))
     assert (summary.seconds is None) == (not grasp_set.times_us.size)
@@ -47,7 +47,7 @@ def test_rows_in_which_nothing_is_held_count_apart_and_clash_with_none(small: Gr
     nothing = np.array([False, True, True, False, False, True])
     found = replace(small, grasps=np.where(nothing, "none", small.grasps), times_us=10_000 * np.arange(6))
     summary = summarise(found)
-    assert (summary.rows, summary.none, summary.movements, summary.seconds) == (6, 3, 6, 0.03)
+    assert (summary.frames, summary.none, summary.movements, summary.seconds) == (6, 3, 6, 0.03)
     assert summary.grasps == (Count("PoS", 2), Count("Tip", 1))
     assert (summary.balance, len(summary.absent)) == (0.5, 12)
     kinds = {finding.kind: finding for finding in summary.warnings}
@@ -59,7 +59,7 @@ def test_rows_in_which_nothing_is_held_count_apart_and_clash_with_none(small: Gr
 
 def test_a_set_without_rows_has_a_summary(small: GraspSet) -> None:
     summary = summarise(small.rows([]))
-    assert (summary.rows, summary.grasps, summary.balance, summary.separability) == (0, (), 0.0, ())
+    assert (summary.frames, summary.grasps, summary.balance, summary.separability) == (0, (), 0.0, ())
     assert {(joint.least, joint.largest, joint.codes) for joint in summary.joints} == {(None, None, 0)}
 
 

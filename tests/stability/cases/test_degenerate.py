@@ -56,9 +56,9 @@ def path(name: str, tmp_path: Path) -> Path:
 def test_info_tells_what_is_there(name: str, path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = command(capsys, "info", path)
     assert code == 0
-    assert f"{len(SETS[name])} grasps of {len(np.unique(SETS[name].labels))} types" in out
+    assert SETS[name].size in out
     summary = json.loads(command(capsys, "info", path, "--json")[1])
-    assert summary["rows"] == len(SETS[name])
+    assert summary["frames"] == len(SETS[name])
     code, _, complaint = command(capsys, "info", path, "--plot", path.with_suffix(".svg"))
     assert (code, complaint) == ((0, "") if len(SETS[name]) else (2, "thenar: a set without rows cannot be drawn\n"))
 
