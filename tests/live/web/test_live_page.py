@@ -41,11 +41,11 @@ def test_the_page_shows_what_is_published(run: Callable[[], Any], browser: Any) 
         shown(browser, scene, row)
         answers.add(browser.text("grasp"))
         names = [name for name, bit in zip(truth.switch_names, truth.bits[row], strict=True) if bit]
-        said = f"{len(names)} of {len(truth.switch_names)} closed"
+        said = f"{len(names)} of {len(truth.switch_names)} closed" + ": " * bool(names) + ", ".join(names[:8])
+        # A busy computer may miss a device for a moment at any time.
         browser.wait(lambda said=said: browser.text("hand-says").startswith(said))
-        assert browser.text("hand-says").removeprefix(said).strip(": ").startswith(", ".join(names[:8]))
         browser.wait(lambda: bars_are(browser, scene))
-        assert browser.driver.title == f"{browser.text('grasp')} · thenar"
+        browser.wait(lambda: browser.driver.title == f"{truth.answer(scene.shown[-1].row)} · thenar")
     assert len(answers) > 5
     assert browser.texts("#types .name") == list(truth.build.manifest.classes)
     assert browser.text("health") == "ok"
