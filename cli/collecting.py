@@ -1,7 +1,7 @@
 """A guided collection while it runs: devices, terminal and recording around the Guide."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
@@ -60,9 +60,11 @@ def collect(
     recording: Path,
     journal: Journal | None,
     countdown_s: float,
+    write: Callable[[int], Sequence[str]],
     page: "PageAt | None" = None,
-) -> int:
-    """Lead through the `trials` that the journal lacks and return the total number of accepted trials.
+) -> None:
+    """Lead through the `trials` that the journal lacks, then call `write` with the total number of accepted trials: it
+    writes their set and returns warnings, which the page shows.
 
     Keys come from stdin, or from the `page` alone if stdin is not a terminal. Raises SettingError or DeviceError if a
     device cannot serve, SinkError if the page cannot be served, click.ClickException if the recording cannot go on.
@@ -74,39 +76,41 @@ def collect(
         raise click.UsageError("the keys that lead a collection come from stdin: send rows by udp: instead")
     switches, sensors = harness.switches, harness.sensor_names
     check_names("column", (*switches, *harness.taxel_names, *sensors))
-    scan = whole_scan(harness, switches, every_taxel=True)
-    with ended_by_signals() as stop, Sources(harness, switches, scan) as sources:
-        session = Session(
-            thenar=version("thenar"),
-            switches=switches,
-            sensors=sensors,
-            harness=read_source(file, HarnessError).text,
-            calibration=None if harness.calibration is None else load_calibration(Path(harness.calibration)),
-            collection=collection,
-            taxels=harness.taxel_names,
-            taxel_calibration=calibration_of(harness.taxel_settings),
-        )
-        if journal is not None:
-            _check_same_glove(journal, session)
-        _meet(sources, len(switches), stop)
-        accepted = () if journal is None else journal.accepted
-        if stop.is_set():
-            return len(accepted)
-        with ExitStack() as entered:
-            taxonomy, faces = Taxonomy(collection.taxonomy, collection.types), list[Face]()
-            if page is not None:
-                # Before the recording begins: an address that cannot be served leaves no file.
-                faces.append(entered.enter_context(page.serve(session, taxonomy, recording)))
-            tail = None if journal is None else journal.tail
-            recorder = entered.enter_context(Recorder(recording, session, tail=tail))
-            if typed:
-                faces.append(entered.enter_context(Terminal(taxonomy)))
-            old_us = old_after_us(sources.switch_period_us, sources.glove_period_us)
-            guide = Guide(trials, recorder, round(countdown_s * 1e6), accepted, old_us)
-            lead(guide, sources, recorder, faces, stop)
-    if recorder.failure is not None:
-        raise click.ClickException(f"{recorder.failure}; free some space, and the same command goes on")
-    return guide.done
+    scan, shown, recorder = whole_scan(harness, switches, every_taxel=True), None, None
+    session = Session(
+        thenar=version("thenar"),
+        switches=switches,
+        sensors=sensors,
+        harness=read_source(file, HarnessError).text,
+        calibration=None if harness.calibration is None else load_calibration(Path(harness.calibration)),
+        collection=collection,
+        taxels=harness.taxel_names,
+        taxel_calibration=calibration_of(harness.taxel_settings),
+    )
+    if journal is not None:
+        _check_same_glove(journal, session)
+    accepted, tail = ((), None) if journal is None else (journal.accepted, journal.tail)
+    taxonomy, done = Taxonomy(collection.taxonomy, collection.types), len(accepted)
+    with ExitStack() as served:
+        with ended_by_signals() as stop, Sources(harness, switches, scan) as sources, ExitStack() as entered:
+            _meet(sources, len(switches), stop)
+            if not stop.is_set():
+                if page is not None:
+                    # Before the recording begins: an address that cannot be served leaves no file.
+                    shown = served.enter_context(page.serve(session, taxonomy, recording))
+                recorder = entered.enter_context(Recorder(recording, session, tail=tail))
+                faces: list[Face] = [] if shown is None else [shown]
+                if typed:
+                    faces.append(entered.enter_context(Terminal(taxonomy)))
+                old_us = old_after_us(sources.switch_period_us, sources.glove_period_us)
+                guide = Guide(trials, recorder, round(countdown_s * 1e6), accepted, old_us)
+                lead(guide, sources, recorder, faces, stop)
+                done = guide.done
+        if recorder is not None and (recorder.failure is not None or recorder.lost):
+            why = recorder.failure or f"{recording}: {recorder.lost} messages were lost"
+            raise click.ClickException(f"{why}; free some space, and the same command goes on")
+        if (warnings := write(done)) and shown is not None:
+            shown.warn(warnings)
 
 
 def _meet(sources: Sources, switches: int, stop: Event) -> None:
@@ -171,7 +175,7 @@ class Terminal:
 
 def lead(guide: Guide, devices: Devices, recorder: Recorder, faces: Sequence[Face], stop: Event) -> None:
     """Lead through the guide's trials until all are done, the user leaves, `stop` is set, or the recording fails."""
-    while guide.stage is not Stage.OVER and recorder.failure is None and not stop.is_set():
+    while guide.stage is not Stage.OVER and not recorder.lost and recorder.failure is None and not stop.is_set():
         arrived = devices.take(_WAIT_US).arrived
         devices.raise_settings()
         guide.take(now_us(), arrived, [device.name for device in devices.devices() if not device.connected])

@@ -1,6 +1,6 @@
 """`thenar record --web`: the page of a trial, the drawing of a glove, and the accuracy so far."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass
 from functools import cache, partial
@@ -174,6 +174,10 @@ class StudiedPage(Closing):
             return
         if found is not None:
             self._page.tell({"problem": "", **to_builtins(found)})
+
+    def warn(self, warnings: Sequence[str]) -> None:
+        """Show what is odd in the set that was written, instead of the accuracy so far."""
+        self._page.tell({"problem": "; ".join(warnings)})
 
     def close(self) -> None:
         """Stop computing the accuracy, and close the page."""

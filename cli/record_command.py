@@ -1,6 +1,8 @@
 """`thenar record`: collect labelled grasps, with guidance."""
 
 import secrets
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -89,14 +91,16 @@ def command(
         wanted = _resumed(journal, wanted, seed)
     trials = planned(wanted)
     accepted = 0 if journal is None else len(journal.accepted)
+    write = partial(_write, recording, output, len(trials))
     if accepted < len(trials):
         page = None
         if web is not None:
             from .guided_web import PageAt
 
             page = PageAt(web, token_for(web_token))
-        accepted = collect(harness, glove, wanted, trials, recording, journal, countdown, page)
-    _write(recording, output, accepted, len(trials))
+        collect(harness, glove, wanted, trials, recording, journal, countdown, write, page)
+    else:
+        write(accepted)
 
 
 def _begun(recording: Path) -> "Journal | None":
@@ -143,16 +147,19 @@ def _both(begun: object, wanted: object) -> str:
     return f" ({shortened(str(begun))}, not {shortened(str(wanted))})" if isinstance(begun, str | int) else ""
 
 
-def _write(recording: Path, output: Path, accepted: int, planned: int) -> None:
+def _write(recording: Path, output: Path, planned: int, accepted: int) -> Sequence[str]:
+    """Write the set of all accepted trials, say so, and return the warnings."""
     from thenar.compiler.recordings.mcap_recording import import_recordings
 
     if not accepted:
         echo(f"no trial was accepted: {output} is not written; run the same command to continue")
-        return
+        return ()
     with progress(f"importing {recording.name}"):
         grasp_set, report = import_recordings([recording])
     grasp_set.save(output)
-    for finding in report.warnings:
-        warning(finding.message)
+    warnings = [finding.message for finding in report.warnings]
+    for message in warnings:
+        warning(message)
     rest = "" if accepted == planned else "; run the same command to continue"
     echo(f"{output}: {grasp_set.size}; {accepted} of {planned} trials are done{rest}")
+    return warnings

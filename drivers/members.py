@@ -89,7 +89,7 @@ class Members(Mapping[str, M], Generic[M]):
         except KeyboardInterrupt:
             raise
         except BaseException as error:
-            # A call of sys.exit has no text of its own.
+            # str() of a SystemExit is only its number.
             what = str(error) if isinstance(error, Exception) else repr(error)
             said = f"cannot be loaded: {shortened(what)}; fix or uninstall it"
             raise MemberError(f"{self._where(point)} {said}") from error

@@ -44,7 +44,7 @@ class Glove:
 
     Devices may be disconnected and connected again: missing inputs make the health "degraded", and "unknown" when too
     few are left. There is a moment whenever a device has delivered something, and when something has expired. The
-    recording and each sink work on threads of their own: a disk or a reader that hangs delays no moment.
+    recording and each sink have a separate thread: a disk or a reader that hangs delays no moment.
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ class Glove:
         self.sources.raise_settings()
 
     def _troubles(self) -> tuple[OutputTrouble, ...]:
-        """Return what takes nothing now: the recording, and sinks."""
+        """Return the troubles of the recording and of the sinks."""
         failure = None if self.recorder is None else self.recorder.failure
         recording = () if failure is None else (OutputTrouble("recording", failure),)
         return (*recording, *self._fanout.troubles())

@@ -1,5 +1,6 @@
 """A collection from end to end: the real command on a terminal of its own, real drivers, emulated devices on ptys."""
 
+import json
 import os
 import pty
 import re
@@ -15,6 +16,8 @@ from time import monotonic
 
 import numpy as np
 import pytest
+from websockets.sync.client import connect
+from websockets.typing import Origin
 
 from thenar.cli import run
 from thenar.compiler import GraspSet
@@ -308,6 +311,22 @@ def test_with_a_page_the_terminal_is_still_one(folder: Path, start: Start) -> No
     assert "1 of 4 trials are done" in said
 
 
+def test_the_page_ends_with_the_warnings_of_the_set(folder: Path, start: Start) -> None:
+    terminal = start("--no-none", "--web", "127.0.0.1:0")
+    place = terminal.until(rb"the page is at http://127.0.0.1:\d+/").decode().rpartition("http://")[2].strip("/")
+    terminal.until(rb"Enter: start the countdown")
+    terminal.press(b"\r")
+    reviewed(terminal, 1)
+    with connect(f"ws://{place}/live", origin=Origin(f"http://{place}"), proxy=None, compression=None) as page:
+        terminal.press(b"\rq")
+        code, said = terminal.finish()
+        told = [json.loads(message) for message in page]
+    assert code == 0, said
+    warnings = re.findall(r"warning: (.*?)\r\n", said)
+    assert warnings
+    assert [message for message in told if message["topic"] == "study"][-1]["problem"] == "; ".join(warnings)
+
+
 def test_a_page_that_cannot_be_served_leaves_no_file(folder: Path, start: Start) -> None:
     code, said = start("--no-none", "--web", "0.0.0.0:0").finish()
     assert code == 2
@@ -336,7 +355,7 @@ def test_a_full_disk_ends_it_with_a_sentence_and_room_lets_it_go_on(folder: Path
     code, said = start(most_bytes=16_384).finish()
     assert code == 2
     words = " ".join(said.split())
-    assert "File too large: the recording has stopped after" in words
+    assert "File too large: nothing more is written after" in words
     assert "free some space, and the same command goes on" in words
     again = start()
     again.until(rb"Enter: start the countdown")

@@ -24,7 +24,7 @@ from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.sources import Arrivals, Taken
-from thenar.runtime.recording.writer import Recorder
+from thenar.runtime.recording.writer import LiveRecorder
 
 WINDOW = 10_000
 # Calls are counted in the last frames of a window, in which every period of the feed lies at the same place.
@@ -123,7 +123,7 @@ def soak(build: Build, harness: Harness, rows: Path, folder: Path, frames: int) 
                 pass
 
 
-def _sample(frame: int, calls: float, recorder: Recorder) -> Sample:
+def _sample(frame: int, calls: float, recorder: LiveRecorder) -> Sample:
     status = Path("/proc/self/status").read_text().splitlines()
     rss_kib = next(int(line.split()[1]) for line in status if line.startswith("VmRSS"))
     files = len(os.listdir("/proc/self/fd"))  # noqa: PTH208

