@@ -181,7 +181,8 @@ class LineParser:
         self._splitter = Splitter()
         self._names: tuple[str, ...] | None = None
         # A header that no row has followed yet, and the misfit before it: it may be a message.
-        self._header, self._odd_before = (), ""  # type: tuple[str, ...], str
+        self._header: tuple[str, ...] = ()
+        self._odd_before = ""
 
     def feed(self, chunk: bytes) -> list[Row]:
         """Return the rows whose lines `chunk` completes, with names if a header came before them."""

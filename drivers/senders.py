@@ -5,6 +5,9 @@ import re
 from collections.abc import Hashable
 from typing import NamedTuple
 
+from .errors import SettingError
+from .names import shortened
+
 # A stream belongs to its first sender until that one has been silent for this long.
 SILENCE_US = 1_000_000
 # Another sender is reported until it has been silent for this long.
@@ -64,10 +67,16 @@ def address_of(host: str, port: int | None = None) -> Address:
 def parse_address(text: str) -> Address:
     """Return the address that is written as `192.168.4.7`, `192.168.4.7:5001`, `fe80::1` or `[fe80::1]:5001`.
 
-    Raises ValueError if none is.
+    Raises SettingError if it is none.
     """
-    if found := _ADDRESS.fullmatch(text):
-        if not 0 < int(found[3]) < 65536:
-            raise ValueError(f"no port {found[3]}")
-        return address_of(found[1] or found[2], int(found[3]))
-    return address_of(text)
+    found = _ADDRESS.fullmatch(text)
+    try:
+        if found is None:
+            return address_of(text)
+        if 0 < int(found[3]) < 65536:
+            return address_of(found[1] or found[2], int(found[3]))
+    except ValueError:
+        pass
+    raise SettingError(
+        f"{shortened(repr(text))} is not the address of a sender, such as 192.168.4.7 or 192.168.4.7:5001"
+    )

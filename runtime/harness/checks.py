@@ -135,8 +135,8 @@ def _sender_fault(port: str, sender: str) -> str:
         return "is for udp:// ports, to which several may send: leave it out"
     try:
         parse_address(sender)
-    except ValueError:
-        return f"{shortened(repr(sender))} is not the address of a sender, such as 192.168.4.7 or 192.168.4.7:5001"
+    except SettingError as reason:
+        return str(reason)
     return ""
 
 

@@ -279,7 +279,7 @@ class RowSource(Source):
         counts = self.watch.counts
         if not abs(sent_us) <= _LATEST_US:  # nan, too
             counts.untimed += 1
-            self._report(came_us, f"rows whose clock is not a time ({sent_us / 1e6:g} s) are left out")
+            self._report(came_us, "rows come whose clock is missing, or no time, and are left out")
             return None
         if sent_us != self._clock.last_us:
             self._ticked_us = came_us
@@ -369,7 +369,11 @@ class RowSource(Source):
             if misfits > 0 and (odd := self.reader.odd):
                 return f"the data holds no rows: {odd}"
         if self._silent:
-            return f"{received} bytes have come, but no row" if received else _SILENT
+            return (
+                "bytes come, but no row: check the line ends and, of a serial port, the baud rate"
+                if received
+                else _SILENT
+            )
         if now_us() < self._fault_until_us:
             return self._fault
         if self._columns.absent:

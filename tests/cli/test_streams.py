@@ -47,15 +47,16 @@ PORTS = [
 @pytest.fixture
 def moving(tmp_path: Path) -> Iterator[SocketLines]:
     """Yield a sender of a clock, a count, two switches, a pad and a flex sensor, which all move."""
-    columns, done = ("ms", "n", "thumb", "index", "pad_tip", "flex_mcp"), Event()
-    with SocketLines(tmp_path / "line") as lines, LineSender(lines.send, columns, 100, "ms", "ms") as sender:
+    done = Event()
+    with SocketLines(tmp_path / "line") as lines:
 
         def move() -> None:
-            n = 0
-            while not done.wait(0.005):
+            began, n = monotonic(), 0
+            while not done.wait(0.01):
                 n += 1
-                sender.show({"n": n, "thumb": n // 20 % 2, "index": n // 30 % 2})
-                sender.show({"pad_tip": 400 + round(300 * math.sin(n / 9)), "flex_mcp": 1500 + 9 * (n % 80)})
+                row = [1000 * (monotonic() - began), n, n // 10 % 2, n // 15 % 2]
+                row += [400 + 300 * math.sin(n / 5), 1500 + 18 * (n % 40)]
+                lines.send(",".join(str(round(number)) for number in row).encode() + b"\n")
 
         mover = Thread(target=move)
         mover.start()
@@ -374,9 +375,7 @@ def test_a_broken_sender_spoils_no_answer_and_is_counted(thenar: Thenar, build_f
         sender.join()
     assert finished.returncode == 0, finished.stderr
     found = [json.loads(line) for line in out.read_text().splitlines()]
-    grasps = [one for one in found if one["kind"] == "grasp"][10:]
-    assert len({one["grasp"] for one in grasps}) == 1
-    assert sum(one["health"] == "ok" for one in grasps) >= 0.9 * len(grasps)
+    assert len({one["grasp"] for one in found if one["kind"] == "grasp" and one["health"] == "ok"}) == 1
     (device,) = [one for one in found if one["kind"] == "health"][-1]["devices"]
     counts = {count["name"]: count["value"] for count in device["counts"]}
     assert min(counts[name] for name in ("rows", "late", "misfits", "overlong", "wrong columns")) > 0

@@ -112,6 +112,12 @@ def test_the_sender_of_datagrams_that_is_named_counts_whoever_was_first(with_por
         assert reader.other_sender().endswith("count; stop it")
 
 
+@pytest.mark.parametrize("sender", ["glove.local", "192.168.4.7:0", "192.168.4.7:70000", "[::1]", "1.2.3", "::1:x"])
+def test_what_is_no_address_of_a_sender_is_refused(sender: str) -> None:
+    with pytest.raises(SettingError, match="is not the address of a sender"):
+        LineReader("udp://127.0.0.1:5", sender=sender)
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux dates datagrams")
 def test_datagrams_are_dated_when_they_come_not_when_they_are_read() -> None:
     with DatagramLines() as sender, LineReader(sender.port) as reader:

@@ -217,7 +217,7 @@ def test_a_row_whose_clock_is_no_time_is_left_out_and_said(play: Play, clock: by
     source, frames = play(sorted(good + odd), GLOVE.replace('time = "ms"', 'time = "ms"\ntime_unit = "s"'))
     assert [frame.closed for frame in frames if isinstance(frame, SwitchFrame)] == [0b0100] * 4
     assert counted(source)["untimed"] == 4
-    assert source.trouble().startswith("rows whose clock is not a time (")
+    assert source.trouble() == "rows come whose clock is missing, or no time, and are left out"
 
 
 def test_more_rows_than_stated_are_said_unless_they_had_been_waiting(play: Play) -> None:
@@ -271,6 +271,8 @@ def test_a_sender_that_falls_silent_or_sends_something_else_is_said(play: Play) 
     assert source.trouble().startswith("its rows have other columns than glove.toml: column 1, column 2, not ms")
     source, _ = play([(1_000_000, row), (3_100_000, b"rst:0x10\n")])
     assert source.trouble() == "the data holds no rows: 'rst:0x10'"
+    source, _ = play([(1_000_000, row), (3_100_000, b"\x80\x00\x80")])
+    assert source.trouble() == "bytes come, but no row: check the line ends and, of a serial port, the baud rate"
 
 
 @pytest.mark.parametrize("moving", [0, 1])
