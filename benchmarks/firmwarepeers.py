@@ -261,8 +261,8 @@ def peers() -> Iterator[Peer]:
     """Yield the peers."""
     for groups, share in product(LOGITS, SHARES):
         name = f"{by_hand(groups, share)}, joints {2**groups.shift} times finer"
-        train = partial(integer_logit, groups=groups, share=share)
-        yield Peer(name, train, lambda made: {"peer.S": made.source}, lambda made: made)
+        fit = partial(integer_logit, groups=groups, share=share)
+        yield Peer(name, fit, lambda made: {"peer.S": made.source}, lambda made: made)
     for kind, features, what in (("uint8_t", _coarse, "uint8, 2-degree steps"), ("int16_t", _doubled, "int16")):
         for trees, leaves in FORESTS:
             name = f"emlearn, forest {trees} x {leaves}, {what}"
