@@ -13,12 +13,13 @@ left out if it is not installed.
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from firmware import BINS, LINE, Ours
 from firmwaredata import Fold, folds, raw, split
 from firmwarelogit import Groups, integer_logit
-from firmwarepeers import peers
+from firmwarepeers import SHARES, by_hand, peers
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
@@ -139,8 +140,8 @@ def ours(fold: Fold) -> Iterator[Line]:
 def theirs(fold: Fold) -> Iterator[Line]:
     """Yield the peers."""
     made = [
-        (f"int8 logistic regression by hand, groups of {groups.size}", integer_logit(fold, groups).c_source)
-        for groups in GROUPS
+        (by_hand(groups, share), integer_logit(fold, groups, share).c_source)
+        for groups, share in product(GROUPS, SHARES)
     ]
     forests = (peer for peer in peers() if peer.name.startswith("emlearn, forest") and peer.name.endswith("int16"))
     made += [(peer.name, peer.files(peer.train(fold))["peer.c"]) for peer in forests if peer.available]

@@ -22,6 +22,8 @@ from thenar.compiler.firmware.assembly import FLAGS, group_lines
 from thenar.compiler.firmware.layout import Field
 
 _LIMIT, _BYTE = 32767, 255
+# scikit-learn's C of the refit of a pruned model: fewer weights need less of a pull. The full model has 1.
+REFIT_C = 3.0
 _SUMS = (2, 4, 6, 8, 10, 12, 14, 18, 20, 22, 24, 26, 28)  # r17:r16 are the operands, r31:r30 the pointer
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -201,7 +203,7 @@ def pruned(fold: Fold, share: float) -> tuple[Floats, Floats, Floats]:
         scores = np.hstack([inputs @ weights, np.zeros((len(inputs), 1))])
         whole = logsumexp(scores, axis=1, keepdims=True)
         # scikit-learn's penalty, which does not depend on the class that the weights are relative to.
-        pull = weights - weights.sum(axis=1, keepdims=True) / scores.shape[1]
+        pull = (weights - weights.sum(axis=1, keepdims=True) / scores.shape[1]) / REFIT_C
         pull[0] = 0
         slope = inputs.T @ (np.exp(scores - whole) - hits)[:, :-1] + pull
         return float((whole - scores)[hits > 0].sum() + (pull * weights).sum() / 2), (slope * kept).ravel()

@@ -250,14 +250,19 @@ def _with(trees: int, leaves: int, features: Callable[[Rows], Any] = _plain) -> 
     return lambda fold: _forest(fold, trees, leaves, features)
 
 
+def by_hand(groups: Groups, share: float) -> str:
+    """Return the name of a handwritten logistic regression with a share of the joints' weights."""
+    switches = "single switches" if groups.size == 1 else f"groups of {groups.size}"
+    kept = "" if share == 1 else f", {share:.0%} of the joints' weights"
+    return f"int8 logistic regression by hand{kept}, {switches}"
+
+
 def peers() -> Iterator[Peer]:
     """Yield the peers."""
     for groups, share in product(LOGITS, SHARES):
-        switches = "single switches" if groups.size == 1 else f"groups of {groups.size}"
-        kept = "" if share == 1 else f", {share:.0%} of the joints' weights"
-        name = f"int8 logistic regression by hand, {switches}, joints {2**groups.shift} times finer{kept}"
-        train = partial(integer_logit, groups=groups, share=share)
-        yield Peer(name, train, lambda made: {"peer.S": made.source}, lambda made: made)
+        name = f"{by_hand(groups, share)}, joints {2**groups.shift} times finer"
+        fit = partial(integer_logit, groups=groups, share=share)
+        yield Peer(name, fit, lambda made: {"peer.S": made.source}, lambda made: made)
     for kind, features, what in (("uint8_t", _coarse, "uint8, 2-degree steps"), ("int16_t", _doubled, "int16")):
         for trees, leaves in FORESTS:
             name = f"emlearn, forest {trees} x {leaves}, {what}"

@@ -56,7 +56,13 @@ def _address(_: click.Context, __: click.Parameter, text: str | None) -> str | N
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=OutputFolder(), required=True, help="Folder for tables, pictures and the store.")
 @click.option("--glove", type=existing_file, help="A glove.toml: try its wiring too, and choose by its ports.")
-@click.option("--target", type=OneOf("target", _timed), default="host", show_default=True, help="Deployment target.")
+@click.option(
+    "--target",
+    type=OneOf("target", _timed),
+    default="host",
+    show_default=True,
+    help="Deployment target. Times of pi are a guess unless the command runs on one.",
+)
 @click.option(
     "--budget-us",
     type=Number(min=0, min_open=True),

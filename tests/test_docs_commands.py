@@ -35,9 +35,13 @@ NOT_RUN = {
     ". .venv/bin/activate": "the scratch folder has no .venv: `thenar` and `python` are on the PATH",
     "make demo": "takes minutes; it consists of commands that have tests",
     "make test": "would run these tests",
-    "thenar run build/ --glove glove.toml --sink ros:/thenar --preshape barrett_bh8": "needs a glove",
-    "thenar simulate kamakura -o kamakura.grasps": "is for the frontier below",
-    "thenar frontier kamakura.grasps -o frontier/": "takes five minutes on two idle cores",
+    'pip install ".[compiler]"': "installs thenar, which tests/test_packaging.py does from the wheel",
+    "thenar doctor --line /dev/ttyUSB0 --propose glove.toml": "needs a glove",
+    "thenar run build/ --glove glove.toml --sink ros:/thenar": "needs a glove",
+    "thenar simulate crowd --subjects 20 --repetitions 6 -o hands.grasps": "is for the rates below",
+    "thenar evaluate hands.grasps --by subject --protocol nested --tables compositions --prune 30 --trainer logit": (
+        "takes minutes"
+    ),
 }
 # Commands that take too long for `make test`: there a page runs up to the first of them.
 SLOW = {

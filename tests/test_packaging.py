@@ -192,7 +192,7 @@ def test_an_installed_wheel_imports_compiles_and_replays(distributions: Path, tm
         ["compile", "set.grasps", "-o", "build", "--prune", "200", "--trainer", "logit", "--folds", "0", "--no-report"],
         ["run", "build", "--replay", "set.grasps"],
     ):
-        run = [python, "-I", "-m", "thenar.cli", *command]
+        run = [str(python), "-I", "-m", "thenar.cli", *command]
         done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
     assert "2304 frames" in done.stderr

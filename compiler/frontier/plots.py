@@ -115,7 +115,8 @@ def pictures(frontier: Frontier, kind: Literal["svg", "png"], *, letters: bool =
 
 
 def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
-    figure, axes = _sheet(frontier, cost.title.replace("switches", elements_of(frontier)))
+    machine = f", {shorten(frontier.machine)}" if cost.is_time else ""
+    figure, axes = _sheet(frontier, cost.title.replace("switches", elements_of(frontier)) + machine)
     marks = [(max(x, _LOWEST), mark) for mark in frontier.marks if (x := cost.of_mark(mark)) is not None]
     points = [(max(x, _LOWEST), point) for point in frontier.points if (x := cost.of_point(point)) is not None]
     ends = [(x, end, point) for x, point in points if (end := cost.end(point)) is not None]
@@ -185,7 +186,7 @@ def _sheet(frontier: Frontier, title: str) -> tuple["Figure", "Axes"]:
     left, right, bottom, top = _LEFT / _WIDTH, _RIGHT / _WIDTH, _BOTTOM / _HEIGHT, _TOP / _HEIGHT
     under = (
         f"{shorten(frontier.source)}: {frontier.trials:,} trials of {counted(frontier.subjects, 'person', 'people')}, "
-        f"{len(frontier.grasps)} types; {shorten(frontier.machine)}; "
+        f"{len(frontier.grasps)} types; "
         f"placement inside the fold, corrected for luck, 95 % intervals"
     )
     figure.text(left, 1 - 0.30 / _HEIGHT, title, fontsize=13, fontweight="bold", color=_INK)

@@ -1,4 +1,4 @@
-"""The machine that measured times are of. It is named beside them only: nothing that is deployed depends on it."""
+"""The machine that measured times are of. Nothing that is deployed depends on its name."""
 
 import platform
 import re

@@ -120,14 +120,6 @@ def test_the_example_prints_the_grasp_that_python_finds(
     assert first_line(tool("simavr"), elf, BOARDS[board][0]) == wanted
 
 
-def test_the_sketch_of_the_readme_compiles(make_tables: MakeTables, library: Library, sketch: Sketch) -> None:
-    page = (Path(__file__).parents[4] / "README.md").read_text(encoding="utf-8")
-    (text,) = re.findall(r"```cpp\n(.*?)```", page, re.DOTALL)
-    made = library(arrange(make_tables(**ON_A_BOARD["uno"])))
-    (made / "examples/Recognise/Recognise.ino").write_text(text.replace("thenar_glove", "thenar_hand"))
-    assert sketch(made, "uno").exists()
-
-
 def first_line(simavr: str, elf: Path, part: str) -> str:
     """Return the first line that a program prints at its UART: simavr repeats it in colours, on standard output."""
     command = [simavr, "-m", part, "-f", "16000000", str(elf)]
