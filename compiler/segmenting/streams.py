@@ -13,6 +13,8 @@ from ..recordings.trials import groups
 TICK_US = 10_000  # also between consecutive rows if times are unknown
 # A longer pause ends a stream: the grasp before it carries no information about the one after it.
 PAUSE_US = 1_000_000
+# A clock that falls by no more than this jitters; no movement is as short.
+JITTER_US = 100_000
 
 
 class SegmentingError(ThenarError, ValueError):
@@ -41,15 +43,17 @@ def newest(
     """Return the stretches of n readings, as the time of the first tick and the newest reading (T,) at each tick.
 
     The times (n,) are in the order of arrival. A stretch ends where they jump by more than PAUSE_US, ahead or back, and
-    where one of the `movements` (n,) begins before the middle of the one before it: on a clock that started again. A
-    clock that repeats a time, or jitters, ends none.
+    where one of the `movements` (n,) begins on a clock that started again: by more than JITTER_US back, to before the
+    middle of the movement before it. A clock that repeats a time, or jitters, ends none.
     """
     # As doubles, because the difference of two int64 can overflow.
-    jumps = np.abs(np.diff(times_us.astype(np.float64))) > PAUSE_US
+    steps = np.diff(times_us.astype(np.float64))
+    jumps = np.abs(steps) > PAUSE_US
     changes = jumps if movements is None else jumps | (np.diff(movements) != 0)
-    begins = np.append(0, np.flatnonzero(changes) + 1)
-    restarts = times_us[begins[1:]] < times_us[(begins[:-1] + begins[1:]) // 2]
-    cuts, found = begins[1:][restarts | jumps[begins[1:] - 1]], []
+    begins, found = np.append(0, np.flatnonzero(changes) + 1), []
+    later, step = begins[1:], steps[begins[1:] - 1]
+    restarts = (step < -JITTER_US) & (times_us[later] < times_us[(begins[:-1] + later) // 2])
+    cuts = later[restarts | (np.abs(step) > PAUSE_US)]
     for first, own in zip([0, *cuts.tolist()], np.split(times_us, cuts), strict=True):
         rising = _rising(own)
         ticks = np.arange(int(rising[0]), int(rising[-1]) + 1, tick_us)
