@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.compiler import GraspSet, Joint, compile_build
+from thenar.compiler import GraspSet, Joint, Options, compile_build
 from thenar.compiler.recordings.taxonomy import own
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.build import Build
@@ -273,8 +273,9 @@ def test_tables_too_large_for_a_glove_name_a_remedy_that_works(thenar: Thenar, t
     (tmp_path / "hand.toml").write_text(hand.to_toml())
     said = {}
     for linear in (1, 0):
-        settings = {"trainer": "logit", "linear": linear, "max_bins": 16, "penalty": 1.0, "smoothness": 1.0}
-        made = compile_build(grasp_set, tmp_path / "build", folds=0, jobs=1, refuse=0, **settings)
+        settings: dict[str, float | str] = {"penalty": 1.0, "smoothness": 1.0, "linear": linear}
+        options = Options(trainer="logit", max_bins=16, settings=settings, folds=0, refuse=0.0)
+        made = compile_build(grasp_set, tmp_path / "build", options, jobs=1)
         wired = ("--board", tmp_path / "board.toml", "--calibration", tmp_path / "hand.toml", "-o", tmp_path / "made")
         said[linear] = thenar("firmware", made.folder, "--target", "avr2560", "--mode", "glove", *wired)
     assert said[1].returncode == 2

@@ -71,15 +71,15 @@ def test_segments_are_those_that_were_recorded(
 
 
 def _repeated(times: np.ndarray, _: np.random.Generator) -> np.ndarray:
-    return times // 20_000 * 20_000
+    return np.asarray(times // 20_000 * 20_000)
 
 
 def _jittering(times: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    return times + random.integers(-9_000, 9_001, len(times))
+    return np.asarray(times + random.integers(-9_000, 9_001, len(times)))
 
 
 def _late(times: np.ndarray, _: np.random.Generator) -> np.ndarray:
-    return times + 900_000 * (np.arange(len(times)) > 130)
+    return np.asarray(times + 900_000 * (np.arange(len(times)) > 130))
 
 
 @pytest.mark.parametrize("damage", [_repeated, _jittering, _late])
