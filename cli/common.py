@@ -339,9 +339,15 @@ def table(columns: Iterable[str], numbers: Container[str] = (), title: TextType 
 
 
 @contextmanager
-def progress(what: str) -> Iterator[Callable[[int, int], None]]:
-    """Yield report(done, total), which draws a bar on stderr if that is a terminal and does nothing otherwise."""
+def progress(what: str, *, lines: bool = False) -> Iterator[Callable[[int, int], None]]:
+    """Yield report(done, total), which draws a bar on stderr if that is a terminal, and does nothing otherwise; with
+    `lines`, for work of minutes, it prints a line for each step then.
+    """
     console = err()
+    if lines and not console.is_terminal:
+        echo(f"{what} ...", err=True)
+        yield lambda done, total: echo(f"{what}: {done} of {total} steps", err=True)
+        return
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),

@@ -210,10 +210,10 @@ def _evaluate_streams(
 
     named = {name: asked[name] for name in ("prune", "seed", "levels", "keep_joints")}
     options = changed(Options(trainer="logitboost"), {**named, **training})
-    grasp_set = GraspSet.load(grasps)
-    if chosen := asked["subjects"]:
-        grasp_set = grasp_set.rows(np.isin(grasp_set.subjects, chosen))
-    with progress("evaluating streams") as report:
+    with progress("evaluating streams", lines=True) as report:
+        grasp_set = GraspSet.load(grasps)
+        if chosen := asked["subjects"]:
+            grasp_set = grasp_set.rows(np.isin(grasp_set.subjects, chosen))
         study = study_streams(grasp_set, options, jobs, report)
     if output is not None:
         write_json(output, study)

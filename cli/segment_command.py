@@ -98,13 +98,12 @@ def command(
 
 
 def _summary(timelines: "Sequence[Timeline]") -> Segmented:
-    from thenar.compiler.segmenting.scores import OVERLAPS, Score, score
+    from thenar.compiler.segmenting.scores import OVERLAPS, score_streams
 
-    truths = [each.truth for each in timelines if each.truth is not None]
-    f1 = None
-    if len(truths) == len(timelines) and any((each < len(timelines[0].types)).any() for each in truths):
-        pairs = zip(truths, timelines, strict=True)
-        total = Score.total(score(truth, each.states, len(each.types)) for truth, each in pairs)
+    known = [(each.continued, each.truth, each.states, None) for each in timelines if each.truth is not None]
+    none, f1 = len(timelines[0].types), None
+    if len(known) == len(timelines) and any((truth < none).any() for _, truth, *_ in known):
+        total = score_streams(known, none)
         f1 = tuple(total.f1(place) for place in range(len(OVERLAPS)))
     return Segmented(
         segments=tuple(one for each in timelines for one in each.segments()),

@@ -152,9 +152,9 @@ class Samples:
             return self
         return replace(self.rows(~self.is_none), grasps=self.grasps[:-1], has_none=False)
 
-    def balanced(self) -> NDArray[np.intp]:
-        """Return the numbers of the rows to train on: no more with nothing held than with a grasp, and at most FRAMES
-        of a movement, evenly spaced. Frames of a movement resemble their neighbours.
+    def balanced(self, most_frames: int = FRAMES) -> NDArray[np.intp]:
+        """Return the numbers of the rows to train on: no more with nothing held than with a grasp, and at most
+        `most_frames` of a movement, evenly spaced. Frames of a movement resemble their neighbours.
         """
         none, held = np.flatnonzero(self.is_none), np.flatnonzero(~self.is_none)
         if len(none) > len(held):
@@ -166,7 +166,7 @@ class Samples:
         _, starts, own, counts = np.unique(
             self.movements[rows], return_index=True, return_inverse=True, return_counts=True
         )
-        place, frames, most = np.arange(len(rows)) - starts[own], counts[own], np.minimum(counts, FRAMES)[own]
+        place, frames, most = np.arange(len(rows)) - starts[own], counts[own], np.minimum(counts, most_frames)[own]
         return np.sort(rows[(place + 1) * most // frames > place * most // frames])
 
     def rows(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> "Samples":

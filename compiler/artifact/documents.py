@@ -32,7 +32,7 @@ _TRAININGS = 40  # roughly, for the paper's tables
 Progress = Callable[[int, int], None]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class BuildReport:
     """A build and its properties.
 
@@ -78,6 +78,11 @@ class BuildReport:
     faults: FaultCounts
     has_page: bool
     confusion: NDArray[np.intp] | None
+
+    def __repr__(self) -> str:
+        """Return the folder, and the numbers of grasp types, switches and joints."""
+        types, switches, joints = self.tables.n_classes, self.tables.n_switches, self.tables.n_joints
+        return f"<BuildReport {self.folder}: {types} grasp types, {switches} switches, {joints} joints>"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

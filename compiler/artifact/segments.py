@@ -14,7 +14,7 @@ from thenar.runtime.segmenting.decoder import decode, emissions
 
 from ..recordings.graspset import GraspSet
 from ..segmenting.learning import live_states
-from ..segmenting.streams import PAUSE_US, SegmentingError, streams_of
+from ..segmenting.streams import SegmentingError, newest, streams_of
 from ..segmenting.timeline import Timeline, probabilities
 from ..tables.quantise import integer_scores
 from .documents import Progress
@@ -93,8 +93,19 @@ def _of_movements(
         scores, rejection = integer_scores(build.tables, *own), build.manifest.rejection
         no = None if rejection is None else refused(rejection, scores, *own)
         states, likely = _decoded(build, scores, no, lag_us)
-        truth, tick_us = known[grasp_set.labels[stream.rows]], build.manifest.segmenting.tick_us
-        found.append(Timeline(stream.subject, stream.session, stream.start_us, tick_us, types, states, likely, truth))
+        found.append(
+            Timeline(
+                subject=stream.subject,
+                session=stream.session,
+                start_us=stream.start_us,
+                tick_us=build.manifest.segmenting.tick_us,
+                types=types,
+                states=states,
+                probabilities=likely,
+                truth=known[grasp_set.labels[stream.rows]],
+                continued=stream.continued,
+            )
+        )
         if progress is not None:
             progress(done, len(streams))
     return tuple(found)
@@ -113,29 +124,19 @@ def _decoded(
 
 
 def _of_run(build: Build, path: Path, lag_us: int | None, warn: Callable[[str], None]) -> tuple[Timeline, ...]:
-    """Return the timelines of a live run, cut where too little could be read; each tick takes the newest scores."""
+    """Return the timelines of a live run, cut where too little could be read for longer than a pause."""
     tick_us, types = build.manifest.segmenting.tick_us, build.grasps[: build.manifest.segmenting.n_types]
-    parts: list[tuple[int, list[tuple[Sequence[int], bool]]]] = []
+    read: list[tuple[int, Sequence[int], bool]] = []
     zero_us: int | None = None
-    before: tuple[Sequence[int], bool] | None = None
-    due_us = 0
     for moment in recognised(build, path, warn):
-        now_us = moment.grasp.unix_us
-        scores = None if moment.scores is None else (moment.scores, moment.refused)
-        zero_us = now_us if zero_us is None else zero_us
-        if scores is not None and (before is None or not 0 <= now_us - due_us + tick_us < PAUSE_US):
-            parts.append((now_us, []))
-            due_us = now_us
-        while scores is not None and due_us <= now_us:
-            late = before is not None and due_us + tick_us <= now_us
-            parts[-1][1].append(before if late and before is not None else scores)
-            due_us += tick_us
-        before = scores
-    if not parts:
+        zero_us = moment.grasp.unix_us if zero_us is None else zero_us
+        if moment.scores is not None:
+            read.append((moment.grasp.unix_us, moment.scores, moment.refused))
+    if not read:
         raise SegmentingError(f"{path.name} holds no moment with enough readings for the build")
+    times_us, lanes, no = (np.array(each) for each in zip(*read, strict=True))
     found = []
-    for number, (start_us, rows) in enumerate(parts, 1):
-        lanes, no = (np.array(each) for each in zip(*rows, strict=True))
-        states, likely = _decoded(build, lanes, no, lag_us)
+    for number, (start_us, rows) in enumerate(newest(times_us, tick_us), 1):
+        states, likely = _decoded(build, lanes[rows], no[rows], lag_us)
         found.append(Timeline(path.stem, str(number), start_us, tick_us, types, states, likely, zero_us=zero_us or 0))
     return tuple(found)

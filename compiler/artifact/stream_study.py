@@ -1,10 +1,12 @@
 """`evaluate --streams`: how accurately whole movements of new subjects are cut into grasps, live and offline.
 
 Each subject is left out in turn. Placement, model, tables and segment costs are learned from the others, and candidate
-costs are compared on inner folds of them. Every row of the result decodes the same scores of the same tables.
+costs are compared on inner folds of them. The trainer and its settings are chosen once for these others, with all their
+inputs. Of many movements fewer frames each are learnt from. Every row of the result decodes the same scores of the same
+tables.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from statistics import fmean
@@ -12,6 +14,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.runtime.live.decision import Decision, SequentialTest, Standing
@@ -25,17 +28,19 @@ from ..evaluation.folds import Fold, leave_groups_out, trial_folds
 from ..evaluation.rates import RecipeWords, student
 from ..evaluation.study import recipe_words
 from ..recordings.graspset import GraspSet
-from ..samples import Samples
+from ..samples import FRAMES, Samples
 from ..segmenting.learning import LAG_TICKS, Counts, announced_live, live_states
-from ..segmenting.scores import OVERLAPS, Score, score, segments_of
+from ..segmenting.scores import OVERLAPS, Score, score_streams, segments_of
 from ..segmenting.streams import TICK_US, SegmentingError, moving, streams_of
 from ..tables.quantise import integer_scores
+from ..trainers.base import SHARED
 from ..workers import in_workers
 from .documents import Progress
 from .training import integers_of, scores_of, segments_for, train
 
 Labels = NDArray[np.intp]
 _INNER = 4
+_LEARNT = 5500  # rows to learn from, at least two of each movement
 _ERROR_RATE = 0.01  # of the sequential test
 # The methods compared, in the order of the table; the first is the one that a live glove uses.
 METHODS = {
@@ -97,7 +102,7 @@ def study_streams(
     jobs : int
         Worker processes; the result does not depend on their number.
     progress : callable, optional
-        Called with (done, total) after each subject.
+        Called with (done, total): at once, and after each subject with each kind of inputs.
 
     Returns
     -------
@@ -120,13 +125,17 @@ def study_streams(
         raise SegmentingError(f"the set holds streams of {subjects[0]} only: leaving a subject out takes two")
     there: dict[Inputs, bool] = {"switches": bool(grasp_set.element_names), "joints": bool(grasp_set.joints)}
     kinds = [kind for kind, some in {"both": all(there.values()), **there}.items() if some]
-    tasks = [(kind, subject) for kind in kinds for subject in subjects]
+    report, total = progress or (lambda _done, _total: None), len(subjects) * (1 + len(kinds))
+    report(0, total)
+    chosen: dict[str, Options] = {}
+    for subject, own in in_workers(partial(_chosen, grasp_set, kinds[0], options), subjects, jobs):
+        chosen[subject] = own
+        report(len(chosen), total)
+    tasks = [(kind, subject, chosen[subject]) for kind in kinds for subject in subjects]
     found: dict[tuple[Inputs, str], dict[str, Score]] = {}
-    work = partial(_of_subject, grasp_set, options)
-    for done, (task, scores) in enumerate(in_workers(work, tasks, jobs), 1):
-        found[task] = scores
-        if progress is not None:
-            progress(done, len(tasks))
+    for kind, subject, scores in in_workers(partial(_of_subject, grasp_set), tasks, jobs):
+        found[kind, subject] = scores
+        report(len(chosen) + len(found), total)
     return StreamStudy(
         fingerprint=grasp_set.fingerprint(),
         recipe=recipe_words(options),
@@ -141,31 +150,54 @@ def study_streams(
     )
 
 
-def _of_subject(
-    grasp_set: GraspSet, options: Options, task: tuple[Inputs, str]
-) -> tuple[tuple[Inputs, str], dict[str, Score]]:
-    kind, subject = task
-    samples, new = Samples.of(grasp_set, kind), grasp_set.subjects == subject
-    learning, own = samples.rows(~new), grasp_set.rows(~new)
-    groups = own.subjects if len(np.unique(own.subjects)) > 1 else None
-    trained = train(learning, options, groups=groups)
-    tables = integers_of(trained, learning, options)
+def _learning(grasp_set: GraspSet, kind: Inputs, subject: str) -> tuple[GraspSet, Samples, NDArray[np.intp]]:
+    """Return the rows of all other subjects, as a set and as samples, and the numbers of those to learn from.
+
+    These are all rows, unless the usual frames of each movement are more than _LEARNT.
+    """
+    own = grasp_set.rows(grasp_set.subjects != subject)
+    samples = Samples.of(grasp_set, kind).rows(grasp_set.subjects != subject)
+    movements = len(np.unique(samples.movements))
+    few = movements * FRAMES > _LEARNT
+    return own, samples, samples.balanced(max(2, _LEARNT // movements)) if few else np.arange(len(own))
+
+
+def _groups(own: GraspSet) -> NDArray[np.str_] | None:
+    return own.subjects if len(np.unique(own.subjects)) > 1 else None
+
+
+def _chosen(grasp_set: GraspSet, kind: Inputs, options: Options, subject: str) -> tuple[str, Options]:
+    """Return the options with the trainer and settings that suit all other subjects best."""
+    own, learning, some = _learning(grasp_set, kind, subject)
+    training = train(learning.rows(some), options, groups=_groups(own.rows(some))).training
+    assert training is not None
+    settings: dict[str, Any] = dict(training.settings)
+    return subject, replace(options, trainer=training.trainer, settings=settings, **dict.fromkeys(SHARED))
+
+
+def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Options]) -> tuple[Inputs, str, dict[str, Score]]:
+    kind, subject, options = task
+    own, learning, some = _learning(grasp_set, kind, subject)
+    samples, few = Samples.of(grasp_set, kind), learning.rows(some)
+    trained = train(few, options)
+    tables = integers_of(trained, few, options)
     scores = np.zeros((len(own), samples.n_classes))
     for fold in _inner_folds(learning, own, options):
-        scores[fold.test] = scores_of(learning, options, None, groups, None, fold)
+        thinned = Fold(np.intersect1d(fold.train, some), fold.test, fold.name)
+        scores[fold.test] = scores_of(learning, options, None, _groups(own), None, thinned)
     model = segments_for(own, learning, scores, tables.scale)
     assert model is not None
     read = trained.read(samples)
     counts = Counts.of((learning.labels[stream.rows] for stream in streams_of(own)), samples.n_types)
-    parts: dict[str, list[Score]] = {name: [] for name in METHODS}
+    parts: dict[str, list[tuple[bool, Labels, Labels, Labels | None]]] = {name: [] for name in METHODS}
     for stream in streams_of(grasp_set):
         if stream.subject == subject:
             part = read.rows(stream.rows)
             lanes = integer_scores(tables, part.switches, part.codes)
             found = _Decoded(lanes, Scorer(tables), model, counts, tables.scale)
             for name, (states, announced) in found.every().items():
-                parts[name].append(score(part.labels, states, model.n_types, announced))
-    return task, {name: Score.total(every) for name, every in parts.items()}
+                parts[name].append((stream.continued, part.labels, states, announced))
+    return kind, subject, {name: score_streams(every, model.n_types) for name, every in parts.items()}
 
 
 def _inner_folds(learning: Samples, own: GraspSet, options: Options) -> list[Fold]:
@@ -201,20 +233,21 @@ class _Decoded:
             f"dwell {ms} ms": Decision(lead, 1000 * ms, policy.hold_us) for ms in (50, 200)
         }
         rules["sequential test"] = SequentialTest(none + 1, self.scale, _ERROR_RATE, policy.hold_us)
-        ruled = {name: self._ruled(rule.update, none) for name, rule in rules.items()}
         return {
             "decoder, live": (live, announced),
             "decoder, afterwards": (decode(self.model, emissions(self.lanes, self.model)), None),
-            **{name: (states, states) for name, states in ruled.items()},
+            **{name: (states, states) for name, states in zip(rules, self._ruled([*rules.values()]), strict=True)},
             "plain HMM": (self._hidden_markov(), None),
         }
 
-    def _ruled(self, update: Callable[..., int | None], none: int) -> Labels:
-        states = []
+    def _ruled(self, rules: list[Decision | SequentialTest]) -> NDArray[np.intp]:
+        """Return the states (rules, T) that the rules announce."""
+        none, states = self.model.n_types, []
         for tick, row in enumerate((self.lanes + LANE_OFFSET).tolist()):
-            decided = update(tick * TICK_US, Standing(tuple(row), self.scorer))
-            states.append(none if decided is None else decided)
-        return np.array(states, np.intp)
+            standing = Standing(tuple(row), self.scorer)
+            decided = [rule.update(tick * TICK_US, standing) for rule in rules]
+            states.append([none if each is None else each for each in decided])
+        return np.array(states, np.intp).T
 
     def _hidden_markov(self) -> Labels:
         """Return the most probable states of a chain with the counted changes per tick and softmax scores."""

@@ -104,8 +104,8 @@ def flash_shares(target: Target) -> tuple[int, int]:
 
 
 def _layouts(tables: IntegerTables, target: Target, ports: Ports | None, entry_bits: int | None) -> Iterator[Layout]:
-    """Yield all possible layouts. Raises FirmwareError with the reason if there is none."""
-    refused: FirmwareError | None = None
+    """Yield all possible layouts. Raises FirmwareError if there is none, with the reason against the widest entries."""
+    refused: dict[int, FirmwareError] = {}
     found = False
     sizes = range(SMALLEST_GROUP, LARGEST_GROUP + 1) if tables.n_switches else [SMALLEST_GROUP]
     for bits, size, bins in product((8, 16) if entry_bits is None else (entry_bits,), sizes, _bins(tables)):
@@ -115,15 +115,15 @@ def _layouts(tables: IntegerTables, target: Target, ports: Ports | None, entry_b
                 rows = layout.n_rows * layout.parts.width * len(layout.parts.firsts) * layout.entry_bits // 8
                 if target.avr and rows > _LARGEST_ARRAY:
                     raise FirmwareError(
-                        f"the rows need {rows} bytes, but an array of an AVR has at most {_LARGEST_ARRAY}: "
-                        "compile with fewer --rounds"
+                        f"the rows need {rows} bytes, but an array of an AVR has at most {_LARGEST_ARRAY}: compile "
+                        "with --linear 0 --max-bins 16, or with fewer --rounds"
                     )
                 found = True
                 yield from (replace(layout, adding=adding) for adding in _addings(target))
         except FirmwareError as reason:
-            refused = refused or reason
-    if not found and refused is not None:
-        raise refused
+            refused.setdefault(bits, reason)
+    if not found:
+        raise refused[max(refused)]
 
 
 def _sharings(tables: IntegerTables, n_groups: int) -> Iterator[tuple[Shared, ...]]:

@@ -16,7 +16,7 @@ from thenar.runtime.tables import IntegerTables
 
 from ..publication import check_folder, entries, publish_folder
 from . import FirmwareError
-from .board import Board, keys_of
+from .board import Board, check_switches, keys_of
 from .board_files import (
     board_files,
     config_of,
@@ -98,10 +98,15 @@ class Firmware:
 
     @property
     def _ports(self) -> Ports | None:
-        """The ports of the switches: eight consecutive keys of the board each, or readings of the build's harness."""
+        """The ports of the switches: eight consecutive keys of the board each, or readings of the build's harness.
+
+        Raises FirmwareError if the board lacks a switch.
+        """
         if self.board is None:
             return ports_of_scan(self.scan)
-        return key_ports(self.board, keys_of(self.board, self.names.switches))
+        keys = keys_of(self.board, self.names.switches)
+        check_switches(self.board, keys)
+        return key_ports(self.board, keys)
 
     @property
     def segments(self) -> str:

@@ -15,7 +15,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.segmenting.decoder import Decoder
+from thenar.runtime.segmenting.decoder import Decoder, emissions
 from thenar.runtime.segmenting.model import STEPS, SegmentModel, gain_of
 
 from .scores import OVERLAPS, Score, score
@@ -164,8 +164,7 @@ def live_states(
 ) -> Labels:
     """Return the states (T,) that a live decoder reports for scores (T, n_lanes), `lag_ticks` after each tick."""
     decoder = Decoder(model, lag_ticks)
-    no = [False] * len(lanes) if refused is None else refused.tolist()
-    states = [decoder.push(*tick).state for tick in zip(lanes.tolist(), no, strict=True)][lag_ticks:]
+    states = [decoder.take(costs).state for costs in emissions(lanes, model, refused).tolist()][lag_ticks:]
     return np.array(states + decoder.finish(), np.intp)
 
 

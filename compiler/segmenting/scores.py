@@ -139,6 +139,23 @@ def score(truth: ArrayLike, found: ArrayLike, none: int, announced: ArrayLike | 
     )
 
 
+def score_streams(streams: Iterable[tuple[bool, Labels, Labels, Labels | None]], none: int) -> Score:
+    """Score streams, in order: whether one continues a grasp of the one before, then the arguments of `score`.
+
+    A grasp that a pause divides is one true segment all the same, whatever was found on either side.
+    """
+    joined: list[list[Labels]] = []
+    for continued, truth, found, announced in streams:
+        arrays = [truth, found] if announced is None else [truth, found, announced]
+        if continued and joined:
+            # A tick in which nothing is found stands for the pause.
+            pause = (int(truth[0]), none, none)
+            parts = zip(joined.pop(), pause, arrays, strict=False)
+            arrays = [np.concatenate([one, [state], more]) for one, state, more in parts]
+        joined.append(arrays)
+    return Score.total(score(truth, found, none, *rest) for truth, found, *rest in joined)
+
+
 def _matched(true: list[Segment], found: list[Segment]) -> tuple[tuple[int, ...], list[tuple[Segment, int]]]:
     """Return how many of `found` are right at each of OVERLAPS, and the matches at the smallest overlap.
 

@@ -32,6 +32,7 @@ class Timeline:
     types              names of states 0 to K - 1; state K means that nothing is held
     states, truth      (T,) found, and as recorded; None: unknown
     probabilities      (T,) of the states found
+    continued          whether it begins in the middle of a recorded grasp that began in the timeline before
     """
 
     subject: str
@@ -43,6 +44,7 @@ class Timeline:
     probabilities: NDArray[np.float64]
     truth: NDArray[np.intp] | None = None
     zero_us: int = 0
+    continued: bool = False
 
     @property
     def name(self) -> str:

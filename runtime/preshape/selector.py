@@ -4,11 +4,11 @@ moment.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 import msgspec
 
 from ..errors import ThenarError
-from ..names import list_names
 from ..published import NONE, UNKNOWN, LiveGrasp
 
 
@@ -50,12 +50,15 @@ class PreshapeTable:
         missing = tuple(grasp for grasp in wanted if grasp not in self.chosen)
         if not missing:
             return ""
-        if len(missing) == len(wanted):
+        spare = [grasp for grasp in self.chosen if grasp not in wanted]
+        likely = {grasp: get_close_matches(grasp, spare, n=1, cutoff=0.8) for grasp in missing}
+        if len(missing) == len(wanted) and not any(likely.values()):
             raise PreshapeError(
-                f"preshapes {self.name}: none of the build's grasp types ({list_names(wanted)}) is among the table's "
-                f"({list_names(tuple(self.chosen))}): use a table for the taxonomy of the build"
+                f"preshapes {self.name}: none of the build's grasp types ({', '.join(wanted)}) is among the table's "
+                f"({', '.join(self.chosen)}): use a table for the taxonomy of the build"
             )
-        return f"preshapes {self.name}: none for {', '.join(missing)}: nothing is sent to the hand for those"
+        names = [grasp + "".join(f" (the table has {near!r})" for near in likely[grasp]) for grasp in missing]
+        return f"preshapes {self.name}: none for {', '.join(names)}: nothing is sent to the hand for those"
 
 
 MIN_PROBABILITY = 0.8

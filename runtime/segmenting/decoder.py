@@ -184,8 +184,12 @@ class Decoder:
 
     def push(self, lanes: Sequence[int], refused: bool = False) -> Decoded:
         """Take the scores of the next tick, and whether its frame is refused (for models with a refusal)."""
+        return self.take(self._model.costs(lanes, refused))
+
+    def take(self, costs: Sequence[int]) -> Decoded:
+        """Take the costs of the next tick, one for each state, as `emissions` returns them."""
         paths = self._paths
-        paths.step(self._model.costs(lanes, refused))
+        paths.step(costs)
         tick, newest, begun = paths.tick - self._lag, *paths.newest
         if tick < 0:
             state, start = self._model.n_types, 0

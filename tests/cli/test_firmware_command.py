@@ -4,9 +4,12 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from thenar.compiler import GraspSet, compile_build
+from thenar.compiler import GraspSet, Joint, Options, compile_build
+from thenar.compiler.recordings.taxonomy import own
+from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.build import Build
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
@@ -234,6 +237,50 @@ def test_what_cannot_be_is_one_sentence(
     assert message in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert not Path("made").exists()
+
+
+def test_a_matrix_that_lacks_a_kept_switch_names_it(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+    first, *others = [switch.name for switch in Build.load(build).manifest.switches]
+    columns = [f"PB{number}" for number in range(len(others))]
+    matrix = {"rows": ["PD2"], "columns": columns, "switches": [others]}
+    lines = (f"{key} = {json.dumps(value)}\n" for key, value in matrix.items())
+    (tmp_path / "board.toml").write_text(f'part = "atmega328p"\n[matrix]\ndiodes = true\n{"".join(lines)}')
+    for mode in ("glove", "scan"):
+        made = ("--mode", mode, "--board", tmp_path / "board.toml", "-o", tmp_path / "made")
+        done = thenar("firmware", build, "--target", "avr328p", *made)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert f"the board has no pin or key for {first}, which the build keeps" in done.stderr
+
+
+def test_tables_too_large_for_a_glove_name_a_remedy_that_works(thenar: Thenar, tmp_path: Path) -> None:
+    joints, types, random = [f"j{number}" for number in range(16)], 8, np.random.default_rng(1)
+    labels = np.arange(10 * types) % types
+    centres = random.integers(40, 200, (types, len(joints)))
+    grasp_set = GraspSet(
+        switches=(labels[:, np.newaxis] == np.arange(2)),
+        switch_names=("s0", "s1"),
+        codes=(centres[labels] + random.integers(-9, 10, (len(labels), len(joints)))).astype(np.uint16),
+        joints=tuple(Joint(name, "deg", 0, 0.0, 255, 127.5) for name in joints),
+        grasps=np.array([f"g{label}" for label in labels]),
+        taxonomy=own([f"g{label}" for label in range(types)]),
+        subjects=np.full(len(labels), "A"),
+        objects=np.full(len(labels), "thing"),
+        trials=np.arange(len(labels)),
+    )
+    sensors = f"[cyberglove]\njoints = {json.dumps([*joints, '', ''])}\n"
+    (tmp_path / "board.toml").write_text(f'part = "atmega2560"\n[pins]\ns0 = "PA0"\ns1 = "PA1"\n{sensors}')
+    hand = GloveCalibration(sensors=tuple(SensorCalibration(name, 40, 0.0, 200, 90.0) for name in joints))
+    (tmp_path / "hand.toml").write_text(hand.to_toml())
+    said = {}
+    for linear in (1, 0):
+        settings: dict[str, float | str] = {"penalty": 1.0, "smoothness": 1.0, "linear": linear}
+        options = Options(trainer="logit", max_bins=16, settings=settings, folds=0, refuse=0.0)
+        made = compile_build(grasp_set, tmp_path / "build", options, jobs=1)
+        wired = ("--board", tmp_path / "board.toml", "--calibration", tmp_path / "hand.toml", "-o", tmp_path / "made")
+        said[linear] = thenar("firmware", made.folder, "--target", "avr2560", "--mode", "glove", *wired)
+    assert said[1].returncode == 2
+    assert "an array of an AVR has at most 32767: compile with --linear 0 --max-bins 16" in said[1].stderr
+    assert said[0].returncode == 0, said[0].stderr
 
 
 def test_a_folder_that_is_no_build_is_named(thenar: Thenar, tmp_path: Path) -> None:

@@ -1,16 +1,19 @@
 """`thenar segment`, and `thenar evaluate --streams`, on whole movements."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from thenar.cli import run
-from thenar.compiler import GraspSet, compile_build
+from thenar.compiler import TRAINERS, GraspSet, Samples, compile_build
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.taxonomy import own
+from thenar.compiler.trainers.base import Trainer
 from thenar.runtime.published import NONE
 
 TYPES = ("hook", "pinch")
@@ -67,6 +70,50 @@ def test_segments_are_those_that_were_recorded(
         assert one["subject"] == "ABC"[number // 6]
 
 
+def _repeated(times: np.ndarray, _: np.random.Generator) -> np.ndarray:
+    return np.asarray(times // 20_000 * 20_000)
+
+
+def _jittering(times: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    return np.asarray(times + random.integers(-9_000, 9_001, len(times)))
+
+
+def _late(times: np.ndarray, _: np.random.Generator) -> np.ndarray:
+    return np.asarray(times + 900_000 * (np.arange(len(times)) > 130))
+
+
+@pytest.mark.parametrize("damage", [_repeated, _jittering, _late])
+def test_a_real_clock_changes_no_segment(
+    movements: Path,
+    build: Path,
+    damage: Callable[[np.ndarray, np.random.Generator], np.ndarray],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    clean, random = GraspSet.load(movements), np.random.default_rng(5)
+    times = np.concatenate([damage(10_000 * np.arange(300), random) for _ in "ABC"])
+    # Single frames that could not be read are rows that are not there.
+    read = random.random(len(clean)) > 0.03
+    replace(clean, times_us=times).rows(np.flatnonzero(read)).save(tmp_path / "damaged.grasps")
+    assert run(["segment", str(tmp_path / "damaged.grasps"), "-b", str(build), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["streams"], len(found["segments"])) == (3, 18)
+    assert min(found["f1"]) > 0.99
+
+
+def test_a_pause_ends_a_stream_but_divides_no_true_grasp(
+    movements: Path, build: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clean, paused = GraspSet.load(movements), tmp_path / "paused.grasps"
+    times = np.tile(10_000 * np.arange(300), 3)
+    times[127:300] += 1_100_000  # in the middle of A's third grasp
+    replace(clean, times_us=times).save(paused)
+    assert run(["segment", str(paused), "-b", str(build), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["streams"], len(found["segments"])) == (4, 19)
+    assert found["f1"][0] == pytest.approx(2 * 18 / (18 + 19))
+
+
 def test_what_was_learnt_is_in_the_build(movements: Path, build: Path) -> None:
     manifest = json.loads((build / "build.json").read_text())
     assert manifest["segments"]["least"] == [15, 15, 10]
@@ -95,7 +142,10 @@ def test_streams_are_evaluated_without_the_subject(
 ) -> None:
     line = ["evaluate", str(movements), "--streams", "--rounds", "5", "--jobs", "1", "--json"]
     assert run([*line, "-o", str(tmp_path / "study.json")]) == 0
-    study = json.loads(capsys.readouterr().out)
+    printed = capsys.readouterr()
+    study, told = json.loads(printed.out), printed.err.splitlines()
+    assert told[:2] == ["evaluating streams ...", "evaluating streams: 0 of 12 steps"]
+    assert told[-1] == "evaluating streams: 12 of 12 steps"
     assert study == json.loads((tmp_path / "study.json").read_text())
     assert (study["subjects"], study["movements"], study["seconds"]) == (["A", "B", "C"], 18, 9)
     rows = {(row["inputs"], row["method"]): row["values"] for row in study["rows"]}
@@ -107,6 +157,32 @@ def test_streams_are_evaluated_without_the_subject(
     assert dwell["recognised"]["mean"] < live["recognised"]["mean"] == 1
     assert len(live["F1@50"]["subjects"]) == 3
     assert rows["both", "decoder, afterwards"]["latency ms"]["mean"] is None
+
+
+@pytest.mark.slow
+def test_of_many_movements_few_frames_are_learnt_from(
+    movements: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    once, boosted, learnt = GraspSet.load(movements), type(TRAINERS["logitboost"]), []
+    rows = np.flatnonzero(once.subjects != "C")
+    times = 30
+    many = once.rows(np.tile(rows, times))
+    trials = many.trials + 1000 * np.repeat(np.arange(times), len(rows))
+    order = np.argsort(many.subjects, kind="stable")
+    replace(many, trials=trials, times_us=np.empty(0, np.int64)).rows(order).save(tmp_path / "many.grasps")
+    train = boosted.train
+
+    def counted(self: Trainer, samples: Samples, *settings: Any) -> Any:
+        learnt.append(len(samples.labels))
+        return train(self, samples, *settings)
+
+    monkeypatch.setattr(boosted, "train", counted)
+    line = ["evaluate", str(tmp_path / "many.grasps"), "--streams", "--rounds", "1", "--jobs", "1", "--json"]
+    assert run(line) == 0
+    study = json.loads(capsys.readouterr().out)
+    assert study["movements"] == 360
+    assert 1000 < max(learnt) <= 5500
+    assert study["rows"][0]["values"]["F1@50"]["mean"] > 0.95
 
 
 def test_a_build_of_grasps_alone_finds_segments_by_what_it_refuses(

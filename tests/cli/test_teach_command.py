@@ -2,7 +2,7 @@
 
 import json
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Container, Sequence
 from pathlib import Path
 from threading import Event
 
@@ -86,8 +86,10 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return compile_build(grasp_set, folder, rounds=10, folds=0).folder
 
 
-def record(folder: Path, path: Path, held: list[int]) -> Path:
-    """Record a live run in which this is held, 10 ms a frame."""
+def record(
+    folder: Path, path: Path, held: list[int], clock_us: Sequence[int] = (), unread: Container[int] = ()
+) -> Path:
+    """Record a live run in which this is held, 10 ms a frame, on another clock or with frames that cannot be read."""
     build = Build.load(folder)
     system = System.of(build, parse_harness(GLOVE, "glove.toml"))
     session = Session(
@@ -102,10 +104,13 @@ def record(folder: Path, path: Path, held: list[int]) -> Path:
         for number, label in enumerate(held):
             time_us, (closed, code) = 10_000 * number, readings(label)
             glove = GloveFrame(time_us, bytes([code]) + bytes(17), 3)
-            switches = SwitchFrame(time_us, sum(1 << bit for bit, column in enumerate(kept) if closed >> column & 1))
-            recorder.glove(glove)
+            bits = sum(1 << bit for bit, column in enumerate(kept) if closed >> column & 1)
+            switches = SwitchFrame(time_us, bits, (1 << len(kept)) - 1 if number in unread else 0)
             recorder.switches(switches)
-            recorder.grasp(recognizer.step(time_us + 1, time_us + 1, switches, glove).grasp)
+            if number not in unread:
+                recorder.glove(glove)
+            unix_us = clock_us[number] if clock_us else time_us + 1
+            recorder.grasp(recognizer.step(time_us + 1, unix_us, switches, glove).grasp)
     return path
 
 
@@ -260,6 +265,30 @@ def test_a_recorded_run_is_cut_into_its_grasps(
         assert one["start_s"] == pytest.approx(0.3 + 0.7 * number, abs=0.02)
         assert one["end_s"] == pytest.approx(0.7 + 0.7 * number, abs=0.02)
     assert len((tmp_path / "s.csv").read_text().splitlines()) == 4
+
+
+_FRAMES = range(len(states("cpr")))
+
+
+@pytest.mark.parametrize(
+    ("clock_us", "unread"),
+    [
+        ([20_000 * (number // 2) for number in _FRAMES], ()),
+        ([10_000 * (number ^ 1) for number in _FRAMES], ()),
+        ([10_000 * number + 900_000 * (number > 45) for number in _FRAMES], ()),
+        ([10_000 * number for number in _FRAMES], range(7, 999, 11)),
+    ],
+    ids=["repeats", "jitters", "jumps ahead", "unread frames"],
+)
+def test_the_clock_of_a_run_and_unread_frames_divide_no_grasp(
+    thenar: Thenar, build: Path, tmp_path: Path, clock_us: list[int], unread: Container[int]
+) -> None:
+    path = record(build, tmp_path / "run.mcap", states("cpr"), clock_us, unread)
+    done = thenar("segment", path, "-b", build, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["streams"] == 1
+    assert [one["type"] for one in found["segments"]] == ["cup", "pen", "rod"]
 
 
 def collected(path: Path, held: list[int], switches: tuple[str, ...], joint: str = "bend") -> Path:

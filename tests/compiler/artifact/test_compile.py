@@ -1,6 +1,7 @@
 import hashlib
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -33,6 +34,7 @@ def _bytes(folder: Path) -> dict[str, bytes]:
 
 def test_a_build_knows_its_inputs_and_recognises_what_it_was_trained_on(grasp_set: GraspSet, tmp_path: Path) -> None:
     report = compile_build(grasp_set, tmp_path / "build", rounds=ROUNDS)
+    assert re.fullmatch(r"<BuildReport \S+/build: 4 grasp types, \d+ switches, 3 joints>", repr(report))
     build = Build.load(tmp_path / "build")
     kept = [switch.column for switch in build.manifest.switches]
     frames = zip(grasp_set.switches[:, kept], grasp_set.codes, strict=True)

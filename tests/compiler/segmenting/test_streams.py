@@ -41,7 +41,7 @@ def test_each_tick_has_the_newest_row(make_movements: Make, steps: list[int], ti
     assert times[-1] - tick_us < 7 + (len(stream.rows) - 1) * tick_us <= times[-1]
 
 
-def test_a_stream_ends_before_a_pause_and_where_time_does_not_rise(make_movements: Make) -> None:
+def test_a_stream_ends_before_a_pause_and_where_the_clock_starts_again(make_movements: Make) -> None:
     grasp_set = make_movements("A")
     times = grasp_set.times_us.copy()
     times[20:] += PAUSE_US
@@ -49,6 +49,16 @@ def test_a_stream_ends_before_a_pause_and_where_time_does_not_rise(make_movement
     found = streams_of(replace(grasp_set, times_us=times))
     assert [stream.rows[0] for stream in found] == [0, 20, 40]
     assert found[2].start_us == 0
+    assert [stream.continued for stream in found] == [False, True, True]
+
+
+def test_a_clock_of_each_trial_starts_a_stream_with_it(make_movements: Make) -> None:
+    grasp_set = make_movements("A")
+    first = np.flatnonzero(np.diff(grasp_set.trials, prepend=-1))
+    own = grasp_set.times_us - np.repeat(grasp_set.times_us[first], np.diff(first, append=len(grasp_set)))
+    streams = streams_of(replace(grasp_set, times_us=own))
+    assert [stream.rows[0] for stream in streams] == first.tolist()
+    assert not any(stream.continued for stream in streams)
 
 
 def test_sessions_are_streams_of_their_own(make_movements: Make) -> None:

@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from thenar.compiler.recordings.taxonomy import CUTKOSKY_16, KAMAKURA_14
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.preshape import SHIPPED, PreshapeError, load_preshapes
+from thenar.runtime.preshape.selector import PreshapeTable
 
 OWN = """\
 name = "mine"
@@ -114,9 +116,18 @@ def test_where_the_literature_gives_nothing_the_table_says_so() -> None:
     )
 
 
-def test_a_table_for_another_taxonomy_is_refused() -> None:
-    with pytest.raises(PreshapeError, match="none of the build's grasp types \\(mug, pen\\)"):
-        load_preshapes("barrett_bh8").check(["mug", "pen"])
+def test_a_table_for_another_taxonomy_is_refused_with_every_grasp_type() -> None:
+    types = [f"own {number}" for number in range(9)]
+    with pytest.raises(PreshapeError, match=re.escape(f"none of the build's grasp types ({', '.join(types)})")):
+        load_preshapes("barrett_bh8").check(types)
+
+
+def test_a_misspelt_grasp_type_of_the_table_is_named() -> None:
+    shape = load_preshapes("parallel_gripper").chosen["PoS"]
+    table = PreshapeTable("Mine", {"laterl": shape, "cup": shape})
+    said = "preshapes Mine: none for lateral (the table has 'laterl'), pen: nothing is sent to the hand for those"
+    assert table.check(["cup", "lateral", "pen"]) == said
+    assert table.check(["lateral"]).startswith("preshapes Mine: none for lateral (the table has 'laterl')")
 
 
 def test_the_parallel_gripper_opens_wider_for_a_cylinder_than_for_a_needle() -> None:
