@@ -266,7 +266,7 @@ def _placed_by(estimator: Any, options: Options) -> tuple[Options, tuple[float, 
     if len(selectors) != 1:
         return options, ()
     selector, method = selectors[0], METHODS.named(selectors[0].method)
-    parameter = {"keep": selector.n_switches} if method.by_number else {"prune": selector.min_samples}
+    parameter = {"keep" if method.by_number else "prune": selector.parameter_}
     gains = tuple(selector.gains_[np.argsort(selector.order_)].tolist()) if method.name == PAPERS else ()
     return structs.replace(options, placement=method.name, **parameter), gains
 

@@ -15,7 +15,7 @@ from .stumps import TIE, winners
 
 with optional():
     from sklearn.base import BaseEstimator, ClassifierMixin
-    from sklearn.utils import Tags, check_array
+    from sklearn.utils import check_array
     from sklearn.utils.multiclass import check_classification_targets
     from sklearn.utils.validation import check_is_fitted, validate_data
 
@@ -39,7 +39,7 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[m
         Parameters
         ----------
         X : array-like, shape (n, d)
-            Numbers; NaN is a missing value.
+            Finite numbers.
         y : array-like, shape (n,)
             Labels.
         sample_weight : array-like, shape (n,), optional
@@ -56,8 +56,10 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[m
         ------
         BoostingError
             A ValueError, if a parameter, a weight or a label is invalid.
+        ValueError
+            If X holds NaN or an infinity, here and wherever X is given.
         """
-        inputs, targets = validate_data(self, X, y, ensure_all_finite="allow-nan", dtype=_kept_dtypes(X))
+        inputs, targets = validate_data(self, X, y, dtype=_kept_dtypes(X))
         if self.classes is None:
             check_classification_targets(targets)
         self.classes_ = np.unique(targets) if self.classes is None else np.asarray(self.classes)
@@ -89,12 +91,6 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[m
         labels: NDArray[Any] = self.classes_[best]
         return labels
 
-    def __sklearn_tags__(self) -> Tags:
-        """Tell scikit-learn that NaN is allowed."""
-        tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
-        return tags
-
     @abstractmethod
     def _learn(
         self,
@@ -121,7 +117,7 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[m
 
     def _inputs(self, X: ArrayLike) -> NDArray[Any]:
         check_is_fitted(self)
-        inputs: NDArray[Any] = validate_data(self, X, reset=False, ensure_all_finite="allow-nan", dtype=_kept_dtypes(X))
+        inputs: NDArray[Any] = validate_data(self, X, reset=False, dtype=_kept_dtypes(X))
         return inputs
 
     def _index(self, targets: NDArray[Any]) -> NDArray[np.intp]:
@@ -138,9 +134,8 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[m
 class LogitBoostClassifier(AdditiveClassifier):
     """Additive logistic regression on decision stumps, multi-class as Weka 3.6's LogitBoost computes it.
 
-    Inputs are bits, integer codes or floating-point numbers, X (n, d); NaN is a missing value, which gets a separate
-    branch. A threshold lies midway between two neighbouring values of the training set. `compile_build` trains this
-    classifier, and `compile` makes a build of a fitted one.
+    Inputs are bits, integer codes or floating-point numbers, X (n, d). A threshold lies midway between two neighbouring
+    values of the training set. `compile_build` trains this classifier, and `compile` makes a build of a fitted one.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from ..samples import Samples
 from .constraints import Limits
 from .elements import elements_of
 from .inputs import check_bits
-from .methods.base import BEST, METHODS, PAPERS
+from .methods.base import BEST, METHODS, PAPERS, Method
 from .placement import choose
 from .ports import PortCosts
 
@@ -22,6 +22,8 @@ with optional():
     from sklearn.utils.multiclass import check_classification_targets
     from sklearn.utils.validation import check_is_fitted, validate_data
 
+_USUAL = 20
+
 
 class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
     """Keep the switches that a placement method chooses.
@@ -30,8 +32,9 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
     ----------
     method : str, default="elimination"
         A name in `thenar.compiler.METHODS`; `thenar place --help` lists them.
-    n_switches : int, default=20
-        The most switches to keep. Fewer are kept if fewer vary, or help. Ignored by methods that take the paper's S.
+    n_switches : int or None, default=None
+        The most switches to keep, from 1 to the number of columns; None: 20, or all columns if there are fewer. Fewer
+        are kept if fewer vary, or help. Ignored by methods that take the paper's S.
     min_samples : int, default=0
         The paper's S: a node of the tree with fewer rows decides nothing. Ignored by methods that take a number of
         switches.
@@ -39,9 +42,9 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
         Costs of reading each port, in microseconds, for methods that use them; None: all switches cost the same.
     limits : Limits or None, default=None
         Constraints on the placement; its names are those of the columns of X, all of them switches.
-    binarize : float or None, default=0.0
-        A switch counts as closed if its input exceeds this number, as in scikit-learn's `BernoulliNB`. For bits, the
-        default changes nothing. None rejects any input that is not a bit.
+    binarize : float or None, default=None
+        A switch counts as closed if its input exceeds this number, as in scikit-learn's `BernoulliNB`. None rejects
+        any input that is not a bit, such as a count.
 
     Attributes
     ----------
@@ -49,6 +52,8 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
         The kept columns, in the order in which the method chose them; `get_support` and `transform` keep that of X.
     gains_ : ndarray of float, shape (n_kept,)
         The information about the class of each of `order_`, in bits: its gain in the tree for ID3, otherwise alone.
+    parameter_ : int
+        The most switches to keep, or the paper's S.
     classes_ : ndarray, shape (n_classes,)
         The labels, in ascending order.
     n_features_in_ : int
@@ -60,7 +65,7 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
     ------
     ValueError
         In `fit`, if X or y cannot be used; a MemberError for an unknown method, a PlacementError if it cannot choose
-        here, or if a number is negative.
+        here, or if a number is out of its range.
 
     See Also
     --------
@@ -79,10 +84,10 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
     def __init__(
         self,
         method: str = BEST,
-        n_switches: int = 20,
+        n_switches: int | None = None,
         min_samples: int = 0,
         ports: PortCosts | None = None,
-        binarize: float | None = 0.0,
+        binarize: float | None = None,
         limits: Limits | None = None,
     ) -> None:
         self.method = method
@@ -106,17 +111,15 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
         -------
         self
         """
-        method = METHODS.named(self.method)
-        self._choose(X, y, method.name, self.n_switches if method.by_number else self.min_samples)
+        self._choose(X, y, METHODS.named(self.method))
         return self
 
-    def _choose(self, X: ArrayLike, y: ArrayLike, method: str, parameter: int) -> Any:
+    def _choose(self, X: ArrayLike, y: ArrayLike, method: Method) -> Any:
         """Choose, set the attributes, and return the tree, if there is one."""
         inputs, targets = validate_data(self, X, y)
         check_classification_targets(targets)
-        if parameter < 0:
-            raise ValueError(f"{type(self).__name__} takes a number of switches or rows >= 0, not {parameter}")
         bits = check_bits(inputs) if self.binarize is None else inputs > self.binarize
+        self.parameter_ = self._most(bits.shape[1]) if method.by_number else self._least()
         self.classes_, labels = np.unique(targets, return_inverse=True)
         none = np.zeros((len(bits), 0), np.uint16)
         samples = Samples(bits, none, labels, tuple(map(str, self.classes_.tolist())))
@@ -125,10 +128,24 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
             if len(self.limits.names) != bits.shape[1]:
                 raise ValueError(f"the limits name {len(self.limits.names)} switches, X has {bits.shape[1]} columns")
             bound = self.limits.on(elements_of(samples), self.ports)
-        chosen = choose(samples, method, float(parameter), self.ports, bound)
+        chosen = choose(samples, method.name, float(self.parameter_), self.ports, bound)
         self.order_ = np.array(chosen.columns, dtype=np.intp)
         self.gains_ = np.array(chosen.gains)
         return chosen.tree
+
+    def _most(self, columns: int) -> int:
+        if self.n_switches is None:
+            return min(_USUAL, columns)
+        if not isinstance(self.n_switches, int | np.integer) or not 1 <= self.n_switches <= columns:
+            raise ValueError(
+                f"n_switches={self.n_switches}, and X has n_features = {columns}: give a whole number from 1 to that"
+            )
+        return int(self.n_switches)
+
+    def _least(self) -> int:
+        if not isinstance(self.min_samples, int | np.integer) or self.min_samples < 0:
+            raise ValueError(f"min_samples={self.min_samples}: give a whole number of rows, 0 or more")
+        return int(self.min_samples)
 
     def _get_support_mask(self) -> NDArray[np.bool_]:
         check_is_fitted(self)
@@ -150,7 +167,7 @@ class ID3Selector(SwitchSelector):
     ----------
     min_samples : int, default=0
         The paper's S: a node with fewer rows decides nothing, and fewer switches are kept; 0 does not prune.
-    binarize : float or None, default=0.0
+    binarize : float or None, default=None
         A switch counts as closed if its input exceeds this number; None rejects any input that is not a bit.
         (`grow_id3` takes inputs of more than two values.)
 
@@ -158,7 +175,7 @@ class ID3Selector(SwitchSelector):
     ----------
     tree_ : Tree
         The tree. Its classes are `classes_`' numbers; `tree_.text(names)` prints it.
-    order_, gains_, classes_, n_features_in_, feature_names_in_
+    order_, gains_, parameter_, classes_, n_features_in_, feature_names_in_
         As in `SwitchSelector`; the gains are those in the tree, and add up.
 
     See Also
@@ -180,10 +197,10 @@ class ID3Selector(SwitchSelector):
     array([False,  True,  True, False])
     """
 
-    def __init__(self, min_samples: int = 0, binarize: float | None = 0.0) -> None:
+    def __init__(self, min_samples: int = 0, binarize: float | None = None) -> None:
         super().__init__(PAPERS, min_samples=min_samples, binarize=binarize)
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Grow the tree of bits X (n_samples, n_features) and labels y (n_samples,), and keep the inputs it tests."""
-        self.tree_ = self._choose(X, y, PAPERS, self.min_samples)
+        self.tree_ = self._choose(X, y, METHODS[PAPERS])
         return self

@@ -22,7 +22,7 @@ from ..frontier.words import (
     of_time,
     rates_of,
     summary,
-    training_of,
+    trainer_of,
     way_of,
     wiring_of,
 )
@@ -175,7 +175,7 @@ def _make_point(marker: ElementTree.Element, said: str, picked: bool) -> None:
 
 def _detail(point: Point, frontier: Frontier, hand: HandShape | None) -> Detail:
     setting = point.setting
-    what = (inputs_of(point), setting.placement.method, training_of(setting), f"{setting.width} bits")
+    what = (inputs_of(point), setting.placement.method, trainer_of(setting), f"{setting.width} bits")
     words = ", ".join(filter(None, (*what, _wiring(point))))
     return Detail(
         number=point.number,
@@ -199,7 +199,7 @@ def _facts(point: Point, frontier: Frontier) -> Iterable[tuple[str, str]]:
     yield "Inputs", f"{setting.inputs}, {counted(len(point.switches), 'switch', 'switches')}"
     yield "Wiring", f"{_wiring(point)}; {counted(point.ports, 'port')}, {counted(point.chips, 'chip')}"
     layout = setting.layout and f"; {setting.layout}"
-    yield "Tables", f"{training_of(setting)}, {setting.width} bits{layout}"
+    yield "Tables", f"{trainer_of(setting)}, {setting.width} bits{layout}"
     asked = f"the joints are read in {percent(point.asked)} of frames, where the switches do not decide"
     ending = {"full": "full", "early": "ends early", "demand": asked}[setting.scan]
     yield "Scan", f"{_time(point.scan)}; {ending}" if point.switches else DASH
@@ -238,6 +238,7 @@ def _points(frontier: Frontier) -> PlainTable:
         elements_of(frontier).capitalize(),
         "Inputs",
         "Method",
+        "Trainer",
         *rates_of(frontier),
         *(of_time(frontier, what) for what in ("Frame, µs", "Latency, µs", "99th pct., µs")),
     )
@@ -247,6 +248,7 @@ def _points(frontier: Frontier) -> PlainTable:
             str(len(point.switches)),
             point.setting.inputs,
             _placement(point),
+            trainer_of(point.setting),
             *(interval(rate(point)) for rate in rates_of(frontier).values()),
             microseconds(point.frame.us),
             *_latency(point),
@@ -256,18 +258,19 @@ def _points(frontier: Frontier) -> PlainTable:
         for point in frontier.points
     )
     caption = f"Points of the frontier; accuracy in % with 95{NBSP}% intervals"
-    return PlainTable(caption, (*columns, "Missed, %", "Flash, bytes"), rows, words=(0, 2, 3))
+    return PlainTable(caption, (*columns, "Missed, %", "Flash, bytes"), rows, words=(0, 2, 3, 4))
 
 
 def _tables(frontier: Frontier) -> Iterator[PlainTable]:
     """Yield tables of reference points, baselines, screened placements and model errors, where there are any."""
-    kept = elements_of(frontier).capitalize()
+    kept, trainer = elements_of(frontier).capitalize(), "".join(frontier.trainers[:1]) or "none"
     if frontier.marks:
         marks = tuple(
             (mark.name, str(mark.n_switches), interval(mark.rate), microseconds(mark.frame_us))
             for mark in frontier.marks
         )
-        yield PlainTable("Reference points", ("What", kept, f"{frontier.by}, %", of_time(frontier, "Frame, µs")), marks)
+        caption = f"Reference points; trainer: {trainer}, that of a build as compiled"
+        yield PlainTable(caption, ("What", kept, f"{frontier.by}, %", of_time(frontier, "Frame, µs")), marks)
     if frontier.curves:
         sizes = sorted({size for curve in frontier.curves for size in curve.sizes})
         rows = []
@@ -276,13 +279,14 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
             cells = (f"{100 * rates[size].mean:.1f}" if size in rates else "" for size in sizes)
             rows.append((f"{curve.method}{' (ours)' if curve.ours else ''}", curve.what, *cells))
         columns = ("Method", "Description", *(f"{size:g}" for size in sizes))
-        caption = f"Accuracy in % ({frontier.by}, trials), switches only, against the number of switches"
-        yield PlainTable(caption, columns, tuple(rows), words=(0, 1))
+        what = f"Accuracy in % ({frontier.by}, trials), {elements_of(frontier)} only, against their number"
+        yield PlainTable(f"{what}; trainer: {trainer}", columns, tuple(rows), words=(0, 1))
     if frontier.tried:
         tried = tuple(
             (
                 f"{each.placement.method} {each.placement.parameter:g}",
                 each.inputs,
+                each.trainer,
                 str(each.n_switches),
                 DASH if each.rounds is None else str(each.rounds),
                 interval(each.rate),
@@ -290,8 +294,16 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
             )
             for each in frontier.tried
         )
-        columns = ("Placement", "Inputs", kept, "Rounds", f"{frontier.by}, %", of_time(frontier, "Frame, µs"))
-        yield PlainTable("Screened placements", columns, tried)
+        columns = (
+            "Placement",
+            "Inputs",
+            "Trainer",
+            kept,
+            "Rounds",
+            f"{frontier.by}, %",
+            of_time(frontier, "Frame, µs"),
+        )
+        yield PlainTable("Screened placements; settings chosen from the training rows", columns, tried, words=(0, 1, 2))
     if frontier.checks:
         checks = tuple(
             (check.what, check.how, str(check.n), f"{100 * check.mean_error:.1f}", f"{100 * check.worst_error:.1f}")

@@ -1,5 +1,6 @@
 """`report_html`: one HTML file that needs no other file, no network and no date."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 from thenar.drivers.extras import optional
@@ -75,8 +76,9 @@ def _tree(content: ReportContent) -> TreeView | None:
 def _hand(content: ReportContent) -> HandPicture | None:
     if content.hand is None or not content.sources:
         return None
+    placed = replace(SensorCount.of_build(content.manifest), joints=(0, 0))
     summary = (
-        f"{content.hand.view}; {SensorCount.of_build(content.manifest)} are kept and numbered in the order in which "
-        "they were chosen. The table lists them."
+        f"{content.hand.view}; {placed} are kept and numbered in the order in which they were chosen. "
+        "The table lists them."
     )
     return hand_picture(content.hand, content.sources, "kept-hand", "Kept sensors on the hand", sentence(summary))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.drivers.members import Members
+from thenar.drivers.names import shortened
 
 from ...samples import Columns, Samples
 from ..inputs import PlacementError
@@ -128,7 +129,8 @@ class Method:
         """Do the expensive work, and return the kept switches as a function of the parameter.
 
         Numbers of switches are rounded down. Without `ports` all switches cost the same. Raises PlacementError if
-        there are no switches, if `ports` are those of other switches, or if the required package is missing.
+        there are no switches, if `ports` are those of other switches, if the required package is missing, or if the
+        method chooses a column twice or one that there is not.
         """
         if not self.installed:
             raise PlacementError(f"{self.name} needs {self.imports}, which is missing: pip install {self.install}")
@@ -136,7 +138,18 @@ class Method:
             raise PlacementError("there are no switches to choose from: the set holds joints only")
         if ports is not None and len(ports.port_of) != samples.n_switches:
             raise PlacementError(f"ports are given for {len(ports.port_of)} switches, the set has {samples.n_switches}")
-        return self.learn(samples, ports)
+        learnt = self.learn(samples, ports)
+
+        def chosen(parameter: float) -> Columns:
+            columns = tuple(learnt(parameter))
+            if len(set(columns)) < len(columns) or not all(0 <= column < samples.n_switches for column in columns):
+                raise PlacementError(
+                    f"method {self.name!r} chose the columns {shortened(str(columns))} of {samples.n_switches}: each "
+                    "may be chosen once; report this to the method's authors"
+                )
+            return columns
+
+        return chosen
 
 
 METHODS: Members[Method] = Members("placement method", Method, "thenar.compiler.placement.methods", "thenar.methods")

@@ -50,7 +50,7 @@ def test_documents_come_and_go_with_the_builds_they_are_of(gloved: GraspSet, tmp
     made = sorted(path.name for path in build.iterdir())
     assert made == ["build.json", "ensemble.bin", "firmware", "hand.json", "tables.bin", "try.html"]
     _compile(gloved, build)
-    assert "This build reads no switches." in _compile(gloved, build, inputs="joints")
+    assert "This build reads no switches or pads." in _compile(gloved, build, inputs="joints")
     assert not (build / "spec").exists()
 
 
@@ -67,15 +67,15 @@ def test_the_same_recordings_give_the_same_documents(gloved: GraspSet, tmp_path:
 def test_switches_of_nobody_knows_which_glove_have_a_spec_without_a_pattern(
     grasp_set: GraspSet, tmp_path: Path
 ) -> None:
-    assert "The positions of these switches on the hand are not known" in _compile(grasp_set, tmp_path / "build")
+    assert "The positions of these sensors on the hand are not known" in _compile(grasp_set, tmp_path / "build")
     assert not list((tmp_path / "build" / "spec").glob("cutting.*"))
 
 
 def test_the_report_has_the_papers_tables_of_the_builds_own_folds(gloved: GraspSet, tmp_path: Path) -> None:
     words = _compile(gloved, tmp_path / "build", folds=3, seed=5)
     assert "Angle + Sel-Co" in words
-    assert "3 stratified folds of whole trials, 1 repeat from seed 5; 3 rounds" in words
-    assert "This build's recipe, within subject, 3 nested folds" in words
+    assert "3 stratified folds of whole trials, 1 repeat from seed 5; accuracies" in words
+    assert re.search(r"This build's recipe \(placement: .*; trainer: .*\), within subject, 3 nested folds", words)
 
 
 def test_without_folds_the_report_says_what_it_lacks(gloved: GraspSet, tmp_path: Path) -> None:

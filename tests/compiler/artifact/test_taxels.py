@@ -50,7 +50,7 @@ def padded(make_set: Make) -> GraspSet:
 def test_a_build_says_at_which_value_each_kept_pad_switches(padded: GraspSet, tmp_path: Path) -> None:
     manifest = compile_build(padded, tmp_path / "build", rounds=5, documents=Documents()).manifest
     elements = elements_of(Samples.of(padded))
-    assert (manifest.source.switches, manifest.source.taxels, manifest.source.joints) == (2, 4, 2)
+    assert (manifest.source.switches, manifest.source.taxels, manifest.source.joints) == (2, 4, 3)
     pads = [switch for switch in manifest.switches if switch.threshold is not None]
     assert len(pads) > len({pad.column for pad in pads})
     for pad in pads:
@@ -66,7 +66,7 @@ def test_a_build_says_at_which_value_each_kept_pad_switches(padded: GraspSet, tm
     assert " N (codes above " in rising
     assert falling.startswith("closed below ")
     text = " ".join((tmp_path / "build" / "spec" / "README.txt").read_text().split())
-    assert re.search(r"is the taxel pad0, whose counts thenar compares: .*" + re.escape(rising), text)
+    assert re.search(r"is the pad pad0, whose counts thenar compares: .*" + re.escape(rising), text)
     assert rising in (tmp_path / "build" / "report.html").read_text()
 
 

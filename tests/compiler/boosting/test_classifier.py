@@ -7,7 +7,7 @@ import pytest
 from sklearn.base import clone
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from thenar.compiler import LogitBoostClassifier
+from thenar.compiler import AdditiveLogitClassifier, LogitBoostClassifier
 from thenar.runtime.errors import ThenarError
 
 
@@ -47,11 +47,14 @@ def test_one_class_alone_is_certain() -> None:
     assert (classifier.predict_proba(X) == 1.0).all()
 
 
-def test_a_missing_input_goes_its_own_way() -> None:
+def test_a_missing_input_is_refused() -> None:
     inputs = np.array([[0.0], [0.0], [1.0], [1.0], [np.nan], [np.nan]])
     labels = np.array([0, 0, 1, 1, 2, 2])
-    classifier = LogitBoostClassifier(rounds=50).fit(inputs, labels)
-    assert classifier.predict(inputs).tolist() == labels.tolist()
+    for classifier in (LogitBoostClassifier(rounds=5), AdditiveLogitClassifier()):
+        with pytest.raises(ValueError, match="contains NaN"):
+            classifier.fit(inputs, labels)
+        with pytest.raises(ValueError, match="contains NaN"):
+            classifier.fit(inputs[:4], labels[:4]).predict(inputs)
 
 
 def test_staged_decisions_end_where_decisions_are() -> None:

@@ -27,7 +27,9 @@ Make = Callable[..., GraspSet]
 
 # Some checks take positive inputs only: all switches are closed then, and scikit-learn warns that none is kept.
 @pytest.mark.filterwarnings("ignore:No features were selected")
-@parametrize_with_checks([ID3Selector(), SwitchSelector("cmim"), SwitchSelector("elimination", n_switches=2)])
+@parametrize_with_checks(
+    [ID3Selector(binarize=0.0), *(SwitchSelector(name, binarize=0.0) for name in ("cmim", "elimination"))]
+)
 def test_scikit_learn_s_checks_pass_without_exception(estimator: BaseEstimator, check: Any) -> None:
     check(estimator)
 
@@ -101,15 +103,23 @@ def test_numbers_become_bits_at_a_threshold_or_are_refused(data: tuple[Any, Any]
     X, y = data
     pressure = np.where(X, 0.8, 0.1)
     assert ID3Selector(binarize=0.5).fit(pressure, y).tree_ == ID3Selector().fit(X, y).tree_
-    with pytest.raises(ValueError, match=r"X holds 0\.[18] in row 0, column 0"):
-        ID3Selector(binarize=None).fit(pressure, y)
+    for selector in (ID3Selector(), SwitchSelector(n_switches=2)):
+        with pytest.raises(ValueError, match=r"X holds 0\.[18] in row 0, column 0"):
+            selector.fit(pressure, y)
+        with pytest.raises(ValueError, match=r"X holds 7 in row \d+, column \d: neither 0 nor 1"):
+            selector.fit(7 * X, y)
 
 
 def test_what_cannot_be_chosen_is_said(data: tuple[Any, Any]) -> None:
     with pytest.raises(MemberError, match="there is no placement method 'best'"):
         SwitchSelector("best").fit(*data)
-    with pytest.raises(ValueError, match="SwitchSelector takes a number of switches or rows >= 0, not -1"):
-        SwitchSelector("cmim", -1).fit(*data)
+    for number in (-1, 0, 2.5, 10, 999):
+        with pytest.raises(ValueError, match=rf"n_switches={number}, and X has n_features = 9: give a whole number"):
+            SwitchSelector("cmim", number).fit(*data)  # type: ignore[arg-type]
+    assert len(SwitchSelector("cmim").fit(*data).order_) == 9
+    for number in (-1, 2.5):
+        with pytest.raises(ValueError, match=f"min_samples={number}: give a whole number of rows"):
+            ID3Selector(number).fit(*data)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="2 switches, the set has 9"):
         SwitchSelector("id3-cost", 3, ports=PortCosts((0, 0), (1.0,))).fit(*data)
 

@@ -126,6 +126,7 @@ def test_a_point_that_misses_every_grasp_has_no_latency_to_show(frontier: Fronti
     at = view.points.columns.index("Latency, µs")
     assert view.points.rows[0][at : at + 3] == (DASH, DASH, "100.0")
     assert dict(view.details[0].facts)["Latency"] == DASH
+    assert view.points.rows[0][view.points.columns.index("Trainer")].startswith(f"{first.setting.trainer}, ")
     assert DASH not in view.points.rows[1][at : at + 3]
     assert "No tools were there." in view.notes
     by_frame, _, by_latency = view.charts
