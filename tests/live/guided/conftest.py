@@ -123,10 +123,10 @@ class Wearer:
         (folder / "wearer.toml").write_text(performance.calibration.to_toml())
         (folder / "glove.toml").write_text(GLOVE.format(folder=folder, switches=names))
         sensors = len(performance.calibration.sensors)
-        scanner_line = stack.enter_context(PtyLine(folder / "scanner", 1_000_000))
-        glove_line = stack.enter_context(PtyLine(folder / "glove"))
-        self.scanner = stack.enter_context(EmulatedScanner(scanner_line, len(names)))
-        self.glove = stack.enter_context(EmulatedCyberGlove(glove_line, sensors=sensors))
+        self.scanner_line = stack.enter_context(PtyLine(folder / "scanner", 1_000_000))
+        self.glove_line = stack.enter_context(PtyLine(folder / "glove"))
+        self.scanner = stack.enter_context(EmulatedScanner(self.scanner_line, len(names)))
+        self.glove = stack.enter_context(EmulatedCyberGlove(self.glove_line, sensors=sensors))
         self.show(0)
 
     def show(self, row: int) -> int:
