@@ -314,7 +314,7 @@ class Guide:
         self._become(Stage.REVIEW)
 
     def _lack(self, now_us: int, oldest_us: int) -> str:
-        """Return what is not read in frames of at most this age, as a sentence; "" if all is."""
+        """Return the inputs that are not read in frames of at most this age, as a sentence; "" if all is."""
         session = self._recorder.session
         if session.switches or session.taxels:
             if self._switches is None or now_us - self._switches.time_us > oldest_us:
@@ -332,7 +332,7 @@ class Guide:
         return ""
 
     def _lost(self, now_us: int, disconnected: Sequence[str]) -> str:
-        """Return what has not been read for so long that it counts as lost."""
+        """Return the devices or inputs that count as lost."""
         if disconnected:
             return f"{list_names(disconnected)} not connected"
         lack = self._lack(now_us, self.old_us)
