@@ -225,13 +225,7 @@ class Guide:
         """
         for frame in arrived:
             self._record(frame)
-        lack = self._lack(now_us, self.old_us)
-        if not lack or self._whole_us is None:
-            self._whole_us = now_us
-        if disconnected:
-            self.lost = f"not connected: {list_names(disconnected)}"
-        else:
-            self.lost = lack if now_us - self._whole_us > self.old_us else ""
+        self.lost = self._lost(now_us, disconnected)
         if self.stage not in (Stage.COUNTDOWN, Stage.MOVING) or now_us < self._zero_us:
             return
         if self.stage is Stage.COUNTDOWN and self._left[-1].grasp == NONE:
@@ -320,7 +314,7 @@ class Guide:
         self._become(Stage.REVIEW)
 
     def _lack(self, now_us: int, oldest_us: int) -> str:
-        """Return what is not read in frames of at most this age, as a sentence; "" if all is."""
+        """Return the inputs that are not read in frames of at most this age, as a sentence; "" if all is."""
         session = self._recorder.session
         if session.switches or session.taxels:
             if self._switches is None or now_us - self._switches.time_us > oldest_us:
@@ -336,6 +330,17 @@ class Guide:
         if self._glove is not None and not self._glove.plugged:
             return "the CyberGlove is not plugged into its box"
         return ""
+
+    def _lost(self, now_us: int, disconnected: Sequence[str]) -> str:
+        """Return the devices or inputs that count as lost."""
+        if disconnected:
+            return f"{list_names(disconnected)} not connected"
+        lack = self._lack(now_us, self.old_us)
+        if not lack or self._whole_us is None:
+            self._whole_us = min(
+                (frame.time_us for frame in (self._switches, self._glove) if frame is not None), default=now_us
+            )
+        return lack if now_us - self._whole_us > self.old_us else ""
 
     def _label(self, now_us: int, event: Event) -> None:
         trial = self._left[-1]

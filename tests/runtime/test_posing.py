@@ -2,6 +2,7 @@ import pytest
 
 from thenar.drivers.calibration import FLAT, POSES
 from thenar.drivers.cyberglove_protocol import SENSORS_18
+from thenar.runtime.frames import OLD_US
 from thenar.runtime.posing import SETTLE_US, PoseGuide, PoseKey, PoseStage
 
 HOLD_US = 1_000_000
@@ -11,6 +12,17 @@ ALL = (FLAT, *POSES)
 @pytest.fixture
 def guide() -> PoseGuide:
     return PoseGuide(SENSORS_18, HOLD_US)
+
+
+def test_no_pose_is_taken_of_a_glove_that_is_silent(guide: PoseGuide) -> None:
+    guide.press(0, PoseKey.ACCEPT)
+    guide.take(0, bytes([60] * 18))
+    guide.press(OLD_US + 1, PoseKey.ACCEPT)
+    assert set(guide.offered(OLD_US + 1)) == {PoseKey.QUIT}
+    assert PoseKey.ACCEPT in guide.offered(OLD_US)
+    assert guide.step == 0
+    guide.press(OLD_US, PoseKey.ACCEPT)
+    assert guide.stage is PoseStage.HELD
 
 
 def hold(guide: PoseGuide, raw: bytes, now: int = 0) -> PoseStage:
@@ -41,7 +53,7 @@ def test_poses_one_after_the_other_make_the_lines(guide: PoseGuide) -> None:
     }
     guide.press(0, PoseKey.ACCEPT)
     assert (guide.stage, guide.left) == (PoseStage.OVER, False)
-    assert guide.offered() == {}
+    assert guide.offered(0) == {}
 
 
 def test_a_doubtful_pose_is_held_again_or_kept(guide: PoseGuide) -> None:
@@ -58,7 +70,7 @@ def test_a_doubtful_pose_is_held_again_or_kept(guide: PoseGuide) -> None:
 
 
 def test_one_goes_back_pose_by_pose_also_from_the_end(guide: PoseGuide) -> None:
-    assert PoseKey.BACK not in guide.offered()
+    assert PoseKey.BACK not in guide.offered(0)
     through(guide)
     guide.press(0, PoseKey.BACK)
     assert (guide.stage, guide.pose) == (PoseStage.READY, ALL[-1])
@@ -71,6 +83,7 @@ def test_one_goes_back_pose_by_pose_also_from_the_end(guide: PoseGuide) -> None:
 @pytest.mark.parametrize("stage", [PoseStage.READY, PoseStage.HELD, PoseStage.DOUBTED, PoseStage.DONE])
 def test_one_may_leave_at_any_time(guide: PoseGuide, stage: PoseStage) -> None:
     if stage is PoseStage.HELD:
+        guide.take(0, bytes([60] * 18))
         guide.press(0, PoseKey.ACCEPT)
     elif stage is PoseStage.DOUBTED:
         hold(guide, bytes([1] * 18))
@@ -87,6 +100,7 @@ def test_saturated_dead_and_unmeasured_sensors_are_told(guide: PoseGuide) -> Non
     for number in range(2):
         raw = [60 + 60 * number] * 18
         raw[index] = raw[thumb] = 60
+        guide.take(0, bytes(raw))
         guide.press(0, PoseKey.ACCEPT)
         for time_us in (SETTLE_US, SETTLE_US + HOLD_US):
             guide.take(time_us, bytes(raw))

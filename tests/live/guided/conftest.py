@@ -36,6 +36,11 @@ switches = {switches}
 """
 
 
+ENTER = Keys.ENTER
+# Nothing is offered that needs a device which is silent, as one may be for a moment on a busy machine.
+_OFFERED = "return document.querySelector(`nav button:not([hidden])[aria-keyshortcuts='${arguments[0]}']`) !== null"
+
+
 class Browser(PageBrowser):
     """A browser with one page open, used by keyboard alone."""
 
@@ -54,7 +59,9 @@ class Browser(PageBrowser):
         return self.stage()
 
     def press(self, key: str) -> None:
-        """Type a key that changes something, and wait until the page shows that."""
+        """Type a key that changes something, once it is offered, and wait until the page shows that."""
+        letter = "Enter" if key == ENTER else key
+        self.wait(lambda: self.script(_OFFERED, letter))
         step = self.step()
         self.type(key)
         self.wait(lambda: self.step() != step)
@@ -76,9 +83,6 @@ class Browser(PageBrowser):
     def overflow(self) -> object:
         """Return by how many pixels the page is wider than its window."""
         return self.script("return document.documentElement.scrollWidth - innerWidth")
-
-
-ENTER = Keys.ENTER
 
 
 @pytest.fixture(scope="module")
@@ -123,10 +127,10 @@ class Wearer:
         (folder / "wearer.toml").write_text(performance.calibration.to_toml())
         (folder / "glove.toml").write_text(GLOVE.format(folder=folder, switches=names))
         sensors = len(performance.calibration.sensors)
-        scanner_line = stack.enter_context(PtyLine(folder / "scanner", 1_000_000))
-        glove_line = stack.enter_context(PtyLine(folder / "glove"))
-        self.scanner = stack.enter_context(EmulatedScanner(scanner_line, len(names)))
-        self.glove = stack.enter_context(EmulatedCyberGlove(glove_line, sensors=sensors))
+        self.scanner_line = stack.enter_context(PtyLine(folder / "scanner", 1_000_000))
+        self.glove_line = stack.enter_context(PtyLine(folder / "glove"))
+        self.scanner = stack.enter_context(EmulatedScanner(self.scanner_line, len(names)))
+        self.glove = stack.enter_context(EmulatedCyberGlove(self.glove_line, sensors=sensors))
         self.show(0)
 
     def show(self, row: int) -> int:

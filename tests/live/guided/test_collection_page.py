@@ -43,6 +43,16 @@ def reviewed(page: Browser) -> None:
         page.press(ENTER)
 
 
+def paused(page: Browser) -> None:
+    """Pause in a countdown; one that ends before the key is pressed is begun again."""
+    while (stage := page.until("countdown", "review", "ready", "paused")) != "paused":
+        if stage == "countdown":
+            page.type("p")
+            page.until("review", "ready", "paused")
+        else:
+            page.press("r" if stage == "review" else ENTER)
+
+
 def test_a_whole_collection_by_keyboard(
     record: Callable[..., Command], wearer: Wearer, browser: Browser, tmp_path: Path
 ) -> None:
@@ -90,7 +100,7 @@ def test_undo_skip_and_pause_in_two_browsers_and_a_kill(
     going = record("--no-none", "--countdown", 1.5)
     page = browser.see(going.url, width=400, scheme="dark")
     page.until("ready")
-    assert page.offered()[0] == "start the countdown Enter"
+    page.wait(lambda: page.offered()[0] == "start the countdown Enter")
     page.press("s")
     assert page.text("count") == "0 of 6 trials done, 1 skipped"
     captured(page)
@@ -113,12 +123,12 @@ def test_undo_skip_and_pause_in_two_browsers_and_a_kill(
         assert one.script("return document.querySelectorAll('main script').length") == 0
     reviewed(page)
     page.press("u")
-    page.press("p")
-    assert page.text("stage") == "paused; nothing is recorded meanwhile"
+    paused(page)
+    assert page.text("stage").startswith("paused; nothing is recorded meanwhile")
     second.until("paused")
     assert second.text("count") == "1 of 6 trials done, 1 skipped"
     # Who closes the browser in the middle of a trial loses nothing.
-    second.type(ENTER)
+    second.press(ENTER)
     page.until("countdown", "review", "ready")
     for one in (page, second):
         one.driver.get("about:blank")
@@ -158,6 +168,34 @@ def test_a_signal_ends_it_and_the_page_says_so(
     page.wait(lambda: page.text("link").startswith("page: ended since"))
     assert page.text("stage") == "the collection has ended"
     assert len(GraspSet.load(tmp_path / "set.grasps")) == 1
+
+
+def test_the_countdown_waits_for_devices_that_are_lost(
+    record: Callable[..., Command], wearer: Wearer, browser: Browser
+) -> None:
+    going = record("--no-none")
+    page = browser.see(going.url)
+    page.until("ready")
+    page.wait(lambda: page.text("stage") == "Enter starts the countdown" and page.offered()[0].startswith("start"))
+    wearer.scanner_line.unplug()
+    page.wait(lambda: page.text("stage").startswith("the countdown waits: ") and "start" not in page.offered()[0])
+    lost = page.texts("#devices [data-is=bad]")
+    assert len(lost) == 1
+    name = lost[0].removeprefix("✗ ").partition(": ")[0]
+    assert page.text("stage") == f"the countdown waits: {name} not connected"
+    page.wait(lambda: f"{name} lost since " in page.text("glove-state"))
+    wearer.glove_line.unplug()
+    switches = len(wearer.performance.switch_names)
+    page.wait(lambda: page.text("sees").startswith(f"0 of 0 readable switches closed; {switches} lost ("))
+    page.wait(lambda: "0 of 0 readable joints measured; 18 lost (" in page.text("sees"))
+    page.wait(lambda: page.script("return document.documentElement.classList.contains('old')"))
+    assert page.text("link").startswith("page: connected since ")
+    assert page.axe() == []
+    page.picture("collect-lost-1400-light")
+    wearer.scanner_line.replug()
+    wearer.glove_line.replug()
+    page.wait(lambda: page.text("stage") == "Enter starts the countdown" and page.offered()[0].startswith("start"))
+    captured(page)
 
 
 def test_without_devices_there_is_neither_a_page_nor_a_file(

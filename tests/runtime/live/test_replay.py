@@ -60,6 +60,14 @@ def test_levels_are_read_off_recorded_counts_and_switches_by_their_names(pressed
             assert (moment.grasp.candidate, moment.grasp.margin, moment.grasp.lost) == (found.grasp, found.margin, ())
 
 
+def test_no_moment_is_before_its_frames_whatever_their_order(pressed: Build, tmp_path: Path) -> None:
+    """Frames of several devices are recorded as they arrive, not in the order of their times."""
+    frames = [SwitchFrame(time_us, 0, taxels=(100, 7)) for time_us in (0, 10_000, 7_100, 20_000)]
+    grasps = [moment.grasp for moment in recognised(pressed, record(tmp_path / "late.mcap", frames))]
+    assert [grasp.time_us for grasp in grasps] == [0, 10_000, 10_000, 20_000]
+    assert [grasp.latency_us for grasp in grasps] == [0] * 4
+
+
 def test_a_taxel_that_was_not_recorded_is_named(pressed: Build, tmp_path: Path) -> None:
     path = record(tmp_path / "heel.mcap", [SwitchFrame(0, 0, taxels=(7,))], taxels=("heel",))
     with pytest.raises(SettingError, match=r"heel\.mcap was recorded without pad>60, which the build"):

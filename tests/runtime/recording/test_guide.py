@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.frames import OLD_US, GloveFrame, SwitchFrame
 from thenar.runtime.recording.guide import FRESH_US, MOVING_US, Guide, Key, Stage, planned, read_journal
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Collection, Label, Session, Task
@@ -137,6 +137,38 @@ def test_nothing_is_captured_of_devices_that_are_not_all_there(
     assert guide.problem == ""
     guide.take(2 * COUNTDOWN_US, whole(2 * COUNTDOWN_US))
     assert stage(guide) is Stage.REVIEW
+
+
+def test_no_countdown_starts_while_a_device_is_lost(guide: Guide, recorder: Recorder) -> None:
+    guide.take(0, whole(0))
+    assert Key.ACCEPT in guide.offered()
+    guide.take(1, [], ["bench scanner"])
+    assert guide.lost == "bench scanner not connected"
+    guide.press(1, Key.ACCEPT)
+    guide.press(1, Key.REDO)
+    assert stage(guide) is Stage.READY
+    guide.take(OLD_US, [SwitchFrame(OLD_US, 0)])
+    assert guide.lost == ""
+    guide.take(OLD_US + 1, [SwitchFrame(OLD_US + 1, 0)])
+    assert guide.lost == "the CyberGlove is silent"
+    assert Key.ACCEPT not in guide.offered()
+    now = 2 * OLD_US
+    guide.take(now, whole(now))
+    # One frame with a lost switch is no lost device.
+    for time_us, lost in ((now + 1, ""), (now + OLD_US + 1, "switches cannot be read: s001")):
+        guide.take(time_us, [SwitchFrame(time_us, 0, lost=2), GloveFrame(time_us, b"\x01\x02", 3)])
+        assert guide.lost == lost
+    now += 2 * OLD_US
+    guide.take(now, whole(now))
+    guide.press(now, Key.ACCEPT)
+    now += COUNTDOWN_US
+    guide.take(now, whole(now))
+    assert stage(guide) is Stage.REVIEW
+    # A trial that is kept does not begin the next countdown either; what was captured is still shown.
+    guide.take(now + 1, [], ["glove", "bench scanner"])
+    assert guide.captured == tuple(whole(now))
+    guide.press(now + 1, Key.ACCEPT)
+    assert (guide.stage, guide.done, guide.lost) == (Stage.READY, 1, "glove, bench scanner not connected")
 
 
 def test_a_frame_as_old_as_may_be_is_captured(guide: Guide) -> None:

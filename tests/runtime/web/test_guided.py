@@ -12,7 +12,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
-from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.frames import OLD_US, GloveFrame, SwitchFrame
 from thenar.runtime.live.sources import DeviceState
 from thenar.runtime.recording.guide import Guide, Key, planned
 from thenar.runtime.recording.session import Collection, Session, Task
@@ -79,6 +79,17 @@ def test_what_the_glove_sees(page: GuidePage, guide: Guide) -> None:
     page.show(180_000, guide, DEVICES)
     assert told(page, "guide")["guide"]["joints"] == [70.0, 50.0]
     assert seen["devices"][1] == {"name": "scanner", "connected": False, "error": "is gone"}
+
+
+def test_joints_of_an_old_record_are_not_told_as_measured(page: GuidePage, guide: Guide) -> None:
+    guide.take(0, frames(0, (500, 40)))
+    for now_us, joints in ((OLD_US, [70.0, None]), (2 * OLD_US, [])):
+        guide.take(now_us, [SwitchFrame(now_us, 0, lost=0b111)])
+        page.show(now_us, guide, DEVICES)
+        found = told(page, "guide")["guide"]
+        assert found["joints"] == joints
+        assert found["lost"] == ("" if joints else "switches cannot be read: a, b, c")
+        assert (found["time_us"], found["age_us"]) == (now_us, 0)
 
 
 def test_a_browser_that_comes_late_gets_all_and_presses_at_its_step(page: GuidePage, guide: Guide) -> None:
