@@ -23,7 +23,7 @@ from .oddities import first_oddity
 from .sniff import sniff
 from .table import Table, is_text, read_table
 from .taxonomy import plain, published_for
-from .trial_files import Report, find_files, is_pattern, read_files
+from .trial_files import Report, emptied, find_files, is_pattern, read_files
 from .trials import groups, in_runs, restarts, unit_of_time
 
 # The share of a stream's label changes that lead to or from the label for nothing held.
@@ -66,40 +66,48 @@ def propose_file(path: Path, progress: Report = lambda _done, _total: None) -> t
     table = read_files(files, text, progress) if files else read_table(path, text)
     if text.skip is None:
         text, remarks = PLAIN._replace(skip=table.skip), [skipped(table.skip)] * bool(table.skip)
+    # What a path says is no input, and only a field that is called so has a role.
+    fields = {*files[0].fields} - {*KEYS} if files else set()
+    paths = [*sorted(fields), *([table.rows.column] if isinstance(table.rows, FileRows) else [])]
     try:
-        proposal = propose(table, text, remarks)
+        proposal = propose(emptied(table, paths), text, remarks)
     except TableError as reason:
         raise TableError(f"{reason}; {odd}" if (odd := first_oddity(table)) else str(reason)) from reason
     if others:
         left = f"{len(others)} tables next to them do not match: {list_names([shortened(name) for name in others])}"
         proposal = replace(proposal, remarks=(f"files: {len(files)}; {left}", *proposal.remarks))
-    return table, _by_file(table, proposal) if files else proposal
+    return table, _by_file(table, proposal, tuple(paths)) if files else proposal
 
 
-def _by_file(table: Table, proposal: Proposal) -> Proposal:
+def _by_file(table: Table, proposal: Proposal, paths: tuple[str, ...]) -> Proposal:
     """Return the proposal with the file among the columns of the trial, unless no trial is in two files.
 
-    Not in a stream with rest, whose trials are runs of rows of one label.
+    Not in a stream with rest, whose trials are runs of rows of one label. `paths` are the columns that only the path
+    fills.
     """
     columns, rows = proposal.columns, table.rows
-    if not isinstance(rows, FileRows) or (columns.frames == "restart" and columns.none):
-        return proposal
+    assert isinstance(rows, FileRows)
+    roles = [
+        replace(role, columns=tuple(name for name in role.columns if name not in paths)) for role in proposal.roles
+    ]
+    roles = [role for role in roles if role.columns]
     given = [name for key in ("label", "subject", "object", "session", "trial") for name in columns.parts(key)]
     file = groups(_texts(table, [rows.column]))
     trial = groups(*(_texts(table, [name]) for name in given))
-    if columns.frames is None and columns.parts("trial") and len(np.unique(groups(trial, file))) == trial.max() + 1:
-        return proposal
+    is_stream = columns.frames == "restart" and columns.none
+    if is_stream or (columns.parts("trial") and len(np.unique(groups(trial, file))) == trial.max() + 1):
+        return replace(proposal, roles=(*roles, Role(paths, "left out", "of the path")))
     parts = (rows.column, *columns.parts("trial"))
     reason = "each file is one trial" if len(parts) == 1 else "numbers of trials are of one file"
-    roles = [
-        replace(role, columns=tuple(name for name in role.columns if name != rows.column))
-        for role in proposal.roles
-        if role.role != "trial"
-    ]
+    rest = tuple(name for name in paths if name != rows.column)
     return replace(
         proposal,
         columns=replace(columns, trial=parts if len(parts) > 1 else parts[0], frames=None),
-        roles=(Role(parts, "trial", reason), *(role for role in roles if role.columns)),
+        roles=(
+            *(role for role in roles if role.role != "trial"),
+            Role(parts, "trial", reason),
+            *([Role(rest, "left out", "of the path")] if rest else ()),
+        ),
         lacks="",
     )
 

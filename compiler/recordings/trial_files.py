@@ -7,6 +7,7 @@ as deep as it has slashes, whatever links there are. Hidden files are left out.
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -152,6 +153,12 @@ def read_files(files: Sequence[TrialFile], text: TextFormat, report: Report) -> 
         decimal=tables[0].decimal,
         skip=tables[0].skip,
     )
+
+
+def emptied(table: Table, names: Sequence[str]) -> Table:
+    """Return `table` with the columns `names` empty, which are therefore no inputs."""
+    empty = np.full(len(table.rows), "")
+    return replace(table, columns={**table.columns, **dict.fromkeys(names, empty)})
 
 
 def _check_alike(first: str, table: Table, other: str, its: Table) -> None:

@@ -52,6 +52,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def columns_toml() -> Path:
+    """Return the file of the detected columns."""
+    (path,) = Path().glob("*columns.toml")
+    return path
+
+
 def imported(*arguments: str) -> GraspSet:
     assert run(["import", *arguments, "-o", "set.grasps", "--overwrite"]) == 0
     return GraspSet.load("set.grasps")
@@ -66,6 +72,8 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 def test_the_fields_of_a_pattern_are_columns() -> None:
     write()
     found = imported(PATTERN, "--yes")
+    # What was proposed is what the same pattern can be imported with.
+    assert imported(PATTERN, "--columns", str(columns_toml())).fingerprint() == found.fingerprint()
     tables = [frame.assign(label=label, subject=subject, trial=trial) for label, subject, trial, frame in trials()]
     order = sorted(range(18), key=lambda n: ("cup key pen".index(tables[n]["label"][0]), n))
     pd.concat([tables[number] for number in order]).to_csv("one.csv", index=False)
@@ -73,8 +81,6 @@ def test_the_fields_of_a_pattern_are_columns() -> None:
     for name in ("codes", "labels", "subjects", "trials", "times_us"):
         assert np.array_equal(getattr(found, name), getattr(one, name)), name
     assert found.taxonomy == one.taxonomy
-    # What was proposed is what the same pattern can be imported with.
-    assert imported(PATTERN, "--columns", "columns.toml").fingerprint() == found.fingerprint()
 
 
 def test_a_folder_proposes_its_pattern(capsys: pytest.CaptureFixture[str]) -> None:
@@ -95,7 +101,7 @@ def test_a_folder_proposes_its_pattern(capsys: pytest.CaptureFixture[str]) -> No
     ):
         assert line in said.out.splitlines()
     again = said.err.rpartition("then run: ")[2]
-    assert again == f"thenar import '{PATTERN}' -o set.grasps --columns columns.toml\n"
+    assert again == f"thenar import '{PATTERN}' -o set.grasps --columns {columns_toml()}\n"
     assert run(shlex.split(again)[1:]) == 0
     by_hand = GraspSet.load("set.grasps")
     assert imported("data", "--yes").fingerprint() == by_hand.fingerprint()
@@ -132,7 +138,7 @@ def test_each_file_is_a_trial_whatever_its_path_says(pattern: str) -> None:
     write("data/{label}_{subject}_{trial}.csv", start=1.0)
     found = imported(pattern, "--yes")
     assert len(np.unique(found.trial_ids)) == 18
-    assert 'trial = "file"' in Path("columns.toml").read_text()
+    assert 'trial = "file"' in columns_toml().read_text()
 
 
 def test_numbers_of_trials_in_the_files_are_of_one_file() -> None:
@@ -142,7 +148,8 @@ def test_numbers_of_trials_in_the_files_are_of_one_file() -> None:
             table.to_csv(f"{subject}_{day}.csv", index=False)
     found = imported("{subject}_{part}.csv", "--yes")
     assert len(np.unique(found.trial_ids)) == 2 * 2 * 9
-    assert 'trial = [\n    "file",\n    "rep",\n]' in Path("columns.toml").read_text()
+    assert found.joint_names == ("f1", "f2")
+    assert 'trial = [\n    "file",\n    "rep",\n]' in columns_toml().read_text()
     assert len(np.unique(imported("{subject}_{session}.csv", "--yes").sessions)) == 2
 
 
@@ -183,12 +190,12 @@ def test_faults_name_the_file_and_the_row(capsys: pytest.CaptureFixture[str]) ->
     path.write_text(good)
     imported(PATTERN, "--yes")
     path.write_text("\n".join([*lines[:3], "0.02,oops,1", *lines[4:]]))
-    assert "1 cell, row 4 of key/ben_2.csv 'f1' ('oops')" in refused(capsys, PATTERN, "--columns", "columns.toml")
+    assert "1 cell, row 4 of key/ben_2.csv 'f1' ('oops')" in refused(capsys, PATTERN, "--columns", str(columns_toml()))
     path.write_text("\n".join([*lines[:3], "0.02,,1", *lines[4:]]))
-    columns = Path("columns.toml").read_text()
-    Path("columns.toml").write_text('missing = "drop"\n' + columns)
+    columns = columns_toml().read_text()
+    columns_toml().write_text('missing = "drop"\n' + columns)
     capsys.readouterr()
-    assert run(["import", PATTERN, "-o", "set.grasps", "--overwrite", "--columns", "columns.toml", "--json"]) == 0
+    assert run(["import", PATTERN, "-o", "set.grasps", "--overwrite", "--columns", str(columns_toml()), "--json"]) == 0
     dropped = json.loads(capsys.readouterr().out)["warnings"][0]
     assert "row 4 of key/ben_2.csv (columns f1)" in dropped["message"]
     # In the table of all files: six rows each, key/ben is fourth of six, its second trial the eleventh file.
@@ -220,7 +227,7 @@ def test_what_is_no_set_of_files_is_said(capsys: pytest.CaptureFixture[str]) -> 
 def test_fields_cannot_leave_the_folder(capsys: pytest.CaptureFixture[str]) -> None:
     write()
     Path("other_1.csv").write_text("time,f1,f2\n0,1,2\n")
-    assert len(np.unique(imported("data/*/{subject}_{label}.csv", "--yes").trial_ids)) == 18
+    assert len(np.unique(imported("data/*/{label}_{trial}.csv", "--yes").trial_ids)) == 18
     assert "no table matches" in refused(capsys, "data/{label}{x}_{trial}.csv", "--yes")
 
 
@@ -234,4 +241,4 @@ def test_a_stream_in_each_file_keeps_its_trials() -> None:
     found = imported("{subject}.csv", "--yes")
     assert len(np.unique(found.movement_ids)) == 10
     assert {*found.subjects.tolist()} == {"anna", "ben"}
-    assert 'frames = "restart"' in Path("columns.toml").read_text()
+    assert 'frames = "restart"' in columns_toml().read_text()

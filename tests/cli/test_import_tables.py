@@ -19,12 +19,18 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def columns_toml() -> Path:
+    """Return the file of the detected columns."""
+    (path,) = Path().glob("*columns.toml")
+    return path
+
+
 def imported(path: str | Path, capsys: pytest.CaptureFixture[str]) -> GraspSet:
     """Import `path` with the detected columns, and again with the columns.toml of that: the sets are the same."""
-    for made in Path().glob("columns*.toml"):
+    for made in Path().glob("*columns*.toml"):
         made.unlink()
     assert run(["import", str(path), "-o", "a.grasps", "--yes", "--overwrite"]) == 0, capsys.readouterr().err
-    assert run(["import", str(path), "-o", "b.grasps", "--columns", "columns.toml", "--overwrite"]) == 0
+    assert run(["import", str(path), "-o", "b.grasps", "--columns", str(columns_toml()), "--overwrite"]) == 0
     assert Path("a.grasps").read_bytes() == Path("b.grasps").read_bytes()
     return GraspSet.load("a.grasps")
 
@@ -68,7 +74,7 @@ def test_the_preface_of_the_cases(cases: Path, capsys: pytest.CaptureFixture[str
     grasp_set = imported(cases / "preface_lines" / "with_preface.csv", capsys)
     assert grasp_set.joint_names == ("index_mcp", "thumb_ip")
     assert "rows left out at the top: 7 (skip = 7), which have other cells" in capsys.readouterr().out
-    assert "skip = 7\n" in Path("columns.toml").read_text()
+    assert "skip = 7\n" in columns_toml().read_text()
 
 
 # OpenSim, Vicon Nexus, a spreadsheet saved as text, notes of two cells, and none.
@@ -100,7 +106,7 @@ def test_lines_before_the_table_are_left_out(
     else:
         assert "no column tells which rows are frames of one trial" in refused("t.txt", capsys)
     lines = PREFACES[kind].count("\n")
-    assert (f"skip = {lines}\n" in Path("columns.toml").read_text()) is bool(lines)
+    assert (f"skip = {lines}\n" in columns_toml().read_text()) is bool(lines)
     assert ("rows left out at the top" in said) is bool(lines and header)
 
 
@@ -112,9 +118,9 @@ def test_a_spreadsheet_has_lines_before_its_table_too(capsys: pytest.CaptureFixt
         frame.to_excel(writer, index=False, startrow=3)
     grasp_set = imported("t.xlsx", capsys)
     assert grasp_set.joint_names == FINGERS[:3]
-    assert "skip = 3\n" in Path("columns.toml").read_text()
-    Path("columns.toml").write_text(Path("columns.toml").read_text().replace("skip = 3", "skip = 99"))
-    assert run(["import", "t.xlsx", "-o", "c.grasps", "--columns", "columns.toml"]) == 2
+    assert "skip = 3\n" in columns_toml().read_text()
+    columns_toml().write_text(columns_toml().read_text().replace("skip = 3", "skip = 99"))
+    assert run(["import", "t.xlsx", "-o", "c.grasps", "--columns", str(columns_toml())]) == 2
     assert "t.xlsx: it holds no cells below row 99 (`skip`)" in capsys.readouterr().err
 
 
@@ -126,7 +132,7 @@ def test_rows_keep_their_numbers_below_a_preface(capsys: pytest.CaptureFixture[s
     lines = text.splitlines()
     lines[9] = "A,1,oops"
     Path("t.csv").write_text("\n".join(lines))
-    assert run(["import", "t.csv", "-o", "c.grasps", "--columns", "columns.toml"]) == 2
+    assert run(["import", "t.csv", "-o", "c.grasps", "--columns", str(columns_toml())]) == 2
     assert "row 10 'a' ('oops')" in capsys.readouterr().err
 
 
@@ -175,9 +181,9 @@ def test_lists_in_cells_become_columns(kind: str, capsys: pytest.CaptureFixture[
 def test_the_lists_of_the_cases(cases: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = str(cases / "list_in_cell" / "list.csv")
     assert "no column tells which rows are frames of one trial" in refused(path, capsys)
-    text = Path("columns.toml").read_text()
-    Path("columns.toml").write_text('frames = "independent"\n' + text)
-    assert run(["import", path, "-o", "a.grasps", "--columns", "columns.toml"]) == 0
+    text = columns_toml().read_text()
+    columns_toml().write_text('frames = "independent"\n' + text)
+    assert run(["import", path, "-o", "a.grasps", "--columns", str(columns_toml())]) == 0
     assert GraspSet.load("a.grasps").joint_names == ("data.0", "data.1")
 
 
