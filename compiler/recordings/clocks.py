@@ -91,6 +91,7 @@ class Course:
         A recognised clock, and its name.
     """
 
+    @np.errstate(over="ignore", invalid="ignore")
     def __init__(
         self,
         owner: NDArray[np.intp],
@@ -111,15 +112,19 @@ class Course:
         self.sorted = len(self.first) == len(np.unique(group))
         self.orders = [_successors(self.first, of) for of in (np.zeros_like(owner), owner, group)]
 
+    @np.errstate(over="ignore", invalid="ignore")
     def sign(self, values: Values) -> Sign | None:
-        """Return the sign in `values` (n,) that they are no sensor's, None without one."""
+        """Return the sign in `values` (n,) that they are not a sensor's, None without one."""
         steps = np.diff(values)
         if np.count_nonzero(steps < 0) > np.count_nonzero(steps > 0):
             values, steps = -values, -steps
         if len(steps) < 2 or not steps.any():
             return None
-        signs = (self._equal_steps(values, steps), self._over_trials(values, steps), self._along(values))
-        found = [sign for sign in (*signs, self._few(steps)) if sign is not None]
+        signs, inside = [self._equal_steps(values, steps)], steps[self.within]
+        # Sensors fall as often as they rise, nearly all of them: the rest is for what hardly falls within trials.
+        if np.count_nonzero(inside < 0) <= _FALLS * len(inside):
+            signs += [self._over_trials(values, steps), self._along(values), self._few(steps)]
+        found = [sign for sign in signs if sign is not None]
         return next((sign for sign in found if sign.certain), found[0] if found else None)
 
     def _equal_steps(self, values: Values, steps: Values) -> Sign | None:
@@ -141,10 +146,7 @@ class Course:
 
     def _over_trials(self, values: Values, steps: Values) -> Sign | None:
         """Judge by the rise from trial to trial: in the file, of one subject and session, and among repetitions."""
-        inside = steps[self.within]
-        if np.count_nonzero(inside < 0) > _FALLS * len(inside):
-            return None
-        found = None
+        inside, found = steps[self.within], None
         for order, (before, after) in enumerate(self.orders):
             rise = values[after] - values[before]
             up, down = np.count_nonzero(rise > 0), np.count_nonzero(rise < 0)

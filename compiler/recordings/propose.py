@@ -112,6 +112,7 @@ def _by_file(table: Table, proposal: Proposal, paths: tuple[str, ...]) -> Propos
     )
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ()) -> Proposal:
     """Return the proposed roles of the columns of `table`. Raises TableError if there is no label or no input."""
     found = [facts_of(table, name) for name in table.columns]
@@ -129,7 +130,7 @@ def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ())
         why["time"] += f"; in {unit}"
     taken = {name for columns in chosen.values() for name in columns}
     rest = [column for column in found if column.name not in taken]
-    inputs = inputs_of(rest, held, _counting(table, rest, chosen) | out)
+    inputs = inputs_of(rest, held, _counting(table, found, chosen) | out)
     if not any(role.role in ("switches", "taxels", "joints") for role in inputs):
         raise TableError(f"{table.what}: no column holds numbers that change: it has no inputs{_left_out(inputs)}")
     used = taken | {name for role in inputs if role.role != "left out" for name in role.columns}
@@ -228,7 +229,7 @@ def _corresponds(table: Table, other: Facts, column: Facts) -> bool:
     """Return whether a column has one value for each of another's, more than one and fewer than there are rows."""
     if not (other.nominal and 1 < other.distinct == column.distinct < other.rows):
         return False
-    return int(groups(_texts(table, [other.name]), _texts(table, [column.name])).max()) + 1 == column.distinct
+    return int(groups(_numbered(table, other), _numbered(table, column)).max()) + 1 == column.distinct
 
 
 def _trial_number(
@@ -237,7 +238,7 @@ def _trial_number(
     """Take a column that numbers the trials for the trial, if none has such a name."""
     if "trial" in chosen:
         return
-    group = groups(*(_texts(table, chosen[key]) for key in ("label", "subject", "object", "session") if key in chosen))
+    group = _grouped(table, found, chosen, ("label", "subject", "object", "session"))
     taken = {name for columns in chosen.values() for name in columns}
     for column in found:
         if column.name in taken or column.bits or not column.whole or column.distinct < 2:
@@ -256,9 +257,9 @@ def _constant_texts(
     out: dict[str, str],
 ) -> None:
     """Take texts that are constant within trials for the subject, the session or the object."""
-    label = _texts(table, chosen["label"])
-    who = [label, *(_texts(table, chosen[key]) for key in ("subject", "object", "session", "trial") if key in chosen)]
-    trial = np.cumsum(np.diff(groups(*who), prepend=-1) != 0)
+    label = _grouped(table, found, chosen, ("label",))
+    who = _grouped(table, found, chosen, ("label", "subject", "object", "session", "trial"))
+    trial = np.cumsum(np.diff(who, prepend=-1) != 0)
     taken = {name for columns in chosen.values() for name in columns}
     for column in found:
         if column.name in taken | out.keys() or column.values is not None or not 1 < column.distinct <= _TYPES:
@@ -292,24 +293,40 @@ def _who(column: Facts, crossed: bool, chosen: Iterable[str]) -> str:
     return next((key for key in likely if key not in chosen and column.distinct > 2), "")
 
 
-def _counting(table: Table, rest: Sequence[Facts], chosen: dict[str, tuple[str, ...]]) -> dict[str, str]:
-    """Return which of the other columns are certainly clocks, counters or trial numbers, and why."""
-    keys = [key for key in ("subject", "session", "label", "object", "trial") if key in chosen]
-    texts = {key: groups(_texts(table, chosen[key])) for key in keys}
-    one = np.zeros(len(table.rows), np.intp)
-    owner = groups(one, *(texts[key] for key in ("subject", "session") if key in texts))
-    group = groups(owner, *(texts[key] for key in ("label", "object") if key in texts))
-    trial = groups(group, texts["trial"]) if "trial" in texts else group
+def _numbered(table: Table, column: Facts) -> NDArray[np.intp]:
+    """Return numbers (n,) that are equal where the cells of a column are."""
+    if column.values is None:
+        return groups(_texts(table, [column.name]))
+    cells = np.full(column.rows, np.nan)
+    cells[column.there] = column.values
+    return groups(cells)
+
+
+def _grouped(
+    table: Table, found: Sequence[Facts], chosen: dict[str, tuple[str, ...]], keys: Iterable[str]
+) -> NDArray[np.intp]:
+    """Return numbers (n,) that are equal where all columns of these keys are."""
+    names = {name for key in keys for name in chosen.get(key, ())}
+    parts = [_numbered(table, column) for column in found if column.name in names]
+    return groups(np.zeros(len(table.rows), np.intp), *parts)
+
+
+def _counting(table: Table, found: Sequence[Facts], chosen: dict[str, tuple[str, ...]]) -> dict[str, str]:
+    """Return which columns without a role are certainly clocks, counters or trial numbers, and why."""
+    owner = _grouped(table, found, chosen, ("subject", "session"))
+    group = groups(owner, _grouped(table, found, chosen, ("label", "object")))
+    trial = groups(group, _grouped(table, found, chosen, ("trial",)))
     time = _time(table, chosen)
     name = chosen["time"][0] if time is not None and not np.isnan(time).any() else ""
     course = Course(owner, group, trial, time if name else None, name)
-    found = {}
-    for column in rest:
-        if column.values is None or column.bits or column.distinct < 2:
+    taken = {name for columns in chosen.values() for name in columns}
+    signs = {}
+    for column in found:
+        if column.name in taken or column.values is None or column.bits or column.distinct < 2:
             continue
         if (sign := course.sign(column.over_rows)) and sign.certain:
-            found[column.name] = sign.reason
-    return found
+            signs[column.name] = sign.reason
+    return signs
 
 
 def _left_out(inputs: Sequence[Role]) -> str:
