@@ -10,10 +10,11 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp, Quarantined
+from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp, OutputTrouble, Quarantined
 from thenar.runtime.task import Progress
 
 Devices = Callable[[], Sequence[DeviceHealth]]
+_Wrong = Quarantined | OutputTrouble
 _Shown = tuple[LiveGrasp, Devices, HealthReport | None, Progress | None]
 
 _REDRAW_S = 0.1
@@ -66,7 +67,7 @@ class LiveView:
                 if newest is not None and newest is not shown:
                     grasp, devices, health, progress = shown = newest
                     lines = health_lines(health) if self._status else ()
-                    wrong = () if health is None else health.quarantined
+                    wrong: list[_Wrong] = [] if health is None else [*health.quarantined, *health.outputs]
                     self._live.update(drawn(grasp, devices(), lines, wrong, progress), refresh=True)
 
 
@@ -74,7 +75,7 @@ def drawn(
     grasp: LiveGrasp,
     devices: Sequence[DeviceHealth],
     lines: Sequence[str] = (),
-    wrong: Sequence[Quarantined] = (),
+    wrong: Sequence[_Wrong] = (),
     progress: Progress | None = None,
 ) -> RenderableType:
     """Return the view of one moment."""

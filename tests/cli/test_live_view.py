@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from rich.console import Console
 
 from thenar.cli.live_view import LiveView, drawn
-from thenar.runtime.published import DeviceHealth, Health, HealthReport, LiveGrasp, Quarantined
+from thenar.runtime.published import DeviceHealth, Health, HealthReport, LiveGrasp, OutputTrouble, Quarantined
 from thenar.runtime.task import Progress
 
 LONG_S = 10.0
@@ -108,13 +108,14 @@ def test_what_is_missing_is_named_six_of_it_at_most() -> None:
     assert not any(line.startswith("missing") for line in picture(grasp("Tripod")))
 
 
-def test_what_is_in_quarantine_is_drawn_with_the_reason_with_or_without_status() -> None:
+def test_what_is_in_quarantine_or_takes_nothing_is_drawn_with_the_reason_with_or_without_status() -> None:
     wrong = (Quarantined("palm", "stuck closed"), Quarantined("tip", "chattering", used=True))
     terminal = Terminal()
     health = HealthReport(0, (), (), (), (), 100.0, 90.0, 120, 0, 0, 0, quarantined=wrong)
+    health = replace(health, outputs=(OutputTrouble("recording", "the disk is full"),))
     with LiveView(Console(file=terminal, force_terminal=True, width=80)) as view:
         view.show(grasp("first"), nobody, health)
-        terminal.until("palm", "stuck closed, treated as lost", "chattering, still used")
+        terminal.until("palm", "stuck closed, treated as lost", "chattering, still used", "the disk is full")
 
 
 def test_the_newest_grasp_is_drawn() -> None:
