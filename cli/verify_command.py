@@ -83,7 +83,7 @@ def _print(found: "Verification") -> None:
     console = out()
     trials = counted(found.trials, "trial")
     console.print(
-        f"{counted(found.rows, 'row')} of {trials}; the build was trained on {found.trained_on} of these trials"
+        f"{counted(found.rows, 'row')} of {trials}; the build was trained on {found.trained_on:,} of these trials"
     )
     console.print(
         f"ensemble to float tables: at most {found.collapse_difference:.3g} of a unit, "
