@@ -14,9 +14,10 @@ from rich.table import Table
 from rich.text import Text
 
 from thenar.cli.common import err, out, print_json
-from thenar.cli.lines import echo, json_shown, shown
+from thenar.cli.lines import echo, json_shown
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.taxonomy import own
+from thenar.drivers.names import shown
 
 HOSTILE = ["\x1b[2J\x1b[31mred", "\x1b]0;title\x07", "\x9b31m", "a\rb", "a\x08b", "\u202egnp", "\u2028", "\x7f"]
 TEXTS = st.text() | st.sampled_from(HOSTILE)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.drivers.members import Members
-from thenar.drivers.names import shortened
+from thenar.runtime.names import shortened
 
 from ...samples import Columns, Samples
 from ..inputs import PlacementError
