@@ -79,7 +79,7 @@ def test_every_section_is_there_and_has_something_to_say(page: Page) -> None:
 
 def sentence_of(content: ReportContent) -> str:
     (said,) = re.findall(r'<p class="sentence">(.*?)</p>', report_html(content).decode())
-    return said.replace("\N{NO-BREAK SPACE}", " ")
+    return str(said).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_the_first_sentence_has_the_interval_and_says_what_luck_is_in_the_rate(whole: ReportContent) -> None:
