@@ -157,14 +157,15 @@ def _lend(readings: Readings, none: NDArray[np.bool_], columns: Columns, reader:
 
 
 def _runs(readings: Readings, none: NDArray[np.bool_], timeless: bool) -> NDArray[np.int64]:
-    """Return the trial number (n,) of each row; a trial starts where time does not increase or anything else changes.
+    """Return the trial number (n,) of each row; a trial starts where the clock starts again or anything else changes.
 
     Rows in which nothing is held have the number of the trial that follows.
     """
     time = np.arange(len(none), dtype=np.float64) if timeless else readings.time
     number = restarts(readings.trial_ids(), time)
     last = np.flatnonzero(np.diff(number))
-    leads = none[last] & ~none[last + 1] & (time[last] < time[last + 1])
+    clock = restarts(np.zeros(len(none), np.intp), time)
+    leads = none[last] & ~none[last + 1] & (clock[last] == clock[last + 1])
     for column in (readings.subjects, readings.sessions):
         leads &= column[last] == column[last + 1]
     return np.unique(number + np.append(leads, False)[number - 1], return_inverse=True)[1] + 1

@@ -52,8 +52,21 @@ def in_runs(*columns: NDArray[np.generic]) -> bool:
 
 
 def restarts(ids: NDArray[np.intp], time: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return numbers (n,) from 1 that increase by one where `ids` (n,) change or `time` (n,) does not increase."""
-    return np.cumsum((np.diff(ids, prepend=-1) != 0) | ~(np.diff(time, prepend=-np.inf) > 0)).astype(np.int64)
+    """Return numbers (n,) from 1 that increase by one where `ids` (n,) change or the clock `time` (n,) starts again.
+
+    It does where it falls by a usual step or more, to before the middle of what has passed since it last began. Times
+    that are repeated, or fall less, are those of a clock that is coarse or jitters.
+    """
+    steps = np.diff(time)
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    begins = np.diff(ids, prepend=-1) != 0
+    begun = np.maximum.accumulate(np.where(begins, np.arange(len(ids)), 0))
+    first = 0
+    for row in np.flatnonzero((steps < 0) & (steps <= -usual)) + 1:
+        first = max(first, int(begun[row]))
+        if first < row and 2 * time[row] < time[first] + time[row - 1]:
+            begins[row], first = True, int(row)
+    return np.cumsum(begins).astype(np.int64)
 
 
 # Units of time by the words that name them, and the smallest step between two frames for each: frames come 2 to 2000

@@ -124,7 +124,7 @@ def test_the_frames_of_a_trial_are_put_in_order_and_reduced(
 
 def test_a_trial_begins_where_time_starts_anew() -> None:
     table = Table(
-        "t.csv", {"g": ["a"] * 5 + ["b"], "t": ["0", "2", "0", "1", "1", "2"], "s": ["0", "1"] * 3}, np.arange(6)
+        "t.csv", {"g": ["a"] * 5 + ["b"], "t": ["0", "2", "0", "2", "0", "2"], "s": ["0", "1"] * 3}, np.arange(6)
     )
     columns = Columns("g", time="t", frames="restart", switches=("s",))
     assert import_table(table, columns)[0].trial_ids.tolist() == [0, 0, 1, 1, 2, 3]

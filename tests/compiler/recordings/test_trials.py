@@ -28,16 +28,20 @@ def test_rows_get_one_number_exactly_where_all_columns_are_equal(first: np.ndarr
     assert numbers.tolist() == [order.index(pair) + 1 for pair in pairs]
 
 
-def test_a_trial_begins_with_another_person_and_where_time_does_not_rise() -> None:
-    assert restarts(np.array([0, 0, 0, 1, 1, 1, 0]), np.array([5, 6, 6, 7, 8, 1, 2.0])).tolist() == [
-        1,
-        1,
-        2,
-        3,
-        3,
-        4,
-        5,
-    ]
+def test_a_trial_begins_with_another_person_and_where_the_clock_starts_again() -> None:
+    ids, time = np.array([0, 0, 0, 1, 1, 1, 0]), np.array([5, 6, 6, 7, 8, 1, 2.0])
+    assert restarts(ids, time).tolist() == [1, 1, 1, 2, 2, 3, 4]
+
+
+@given(st.lists(st.integers(3, 40), min_size=1, max_size=8), st.integers(0, 2**32 - 1))
+def test_a_clock_that_repeats_or_jitters_starts_no_trial(sizes: list[int], seed: int) -> None:
+    random = np.random.default_rng(seed)
+    time = np.concatenate([10.0 * np.arange(size) for size in sizes])
+    expected = np.repeat(np.arange(len(sizes)) + 1, sizes)
+    jittered = time + random.integers(-4, 5, len(time))
+    repeated = np.where((random.random(len(time)) < 0.3) & (time > 10), np.roll(time, 1), time)
+    for clock in (time, jittered, repeated):
+        assert restarts(np.zeros(len(time), np.intp), clock).tolist() == expected.tolist()
 
 
 @given(IDS, st.data())
