@@ -192,9 +192,11 @@ def test_what_deviates_is_said(thenar: Thenar, build: Path, demos: list[Path], t
 
 def test_what_teaches_nothing_is_refused(thenar: Thenar, build: Path, set_file: Path, tmp_path: Path) -> None:
     empty = record(build, tmp_path / "empty.mcap", [3] * 80)
+    grasps_of(np.array([0])).save(static := tmp_path / "static.grasps")
     task = ("-b", build, "-o", tmp_path / "task.json")
     for asked, reason in (
         (("teach", empty, *task), "empty.mcap shows no grasp"),
+        (("teach", static, *task), "each row of the set is a separate trial"),
         (("teach", set_file, *task), "the recordings lack 1 input of the build: bend"),
         (("run", build, "--replay", set_file, "--task", set_file), "--task has no effect for a set of grasps"),
         (("run", build, "--replay", empty, "--task", empty), "is not a task of `thenar teach`"),
