@@ -14,6 +14,7 @@ from thenar.compiler.recordings.columns import JointColumns
 from thenar.compiler.recordings.errors import ColumnsError, RecordingError, TableError
 
 
+@pytest.mark.filterwarnings("ignore:.*may be clocks:UserWarning")  # a joint may be called T
 @given(data=st.data(), codes=st.booleans())
 @settings(deadline=None)
 def test_a_set_comes_back_from_its_frame(

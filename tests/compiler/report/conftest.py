@@ -19,6 +19,7 @@ from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.report.content import ReportContent
 from thenar.compiler.tables.compare import worst_case
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.simulator.handmaps.handmap import hand_map
@@ -73,7 +74,10 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
     """Return what a caller that knows everything would hand over, without a frontier."""
     tree = grow_id3(grasp_set.switches, grasp_set.labels, min_samples=8)
     names = [grasp_set.switch_names[number] for number in tree.inputs]
-    glove = GloveWiring(port="/dev/ttyUSB0") if grasp_set.joints else None
+    # Of a joint that the driver does not know, the glove must be told the name.
+    joints = grasp_set.joint_names
+    sensors = SENSORS_18 if set(joints) <= set(SENSORS_18) else (*joints, *SENSORS_18[len(joints) :])
+    glove = GloveWiring(port="/dev/ttyUSB0", joints=sensors) if joints else None
     harness = propose_harness(names, cyberglove=glove)
     made = compile_build(grasp_set, folder, prune=8, rounds=4, folds=2, harness=harness)
     asked = Asked(rounds=2, folds=2, repeats=1, prune=8, prune_list=(0, 8))
