@@ -75,7 +75,10 @@ def test_the_spec_in_a_build_is_what_spec_writes_of_it(
 def test_a_wiring_is_in_the_report_and_its_spec_agrees(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
     build, spec, glove = tmp_path / "build", tmp_path / "spec", tmp_path / "glove.toml"
     done(thenar("compile", gloved_file, "-o", build, *QUICK, "--no-report", "--propose", glove))
-    done(thenar("compile", gloved_file, "-o", build, *QUICK, "--glove", glove))
+    compiled = thenar("compile", gloved_file, "-o", build, *QUICK, "--glove", glove)
+    assert compiled.returncode == 0, compiled.stderr
+    # Nobody knows how the set's own joints are wired: the proposed glove measures none.
+    assert compiled.stderr.startswith("warning: nothing in 'glove' reads the build's joints")
     assert "A whole scan is" in told(build)
     done(thenar("spec", build, "-o", spec))
     for path in spec.iterdir():
