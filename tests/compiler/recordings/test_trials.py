@@ -38,10 +38,10 @@ def test_a_clock_that_repeats_or_jitters_starts_no_trial(sizes: list[int], seed:
     random = np.random.default_rng(seed)
     time = np.concatenate([10.0 * np.arange(size) for size in sizes])
     expected = np.repeat(np.arange(len(sizes)) + 1, sizes)
-    jittered = time + random.integers(-4, 5, len(time))
+    jittered = time + random.integers(-4, 5, len(time)).astype(np.float64)
     repeated = np.where((random.random(len(time)) < 0.3) & (time > 10), np.roll(time, 1), time)
     for clock in (time, jittered, repeated):
-        assert restarts(np.zeros(len(time), np.intp), clock).tolist() == expected.tolist()
+        assert restarts(np.zeros(len(time), np.intp), clock.astype(np.float64)).tolist() == expected.tolist()
 
 
 @given(IDS, st.data())
