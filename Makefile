@@ -35,7 +35,7 @@ else
 	$(BIN)/thenar draw $(OUT)/set.grasps -o $(OUT)/contacts.svg --overwrite
 	$(BIN)/thenar draw $(OUT)/set.grasps --place -o $(OUT)/kept.svg --overwrite
 endif
-	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json --overwrite $(if $(TABLE),--repeats 1 --tables compositions)
+	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json --overwrite --repeats 1 $(if $(TABLE),--tables compositions)
 	$(BIN)/thenar frontier $(OUT)/set.grasps -o $(OUT)/frontier --methods elimination,id3 --baselines none --rounds 50 --repeats 1 --finalists 4 --budget-us 5000
 	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build --from $(OUT)/frontier/frontier.json
 	$(BIN)/thenar verify $(OUT)/build $(OUT)/set.grasps

@@ -9,7 +9,7 @@ import click
 from rich.table import Table
 from rich.text import Text
 
-from thenar.compiler.text import interval
+from thenar.compiler.text import counted, interval
 
 from .common import (
     OutputFile,
@@ -155,7 +155,7 @@ def _simulate(scene: "Scene", output: Path, jobs: int, *, keep_unsettled: bool) 
     with progress(f"simulating {scene.name}") as report:
         simulated = simulate(scene, jobs, report, keep_unsettled=keep_unsettled)
     simulated.grasp_set.save(output)
-    show(simulated.report, _print_report, output)
+    show(simulated.report, _print_report, output, simulated.grasp_set.size)
 
 
 def _print_scenes(scenes: "list[Shipped]") -> None:
@@ -163,15 +163,13 @@ def _print_scenes(scenes: "list[Shipped]") -> None:
         echo(f"{scene.name:<16}{scene.what}")
 
 
-def _print_report(report: "Report", path: Path) -> None:
+def _print_report(report: "Report", path: Path, size: str) -> None:
     """Print the grasps by type and the cost of each step, and warn of grasps that did not settle."""
     console = out()
     fresh = f"after repetition {report.done}, " if report.done else ""
-    none = report.rows - sum(grasp.rows for grasp in report.grasps)
-    free = f" ({none} with nothing held)" if none else ""
     console.print(
-        f"{path}: {report.rows} rows{free}, simulated: scene {report.scene}, seed {report.seed}, {fresh}"
-        f"{len(report.subjects)} subject(s), {report.repetitions} grasps in {report.seconds:.1f} s"
+        f"{path}: {size}, simulated: scene {report.scene}, seed {report.seed}, {fresh}"
+        f"{counted(len(report.subjects), 'subject')}, {counted(report.repetitions, 'grasp')} in {report.seconds:.1f} s"
     )
     console.print()
     console.print(_grasps(report))
@@ -193,7 +191,7 @@ def _table(title: str, *columns: str) -> Table:
 def _grasps(report: "Report") -> Table:
     grasps = _table(
         "Grasps, simulated",
-        *("grasp type", "grasps", "rows", "switches ON", "from - to", "distinct patterns", "no contact", "unsettled"),
+        *("grasp type", "grasps", "frames", "switches ON", "from - to", "distinct patterns", "no contact", "unsettled"),
         *("N between switches", "largest residual N", "N mm"),
     )
     for grasp in report.grasps:
