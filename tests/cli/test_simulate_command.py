@@ -279,6 +279,7 @@ main()
 def test_one_process_needs_nothing_beyond_the_base_dependencies(tmp_path: Path) -> None:
     command = [sys.executable, "-c", WITH_THE_BASE_ALONE, str(tmp_path / "set.grasps")]
     done = subprocess.run(command, capture_output=True, text=True)
-    assert (done.returncode, done.stdout.splitlines()[0].partition(": ")[2].split(",")[0]) == (0, "54 trials of 54 frames"), (
-        done.stderr
-    )
+    assert (done.returncode, done.stdout.splitlines()[0].partition(": ")[2].split(",")[0]) == (
+        0,
+        "54 trials of 54 frames",
+    ), done.stderr
