@@ -206,7 +206,7 @@ def _own(name: str) -> str:
 
 
 def _shared(name: str) -> str:
-    return files("thenar.runtime.web").joinpath("pages", name).read_text(encoding="utf-8")
+    return files("thenar.runtime").joinpath("web", "pages", name).read_text(encoding="utf-8")
 
 
 @lru_cache(maxsize=1)
