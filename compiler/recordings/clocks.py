@@ -6,6 +6,7 @@ the same course in all of them.
 """
 
 import re
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -110,7 +111,13 @@ class Course:
         self.time, self.time_name = time, time_name
         # Where each label and object comes once, the first values may rise because the labels are sorted.
         self.sorted = len(self.first) == len(np.unique(group))
-        self.orders = [_successors(self.first, of) for of in (np.zeros_like(owner), owner, group)]
+        self._owner, self._group = owner, group
+
+    @cached_property
+    def orders(self) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """The first rows of trials, and of the next trial: in the file, of one owner, and of one group."""
+        # Only when a column changes: a table of a million equal rows has a million trials.
+        return [_successors(self.first, of) for of in (np.zeros_like(self._owner), self._owner, self._group)]
 
     @np.errstate(over="ignore", invalid="ignore")
     def sign(self, values: Values) -> Sign | None:
