@@ -6,6 +6,7 @@ the same course in all of them.
 """
 
 import re
+from collections.abc import Iterable
 from functools import cached_property
 from typing import NamedTuple
 
@@ -238,10 +239,10 @@ def numbers_trials(values: Values, group: NDArray[np.intp]) -> bool:
     return bool((values == np.rint(values)).all() and ((steps == 0) | next_one | anew).all())
 
 
-def possible_clocks(columns: dict[str, Values], course: Course) -> list[Finding]:
+def possible_clocks(columns: Iterable[tuple[str, Values]], course: Course) -> list[Finding]:
     """Return a finding about those of the inputs `columns` that may be clocks, counters or trial numbers."""
     found = {}
-    for name, values in columns.items():
+    for name, values in columns:
         words = words_of(name)
         if is_time(words) or is_count(words):
             found[name] = "its name is that of a clock or a counter"

@@ -430,7 +430,7 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         for column, (name, entry) in enumerate(selection.coded)
     ]
     costs = tuple(cost for _, _, cost in coded)
-    inputs = dict(zip((name for name, _ in selection.coded), readings.joints.T, strict=True))
+    inputs = zip((name for name, _ in selection.coded), readings.joints.T, strict=True)
     joints, taxels = coded[: len(selection.joints)], coded[len(selection.joints) :]
     empty = np.zeros((len(grasps), 0), np.uint16)
     # Read-only, so that the set uses them without copies.
