@@ -4,6 +4,7 @@ Each sub-command is loaded only when it is called. If the reader of a pipe goes 
 silently with click's exit code 1.
 """
 
+import errno
 import os
 import sys
 import tempfile
@@ -85,9 +86,17 @@ def run_group(arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         raise
     except BaseException as fault:
+        if _nobody_reads(fault):
+            return 1
         echo(f"thenar: {_sentence(fault, arguments)}", err=True)
         return 2
     return code if isinstance(code, int) else 0
+
+
+def _nobody_reads(fault: BaseException) -> bool:
+    """Return whether this is how click ends when the reader of standard output has gone, such as `head`."""
+    reason = fault.__context__
+    return isinstance(fault, SystemExit) and isinstance(reason, OSError) and reason.errno == errno.EPIPE
 
 
 def _sentence(fault: BaseException, arguments: Sequence[str]) -> str:

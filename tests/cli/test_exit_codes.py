@@ -256,3 +256,13 @@ def test_a_port_on_the_command_line_is_held_to_the_rule_for_those_in_files(thena
     said = _one_sentence(thenar("calibrate", f"spy:///dev/null?file={victim}", "-o", tmp_path / "anna.toml"))
     assert "is not a supported port: a port is a device such as /dev/ttyUSB0" in said
     assert victim.read_text() == "kept"
+
+
+def test_a_command_ends_silently_when_the_reader_of_its_output_has_gone() -> None:
+    command = [sys.executable, "-m", "thenar.cli", "stability", "--list"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        process.stdout.close()
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+    assert process.returncode == 1

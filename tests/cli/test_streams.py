@@ -202,7 +202,7 @@ def test_names_are_stripped_checked_and_left_to_a_sender_that_names_its_columns(
 def test_lines_of_one_word_are_shown_and_rows_that_end_with_carriage_returns_are_read(cases: Path, words: bool) -> None:
     sender = [sys.executable, str(cases / "word_lines_silent" / "send.py"), *([] if words else ["cr"])]
     with subprocess.Popen(sender, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
-        command = [sys.executable, "-m", "thenar.cli", "doctor", "--line", "-", "--seconds", "1", "--json"]
+        command = [sys.executable, "-m", "thenar.cli", "doctor", "--line", "-", "--seconds", "3", "--json"]
         done = subprocess.run(command, stdin=process.stdout, capture_output=True, text=True, check=False)
         process.kill()
     if words:
