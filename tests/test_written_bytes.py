@@ -73,7 +73,9 @@ def results_of(grasps: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -
     return {
         "replay": digest(grasps_of_rows),
         "evaluation.json": digest(json.loads((folder / "evaluation.json").read_text())),
-        "curves": digest([(curve["method"], curve["sizes"], [r["correct"] for r in curve["rates"]]) for curve in curves]),
+        "curves": digest(
+            [(curve["method"], curve["sizes"], [r["correct"] for r in curve["rates"]]) for curve in curves]
+        ),
     } | {f"spec/{name}": digest for name, digest in digests(spec)}
 
 
