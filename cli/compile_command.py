@@ -123,7 +123,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
         for name, given in PRESETS.items()
     ),
 )
-@method_option()
+@method_option
 @keep_option
 @levels_option
 @keep_joints_option
