@@ -25,7 +25,7 @@ def poses(scene: Scene, repetitions: int) -> Iterator[Batch]:
     """Yield every condition's first repetitions, in the form that the contact model takes."""
     pipeline = compile_pipeline(scene)
     before = tuple(stop for stop in pipeline.stops if stop.effect.stage == "posture")
-    for session in sessions(scene, Postures.of(scene)):
+    for session in sessions(scene, Postures.shipped(scene.taxonomy)):
         for place, trials in enumerate(session.trials):
             batch = session.batch(place, np.arange(min(repetitions, len(trials))))
             Pipeline(pipeline.setting, before).run([batch], Ledger())

@@ -108,7 +108,7 @@ def command(
     loaded = load_scene(scene).varied(repetitions, seed, names, more, rest, subjects)
     with _located(scene):
         if output is not None:
-            keep_apart(own_file(scene), loaded.postures, output)
+            keep_apart(own_file(scene), output)
             _simulate(loaded, output, jobs, keep_unsettled=keep_unsettled)
         elif explain:
             from thenar.simulator.running.explain import explain as explained

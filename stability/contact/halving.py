@@ -55,7 +55,7 @@ def findings(full: bool) -> Iterator[Finding]:
 def shipped(repetitions: int) -> Iterator[Load]:
     """Yield the grasps of the shipped scene's first subject, varied by its effects."""
     scene, rng = load_scene("kamakura"), np.random.default_rng(14)
-    for condition in conditions_of(scene, scene.subjects[0], Postures.of(scene)):
+    for condition in conditions_of(scene, scene.subjects[0], Postures.shipped(scene.taxonomy)):
         target, n = condition.held, repetitions
         pose = target.pose + rng.normal(size=(n, 6)) * ([1.5] * 3 + [np.radians(2.5)] * 3)
         posture_deg = target.posture_deg + 1.5 * rng.normal(size=(n, 20))

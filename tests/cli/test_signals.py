@@ -36,7 +36,6 @@ main()
 PF_EXITING = 4
 COMMANDS = {
     "simulate": "simulate crowd -o new.grasps --jobs 2",
-    "plan": "plan quick --anew -o new.json --jobs 2",
     "evaluate": "evaluate set.grasps --repeats 50 -o new.json --jobs 2",
     "compile": "compile set.grasps -o new --rounds 100000 --folds 10",
     "verify": "verify build set.grasps --firmware host",

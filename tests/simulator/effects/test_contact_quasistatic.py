@@ -27,7 +27,7 @@ def conditions() -> list[Condition]:
     scene = load_scene("kamakura")
     return [
         condition
-        for session in sessions(scene, Postures.of(scene))
+        for session in sessions(scene, Postures.shipped(scene.taxonomy))
         for condition in session.conditions
         if condition.grasp in ("PoS", "CMF") or condition.thing.name == "pin"
     ]

@@ -63,18 +63,17 @@ def test_the_least_scene_has_defaults_for_everything_else(scene: Load) -> None:
         recording=Recording(rate_hz=100.0, lead_ms=0.0, hold_ms=500.0, release_ms=0.0, rows="last"),
         glove=Glove(layout="murakami160", threshold_n=1.0, codes="common"),
         effects=(),
-        postures=None,
     )
 
 
 def test_everything_that_is_said_is_kept(scene: Load, tmp_path: Path) -> None:
     found = scene(
-        'name = "other"\npostures = "own/mine.json"\n'
+        'name = "other"\n'
         + LEAST
         + '[recording]\nrate_hz = 50\nlead_ms = 10\nhold_ms = 20\nrelease_ms = 30\nrows = "all"\n'
         + '[glove]\nthreshold_n = 0.8\ncodes = "raw"\n'
     )
-    assert (found.name, found.postures) == ("other", tmp_path / "own" / "mine.json")
+    assert found.name == "other"
     assert found.recording == Recording(rate_hz=50.0, lead_ms=10.0, hold_ms=20.0, release_ms=30.0, rows="all")
     assert found.glove == Glove(threshold_n=0.8, codes="raw")
 
