@@ -31,7 +31,7 @@ from .options import Training, asked_settings, method_list, trainer_option
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from thenar.compiler.frontier.points import Check, Frontier, Point
+    from thenar.compiler.frontier.points import Frontier, Point
     from thenar.compiler.frontier.search import Search
 
 
@@ -199,14 +199,12 @@ def _print(found: "Frontier", output: Path) -> None:
 
 
 def print_frontier(frontier: "Frontier") -> None:
-    """Print the points, the picked one bold; then the checks, the omissions, and the caption of the picture."""
+    """Print the points, the picked one bold; then the omissions, and the caption of the picture."""
     from thenar.compiler.frontier.words import LUCK, folds_of, summary
 
     console = out()
     console.print(_grid(frontier))
     console.print(Text(f"{folds_of(frontier)}. Accuracy in % with 95 % intervals. {LUCK} Flash, RAM: bytes.", "dim"))
-    for check in frontier.checks:
-        console.print(Text(_check(check)))
     for missing in frontier.skipped:
         console.print(Text(missing, "yellow"))
     console.print()
@@ -250,10 +248,3 @@ def _cells(point: "Point", rated: Sequence[str]) -> tuple[Text, ...]:
         f"{point.ram:,}",
     )
     return tuple(map(Text, texts))
-
-
-def _check(check: "Check") -> str:
-    return (
-        f"{check.what}, {check.how}: {check.n} times compared with the model, "
-        f"mean error {check.mean_error:.1%}, worst {check.worst_error:.1%}"
-    )

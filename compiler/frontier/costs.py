@@ -16,8 +16,8 @@ FEWER = 5
 # Expected seconds of one core to learn what segments cost, and to play a stream.
 LEARNT_S = 5.0
 # Empirical: number of marked placements in addition to the finalists; of designs of a finalist on a front; the share of
-# distinct placements among those tried; of layouts to simulate in addition.
-_MARKED, _DESIGNS, _DIFFERENT, _CHECKED = 3, 2, 0.8, 30
+# distinct placements among those tried.
+_MARKED, _DESIGNS, _DIFFERENT = 3, 2, 0.8
 
 
 def estimated_costs(survey: Survey) -> dict[str, float]:
@@ -62,6 +62,5 @@ def estimated_costs(survey: Survey) -> dict[str, float]:
         OTHERS: last * sum(fit_s(few, (few.stages, few.tabled), n) for n in more),
         "prices": last * PRICE_S,
         "simulations": last * _DESIGNS * TRIAL_S * simulated,
-        "checks": _CHECKED * TRIAL_S * simulated,
         "latencies": last * (2.0 + _DESIGNS * (LEARNT_S if survey.grasp_set.is_none.any() else 1.0)),
     }

@@ -313,7 +313,7 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
     closes = look_closely(survey, finalists(screened, list(named), search.finalists))
     every = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
     by_time, by_switches = best_designs(every)
-    kept, checks, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
+    kept, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
     luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
     points = points_of(kept, _latencies(survey, stream, kept), luck, survey.names, survey.training, survey.some_joints)
     picked, tried = wanted.pick(points), _tried(screened, closes, search)
@@ -342,7 +342,6 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
         tried=tried,
         curves=curves,
         marks=(*marks_of(named, closes, survey), *own),
-        checks=checks,
         skipped=(*lacking, *claimed, *skipped, *early, stream.what),
         picked=None if picked is None else picked.number,
         wanted=wanted.words,
