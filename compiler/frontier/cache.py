@@ -33,6 +33,8 @@ OLD_HEADERS = tuple(b'{"thenar":"store of answers","schema":%d}\n' % n for n in 
 # process, because it measures this machine, whose name is then part of the cache key.
 Place = Literal["cluster", "machine", "process"]
 Report = Callable[[int, int], None]
+# Steps of the progress of one round.
+ROUND = 100
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -56,9 +58,9 @@ class Stored(Generic[P, R]):
         # Workers find it by name, like any function.
         return self.function.__qualname__
 
-    def call(self, cost: float, /, *args: P.args, **kwargs: P.kwargs) -> "Call[R]":
-        """Return a call for `Cache.ask`, expected to take `cost` seconds of one core."""
-        return Call(self, args, kwargs, cost)
+    def call(self, *args: P.args, **kwargs: P.kwargs) -> "Call[R]":
+        """Return a call for `Cache.ask`."""
+        return Call(self, args, kwargs)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,7 +70,6 @@ class Call(Generic[R]):
     work: Stored[..., R]
     args: tuple[Any, ...]
     kwargs: Mapping[str, Any]
-    cost: float
 
     def __call__(self) -> R:
         """Compute and return the result."""
@@ -222,39 +223,35 @@ class Store(Closing):
 
 
 class Cache:
-    """Returns stored results at once, computes the others in workers and stores them; one progress over all stages.
+    """Returns stored results at once, computes the others in workers and stores them.
 
-    report   called with the done and total expected seconds of one core. When a stage begins, its actual cost replaces
-             the estimate; stored results cost nothing, so speed and remaining time stay correct.
+    report   called with done and total: every call of `ask` is a round of the same weight, ROUND
+    rounds   how many rounds there will be
     jobs, cluster  as for in_workers. Results do not depend on either.
     """
 
-    def __init__(self, store: Store, report: Report, *, jobs: int = -1, cluster: str | None = None) -> None:
-        self.jobs = jobs
-        self._store, self._report, self._cluster = store, report, cluster
-        self._costs: dict[str, float] = {}
-        self._done = 0.0
+    def __init__(
+        self, store: Store, report: Report, rounds: int = 1, *, jobs: int = -1, cluster: str | None = None
+    ) -> None:
+        self._store, self._report, self._rounds, self._jobs, self._cluster = store, report, rounds, jobs, cluster
+        self._begun = 0
 
-    def expect(self, costs: Mapping[str, float]) -> None:
-        """Set the estimated costs of stages that have not begun."""
-        self._costs = {**costs, **self._costs}
-
-    def ask(self, stage: str, calls: Sequence[Call[R]]) -> list[R]:
+    def ask(self, calls: Sequence[Call[R]]) -> list[R]:
         """Return the results in the order of `calls`, all of one function; equal calls are computed once.
 
-        The most expensive calls begin first. Raises StoreError, exceptions of the function, and those of in_workers;
-        results computed until then are stored.
+        Raises StoreError, exceptions of the function, and those of in_workers; results computed until then are stored.
         """
+        self._begun += 1
         if not calls:
-            self._begin(stage, 0.0)
+            self._tell(1, 1)
             return []
         kind: type[R] = get_type_hints(calls[0].work.function)["return"]
         digests: dict[int, str] = {}
         questions = [call.question(digests) for call in calls]
         asked = dict(zip(questions, calls, strict=True))
         found = {key: known for key in asked if (known := self._store.get(key, kind)) is not None}
-        todo = sorted((key for key in asked if key not in found), key=lambda key: -asked[key].cost)
-        self._begin(stage, sum(asked[key].cost for key in todo))
+        todo = [key for key in asked if key not in found]
+        self._tell(len(found), len(asked))
         for number, result in self._found([asked[key] for key in todo], calls[0].work.where):
             key = todo[number]
             self._store.put(key, result)
@@ -263,21 +260,16 @@ class Cache:
             if read is None:
                 raise TypeError(f"the result of {asked[key].work.function.__name__} is no {kind} when read from JSON")
             found[key] = read
-            self._add(asked[key].cost)
+            self._tell(len(found), len(asked))
         return [found[key] for key in questions]
 
-    def _begin(self, stage: str, cost: float) -> None:
-        self._costs[stage] = cost
-        self._add(0.0)
-
     def _found(self, calls: Sequence[Call[R]], where: Place) -> Iterator[tuple[int, R]]:
-        jobs, cluster = (1 if where == "process" else self.jobs), (self._cluster if where == "cluster" else None)
+        jobs, cluster = (1 if where == "process" else self._jobs), (self._cluster if where == "cluster" else None)
         return in_workers(_computed, enumerate(calls), jobs, cluster)
 
-    def _add(self, cost: float) -> None:
-        self._done += cost
-        total = sum(self._costs.values())
-        self._report(min(round(self._done), round(total)), round(total))
+    def _tell(self, done: int, calls: int) -> None:
+        """Report the share of this round that is done, and the rounds before it."""
+        self._report((self._begun - 1) * ROUND + ROUND * done // calls, self._rounds * ROUND)
 
 
 def _computed(numbered: tuple[int, Call[R]]) -> tuple[int, R]:

@@ -27,7 +27,6 @@ from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..text import INDEPENDENT, sentence
 from .cache import Cache, Report, Store
-from .costs import FEWER, LEARNT_S, WIDER, estimated_costs
 from .designs import Design, Latencies, best_designs, designs, lucks, points_of, with_whole_scans
 from .equipment import equipment_for
 from .finalists import Close, finalists, look_closely
@@ -53,6 +52,13 @@ _EARLY = (
     "sequential test needs whole scans."
 )
 _RENEWED = f"{STORE_NAME} had the form of an older thenar: everything was computed again"
+# Placements to screen with the other trainers, as a multiple of the finalists.
+_WIDER = 3
+# Number of placements to try with fewer joints.
+_FEWER = 5
+# Calls of `Cache.ask`: the calibration, five to screen, four with fewer joints, three with other trainers, six for the
+# finalists, the simulations, the latencies.
+_ROUNDS = 21
 _UNTIMED = (
     "the time of reading the joints ({}) is unknown and is left out of every frame time and latency: give it with "
     "--joint-us"
@@ -142,7 +148,7 @@ def find_frontier(
     cluster : str, optional
         Address of a Dask scheduler, whose workers do the work.
     report : callable, optional
-        Called with the done and total expected seconds of one core.
+        Called with the done and total steps; every round of work has the same number of them.
 
     Returns
     -------
@@ -170,14 +176,13 @@ def find_frontier(
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
     made = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
-        cache = Cache(store, report or _unheard, jobs=jobs, cluster=cluster)
+        cache = Cache(store, report or _unheard, _ROUNDS, jobs=jobs, cluster=cluster)
         with _taken_back_if_refused(made):
             records = _records(grasp_set, harness, target, joint_us, record_time, filtered)
             equipment = equipment_for(target, _wirings(grasp_set, harness, target), cache, records)
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
             played = _stream(survey, stream)
             own = () if build is None else (own_build(build, grasp_set, equipment),)
-        cache.expect(estimated_costs(survey))
         untimed = (_UNTIMED.format(list_names(grasp_set.joint_names)),) if records.how == "unknown" else ()
         renewed = (_RENEWED,) if store.renewed else ()
         found = _found(survey, played, wanted or Wanted(), own, (*renewed, *untimed, *lacking))
@@ -306,8 +311,8 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
             f"no placement that was tried can be built for {survey.equipment.model.target}: name other --methods or "
             "another --target"
         )
-    several = finalists(screened, (), WIDER * search.finalists)
-    screened += screen_fewer(survey, finalists([one for one in screened if one.choice.joints], (), FEWER))
+    several = finalists(screened, (), _WIDER * search.finalists)
+    screened += screen_fewer(survey, finalists([one for one in screened if one.choice.joints], (), _FEWER))
     screened += screen_others(survey, several)
     named = choices_to_mark(n_elements, survey.n_joints, search.trainers[0], most)
     closes = look_closely(survey, finalists(screened, list(named), search.finalists))
@@ -358,7 +363,6 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
         grouped.setdefault(design.close.screened.choice, []).append(design)
     calls = [
         latencies.call(
-            2.0 + len(mine) * (LEARNT_S if moving else 1.0),
             survey.read(choice, fold),
             fold.train,
             survey.columns(choice, fold),
@@ -374,7 +378,7 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
     ]
     return {
         (design, kind): latency
-        for mine, found in zip(grouped.values(), survey.cache.ask("latencies", calls), strict=True)
+        for mine, found in zip(grouped.values(), survey.cache.ask(calls), strict=True)
         for design, several in zip(mine, found, strict=True)
         for kind, latency in zip(design.decisions, several, strict=True)
     }

@@ -18,9 +18,6 @@ from .points import FrontierError, Time
 from .timing.classify_times import ClassifyModel, fitting
 from .timing.python_times import classify_us
 
-# Expected seconds: of a trial, of timing all designs in Python.
-TRIAL_S, _TIMES_S = 2.0, 1.0
-
 
 @stored(1, where="machine")
 def count_steps(content: bytes, layout: str, model: ClassifyModel) -> float:
@@ -55,8 +52,9 @@ def measured(designs: Sequence[Design], equipment: Equipment, cache: Cache) -> t
     Simulators run on this machine even with a cluster, whose workers may have none.
     """
     model, lack = equipment.model, unmeasured(equipment.model)
-    found = list(designs)
-    if not lack:
+    if lack:
+        found = list(designs)
+    else:
         found = _simulated(designs, model, cache) if model.part else _timed(designs, model, cache)
     said = (lack, model.note, equipment.overhead.what, equipment.records.what)
     return found, tuple(sentence for sentence in said if sentence)
@@ -79,14 +77,14 @@ def _contents(designs: Sequence[Design]) -> tuple[bytes, ...]:
 def _timed(designs: Sequence[Design], model: ClassifyModel, cache: Cache) -> list[Design]:
     contents = _contents(designs)
     assert model.python is not None
-    (us,) = cache.ask("simulations", [time_here.call(_TIMES_S, contents, model.python.yardstick)])
+    (us,) = cache.ask([time_here.call(contents, model.python.yardstick)])
     times = dict(zip(contents, us, strict=True))
     return [replace(design, measured=Time(times[design.tables.content], "measured")) for design in designs]
 
 
 def _simulated(designs: Sequence[Design], model: ClassifyModel, cache: Cache) -> list[Design]:
-    calls = [count_steps.call(TRIAL_S, design.tables.content, design.classified.layout, model) for design in designs]
-    steps = cache.ask("simulations", calls)
+    calls = [count_steps.call(design.tables.content, design.classified.layout, model) for design in designs]
+    steps = cache.ask(calls)
     return [
         replace(design, measured=Time(model.us(round(each)), "simulated"))
         for design, each in zip(designs, steps, strict=True)

@@ -228,7 +228,7 @@ def told_wrongly(number: int) -> str:
 
 
 def calls_in(folder: Path, numbers: list[int] | range) -> list[Call[Found]]:
-    return [squared.call(1.0 + number % 3, number, folder / "notes") for number in numbers]
+    return [squared.call(number, folder / "notes") for number in numbers]
 
 
 def done_in(folder: Path) -> list[int]:
@@ -242,7 +242,7 @@ def silent(_done: int, _total: int) -> None:
 
 def asked(path: Path, calls: list[Call[Found]], jobs: int = 1, cluster: str | None = None) -> list[Found]:
     with Store(path, "set") as store:
-        return Cache(store, silent, jobs=jobs, cluster=cluster).ask("", calls)
+        return Cache(store, silent, jobs=jobs, cluster=cluster).ask(calls)
 
 
 def found_of(numbers: list[int] | range) -> list[Found]:
@@ -284,7 +284,7 @@ def test_the_order_of_calls_and_of_interruptions_changes_no_answer(tmp_path: Pat
 
 
 def test_what_was_found_before_an_error_is_kept(tmp_path: Path) -> None:
-    calls = [squared.call(9.0, 1, tmp_path / "notes"), squared.call(1.0, -1, tmp_path / "notes")]
+    calls = [squared.call(1, tmp_path / "notes"), squared.call(-1, tmp_path / "notes")]
     with pytest.raises(ValueError, match="-1 is negative"):
         asked(tmp_path / "store", calls)
     with Store(tmp_path / "store", "set") as store:
@@ -293,24 +293,18 @@ def test_what_was_found_before_an_error_is_kept(tmp_path: Path) -> None:
 
 def test_an_answer_that_json_would_change_is_refused_when_it_is_found(tmp_path: Path) -> None:
     with Store(tmp_path / "store", "set") as store, pytest.raises(TypeError, match="the result of told_wrongly is no"):
-        Cache(store, silent, jobs=1).ask("", [told_wrongly.call(1.0, 1)])
+        Cache(store, silent, jobs=1).ask([told_wrongly.call(1)])
 
 
-def test_the_dearest_calls_begin_first(tmp_path: Path) -> None:
-    costs = {1: 2.0, 2: 30.0, 3: 4.0}
-    asked(tmp_path / "store", [squared.call(cost, number, tmp_path / "notes") for number, cost in costs.items()])
-    assert (tmp_path / "notes").read_text().split() == ["2", "3", "1"]
-
-
-def test_one_progress_goes_over_all_stages_and_counts_nothing_that_was_stored(tmp_path: Path) -> None:
+def test_every_round_has_the_same_weight(tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
     asked(tmp_path / "store", calls_in(tmp_path, [2]))
     with Store(tmp_path / "store", "set") as store:
-        cache = Cache(store, lambda done, total: told.append((done, total)), jobs=1)
-        cache.expect({"first": 10.0, "second": 20.0})
-        cache.ask("first", calls_in(tmp_path, range(3)))
-        cache.ask("second", [squared.call(40.0, 9, tmp_path / "notes")])
-    assert told == [(0, 23), (2, 23), (3, 23), (3, 43), (43, 43)]
+        cache = Cache(store, lambda done, total: told.append((done, total)), 3, jobs=1)
+        cache.ask(calls_in(tmp_path, range(4)))
+        cache.ask([])
+        cache.ask([squared.call(9, tmp_path / "notes")])
+    assert told == [(25, 300), (50, 300), (75, 300), (100, 300), (200, 300), (200, 300), (300, 300)]
 
 
 @stored(1)
@@ -325,26 +319,26 @@ def other_lengths(array: np.ndarray[Any, Any], name: str = "") -> int:
 
 def test_a_question_is_its_function_version_and_arguments_and_no_other() -> None:
     array = np.arange(6)
-    here = lengths.call(1.0, array).question({})
-    assert here == lengths.call(2.0, array=array.copy(), name="").question({})
+    here = lengths.call(array).question({})
+    assert here == lengths.call(array=array.copy(), name="").question({})
     others = (array[::-1], array.astype(np.int32), array.reshape(2, 3), array[:5], array + (array == 5))
-    different = [lengths.call(1.0, other) for other in others]
-    different += [lengths.call(1.0, array, "x"), other_lengths.call(1.0, array)]
+    different = [lengths.call(other) for other in others]
+    different += [lengths.call(array, "x"), other_lengths.call(array)]
     assert here not in {call.question({}) for call in different}
     assert len({call.question({}) for call in different}) == len(different)
-    assert squared.call(1.0, 1, Path("a")).question({}) == squared.call(1.0, 1, Path("b")).question({})
+    assert squared.call(1, Path("a")).question({}) == squared.call(1, Path("b")).question({})
 
 
 def run(folder: Path, numbers: range) -> None:
     """Do what the killed process below does; it says when ten answers are stored."""
 
     def told(done: int, _total: int) -> None:
-        if done >= 10:
+        if done >= 1:  # of 100, of 1000 calls
             print("ten", flush=True)
             signal.sigtimedwait([signal.SIGUSR1], 60)
 
     with Store(folder / "store", "set") as store:
-        Cache(store, told, jobs=2).ask("", [squared.call(1.0, number, folder / "notes") for number in numbers])
+        Cache(store, told, jobs=2).ask([squared.call(number, folder / "notes") for number in numbers])
 
 
 RUN = """

@@ -107,7 +107,7 @@ def test_levels_of_a_fold_come_from_its_training_rows_alone(pressed: GraspSet, t
         cache = Cache(store, lambda _done, _all: None, jobs=1)
         survey = Survey(pressed, "set", samples, ports, SEARCH, cuts, equipment, cache)
         choice, fold = Candidate(PlacementChoice("elimination-cost", 5.0), "switches", levels=3), cuts.screening[0]
-        survey.choose("placements", [choice], [fold])
+        survey.choose([choice], [fold])
         alone = samples.rows(fold.train).with_joints(())
         elements = elements_of(alone, 3)
         assert survey.elements(3, fold) == elements
