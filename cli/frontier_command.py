@@ -132,7 +132,7 @@ def command(
     """Show the trade-off between accuracy and time: which switches, joints, rounds, tables, wirings and decisions pay.
 
     Every placement is screened by a nested cross-validation. Those near the front are refined, priced for the target,
-    simulated there, and put on one picture. OUTPUT gets frontier.json, frontier.csv, three pictures and store.jsonl,
+    simulated there, and put on one picture. OUTPUT gets frontier.json, frontier.csv, three pictures and store.sqlite,
     from which an interrupted run continues.
 
     \b

@@ -45,13 +45,12 @@ from .timing.wirings import Wiring, reads_by_itself, wirings
 from .words import csv_bytes
 
 RecordTime = Literal["formula", "wire"]
-FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.jsonl"
+FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.sqlite"
 _DOCUMENTS = frozenset({FRONTIER_NAME, TABLE_NAME, *(f"{name}.svg" for name in PICTURES)})
 _EARLY = (
     "Scans that end early are tried with decisions on single frames: a dwell with a lead reads on for longer, and a "
     "sequential test needs whole scans."
 )
-_RENEWED = f"{STORE_NAME} had the form of an older thenar: everything was computed again"
 # Placements to screen with the other trainers, as a multiple of the finalists.
 _WIDER = 3
 # Number of placements to try with fewer joints.
@@ -184,10 +183,10 @@ def find_frontier(
             played = _stream(survey, stream)
             own = () if build is None else (own_build(build, grasp_set, equipment),)
         untimed = (_UNTIMED.format(list_names(grasp_set.joint_names)),) if records.how == "unknown" else ()
-        renewed = (_RENEWED,) if store.renewed else ()
-        found = _found(survey, played, wanted or Wanted(), own, (*renewed, *untimed, *lacking))
+        found = _found(survey, played, wanted or Wanted(), own, (*untimed, *lacking))
         if output is not None:
-            # The store moves into the new folder as the same file, and must stay locked meanwhile.
+            # The store moves into the new folder as the same file, and stays locked meanwhile.
+            store.finish()
             publish_folder(_documents(found), output, kept_entries, FrontierError)
     return found
 
