@@ -8,13 +8,14 @@ import click
 from rich.text import Text
 
 from thenar.compiler.text import duration, interval
-from thenar.drivers.names import printable, shortened
+from thenar.drivers.names import printable
 from thenar.runtime.manifest import AUTO
 
 from .common import (
     Number,
     OneOf,
     OutputFolder,
+    dask_option,
     err,
     existing_file,
     existing_folder,
@@ -44,12 +45,6 @@ def _timed() -> tuple[str, ...]:
     from thenar.compiler.firmware.targets import timed
 
     return timed()
-
-
-def _address(_: click.Context, __: click.Parameter, text: str | None) -> str | None:
-    if text is not None and not all(text.partition("://")):
-        raise click.BadParameter(f"{shortened(repr(text))} is not an address such as tcp://10.0.0.5:8786")
-    return text
 
 
 @click.command("frontier", cls=Training)
@@ -107,13 +102,7 @@ def _address(_: click.Context, __: click.Parameter, text: str | None) -> str | N
     help="Choose points by left-out subjects, or by trials of all subjects.  [default: subject, if several]",
 )
 @jobs_option()
-@click.option(
-    "--dask",
-    "cluster",
-    callback=_address,
-    metavar="ADDRESS",
-    help="Work on the cluster of this Dask scheduler, such as tcp://host:8786.",
-)
+@dask_option
 @json_flag
 @click.pass_context
 def command(

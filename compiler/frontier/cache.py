@@ -221,13 +221,11 @@ class Cache:
 
     report   called with done and total: every call of `ask` is a round of the same weight, ROUND
     rounds   how many rounds there will be
-    jobs, cluster  as for in_workers. Results do not depend on either.
+    jobs     as for in_workers. Results do not depend on it.
     """
 
-    def __init__(
-        self, store: Store, report: Report, rounds: int = 1, *, jobs: int = -1, cluster: str | None = None
-    ) -> None:
-        self._store, self._report, self._rounds, self._jobs, self._cluster = store, report, rounds, jobs, cluster
+    def __init__(self, store: Store, report: Report, rounds: int = 1, *, jobs: int = -1) -> None:
+        self._store, self._report, self._rounds, self._jobs = store, report, rounds, jobs
         self._begun = 0
 
     def ask(self, calls: Sequence[Call[R]]) -> list[R]:
@@ -258,8 +256,7 @@ class Cache:
         return [found[key] for key in questions]
 
     def _found(self, calls: Sequence[Call[R]], where: Place) -> Iterator[tuple[int, R]]:
-        jobs, cluster = (1 if where == "process" else self._jobs), (self._cluster if where == "cluster" else None)
-        return in_workers(_computed, enumerate(calls), jobs, cluster)
+        return in_workers(_computed, enumerate(calls), 1 if where == "process" else self._jobs, here=where != "cluster")
 
     def _tell(self, done: int, calls: int) -> None:
         """Report the share of this round that is done, and the rounds before it."""

@@ -104,7 +104,6 @@ def find_frontier(
     filtered: bool = False,
     stream: GraspSet | None = None,
     jobs: int = -1,
-    cluster: str | None = None,
     report: Report | None = None,
 ) -> Frontier:
     """Find the trade-off of accuracy and time: the best switches, joints, rounds, tables, wirings and decisions.
@@ -143,9 +142,7 @@ def find_frontier(
     stream : GraspSet, optional
         Other recordings of the same glove, to measure decision latency on; usually the test rows of the first fold.
     jobs : int
-        Worker processes, -1 for all cores.
-    cluster : str, optional
-        Address of a Dask scheduler, whose workers do the work.
+        Worker processes, -1 for all cores. Within `thenar.compiler.dask_cluster`, its workers do the work.
     report : callable, optional
         Called with the done and total steps; every round of work has the same number of them.
 
@@ -175,7 +172,7 @@ def find_frontier(
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
     made = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
-        cache = Cache(store, report or _unheard, _ROUNDS, jobs=jobs, cluster=cluster)
+        cache = Cache(store, report or _unheard, _ROUNDS, jobs=jobs)
         with _taken_back_if_refused(made):
             records = _records(grasp_set, harness, target, joint_us, record_time, filtered)
             equipment = equipment_for(target, _wirings(grasp_set, harness, target), cache, records)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from distributed import LocalCluster
 
-from thenar.compiler.cluster import ClusterError
+from thenar.compiler.cluster import ClusterError, dask_cluster
 from thenar.compiler.frontier.cache import Cache, Call, Store, StoreError, stored
 
 
@@ -204,8 +204,8 @@ def silent(_done: int, _total: int) -> None:
 
 
 def asked(path: Path, calls: list[Call[Found]], jobs: int = 1, cluster: str | None = None) -> list[Found]:
-    with Store(path, "set") as store:
-        return Cache(store, silent, jobs=jobs, cluster=cluster).ask(calls)
+    with Store(path, "set") as store, dask_cluster(cluster):
+        return Cache(store, silent, jobs=jobs).ask(calls)
 
 
 def found_of(numbers: list[int] | range) -> list[Found]:

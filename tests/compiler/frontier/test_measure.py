@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from thenar.compiler.cluster import dask_cluster
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.cache import Cache, Store
 from thenar.compiler.frontier.designs import Design
@@ -40,8 +41,8 @@ def design_of(model: ClassifyModel) -> Design:
 def test_on_a_host_the_runtime_is_timed_once(tmp_path: Path) -> None:
     model = ClassifyModel("host", python=PYTHON)
     design, equipment = design_of(model), Equipment(model, (), WIRE_ONLY)
-    with Store(tmp_path / "store", "here") as store:
-        cache = Cache(store, lambda *_: None, jobs=1, cluster="nowhere:1")
+    with Store(tmp_path / "store", "here") as store, dask_cluster("nowhere:1"):
+        cache = Cache(store, lambda *_: None, jobs=1)
         (timed,), skipped = measured([design], equipment, cache)
         known = len(store)
         (again,), _ = measured([design], equipment, cache)
