@@ -12,7 +12,6 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
         *("python_calamine", "pyarrow", "pandas", "h5py", "defusedxml", "svgelements"),
     ),
     "cluster": ("dask", "distributed"),
-    "sim": ("mujoco",),
     "stability": ("mpmath", "jinja2"),
     "ros": ("cyclonedds",),
     "ws": ("websockets",),

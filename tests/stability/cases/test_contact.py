@@ -1,7 +1,5 @@
 """The hard case of contact: what its bounds are worth, and the same truths over inputs that hypothesis makes."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -17,11 +15,11 @@ from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere, rotation
 from thenar.simulator.contact.balance import Case
 from thenar.simulator.contact.model import split
 from thenar.simulator.contact.settle import Rest, close
-from thenar.simulator.effects.contact_quasistatic import Parameters
+from thenar.simulator.effects.contact_quasistatic import Parameters, Quasistatic
 from thenar.stability.contact.grasps import HAND, Grasp, case_of, hard, held, planned
 from thenar.stability.contact.halving import kept, shipped
 from thenar.stability.contact.posed import centres, digits, exactly, left_of, length, surface
-from thenar.stability.contact.rest import SKIN, is_honest, models
+from thenar.stability.contact.rest import SKIN, is_honest
 from thenar.stability.contact.surfaces import MOST_SWITCHES
 from thenar.stability.contact.systems import errors, near_singular
 from thenar.stability.finding import Worst
@@ -132,31 +130,8 @@ def test_rest_that_is_a_little_off_is_found_out_at_60_digits(field: str) -> None
     assert after.outside > 0 if field == "drags" else after.press_n > 1e-3
 
 
-def test_both_models_are_tried_where_mujoco_is_there() -> None:
-    assert list(models()) == ["quasistatic", "mujoco"]
-
-
-WITHOUT_MUJOCO = """
-import sys
-sys.modules["mujoco"] = None
-from thenar.stability.report import load
-found = list(load("contact").findings(False))
-print(len(found) > 10, *[finding for finding in found if "mujoco" in finding.check or not finding.holds])
-"""
-
-
-@pytest.mark.slow
-def test_without_mujoco_the_case_runs_and_leaves_out_what_needs_it() -> None:
-    ran = subprocess.run(
-        [sys.executable, "-W", "error", "-c", WITHOUT_MUJOCO], capture_output=True, text=True, check=False
-    )
-    assert ran.stderr == ""
-    assert ran.stdout == "True\n"
-
-
-@pytest.mark.parametrize("name", ["quasistatic", "mujoco"])
-def test_every_hard_grasp_comes_to_the_same_numbers_alone_as_in_company(name: str) -> None:
-    model = models()[name]()
+def test_every_hard_grasp_comes_to_the_same_numbers_alone_as_in_company() -> None:
+    model = Quasistatic(Parameters())
     some = GRASPS[::5]
     for grasp, together in zip(some, model.solve([each.load for each in some]), strict=True):
         (alone,) = model.solve([grasp.load])
@@ -165,7 +140,7 @@ def test_every_hard_grasp_comes_to_the_same_numbers_alone_as_in_company(name: st
 
 
 def test_an_answer_that_is_no_number_is_not_honest() -> None:
-    (contact,) = models()["quasistatic"]().solve([held().load])
+    (contact,) = Quasistatic(Parameters()).solve([held().load])
     assert is_honest(contact)
     assert not is_honest(replace(contact, forces_n=contact.forces_n * np.nan))
     endless = replace(contact, residual_n=contact.residual_n * np.inf)
@@ -180,4 +155,4 @@ def test_hands_of_1_and_99_percent_are_those_of_the_survey() -> None:
 
 def test_most_shipped_grasps_settle_so_that_halved_steps_are_compared_at_all() -> None:
     loads = list(shipped(1))
-    assert kept(loads, models()["quasistatic"]().solve(loads)).mean() > 0.9
+    assert kept(loads, Quasistatic(Parameters()).solve(loads)).mean() > 0.9
