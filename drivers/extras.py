@@ -13,7 +13,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     ),
     "cluster": ("dask", "distributed"),
     "sim": ("mujoco",),
-    "stability": ("mpmath", "jinja2"),
+    "stability": ("mpmath",),
     "ros": ("cyclonedds",),
     "ws": ("websockets",),
     "lsl": ("pylsl",),
