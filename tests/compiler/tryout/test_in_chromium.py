@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import pytest
 from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -36,7 +35,6 @@ Make = Callable[..., GraspSet]
 
 pytestmark = pytest.mark.slow
 
-FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1400,1000")
 PATIENCE_S = 30
 
 
@@ -90,13 +88,8 @@ class Trier:
 
 
 @pytest.fixture(scope="module")
-def trier(tool: Callable[[str], str]) -> Iterator[Trier]:
-    options = webdriver.ChromeOptions()
-    options.binary_location = tool("chromium")
-    for flag in FLAGS:
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service(executable_path=tool("chromedriver")))
+def trier(new_chromium: Callable[..., webdriver.Chrome]) -> Iterator[Trier]:
+    driver = new_chromium("--window-size=1400,1000", logs=("browser", "performance"))
     yield Trier(driver)
     driver.quit()
 
