@@ -76,7 +76,7 @@ def command(
     \b
     Example:
         thenar draw --numbers -o glove.svg
-        thenar draw set.grasps --layout glove.svg --per-grasp -o contacts.png
+        thenar draw set.grasps --layout layout.toml --per-grasp -o contacts.png
         thenar draw set.grasps --place -o kept.svg
         thenar draw --kept A=a.json --kept build/ -o kept.svg
     """

@@ -256,9 +256,7 @@ def _option(setting: "Setting", chosen: bool) -> click.Option:
     return _SettingOption(decls, type=kind, show_default=shown, help=what)
 
 
-layout_option = click.option(
-    "--layout", type=existing_file, help="Your glove's switch positions: a drawing (.svg) or a list (.toml)."
-)
+layout_option = click.option("--layout", type=existing_file, help="Your glove's switch positions, a .toml file.")
 
 
 def hand_of(layout: Path | None) -> "HandShape":

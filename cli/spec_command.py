@@ -46,7 +46,7 @@ def command(
     Example:
         thenar spec build/
         thenar spec build/ --hand-length 182 --glove glove.toml -o spec/
-        thenar spec build/ --layout glove.svg -o spec/
+        thenar spec build/ --layout layout.toml -o spec/
     """
     from thenar.compiler.glove.files import check_output, files_of, write_spec
     from thenar.compiler.glove.spec import glove_spec

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from importlib.util import find_spec
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -10,14 +9,13 @@ from rich.console import Console, JustifyMethod
 from rich.table import Table
 from rich.text import Text
 
-from .common import OneOf, OutputFile, jobs_option, json_flag, out, overwrite_flag, progress, show, table
+from .common import OneOf, jobs_option, json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
     from thenar.stability.report import CaseReport, Check, Listed, Report
 
-# Packages that a run, or a page, imports at some point: better reported missing once at the start than in each case.
+# Packages that a run imports at some point: better reported missing once at the start than in each case.
 _NEEDED = ("mpmath", "joblib", "scipy", "sklearn")
-_NEEDED_FOR_A_PAGE = ("jinja2", "matplotlib")
 _HEADS = ("check", "reference", "tried", "worst error", "bound", "verdict")
 _NUMBERS = ("tried", "worst error")
 _CHECK, _REFERENCE = 0, 1  # the columns of words, which share the remaining width
@@ -36,63 +34,41 @@ def _names() -> Iterable[str]:
 @click.option("--full", is_flag=True, help="Try more and harder inputs, such as 10,000 rounds of boosting: minutes.")
 @click.option("--list", "listing", is_flag=True, help="Only list the cases, and what could go wrong in each.")
 @jobs_option("Worker processes. The result does not depend on it.")
-@click.option(
-    "-o", "--output", type=OutputFile(".html"), metavar="PAGE.html", help="Write a page with the table and pictures."
-)
-@overwrite_flag
 @json_flag
-def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int, output: Path | None) -> int:
+def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int) -> int:
     """Run the hard cases: what could go wrong numerically, the truth each is compared with, and the worst error.
 
     Without a CASE, run all of them. The truth is recomputed with 60 digits, independently of the product, or is a fact
-    that must hold exactly. Exits with 1 if an error exceeds its bound. A run of all cases, and a page, also show Weka's
-    results under two settings of its JVM, if java and Weka 3.6 are installed.
+    that must hold exactly. Exits with 1 if an error exceeds its bound. A run of all cases also shows Weka's results
+    under two settings of its JVM, if java and Weka 3.6 are installed.
 
     \b
     Example:
         thenar stability
-        thenar stability --full -o stability.html
+        thenar stability --full
         thenar stability separable weights
     """
     cases = tuple(name for name in _names() if not cases or name in cases)
     if listing:
-        if output is not None or full:
-            raise click.UsageError("--list only lists: leave out --output and --full")
+        if full:
+            raise click.UsageError("--list only lists: leave out --full")
         from thenar.stability.report import listed
 
         show(listed(cases), _print_list)
         return 0
-    for name in (*_NEEDED, *(_NEEDED_FOR_A_PAGE if output is not None else ())):
-        # Not imported here: compiler/pictures.py configures matplotlib.
+    for name in _NEEDED:
         if find_spec(name) is None:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-    return _run(cases, full=full, jobs=jobs, output=output)
-
-
-def _run(cases: tuple[str, ...], *, full: bool, jobs: int, output: Path | None) -> int:
     from thenar.stability.report import NAMES, Report, run
     from thenar.stability.weka import compare_with_weka
 
     with progress("hard cases") as report:
         found = run(cases, full=full, jobs=jobs, progress=report)
     with progress("comparing with Weka"):
-        weka = compare_with_weka() if cases == NAMES or output is not None else None
+        weka = compare_with_weka() if cases == NAMES else None
     result = Report(full, found, weka, all(case.holds for case in found))
-    if output is not None:
-        _write(result, jobs, output)
     show(result, _print)
     return 0 if result.holds else 1
-
-
-def _write(result: "Report", jobs: int, path: Path) -> None:
-    from thenar.runtime.files import write_atomically
-    from thenar.stability.shown.figures import figures, measure
-    from thenar.stability.shown.page import page
-
-    with progress("pictures") as report:
-        measured = measure(full=result.full, jobs=jobs, progress=report)
-        pictures = figures(measured, result.weka)
-    write_atomically(path, page(result, pictures).encode())
 
 
 def _print_list(cases: "list[Listed]") -> None:

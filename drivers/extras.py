@@ -9,10 +9,10 @@ from .errors import ThenarError
 EXTRAS: Mapping[str, tuple[str, ...]] = {
     "compiler": (
         *("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "ezdxf", "clevercsv"),
-        *("python_calamine", "pyarrow", "pandas", "h5py", "defusedxml", "svgelements"),
+        *("python_calamine", "pyarrow", "pandas", "h5py"),
     ),
     "cluster": ("dask", "distributed"),
-    "stability": ("mpmath", "jinja2"),
+    "stability": ("mpmath",),
     "ros": ("cyclonedds",),
     "ws": ("websockets",),
     "lsl": ("pylsl",),

@@ -1,4 +1,4 @@
-"""Run the catalogue of hard cases on all cores, and format the results for the terminal and the page."""
+"""Run the catalogue of hard cases on all cores, and format the results for the terminal."""
 
 import math
 import traceback
@@ -156,11 +156,6 @@ def figure(number: float) -> str:
     return f"{round(number):,}" if whole else f"{number:.3g}"
 
 
-def error_of(finding: Finding) -> str:
-    """Return the worst error with its unit."""
-    return f"{figure(finding.error)} {finding.unit}"
-
-
 def bound_of(finding: Finding) -> str:
     """Return the bound with its unit."""
     return f"{figure(finding.bound)} {finding.unit}"
@@ -205,7 +200,9 @@ def _fault(finding: Finding) -> str:
         return f"{finding.check}: nothing was tried"
     often = f", beyond it {finding.beyond:,} times" if finding.beyond > 1 else ""
     where = f"; worst: {finding.worst}" if finding.worst else ""
-    return f"{finding.check}: {error_of(finding)} against a bound of {bound_of(finding)}{often}{where}"
+    return (
+        f"{finding.check}: {figure(finding.error)} {finding.unit} against a bound of {bound_of(finding)}{often}{where}"
+    )
 
 
 def legend(report: Report) -> tuple[tuple[str, str], ...]:

@@ -107,16 +107,12 @@ class Comparison(msgspec.Struct, frozen=True, tag="run"):
     weka: str  # its version
     rounds: int
     classes: int
-    inputs: int
     rows: int
     held_out: int
-    learned: int | None  # the round from which thenar predicts all training rows correctly
     weka_itself: Differences  # Weka with the JVM's two exp()
     ours_processor: Differences  # thenar and Weka with the processor's exp()
     ours_java: Differences
     weka_changed: int  # held-out rows whose class in Weka depends on the choice of exp()
-    weka_value: float  # the largest branch value of Weka's stumps under either
-    our_value: float
     shuffles: int  # number of other row orders in which thenar was trained
     our_shuffled: float  # the largest difference between its held-out distributions in these orders
 
@@ -164,16 +160,12 @@ def _compare() -> Comparison:
         weka=run_weka("weka.core.Version").partition("\n")[0].strip(),
         rounds=ROUNDS,
         classes=CLASSES,
-        inputs=X.shape[1],
         rows=half,
         held_out=len(held_out),
-        learned=_learned(ours, *training),
         weka_itself=_differences(outputs["p"], outputs["j"]),
         ours_processor=_differences(outputs["o"], outputs["p"]),
         ours_java=_differences(outputs["o"], outputs["j"]),
         weka_changed=int(np.count_nonzero(winners(processor.scores(held_out)) != winners(java.scores(held_out)))),
-        weka_value=float(max(np.abs(processor.values).max(), np.abs(java.values).max())),
-        our_value=float(np.abs(ours.values).max()),
         shuffles=_SHUFFLES,
         our_shuffled=_shuffled(outputs["o"], *training, held_out),
     )
@@ -188,12 +180,6 @@ def _differences(one: Floats, other: Floats) -> Differences:
     largest = np.abs(one - other).max(axis=(1, 2))
     apart = np.flatnonzero(largest > DIVERGED)
     return Differences(tuple(largest.tolist()), int(apart[0]) + 1 if apart.size else None)
-
-
-def _learned(stumps: Stumps, X: NDArray[np.int64], labels: NDArray[np.intp]) -> int | None:
-    wrong = [bool((winners(scores) != labels).any()) for scores in stumps.staged_scores(X)]
-    last = max((round_ for round_, is_wrong in enumerate(wrong, 1) if is_wrong), default=0)
-    return last + 1 if last < len(wrong) else None
 
 
 def _shuffled(output: Floats, X: NDArray[np.int64], labels: NDArray[np.intp], held_out: NDArray[np.int64]) -> float:

@@ -172,6 +172,23 @@ def tool() -> Callable[[str], str]:
 
 
 @pytest.fixture(scope="session")
+def new_chromium(tool: Callable[[str], str]) -> Callable[..., Any]:
+    """Return a function that starts a Chromium without a window, with `flags` of its own, that keeps these `logs`."""
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    def start(*flags: str, logs: tuple[str, ...] = ("browser",)) -> webdriver.Chrome:
+        options = webdriver.ChromeOptions()
+        options.binary_location = tool("chromium")
+        for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", *flags):
+            options.add_argument(flag)
+        options.set_capability("goog:loggingPrefs", dict.fromkeys(logs, "ALL"))
+        return webdriver.Chrome(options=options, service=Service(executable_path=tool("chromedriver")))
+
+    return start
+
+
+@pytest.fixture(scope="session")
 def weka_data() -> Path:
     return need(SHARED_DATA / "weka")
 

@@ -14,7 +14,6 @@ from typing import Any
 import pytest
 from PIL import Image
 from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
 
 from .test_imports import ALLOWED, PACKAGES
 
@@ -22,7 +21,6 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 FIGURES = DOCS / "figures"
 DRAWINGS = sorted(FIGURES.glob("*.svg"))
 EACH = pytest.mark.parametrize("path", DRAWINGS, ids=lambda path: path.stem)
-FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars")
 WIDTH_PX, LEAST_PX, OF_DIAGRAMS_PX, LEAST_CONTRAST = 688, 8, 12, 4.5
 TOUCH_PX = 0.5  # rectangles that share less than this do not overlap
 
@@ -45,12 +43,8 @@ HIDE = """const style = document.createElementNS('http://www.w3.org/2000/svg', '
 
 
 @pytest.fixture(scope="module")
-def driver(tool: Callable[[str], str]) -> Iterator[webdriver.Chrome]:
-    options = webdriver.ChromeOptions()
-    options.binary_location = tool("chromium")
-    for flag in FLAGS:
-        options.add_argument(flag)
-    driver = webdriver.Chrome(options=options, service=Service(executable_path=tool("chromedriver")))
+def driver(new_chromium: Callable[..., webdriver.Chrome]) -> Iterator[webdriver.Chrome]:
+    driver = new_chromium("--hide-scrollbars")
     yield driver
     driver.quit()
 

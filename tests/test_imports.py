@@ -7,8 +7,6 @@ from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("cli", "compiler", "drivers", "firmware_templates", "runtime", "simulator", "stability")
 
@@ -177,7 +175,6 @@ def sources() -> dict[str, Path]:
 
 
 SOURCES = sources()
-EACH = pytest.mark.parametrize("name", SOURCES)
 
 
 @cache
@@ -207,28 +204,34 @@ def fits(name: str, rooms: tuple[str, ...]) -> bool:
     return any(name == room or name.startswith(room + ".") for room in rooms)
 
 
-@EACH
-def test_a_module_imports_only_what_its_room_may(name: str) -> None:
+def faults_of(name: str) -> Iterator[str]:
+    """Yield what a module imports that its room may not, and imports that are written in the wrong way."""
     room = max((key for key in ALLOWED if fits(name, (key,))), key=len)
     ours = {imported for imported in imports(name, tree_of(name)) if imported.split(".")[0] in (*PACKAGES, "thenar")}
-    assert not {imported for imported in ours if not fits(imported, (*ALLOWED[room], "drivers.extras", name))}
-
-
-@EACH
-def test_imports_are_relative_inside_a_room_and_absolute_between_rooms(name: str) -> None:
+    for imported in sorted(ours):
+        if not fits(imported, (*ALLOWED[room], "drivers.extras", name)):
+            yield f"{name} imports {imported}, which {room} may not"
     depth = len(name.split(".")) - (SOURCES[name].name != "__init__.py")
     for node in ast.walk(tree_of(name)):
         if isinstance(node, ast.ImportFrom):
-            assert node.level <= depth, f"line {node.lineno} leaves the room: write from thenar."
-            assert not fits(node.module or "", (f"thenar.{name.split('.')[0]}",)), f"line {node.lineno}: write from ."
+            if node.level > depth:
+                yield f"{name}, line {node.lineno} leaves the room: write from thenar."
+            if fits(node.module or "", (f"thenar.{name.split('.')[0]}",)):
+                yield f"{name}, line {node.lineno}: write from ."
 
 
-@EACH
-def test_the_boards_side_names_no_workstation_package_at_the_top(name: str) -> None:
-    if not fits(name, ("runtime", "drivers", "cli", "compiler.recordings")):
-        return
-    top = ast.Module([node for node in tree_of(name).body if isinstance(node, ast.Import | ast.ImportFrom)], [])
-    assert not WORKSTATION_ONLY & {imported.split(".")[0] for imported in imports(name, top)}
+def test_modules_import_what_their_room_may_relative_inside_it_and_absolute_between_rooms() -> None:
+    assert [fault for name in SOURCES for fault in faults_of(name)] == []
+
+
+def test_the_boards_side_names_no_workstation_package_at_the_top() -> None:
+    wrong = []
+    for name in SOURCES:
+        if fits(name, ("runtime", "drivers", "cli", "compiler.recordings")):
+            top = ast.Module([node for node in tree_of(name).body if isinstance(node, ast.Import | ast.ImportFrom)], [])
+            packages = WORKSTATION_ONLY & {imported.split(".")[0] for imported in imports(name, top)}
+            wrong += [f"{name} imports {package}" for package in sorted(packages)]
+    assert wrong == []
 
 
 def parts_imported(name: str) -> set[str]:

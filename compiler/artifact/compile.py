@@ -337,7 +337,7 @@ class Making:
 
         kept = self.trained.read(self.samples)
         rows = kept.switches, kept.codes, kept.labels
-        return try_html(manifest, tables, hand_from_bytes(hand, manifest), self.harness, rows)
+        return try_html(manifest, tables, hand_from_bytes(hand, manifest), rows)
 
     def _only_answer(self) -> str | None:
         predicted = np.unique(self.comparison.deployed)

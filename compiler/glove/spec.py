@@ -232,7 +232,7 @@ def _remarks(
     """Yield sentences for whoever builds the glove."""
     if hand is None:
         yield (
-            "the positions of this glove's sensors are unknown (--layout names a drawing): there is no cutting "
+            "the positions of this glove's sensors are unknown (--layout gives them): there is no cutting "
             "pattern, and wire lengths are left out"
         )
     else:

@@ -156,65 +156,29 @@ def _hdf5(path: Path, _skip: int | None) -> tuple[Columns, Sequence[int], int]:
     import h5py
 
     found: Columns = {}
+
+    def visit(name: str, item: object) -> None:
+        if not isinstance(item, h5py.Dataset) or not 1 <= item.ndim <= 2:
+            return
+        text = h5py.check_string_dtype(item.dtype)
+        if text or item.dtype.kind in "biuf":
+            _check(item.shape[0], 1)
+            if item.external or item.is_virtual:
+                raise TableError(f"{shortened(repr(item.name))} lies in another file: copy it into this one")
+            found[name] = np.array(item.asstr("utf-8", "replace")[()], np.str_) if text else item[()]
+
     with h5py.File(path, "r", locking=False) as file:
-        matlab = path.suffix.lower() == ".mat"
-
-        def visit(name: str, item: object) -> None:
-            if not isinstance(item, h5py.Dataset) or name.startswith("#") or not 1 <= item.ndim <= 2:
-                return
-            if (array := _dataset(file, item, matlab)) is not None:
-                found[name] = array
-
         file.visititems(visit)
     return _even(found)
 
 
-def _dataset(file: Any, item: Any, matlab: bool) -> AnyArray | None:
-    """Return a dataset's content if it is numbers, text, records of them, or a MATLAB cell array with text."""
-    import h5py
-
-    _check(max(item.shape) if matlab else item.shape[0], min(item.shape) if matlab else 1)
-    if h5py.check_string_dtype(item.dtype):
-        return np.array(_content(item, text=item.dtype.kind != "S"))
-    kind = item.attrs.get("MATLAB_class", b"")
-    if kind == b"cell" and h5py.check_ref_dtype(item.dtype):
-        return _array([_letters(_content(file[reference])) for reference in _content(item).ravel()])
-    if kind == b"char":
-        return np.array([_letters(row) for row in np.atleast_2d(_content(item).T)])
-    if item.dtype.kind not in "biufSV" or h5py.check_vlen_dtype(item.dtype):
-        return None
-    array: AnyArray = _content(item)
-    return array.T if matlab else array
-
-
-def _content(item: Any, text: bool = False) -> Any:
-    """Return all of an HDF5 dataset, as str if it is `text`: the one place that reads any.
-
-    Checked here, since a reference leads to datasets that no walk through the file meets. Raises TableError.
-    """
-    import h5py
-
-    name = shortened(repr(item.name))
-    if not isinstance(item, h5py.Dataset):
-        raise TableError(f"a cell refers to {name}, which holds no data: save each column of the table as an array")
-    if item.external or item.is_virtual:
-        raise TableError(f"{name} lies in another file: copy it into this one")
-    return np.array(item.asstr("utf-8", "replace")[()], np.str_) if text else item[()]
-
-
-def _letters(codes: Any) -> str:
-    """Return a MATLAB text, an array of UTF-16."""
-    return bytes(np.asarray(codes, "<u2").ravel(order="F").tobytes()).decode("utf-16-le").rstrip()
-
-
-def _matlab(path: Path, skip: int | None) -> tuple[Columns, Sequence[int], int]:
+def _matlab(path: Path, _skip: int | None) -> tuple[Columns, Sequence[int], int]:
     from scipy.io import loadmat
 
-    with path.open("rb") as file:
-        opening = file.read(128)
-    if b"MATLAB 7.3" in opening:
-        return _hdf5(path, skip)
-    found = loadmat(path, squeeze_me=False, chars_as_strings=True)
+    try:
+        found = loadmat(path, squeeze_me=False, chars_as_strings=True)
+    except NotImplementedError:
+        raise TableError("it is of MATLAB 7.3: save it with the option -v7") from None
     return _even(
         {
             name: array
@@ -247,12 +211,7 @@ def _even(found: Mapping[str, AnyArray]) -> tuple[Columns, Sequence[int], int]:
     """Return the arrays as columns; those with one element are left out if others have more."""
     columns: Columns = {}
     for name, array in found.items():
-        if array.dtype.names:
-            for field in array.dtype.names:
-                records: Any = array.reshape(-1)
-                columns |= _columns(f"{name}.{field}", records[field])
-        else:
-            columns |= _columns(name, array)
+        columns |= _columns(name, array)
     lengths = Counter(len(column) for column in columns.values())
     if len(lengths) > 1:
         del lengths[1]
@@ -268,10 +227,8 @@ def _even(found: Mapping[str, AnyArray]) -> tuple[Columns, Sequence[int], int]:
 
 def _columns(name: str, array: AnyArray) -> Columns:
     """Return an array as columns called by its name, or by its name and a number."""
-    if array.dtype.kind == "V" or array.ndim > 2:
+    if array.ndim > 2:
         return {}
-    if array.dtype.kind == "S":
-        array = np.char.decode(array.astype(np.bytes_), "utf-8", "replace")
     if array.ndim == 1 or 1 in array.shape:
         return {name: array.reshape(-1)}
     return {f"{name}.{number}": array[:, number] for number in range(array.shape[1])}
@@ -355,8 +312,7 @@ def main(skip: str, parent: str, *sources: str) -> int:
     os.dup2(2, 1)
     what, package, read = READERS[paths[0].suffix.lower()]
     try:
-        for name in {package, "h5py"} if paths[0].suffix == ".mat" else {package}:
-            import_module(name)
+        import_module(package)
     except ModuleNotFoundError as lack:
         print(f"reading {what}: {missing(lack.name or package)}")
         return _REFUSED

@@ -2,7 +2,7 @@
 
 import base64
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib.resources import files
 
@@ -11,13 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.drivers.extras import optional
-from thenar.runtime.errors import ThenarError
 from thenar.runtime.hand import HandDrawing
-from thenar.runtime.harness.wiring import Harness, StreamWiring
 from thenar.runtime.manifest import Calibration, Manifest, Threshold
 from thenar.runtime.rejection import none_leads
-from thenar.runtime.sources.rows import steps_of
-from thenar.runtime.taxels import TaxelSettings, calibration_of, count_limit
 
 from ..pages import embedded, policy_hash, templates
 from ..sensors import SensorCount
@@ -31,8 +27,8 @@ _MOST_ROWS = 400
 # To keep the page small with its rows.
 _ROWS_BYTES = 200_000
 # In dependency order: a module comes after those that it imports.
-_MODULES = ("tables.js", "lines.js", "scanner.js", "cyberglove.js", "serial.js", "try.js")
-_EXPORT = re.compile(r"^export (?:async )?(?:function|class|const) (\w+)", re.MULTILINE)
+_MODULES = ("tables.js", "rows.js", "try.js")
+_EXPORT = re.compile(r"^export (?:function|class) (\w+)", re.MULTILINE)
 
 Json = Mapping[str, object]
 
@@ -41,7 +37,6 @@ def try_html(
     manifest: Manifest,
     tables: bytes,
     hand: HandDrawing,
-    harness: Harness | None,
     rows: tuple[NDArray[np.bool_], NDArray[np.uint16], NDArray[np.intp]],
 ) -> bytes | None:
     """Return the page in UTF-8, at most MOST_BYTES; None where tables and hand alone are larger.
@@ -50,8 +45,6 @@ def try_html(
     ----------
     manifest, tables, hand : Manifest, bytes, HandDrawing
         The contents of `build.json`, `tables.bin` and `hand.json`.
-    harness : Harness or None
-        The wiring that the build was compiled for.
     rows : bits (n, s), codes (n, j), labels (n,)
         The training rows, as the build reads them; a sample of each grasp type goes into the page.
     """
@@ -63,7 +56,6 @@ def try_html(
         "switches": [_switch(switch.name, switch.threshold) for switch in manifest.switches],
         "joints": [_joint(joint, codes[:, number]) for number, joint in enumerate(manifest.joints)],
         "hand": hand,
-        "wiring": _wiring(manifest, harness),
     }
     bare = _rendered(manifest, {**data, "rows": []})
     some: list[object] = []
@@ -124,50 +116,6 @@ def _switch(name: str, threshold: Threshold | None) -> Json:
 def _joint(joint: Calibration, codes: NDArray[np.uint16]) -> Json:
     low, middle, high = np.percentile(codes, (0, 50, 100), method="lower").tolist() if len(codes) else (0, 0, 1)
     return {**_line(joint), "range": [int(low), max(int(high), int(low) + 1)], "typical": int(middle)}
-
-
-def _wiring(manifest: Manifest, harness: Harness | None) -> Json:
-    """Return the build's inputs on the first board, the CyberGlove and the first stream of a wiring."""
-    found: dict[str, object] = {"scanner": None, "cyberglove": None, "stream": None}
-    if harness is None:
-        return found
-    baud = {}
-    if harness.scanners:
-        board = harness.scanners[0]
-        baud["scanner"] = board.baud
-        bits = {switch.name: bit for bit, switch in enumerate(manifest.switches) if switch.threshold is None}
-        levels = _levels(manifest, board.taxels, harness.taxel_settings)
-        found["scanner"] = {"keys": [bits.get(name) for name in board.switches], "taxels": levels}
-    if harness.cyberglove is not None and harness.cyberglove.joints:
-        found["cyberglove"] = harness.cyberglove.joints
-    if harness.streams:
-        found["stream"] = _stream(harness.streams[0])
-        baud["lines"] = harness.streams[0].baud
-    return {**found, "baud": baud}
-
-
-def _levels(manifest: Manifest, taxels: Sequence[str], settings: TaxelSettings) -> list[tuple[int, int, int]]:
-    """Return (channel, limit of its counts, switch) of levels; empty where counts need a calibration."""
-    try:
-        calibration = calibration_of(settings)
-        return [
-            (taxels.index(switch.source), count_limit(switch.threshold, calibration), bit)
-            for bit, switch in enumerate(manifest.switches)
-            if switch.threshold is not None and switch.source in taxels
-        ]
-    except (ThenarError, OSError):
-        return []
-
-
-def _stream(stream: StreamWiring) -> Json:
-    return {
-        "columns": stream.columns or None,
-        "threshold": stream.threshold,
-        "thresholds": stream.thresholds,
-        "low": stream.closed == "low",
-        "joints": stream.joints,
-        "taxels": {name: (*limits, steps_of(limits)) for name, limits in stream.taxels.items()},
-    }
 
 
 def _rendered(manifest: Manifest, data: Json) -> bytes:

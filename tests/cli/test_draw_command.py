@@ -102,9 +102,7 @@ def test_a_set_of_another_glove_is_refused_by_its_first_strange_switch(
 ) -> None:
     for options in ([], ["--place"], ["--per-grasp"]):
         assert run(["draw", str(set_file), *options, "-o", str(tmp_path / "no.svg")]) == 2
-        assert (
-            "the position of switch 's0' is unknown: give --layout a drawing of your glove" in capsys.readouterr().err
-        )
+        assert "the position of switch 's0' is unknown: say it with --layout" in capsys.readouterr().err
     assert not (tmp_path / "no.svg").exists()
 
 

@@ -228,7 +228,6 @@ def test_an_import_without_its_extra_says_which_one_it_needs() -> None:
         ("place {set} --draw {new}.svg", "", "compiler"),
         ("simulate quick -o {new}.grasps", "", "compiler"),
         ("stability", "", "stability"),
-        ("stability -o {new}.html", "mpmath sklearn scipy joblib matplotlib threadpoolctl ezdxf", "stability"),
     ],
 )
 def test_what_is_not_installed_is_named_with_the_extra_that_brings_it(

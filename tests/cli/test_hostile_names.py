@@ -51,7 +51,6 @@ FILES = {
     "key of a scene": ("scene.toml", f"{QUOTED} = 1\n", "simulate {file} -o {new}"),
     "effect of a scene": ("scene.toml", f"[effects]\n{QUOTED} = 1\n", "simulate {file} -o {new}"),
     "key of a layout": ("layout.toml", f"{QUOTED} = 1\n", "draw {set} --layout {file} -o {new}.svg"),
-    "drawn layout": ("layout.svg", f"<svg><{EVIL}/></svg>", "draw {set} --layout {file} -o {new}.svg"),
     "key of a board": ("board.toml", f"{QUOTED} = 1\n", "firmware {build} --board {file} -o {new}"),
     "objects": ("objects.toml", f"{QUOTED} = [1]\n", "record --glove {good} --subject A --objects {file} -o {new}"),
     "frontier": ("frontier.json", FIELD, "compile {set} --from {file} -o {new}"),

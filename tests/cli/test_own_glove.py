@@ -22,14 +22,8 @@ PADS = tuple(f"pad_{finger}_{number}" for finger in ("thumb", "index", "palm") f
 FLEX = ("flex_thumb", "flex_index")
 QUICK = ("--rounds", 5, "--folds", 2)
 FOREIGN = re.compile(r"cyber ?glove|push.?button|EVQPLDA|murakami", re.IGNORECASE)
-LAYOUT = (
-    '<svg xmlns="http://www.w3.org/2000/svg" width="200mm" height="250mm" viewBox="0 0 200 250">'
-    '<path id="outline" d="M 20 240 L 10 20 L 150 20 L 160 240 Z"/>'
-    + "".join(
-        f'<circle id="{name}" cx="{40 + 30 * (place % 3)}" cy="{60 + 40 * (place // 3)}" r="5"/>'
-        for place, name in enumerate(PADS)
-    )
-    + "</svg>"
+LAYOUT = "outline = [[20, 10], [10, 230], [150, 230], [160, 10]]\n[places]\n" + "".join(
+    f"{name} = [{40 + 30 * (place % 3)}, {190 - 40 * (place // 3)}]\n" for place, name in enumerate(PADS)
 )
 
 
@@ -56,7 +50,7 @@ def grasps(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def layout(grasps: Path) -> Path:
-    path = grasps.with_name("glove.svg")
+    path = grasps.with_name("layout.toml")
     path.write_text(LAYOUT)
     return path
 
@@ -69,11 +63,8 @@ def worked(done: Any) -> str:
 
 
 def foreign(folder: Path) -> list[str]:
-    """Return the files that name a glove that this is not; but those of firmware and try.html, whose program can read
-    any.
-    """
-    programs = {"firmware", "try.html"}
-    files = [path for path in folder.rglob("*") if path.is_file() and programs.isdisjoint(path.parts)]
+    """Return the files that name a glove that this is not; but those of firmware, whose program can read any."""
+    files = [path for path in folder.rglob("*") if path.is_file() and "firmware" not in path.parts]
     assert files
     return [path.name for path in files if FOREIGN.search(path.read_text(errors="replace"))]
 
@@ -164,7 +155,7 @@ def test_without_a_layout_nothing_is_drawn_and_with_one_everything_is(
 ) -> None:
     refused = thenar("draw", grasps, "-o", tmp_path / "no.svg")
     assert refused.returncode == 2
-    assert "the position of switch 'pad_thumb_1' is unknown: give --layout a drawing" in refused.stderr
+    assert "the position of switch 'pad_thumb_1' is unknown: say it with --layout" in refused.stderr
     build = tmp_path / "build"
     refused = thenar("compile", grasps, "-o", build, *QUICK, "--hand-length", 180)
     assert refused.returncode == 2

@@ -37,14 +37,14 @@ FAULTS = (
         "compiler/boosting/boost.py",
         "sizes * np.maximum(own, 1.0 / z_max)",
         "sizes * own",
-        "tests/stability/cases/test_targets.py",
+        "tests/stability/test_catalogue.py::test_a_case_holds_quickly[targets]",
     ),
     Fault(
         "branches answer with more than z_max",
         "compiler/boosting/stumpfit.py",
         "np.clip(values, -z_max, z_max).T",
         "values.T",
-        "tests/stability/cases/test_stumpfits.py",
+        "tests/compiler/test_drawn_numbers.py",
     ),
     Fault(
         "an empty branch counts as one of next to no weight",
@@ -72,7 +72,7 @@ FAULTS = (
         "compiler/boosting/stumps.py",
         "(g - add_up(g) / k) * (k - 1) / k",
         "g - add_up(g) / k",
-        "tests/stability/cases/test_scoretables.py",
+        "tests/stability/test_catalogue.py::test_a_case_holds_quickly[scoretables]",
     ),
     Fault(
         "of tied classes the ensemble takes the last",
@@ -142,7 +142,7 @@ FAULTS = (
         "compiler/tables/standing_in.py",
         "if switches and (joints != joints[0]).any():",
         "if False:",
-        "tests/stability/cases/test_missing.py",
+        "tests/stability/test_catalogue.py::test_a_case_holds_quickly[missing]",
     ),
 )
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mpf
 from scipy import special, stats
@@ -17,29 +17,23 @@ from scipy import special, stats
 from thenar.stability.reference.boosting import (
     best_splits,
     boost_rounds,
-    branch_values,
     exp,
     explained,
     log,
-    loss,
     mean_loss,
-    scores,
     softmax,
-    step,
-    target,
 )
 from thenar.stability.reference.information import (
     compare_gains,
     conditional_gain_bits,
     entropy_bits,
-    factors,
     gain_bits,
     sign_of_log_sum,
 )
 from thenar.stability.reference.intervals import normal_quantile, student, student_quantile, wilson
-from thenar.stability.reference.numbers import DIGITS, added, cos, distance, exact, precisely, sin, solve, turn, ulps
+from thenar.stability.reference.numbers import DIGITS, cos, precisely, sin, turn
 from thenar.stability.reference.standing_in import Kind, stand_ins, whole
-from thenar.stability.reference.tables import balanced, mean_row, mean_switch, score_tables, steps, table_scores
+from thenar.stability.reference.tables import steps
 
 HAIR = mpf(10) ** (8 - DIGITS)  # a few roundings of 60 digits
 
@@ -51,54 +45,6 @@ DOUBLES = st.floats(allow_nan=False, allow_infinity=False)
 @precisely()
 def near(got: mpf, truth: mpf) -> bool:
     return bool(abs(got - truth) <= HAIR * max(abs(mpf(truth)), 1))
-
-
-def as_fraction(number: mpf) -> Fraction:
-    sign, mantissa, power, _ = number._mpf_
-    whole = Fraction(-int(mantissa) if sign else int(mantissa))
-    return whole * Fraction(2) ** int(power)
-
-
-@given(DOUBLES)
-def test_a_double_becomes_the_number_that_it_is(x: float) -> None:
-    assert as_fraction(exact(x)) == Fraction(x)
-    assert ulps(x, exact(x)) == 0.0
-
-
-@given(st.lists(st.floats(-1e250, 1e250)))
-def test_a_sum_of_doubles_is_exact_to_sixty_digits(doubles: list[float]) -> None:
-    truth = sum(map(Fraction, doubles), Fraction(0))
-    with precisely():
-        assert abs(added(doubles) - mpf(truth.numerator) / truth.denominator) <= HAIR * abs(mpf(float(truth)))
-
-
-@given(DOUBLES.filter(lambda x: abs(x) < 1e300))
-def test_the_next_double_is_one_ulp_away(x: float) -> None:
-    away = math.nextafter(x, math.inf if x >= 0 else -math.inf)
-    assert ulps(away, exact(x)) == 1.0
-    assert distance(away, exact(x)) == math.ulp(x)
-
-
-def test_digits_hold_inside_and_the_callers_own_are_back_outside() -> None:
-    before = mpmath.mp.dps
-    with precisely():
-        assert mpmath.mp.dps == DIGITS
-    assert mpmath.mp.dps == before
-    assert math.isnan(ulps(math.nan, mpf(1)))
-    assert ulps(math.inf, mpf(1)) == math.inf
-
-
-def test_the_entropy_of_equal_counts_is_the_logarithm_of_their_number() -> None:
-    assert [entropy_bits([7] * 2**k) == k for k in range(6)] == [True] * 6
-    assert entropy_bits([10**9, 0, 0]) == 0
-
-
-def test_the_entropy_of_one_in_a_billion() -> None:
-    # lg n + (1 - 1/n) * -lg(1 - 1/n) in another form: [n ln n - (n - 1) ln(n - 1)] / (n ln 2)
-    n = 10**9
-    with precisely():
-        truth = (n * mpmath.log(n) - (n - 1) * mpmath.log(n - 1)) / (n * mpmath.log(2))
-    assert near(entropy_bits([1, n - 1]), truth)
 
 
 @given(TABLES)
@@ -118,11 +64,6 @@ def test_information_given_something_obeys_the_chain_rule(one: list[list[int]], 
     parts = [[sum(a), sum(b)] for a, b in zip(one, other, strict=True)]
     with precisely():
         assert near(gain_bits(both), gain_bits(parts) + conditional_gain_bits([one, other]))
-
-
-@given(st.lists(st.integers(1, 10**9), min_size=2, max_size=4), st.lists(st.integers(1, 9), min_size=2, max_size=4))
-def test_what_is_independent_gains_exactly_nothing(classes: list[int], values: list[int]) -> None:
-    assert gain_bits([[c * v for v in values] for c in classes]) == 0
 
 
 @given(TABLES, TABLES)
@@ -153,12 +94,6 @@ def test_one_row_in_a_billion_decides_and_equal_gains_of_other_terms_tie() -> No
     assert sign_of_log_sum({4: 1, 2: -2}) == 0
 
 
-@given(st.integers(2, 10**7))
-def test_factors_are_primes_whose_product_is_the_number(number: int) -> None:
-    assert math.prod(prime**power for prime, power in factors(number)) == number
-    assert all(prime % d for prime, _ in factors(number) for d in range(2, math.isqrt(prime) + 1))
-
-
 def test_elementary_functions_have_sixty_digits() -> None:
     e = "2.71828182845904523536028747135266249775724709369995957496697"
     assert near(exp(1), _of(e))
@@ -181,41 +116,6 @@ def test_softmax_sums_to_one_and_agrees_with_scipy(row: list[float]) -> None:
     with precisely():
         assert near(mpmath.fsum(softmax(row)), mpf(1))
     np.testing.assert_allclose([float(p) for p in softmax(row)], special.softmax(row), rtol=1e-11, atol=5e-324)
-
-
-@given(SCORES, st.integers(0, 1))
-def test_the_loss_is_minus_the_logarithm_of_the_share(row: list[float], label: int) -> None:
-    with precisely():
-        assert near(mpmath.exp(-loss(row, label)), softmax(row)[label])
-
-
-def test_the_loss_of_two_classes_keeps_its_digits_however_certain() -> None:
-    with precisely():
-        assert near(loss([1e4, 0.0], 0) / mpmath.exp(-(10**4)), mpf(1) - mpmath.exp(-(10**4)) / 2)
-    assert near(mean_loss([[0.0] * 5] * 3, [0, 1, 4]), log(5))
-    rows, labels = [[0.0, 1.0], [2.0, -1.0]], [0, 1]
-    assert near(mean_loss(rows, labels, [3, 1]), mean_loss([rows[0]] * 3 + [rows[1]], [0, 0, 0, 1]))
-
-
-@given(st.floats(0, 1), st.booleans(), st.sampled_from([1.5, 2.0, 3.0, 4.0, 100.0]))
-def test_a_target_is_the_residual_over_the_clamped_response(p: float, is_member: bool, z_max: float) -> None:
-    weight, z = target(p, is_member, z_max)
-    own = Fraction(p) if is_member else 1 - Fraction(p)
-    size = min(1 / own, Fraction(z_max)) if own else Fraction(z_max)
-    truth = (1 - own) / size
-    with precisely():
-        assert near(weight, mpf(truth.numerator) / truth.denominator)
-        assert near(weight * z, is_member - mpf(p))
-    assert (z > 0) == is_member
-
-
-def test_targets_by_hand() -> None:
-    assert target(0.5, True, 3.0) == (0.25, 2)
-    assert target(0.25, True, 3.0) == (0.25, 3)
-    assert target(0.25, False, 4.0, 8) == (1.5, mpf(-4) / 3) or near(target(0.25, False, 4.0, 8)[0], mpf(1.5))
-    assert target(1.0, True, 3.0) == (0, 1)
-    assert target(0.0, True, 3.0)[1] == 3
-    assert target(1.0, False, 3.0)[1] == -3
 
 
 SHARES = st.integers(0, 8).map(lambda n: n / 8)
@@ -265,28 +165,6 @@ def _neighbours(x: list[float]) -> list[tuple[float, float]]:
     return list(pairwise(values))
 
 
-def test_branches_answer_with_their_means_within_the_clamp() -> None:
-    x, w = [0.0, 0.0, 1.0, math.nan], [1.0, 3.0, 2.0, 0.0]
-    assert branch_values(x, w, [2.0, -6.0, 8.0, 0.0], 0.5, 3.0)[:2] == (-1, 3)
-    assert ulps(2 / 3, branch_values(x, w, [2.0, -6.0, 8.0, 0.0], 0.5, 3.0)[2]) < 1
-    assert branch_values(x, [0.0] * 4, [0.0] * 4, 0.5, 3.0) == (0, 0, 0)
-
-
-def test_a_branch_of_a_weight_300_decades_down_keeps_its_own_mean() -> None:
-    left, right, _ = branch_values([0.0, 1.0, 1.0], [1e-300, 1.0, 1.0], [2e-300, 1.0, 1.5], 0.0, 3.0)
-    assert ulps(float(left), mpf(2)) <= 2
-    assert right == 1.25
-
-
-@given(st.lists(st.floats(-3, 3), min_size=2, max_size=6), st.sampled_from([1.0, 0.5, 0.1]))
-def test_a_step_is_centred(answers: list[float], shrinkage: float) -> None:
-    k, g = len(answers), [Fraction(a) * Fraction(shrinkage) for a in answers]
-    with precisely():
-        for got, own in zip(step(answers, shrinkage), g, strict=True):
-            truth = Fraction(k - 1, k) * (own - sum(g, Fraction(0)) / k)
-            assert near(got, mpf(truth.numerator) / truth.denominator)
-
-
 def test_two_separable_classes_follow_their_recursion() -> None:
     # Uncapped, a member's z is 1/P and the other class's mirror image: F grows by (1 + e^-2F)/2 a round.
     training = boost_rounds([[0.0], [1.0], [1.0]], [0, 1, 1], 2, 12)
@@ -299,25 +177,6 @@ def test_two_separable_classes_follow_their_recursion() -> None:
         assert all(near(a, b) for a, b in zip(losses, truth, strict=True))
         assert near(F[0][0], f)
         assert near(F[1][0], -f)
-
-
-def test_an_ensembles_scores_are_the_sum_of_its_steps() -> None:
-    columns, thresholds = [[0, 1], [1, 1]], [[0.5, 3.0], [2.0, 7.0]]
-    values = [[[-1.0, 1.0, 0.25], [-2.0, 2.0, 0.0]], [[0.5, -0.5, 0.0], [3.0, 1.0, 2.0]]]
-    for row, answers in (
-        ((0.0, 3.0), [(-1.0, -2.0), (-0.5, 3.0)]),
-        ((1.0, 8.0), [(1.0, 2.0), (-0.5, 1.0)]),
-        ((math.nan, math.nan), [(0.25, 0.0), (0.0, 2.0)]),
-    ):
-        with precisely():
-            truth = [sum(parts) for parts in zip(*(step(each, 0.5) for each in answers), strict=True)]
-            got = scores(columns, thresholds, values, 0.5, row)
-            assert all(near(a, b) for a, b in zip(got, truth, strict=True))
-        tables = score_tables(columns, thresholds, values, 0.5, 2, 1)
-        if not math.isnan(row[0]):
-            of_joints = [joint[0] for joint in tables[2]], [joint[1] for joint in tables[2]]
-            by_tables = table_scores(*tables[:2], *of_joints, [bool(row[0])], [int(row[1])])
-            assert all(near(a, b) for a, b in zip(by_tables, truth, strict=True))
 
 
 @pytest.mark.slow
@@ -336,32 +195,12 @@ def test_ten_rounds_are_wekas(weka_data: Path, name: str) -> None:
     assert np.abs(got - arrays["default/I10/half/P_train"]).max() < 1e-9
 
 
-def test_a_round_knows_by_how_much_its_stumps_lead() -> None:
-    only = boost_rounds([[0.0, 0.0], [1.0, 1.0]], [0, 1], 2, 1)[0]
-    assert only.leads() == [1, 1]
-    assert [split[1] for split in only.splits[0]] == [0, 1]
-
-
 @given(st.lists(st.tuples(DOUBLES, DOUBLES), min_size=1, max_size=5))
 def test_whole_steps_are_half_to_even(pairs: list[tuple[float, float]]) -> None:
     for value, scale in pairs:
         doubt = abs(steps(value, scale) - Fraction(value) * Fraction(scale))
         assert doubt <= Fraction(1, 2)
         assert doubt < Fraction(1, 2) or steps(value, scale) % 2 == 0
-
-
-def test_balanced_tables_have_the_same_scores_and_no_bias_where_there_is_room() -> None:
-    bias, joints = [3.0, -2.0], [[[-4.0, 1.0], [6.0, 5.0]]]
-    assert balanced(bias, joints) == ([0, 0], [[[-1, -1], [9, 3]]])
-    bias, rows = balanced([100.0], [[[0.0], [1.0]], [[2.0], [2.0]]])
-    assert (bias, rows) == ([102], [[[0], [1]], [[0], [0]]])
-    bias, rows = balanced([-100.0], [[[0.0], [1.0]], [[2.0], [2.0]]])
-    assert (bias, rows) == ([-97], [[[-1], [0]], [[0], [0]]])
-
-
-def test_means_are_over_the_rows_trained_on() -> None:
-    assert mean_row([3, 9], [[0.0], [1.0], [5.0]], [3, 4, 9, 10]) == [mpf(7) / 4]
-    assert mean_switch([2.0, -8.0], [True, False, False, False]) == [0.5, -2]
 
 
 @pytest.mark.parametrize("counts", [(30, 10), (5, 12, 40), (1, 1, 1, 97)])
@@ -373,11 +212,6 @@ def test_where_the_others_say_nothing_what_stands_in_says_how_frequent_each_clas
         ((found,),) = stand_ins(Kind([rows], labels, [ends], 1000.0), starts)
         for one, other in combinations(range(len(counts)), 2):
             assert found[one] - found[other] == pytest.approx(1000 * math.log(counts[one] / counts[other]), abs=2)
-
-
-def test_what_stands_in_stays_between_its_ends() -> None:
-    kind = Kind([[[0, 0]] * 40], [0] * 30 + [1] * 10, [((-7, -3), (9, 2))], 1000.0)
-    assert stand_ins(kind, {((0, 0),)}) == {((9, -3),)}
 
 
 def test_the_sum_of_a_kind_makes_up_for_what_its_inputs_say_twice() -> None:
@@ -429,27 +263,6 @@ def test_quantiles_in_closed_form() -> None:
 
 
 WHOLE = st.integers(-9, 9).map(float)
-
-
-@given(
-    st.lists(st.lists(WHOLE, min_size=3, max_size=3), min_size=3, max_size=3), st.lists(WHOLE, min_size=3, max_size=3)
-)
-def test_equations_are_solved_as_cramer_does(matrix: list[list[float]], right: list[float]) -> None:
-    def determinant(m: list[list[float]]) -> int:
-        a, b, c = ([int(x) for x in row] for row in m)
-        return sum(a[i] * (b[i - 2] * c[i - 1] - b[i - 1] * c[i - 2]) for i in range(3))
-
-    whole = determinant(matrix)
-    assume(whole)
-    for k, x in enumerate(solve(matrix, right)):
-        replaced = [[*row[:k], b, *row[k + 1 :]] for row, b in zip(matrix, right, strict=True)]
-        with precisely():
-            assert near(x, mpf(determinant(replaced)) / whole)
-
-
-def test_equations_without_an_answer_have_none() -> None:
-    with pytest.raises(ZeroDivisionError):
-        solve([[1.0, 2.0], [2.0, 4.0]], [1.0, 3.0])
 
 
 @given(st.lists(st.floats(0.1, 9), min_size=3, max_size=3), st.floats(-7, 7))

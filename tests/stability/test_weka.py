@@ -15,8 +15,6 @@ from thenar.stability.weka import (
     DIVERGED,
     EXP_IN_JAVA,
     EXP_OF_THE_PROCESSOR,
-    ROUNDS,
-    ROWS_A_CLASS,
     Comparison,
     NotRun,
     WekaError,
@@ -63,18 +61,8 @@ def test_a_model_that_lacks_a_branch_is_refused(left_out: str) -> None:
         read_stumps(PRINTED.replace(left_out, "?"), rounds=1, n_classes=2, n_inputs=2)
 
 
-def test_a_model_of_another_set_is_refused() -> None:
-    with pytest.raises(WekaError, match="Weka split column 1 of 1"):
-        read_stumps(PRINTED, rounds=1, n_classes=2, n_inputs=1)
-
-
 def test_without_java_it_is_not_run_and_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert compare_with_weka() == NotRun("java or Weka is not installed")
-
-
-def test_without_weka_it_is_not_run_and_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(module, "JAR", tmp_path / "weka.jar")
     assert compare_with_weka() == NotRun("java or Weka is not installed")
 
 
@@ -101,16 +89,6 @@ def test_the_stumps_read_give_wekas_own_probabilities(weka: Callable[..., str], 
     assert (ours.argmax(axis=1) == theirs.argmax(axis=1)).all()
 
 
-def test_the_set_is_learned_by_heart(compared: Comparison) -> None:
-    assert compared.learned is not None
-    assert compared.learned < compared.rounds // 2
-    assert (compared.rows, compared.held_out, compared.rounds) == (
-        CLASSES * ROWS_A_CLASS,
-        CLASSES * ROWS_A_CLASS,
-        ROUNDS,
-    )
-
-
 def test_weka_parts_from_itself_and_thenar_from_weka_not_before(compared: Comparison) -> None:
     parts = compared.weka_itself.parts
     assert parts is not None
@@ -118,7 +96,6 @@ def test_weka_parts_from_itself_and_thenar_from_weka_not_before(compared: Compar
     for ours in (compared.ours_processor, compared.ours_java):
         assert max(ours.largest[: parts - 1]) < DIVERGED
     assert compared.weka_changed > 0
-    assert compared.weka_value > 3 >= compared.our_value
 
 
 def test_thenar_trained_in_any_order_of_rows_answers_the_same_to_the_last_bit(compared: Comparison) -> None:

@@ -130,7 +130,7 @@ export class Recogniser {
 }
 
 /** Return a number rounded as in Python: half to even. */
-export function rounded(value) {
+function rounded(value) {
   const down = Math.floor(value), part = value - down;
   return part < 0.5 || (part === 0.5 && down % 2 === 0) ? down : down + 1;
 }
@@ -144,51 +144,4 @@ export function codeOf(joint, value) {
 /** Return the value of a code. */
 export function valueOf(joint, code) {
   return joint.value_a + (code - joint.code_a) * ((joint.value_b - joint.value_a) / (joint.code_b - joint.code_a));
-}
-
-// The line of integers through two readings and their values, as in runtime/code_line.py.
-function codeLine(joint, ...ends) {
-  const step = (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a);
-  const points = ends.map(([reading, value]) => [reading, rounded((joint.code_a + (value - joint.value_a) / step) * 2 ** 24)]);
-  const [[first, low], [last, high]] = points.sort(([a], [b]) => a - b).map(([reading, code]) => [reading, BigInt(code)]);
-  const span = BigInt(last - first), whole = span << 24n;
-  return (reading) => {
-    const far = low * span + (high - low) * BigInt(reading - first) + (span << 23n);
-    let nearest = far / whole, rest = far % whole;
-    if (rest < 0n) [nearest, rest] = [nearest - 1n, rest + whole];
-    if (rest === 0n) nearest -= nearest & 1n;
-    return Math.min(Math.max(Number(nearest), 0), 65535);
-  };
-}
-
-/**
- * Return the code of each byte, 0 to 255, of a CyberGlove's sensor, or of a stream's joint.
- *
- * line: {raw_a, value_a, raw_b, value_b} of a calibration; null: the build must be coded in bytes. Throws Error.
- */
-export function codesOfBytes(joint, line) {
-  const bytes = Array.from({ length: 256 }, (_, raw) => raw);
-  if (line) {
-    const code = codeLine(joint, [line.raw_a, line.value_a], [line.raw_b, line.value_b]);
-    return bytes.map(code);
-  }
-  const raw = (code) => code >= 1 && code <= 255;
-  if (raw(joint.code_a) && raw(joint.code_b)) return bytes;
-  throw new Error(`joint ${joint.name} of the build is coded in ${joint.unit}, not in the glove's bytes: open its calibration`);
-}
-
-/** Return the lines of a calibration.toml by the names of their sensors. Throws Error. */
-export function parseCalibration(text) {
-  const found = new Map();
-  for (const piece of text.split(/\[\[\s*sensor\s*\]\]|\{/).slice(1)) {
-    const name = /\bname\s*=\s*("(?:[^"\\]|\\.)*")/.exec(piece);
-    const numbers = ["raw_a", "value_a", "raw_b", "value_b"].map((key) =>
-      Number(new RegExp(`\\b${key}\\s*=\\s*([-+0-9.eE]+)`).exec(piece)?.[1] ?? NaN),
-    );
-    if (!name || !numbers.every(Number.isFinite) || numbers[0] === numbers[2]) continue;
-    const [raw_a, value_a, raw_b, value_b] = numbers;
-    found.set(JSON.parse(name[1]), { raw_a, value_a, raw_b, value_b });
-  }
-  if (!found.size) throw new Error("this is not a calibration: it has no [[sensor]] with name, raw_a, value_a, raw_b, value_b");
-  return found;
 }

@@ -1,4 +1,4 @@
-// The page: one state of all inputs, from the hand, from a recorded row or from a glove; and its prediction.
+// The page: one state of all inputs, from the hand or from a recorded row; and its prediction.
 
 const data = JSON.parse(document.getElementById("try-data").textContent);
 const at = (id) => document.getElementById(id);
@@ -190,7 +190,7 @@ function readTable(text, name) {
       const cell = cells[places.get(column)]?.trim();
       return cell ? { true: 1, false: 0 }[cell.toLowerCase()] ?? (Number.isFinite(Number(cell)) ? Number(cell) : null) : null;
     };
-    return { truth: label ? (cells[places.get(label)] ?? null) : null, ...readRow(data, value, RECORDED).inputs };
+    return { truth: label ? (cells[places.get(label)] ?? null) : null, ...readRow(data, value) };
   });
   const note = missing.length ? `; it lacks ${missing.length} column${missing.length === 1 ? "" : "s"}, such as ${missing[0]}, which are treated as lost` : "";
   return [found, note];
@@ -209,64 +209,6 @@ at("file").addEventListener("change", async ({ target: { files: [file] } }) => {
     at("rows-said").textContent = wrong.message;
   }
 });
-
-/* ---- A glove on Web Serial ---- */
-
-let close = null, calibration = null;
-const BAUDS = { scanner: data.wiring.baud?.scanner ?? 1_000_000, cyberglove: 115_200, lines: data.wiring.baud?.lines ?? 115_200 };
-const tell = (words) => (at("serial-said").textContent = words);
-
-at("kind").addEventListener("change", () => (at("baud").value = BAUDS[at("kind").value]));
-at("kind").dispatchEvent(new Event("change"));
-at("calibration").addEventListener("change", async ({ target: { files: [file] } }) => {
-  try {
-    calibration = file ? parseCalibration(await file.text()) : null;
-    tell(calibration ? `Calibration of ${calibration.size} sensors.` : "");
-  } catch (wrong) {
-    tell(`${file.name}: ${wrong.message}`);
-  }
-});
-at("connect").addEventListener("click", async () => {
-  if (close) return close();
-  try {
-    const port = await navigator.serial.requestPort();
-    pause();
-    close = await openGlove(
-      at("kind").value, port, at("baud").valueAsNumber, data, calibration,
-      (inputs, said) => {
-        if (inputs) {
-          for (const key of ["bits", "codes", "lostSwitches", "lostJoints"]) state[key] = inputs[key].slice();
-          at("truth").textContent = "";
-          draw();
-        }
-        tell(`Connected: ${said}.`);
-      },
-      (reason) => {
-        close = null;
-        at("connect").textContent = "Connect a glove";
-        tell(reason ? `Disconnected: ${reason}.` : "Disconnected.");
-      },
-    );
-    at("connect").textContent = "Disconnect";
-  } catch (wrong) {
-    tell(wrong.name === "NotFoundError" ? "No port was chosen." : wrong.message);
-  }
-});
-
-let drawing = false;
-function draw() {
-  if (drawing) return;
-  drawing = true;
-  requestAnimationFrame(() => {
-    drawing = false;
-    show();
-  });
-}
-
-if (!navigator.serial) {
-  at("connect").disabled = true;
-  tell("This browser has no Web Serial: Chrome, Edge and Opera on a computer have it.");
-}
 
 // For use from the browser's console.
 globalThis.thenar = Object.freeze({

@@ -76,38 +76,10 @@ def test_hdf5_is_read(text: str, tmp_path: Path) -> None:
     check(tmp_path / "t.h5", [1, 2, 3])
 
 
-def test_records_of_hdf5_are_columns(tmp_path: Path) -> None:
-    records = np.array([(1, (2.0, 3.0)), (4, (5.0, 6.0))], [("a", "i4"), ("b", "f8", 2)])
-    with h5py.File(tmp_path / "t.h5", "w") as file:
-        file["glove/table"] = records
-    columns = read_table(tmp_path / "t.h5").columns
-    assert {name: list(column) for name, column in columns.items()} == {
-        "glove/table.a": [1, 4],
-        "glove/table.b.0": [2, 5],
-        "glove/table.b.1": [3, 6],
-    }
-
-
 @pytest.mark.parametrize("structured", [True, False])
 def test_matlab_is_read(structured: bool, tmp_path: Path) -> None:
     variables = {"grasp": np.array(GRASPS, object), "flex": JOINTS, "pads": PADS, "rate": 50}
     savemat(tmp_path / "t.mat", {"glove": variables} if structured else variables, oned_as="column")
-    check(tmp_path / "t.mat", [1, 2, 3])
-
-
-def test_matlab_7_3_is_read(tmp_path: Path) -> None:
-    # As MATLAB writes it: transposed, text in UTF-16 behind references, and a block of its own before all.
-    with h5py.File(tmp_path / "t.mat", "w", userblock_size=512) as file:
-        references = []
-        for number, grasp in enumerate(GRASPS):
-            file[f"#refs#/{number}"] = np.frombuffer(grasp.encode("utf-16-le"), np.uint16)[:, None]
-            references.append(file[f"#refs#/{number}"].ref)
-        cell = file.create_dataset("grasp", (1, 3), h5py.ref_dtype)
-        cell[0] = references
-        cell.attrs["MATLAB_class"] = np.bytes_("cell")
-        file["flex"], file["pads"], file["rate"] = [JOINTS], np.transpose(PADS), [[50.0]]
-    content = (tmp_path / "t.mat").read_bytes()
-    (tmp_path / "t.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(128) + content[128:])
     check(tmp_path / "t.mat", [1, 2, 3])
 
 
@@ -156,19 +128,21 @@ def test_no_other_file_is_read_through_hdf5(tmp_path: Path) -> None:
     elsewhere = [("secret", 0, 4)]
     linked = hdf5(tmp_path / "t.h5", a={"shape": (4,), "dtype": "u1", "external": elsewhere}, b=[1, 2, 3, 4])
     assert "'/a' lies in another file" in refused(linked)
-    # What only a reference of a cell leads to is met by no walk through the file.
-    os.mkfifo(tmp_path / "endless")
-    for name in ("secret", "endless"):
-        with h5py.File(tmp_path / "t.mat", "w", userblock_size=512) as file:
-            external = [(str(tmp_path / name), 0, 4)]
-            item = file.create_dataset("#refs#/0", (2, 1), "u2", external=external)
-            cell = file.create_dataset("grasp", (1, 3), h5py.ref_dtype)
-            cell[0] = [item.ref] * 3
-            cell.attrs["MATLAB_class"] = np.bytes_("cell")
-            file["flex"] = [JOINTS]
-        content = (tmp_path / "t.mat").read_bytes()
-        (tmp_path / "t.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(128) + content[128:])
-        assert "'/#refs#/0' lies in another file" in refused(tmp_path / "t.mat")
+    layout = h5py.VirtualLayout(shape=(4,), dtype="f8")
+    layout[:] = h5py.VirtualSource(hdf5(tmp_path / "u.h5", a=[1.0, 2.0, 3.0, 4.0]), "a", shape=(4,))
+    with h5py.File(tmp_path / "v.h5", "w") as file:
+        file.create_virtual_dataset("a", layout)
+    assert "'/a' lies in another file" in refused(tmp_path / "v.h5")
+    # A link to a dataset of another file is not followed.
+    with h5py.File(tmp_path / "w.h5", "w") as file:
+        file["a"] = h5py.ExternalLink("u.h5", "a")
+    assert "it holds no columns" in refused(tmp_path / "w.h5")
+
+
+def test_matlab_7_3_is_refused_with_what_to_save_instead(tmp_path: Path) -> None:
+    path = hdf5(tmp_path / "t.mat", a=[1, 2])
+    path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM" + path.read_bytes())
+    assert "save it with the option -v7" in refused(path)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -19,7 +18,6 @@ from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.report.content import ReportContent
 from thenar.compiler.report.page import report_html
 
-FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1300,1000")
 PATIENCE_S = 30
 
 pytestmark = pytest.mark.slow
@@ -86,13 +84,8 @@ class Reader:
 
 
 @pytest.fixture(scope="module")
-def reader(tool: Callable[[str], str]) -> Iterator[Reader]:
-    options = webdriver.ChromeOptions()
-    options.binary_location = tool("chromium")
-    for flag in FLAGS:
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service(executable_path=tool("chromedriver")))
+def reader(new_chromium: Callable[..., webdriver.Chrome]) -> Iterator[Reader]:
+    driver = new_chromium("--window-size=1300,1000", logs=("browser", "performance"))
     yield Reader(driver)
     driver.quit()
 

@@ -1,4 +1,4 @@
-"""try.html as a visitor has it: opened from its file in a real browser, clicked, dragged, typed at, fed by gloves."""
+"""try.html as a visitor has it: opened from its file in a real browser, clicked, dragged, typed at."""
 
 import base64
 import csv
@@ -15,12 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.remote.webelement import WebElement
-from selenium.webdriver.support.select import Select
 from selenium.webdriver.support.wait import WebDriverWait
 
 from thenar.compiler import GraspSet, compile_build
@@ -28,32 +26,8 @@ from thenar.compiler.recordings.export import to_csv
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.tryout import writing
-from thenar.drivers.calibration import GloveCalibration, SensorCalibration
-from thenar.drivers.cyberglove_protocol import SENSORS_22
-from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts, GloveState
-from thenar.drivers.emulated.scanner import ScannerBoard
-from thenar.drivers.line_reader import RowReader
-from thenar.drivers.lines import Header, Row, parsed
-from thenar.drivers.scanner_protocol import (
-    WITHOUT_DIODES,
-    Event,
-    Frame,
-    FrameDecoder,
-    FromBoard,
-    Heartbeat,
-    Hello,
-    Lost,
-    encode,
-    frame,
-)
-from thenar.drivers.scanner_state import ambiguous
 from thenar.runtime import Build
-from thenar.runtime.calibration import CodeTables, codes_of_bytes, numbers_of
-from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.harness.wiring import Debounce, Harness, ScannerWiring, StreamWiring
-from thenar.runtime.live.system import System
 from thenar.runtime.manifest import Calibration
-from thenar.runtime.sources.rows import RowSource
 from thenar.runtime.tables import PAIRED, PLAIN, SLOPED
 from thenar.simulator.handmaps.handmap import hand_map
 
@@ -61,22 +35,7 @@ Make = Callable[..., GraspSet]
 
 pytestmark = pytest.mark.slow
 
-FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1400,1000")
 PATIENCE_S = 30
-
-# A navigator.serial whose one port says what it is fed, and keeps what it is told.
-FAKE_SERIAL = """
-    globalThis.fake = { written: [], options: null, closed: false };
-    const port = {
-      async open(options) {
-        fake.options = options;
-        this.readable = new ReadableStream({ start(controller) { fake.controller = controller; } });
-        this.writable = new WritableStream({ write(chunk) { fake.written.push(...chunk); } });
-      },
-      async close() { fake.closed = true; },
-    };
-    Object.defineProperty(navigator, "serial", { value: { requestPort: async () => port } });
-"""
 
 
 class Trier:
@@ -128,27 +87,9 @@ class Trier:
         return [message["params"]["request"]["url"] for message in sent]
 
 
-def _driver(tool: Callable[[str], str]) -> webdriver.Chrome:
-    options = webdriver.ChromeOptions()
-    options.binary_location = tool("chromium")
-    for flag in FLAGS:
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    return webdriver.Chrome(options=options, service=Service(executable_path=tool("chromedriver")))
-
-
 @pytest.fixture(scope="module")
-def trier(tool: Callable[[str], str]) -> Iterator[Trier]:
-    driver = _driver(tool)
-    yield Trier(driver)
-    driver.quit()
-
-
-@pytest.fixture(scope="module")
-def gloved_trier(tool: Callable[[str], str]) -> Iterator[Trier]:
-    """Return a browser whose pages find a glove on Web Serial."""
-    driver = _driver(tool)
-    driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": FAKE_SERIAL})
+def trier(new_chromium: Callable[..., webdriver.Chrome]) -> Iterator[Trier]:
+    driver = new_chromium("--window-size=1400,1000", logs=("browser", "performance"))
     yield Trier(driver)
     driver.quit()
 
@@ -348,7 +289,7 @@ def test_the_keyboard_alone_reaches_and_works_everything(opened: Trier, folder: 
             focused.send_keys(Keys.ARROW_RIGHT)
         ActionChains(opened.driver).send_keys(Keys.TAB).perform()
     identities = {one.get_attribute("id") for one in reached}
-    assert {"lose", "open-all", "joint-0", "row", "play", "file", "kind", "baud", "connect"} <= identities
+    assert {"lose", "open-all", "joint-0", "row", "play", "file"} <= identities
     assert sum(one.get_attribute("role") == "button" for one in reached) == build.tables.n_switches
     assert sum(pressed(opened)) > 0
     assert (opened.text("grasp"), opened.text("margin")) == said_of(build, bits_now(opened, build), codes_now(opened))
@@ -512,277 +453,15 @@ def test_names_that_hold_scripts_run_nothing(trier: Trier, make_set: Make, tmp_p
     assert trier.requests() == [(tmp_path / "build" / "try.html").as_uri()]
 
 
-# ---- Gloves on Web Serial ----
-
-
-class Wire:
-    """The far end of the page's port: what the page wrote, and what it is fed."""
-
-    def __init__(self, trier: Trier) -> None:
-        self.trier = trier
-
-    def written(self) -> bytes:
-        return bytes(self.trier.script("return fake.written.splice(0)"))
-
-    def feed(self, data: bytes) -> None:
-        if data:
-            self.trier.script("fake.controller.enqueue(Uint8Array.from(arguments[0]))", list(data))
-
-    def until(self, said: Callable[[], bool], turn: Callable[[bytes], bytes]) -> None:
-        """Answer what the page writes, until it says so."""
-
-        def step() -> bool:
-            self.feed(turn(self.written()))
-            return said()
-
-        self.trier.wait(step)
-
-
-def chosen(trier: Trier, kind: str) -> None:
-    """Choose what the glove is, and connect it."""
-    Select(trier.one("#kind")).select_by_value(kind)
-    trier.one("#connect").click()
-
-
-def connected(trier: Trier, page: Path, kind: str) -> Wire:
-    trier.open(page)
-    chosen(trier, kind)
-    trier.wait(lambda: trier.script("return Boolean(fake.controller)"))
-    return Wire(trier)
-
-
-def test_a_scanner_board_is_read_key_by_key(gloved_trier: Trier, folder: Path) -> None:
-    build, trier = Build.load(folder), gloved_trier
-    keys = build.tables.n_switches
-    wire, board, now = connected(trier, folder / "try.html", "scanner"), ScannerBoard(1, keys), 0
-    wire.feed(b"noise\x00" + b"".join(board.boot(0)))
-    closed = 0
-
-    def turn(heard: bytes) -> bytes:
-        nonlocal now
-        now += 30_000
-        return b"".join([*board.receive(heard, now), *board.scan(closed, now)])
-
-    for closed in (0b101, 0b10, (1 << keys) - 1):
-        board.touch(now)
-        wanted = [closed >> key & 1 for key in range(keys)]
-        wire.until(lambda wanted=wanted: bits_now(trier, build) == wanted, turn)  # type: ignore[misc]
-    codes, dull = codes_now(trier), np.ones(build.tables.n_joints, bool)
-    found = build.recognise(np.ones(keys, bool), np.array(codes, np.uint16), None, dull)
-    assert trier.text("grasp") == found.grasp
-    assert f"degraded: {len(codes)} inputs are lost" in trier.text("margin")
-    assert f"board of {keys} keys" in trier.text("serial-said")
-    # A frame is lost: nothing is known before the board has told all of its keys again.
-    lossy = b"".join(board.scan(closed ^ 1, now + 60_000)) or b"x"
-    wire.feed(lossy[:-3] + b"\x00")
-    wire.until(lambda: bits_now(trier, build)[0] == 0, turn)
-    trier.one("#connect").click()
-    trier.wait(lambda: trier.script("return fake.closed"))
-    assert trier.script("return fake.options.baudRate") == 1_000_000
-    assert trier.log("browser") == []
-
-
-def test_a_cyberglove_is_asked_what_it_is_and_its_bytes_become_codes(
-    gloved_trier: Trier, folder: Path, tmp_path: Path
-) -> None:
-    build, trier = Build.load(folder), gloved_trier
-    names = [joint.name for joint in build.manifest.joints]
-    calibration = GloveCalibration(
-        sensors=tuple(SensorCalibration(name, 40 + 10 * at, 0.0, 200, 90.5) for at, name in enumerate(names))
-    )
-    (tmp_path / "calibration.toml").write_text(calibration.to_toml())
-    state = GloveState(22, 0)
-    box = CyberGloveBox(state, "a glove", Doubts(stop_echo=True))
-    trier.open(folder / "try.html")
-    trier.one("#calibration").send_keys(str(tmp_path / "calibration.toml"))
-    trier.wait(lambda: trier.text("serial-said") == f"Calibration of {len(names)} sensors.")
-    chosen(trier, "cyberglove")
-    trier.wait(lambda: trier.script("return Boolean(fake.controller)"))
-    wire = Wire(trier)
-
-    def turn(heard: bytes) -> bytes:
-        said = b"".join(each for each in box.feed(heard) if isinstance(each, bytes))
-        return said + (state.record(streamed=True) if box.streaming else b"")
-
-    tables = CodeTables(build.manifest.joints, SENSORS_22, calibration)
-    for values in (bytes(range(100, 122)), bytes([ord("S"), ord("G")] * 11)):
-        state.set(values)
-        wanted = list(tables.codes(values))
-        shown = [min(max(code, low), high) for code, (low, high) in zip(wanted, ranges(trier), strict=True)]
-        wire.until(lambda shown=shown: codes_now(trier) == shown, turn)  # type: ignore[misc]
-        found = build.recognise(
-            np.zeros(build.tables.n_switches, bool),
-            np.array(wanted, np.uint16),
-            np.ones(build.tables.n_switches, bool),
-            None,
-        )
-        said = f"{100 * found.probability:.1f} %, ahead by {found.margin} steps"
-        trier.wait(lambda said=said: trier.text("margin").startswith(said))  # type: ignore[misc]
-    state.plugged = False
-    wire.until(lambda: "unplugged" in trier.text("serial-said"), turn)
-    inputs = build.tables.n_switches + build.tables.n_joints
-    trier.wait(lambda: f"degraded: {inputs} inputs are lost" in trier.text("margin"))
-    assert trier.log("browser") == []
-
-
-def ranges(trier: Trier) -> list[tuple[int, int]]:
-    ends = trier.script(
-        "return [...document.querySelectorAll('#joints [type=range]')].map((one) => [one.min, one.max])"
-    )
-    return [(int(low), int(high)) for low, high in ends]
-
-
-def test_a_glove_without_its_calibration_is_refused_in_words(gloved_trier: Trier, folder: Path) -> None:
-    trier = gloved_trier
-    trier.open(folder / "try.html")
-    chosen(trier, "cyberglove")
-    trier.wait(lambda: "not in the glove's bytes: open its calibration" in trier.text("serial-said"))
-
-
-def test_lines_of_numbers_are_rows_of_the_build(gloved_trier: Trier, folder: Path, gloved: GraspSet) -> None:
-    build, trier = Build.load(folder), gloved_trier
-    wire = connected(trier, folder / "try.html", "lines")
-    bits, codes = rows_of(build, gloved)
-    names = [*(switch.name for switch in build.manifest.switches), *(joint.name for joint in build.manifest.joints)]
-    for row, form in enumerate(("header", "pairs", "json", "order")):
-        joints = [
-            joint.value_a + (code - joint.code_a) * (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a)
-            for joint, code in zip(build.manifest.joints, codes[row].tolist(), strict=True)
-        ]
-        values = [*bits[row].astype(int).tolist(), *joints]
-        order = ",".join(map(str, values))
-        line = {
-            "header": f"ms,{','.join(names)}\n12,{order}\n",
-            "pairs": "12,what\n"
-            + ",".join(f"{name}:{value}" for name, value in zip(names, values, strict=True))
-            + "\n",
-            "json": json.dumps(dict(zip(names, values, strict=True))) + "\n",
-            "order": f"{order}\n",
-        }[form].encode()
-        wire.feed(line[:7])
-        wire.feed(line[7:])
-        wanted = said_of(build, bits[row].tolist(), codes[row].tolist())
-        trier.wait(lambda wanted=wanted: (trier.text("grasp"), trier.text("margin")) == wanted)  # type: ignore[misc]
-        assert bits_now(trier, build) == bits[row].astype(int).tolist()
-    trier.wait(lambda: trier.text("serial-said") == 'Connected: 4 rows; lines without a row: 1, such as "12,what".')
-    assert trier.log("browser") == []
-
-
-@pytest.fixture(scope="module")
-def counted_pads(make_set: Make) -> GraspSet:
-    """Return a set with two switches and two taxels whose codes are a converter's counts."""
-    made = make_set()
-    held = np.where(made.switches[:, 2:4], 700, 80) + np.random.default_rng(3).integers(0, 300, (len(made), 2))
-    return replace(
-        made,
-        switches=made.switches[:, :2],
-        switch_names=("a", "b"),
-        taxels=held.astype(np.uint16),
-        taxel_columns=tuple(Joint(name, "count", 0, 0.0, 1023, 1023.0) for name in ("pad", "other pad")),
-    )
-
-
-def test_a_board_is_read_as_the_wiring_has_it_with_its_taxels(
-    gloved_trier: Trier, counted_pads: GraspSet, tmp_path: Path
-) -> None:
-    board = ScannerWiring(port="/dev/ttyACM0", switches=("", "b", "a"), taxels=("", "other pad", "pad"), baud=500_000)
-    harness = Harness(name="glove", scanners=(board,))
-    compile_build(counted_pads, tmp_path / "build", folds=0, rounds=8, levels=3, inputs="switches", harness=harness)
-    build, trier, now = Build.load(tmp_path / "build"), gloved_trier, 0
-    wire = connected(trier, tmp_path / "build" / "try.html", "scanner")
-    emulated = ScannerBoard(1, 3, channels=3, bits=10)
-    wire.feed(b"".join(emulated.boot(0)))
-    kept = {switch.source for switch in build.manifest.switches}
-    assert {"pad", "other pad"} <= kept
-    for row in (0, 1, 2):
-        values = dict(zip(("pad", "other pad"), counted_pads.taxels[row].tolist(), strict=True))
-        values |= dict(zip(("a", "b"), counted_pads.switches[row].tolist(), strict=True))
-        emulated.codes = (5, values["other pad"], values["pad"])
-        closed = values["b"] << 1 | values["a"] << 2
-        emulated.touch(now)
-
-        def turn(heard: bytes, closed: int = closed) -> bytes:
-            nonlocal now
-            now += 30_000
-            return b"".join([*emulated.receive(heard, now), *emulated.scan(closed, now)])
-
-        bits, _ = rows_of(build, counted_pads)
-        wanted = said_of(build, bits[row].astype(int).tolist(), [])
-        wire.until(lambda wanted=wanted: (trier.text("grasp"), trier.text("margin")) == wanted, turn)  # type: ignore[misc]
-    assert trier.script("return fake.options.baudRate") == 500_000
-    assert trier.log("browser") == []
-
-
-def test_lines_are_read_as_the_wiring_of_a_stream_has_them(
-    gloved_trier: Trier, counted_pads: GraspSet, tmp_path: Path
-) -> None:
-    stream = StreamWiring(
-        port="/dev/ttyACM0",
-        columns=("ms", "j0", "b", "a", "pad", "other pad", "j1", "j2"),
-        switches=("a", "b"),
-        threshold=2.5,
-        thresholds={"b": 100.0},
-        closed="low",
-        joints={"j0": (0.0, 127.5), "j1": (200.0, -3.0), "j2": (0.0, 1.0)},
-        taxels={"pad": (0.0, 1023.0), "other pad": (0.0, 1023.0)},
-    )
-    harness = Harness(name="glove", streams=(stream,), debounce=Debounce(enabled=False))
-    compile_build(counted_pads, tmp_path / "build", folds=0, rounds=8, levels=3, harness=harness)
-    build, trier = Build.load(tmp_path / "build"), gloved_trier
-    wire = connected(trier, tmp_path / "build" / "try.html", "lines")
-    system, reader = System.of(build, harness), Handed()
-    source = RowSource(reader, harness, 0, system.switch_names, system.scan)
-    source.open()
-    joints = CodeTables(build.manifest.joints, harness.sensor_names, numbers_of(stream.joints))
-    for line in (b"7,99.4,100.5,2.4,300,900,12.25,0.5", b"8,130,99,3,0,1023,201,-1", b"9,nan,1,2.5,512,80,100,0.3333"):
-        wire.feed(line + b"\n")
-        reader.lines.append(line)
-        switches, glove = source.read(0), source.read(0)
-        assert isinstance(switches, SwitchFrame)
-        assert isinstance(glove, GloveFrame)
-        codes = np.array(joints.codes(glove.sensors), np.uint16)
-        flags = [
-            [bool(mask >> bit & 1) for bit in range(build.tables.n_switches)]
-            for mask in (switches.closed, switches.lost)
-        ]
-        dull = [bool(joints.lost >> joint & 1) for joint in range(build.tables.n_joints)]
-        found = build.recognise(flags[0], codes, flags[1], dull)
-        said = f"{100 * found.probability:.1f} %, ahead by {found.margin} steps"
-        trier.wait(lambda said=said: trier.text("margin").startswith(said))  # type: ignore[misc]
-        assert trier.text("grasp") == found.grasp
-    assert trier.log("browser") == []
-
-
-class Handed(RowReader):
-    """Hands over the rows of lines, one at a time."""
-
-    def __init__(self) -> None:
-        self.lines: list[bytes] = []
-
-    def open(self) -> None:
-        """Do nothing."""
-
-    def read(self, _timeout_s: float) -> list[Row]:
-        row = parsed(self.lines.pop(0))
-        assert isinstance(row, Row)
-        return [row]
-
-    def close(self) -> None:
-        """Do nothing."""
-
-
 # ---- The parts that are Python's, in JavaScript ----
 
-PARTS = (
-    *("parseCalibration", "codeOf", "codesOfBytes", "rounded"),
-    *("parsedLine", "parseCsv", "encodeFrame", "FrameDecoder", "ScannerBoard"),
-)
+PARTS = ("codeOf", "parseCsv")
 
 
 @pytest.fixture(scope="module")
 def parts(trier: Trier, tmp_path_factory: pytest.TempPathFactory) -> Trier:
     """Return a browser in which `parts` holds functions of the page's modules."""
-    modules = [Path(writing.__file__).with_name("page") / name for name in ("tables.js", "lines.js", "scanner.js")]
+    modules = [Path(writing.__file__).with_name("page") / name for name in ("tables.js", "rows.js")]
     script = "".join(writing.scoped(module.read_text()) for module in modules)
     page = tmp_path_factory.mktemp("parts") / "parts.html"
     page.write_text(f"<script type=module>{script}globalThis.parts = {{ {', '.join(PARTS)} }};</script>")
@@ -790,87 +469,7 @@ def parts(trier: Trier, tmp_path_factory: pytest.TempPathFactory) -> Trier:
     return trier
 
 
-TEXTS = (
-    *("12,0,1,1023", "12;0,5;-1,25", "1 2\t3", " 7 ", "ms,thumb,index", "ms thumb index", "thumb", "12,what", "1,,3"),
-    *("1,nan,-inf,-", "nan", "ms:12,thumb:0,flex:1023", "a:1 b:2", "a: 1, b :2", "a:1,a:2", ":1", "a:x"),
-    *('{"ms": 12, "thumb": NaN}', '[1, null, true, "2"]', '{"a": {"b": 1}}', "{broken", "[]", "{}"),
-    *("[NaN, -Infinity, 3]", '"1","2"', "1e5,.5,5.,+3", "1e1234", "\ufeffa,b", "_a,b", "1a,2b", "é,ß", "-", "a,a"),
-    *("time;x", "12, 13 ,14", "0x10", "1_000", "garbage!", "a,", ",", "1,2,", "1,2,fist", "1,b,fist"),
-    *("flex[0],flex[1]", '[" 8 ", "1e2", "x"]', '{"a": "7.5", "b": "fist"}'),
-)
-
-
-@pytest.mark.parametrize("columns", [0, 3])
-def test_a_line_holds_what_the_driver_finds_in_it(parts: Trier, columns: int) -> None:
-    told = parts.script("return arguments[0].map((text) => parts.parsedLine(text, arguments[1]))", TEXTS, columns)
-    for text, found in zip(TEXTS, told, strict=True):
-        row = parsed(text.encode(), columns)
-        wanted: dict[str, Any] | None = None
-        if isinstance(row, Header):
-            wanted = {"header": list(row.names)}
-        elif row is not None:
-            wanted = {"names": None if row.names is None else list(row.names), "values": list(row.values)}
-        assert found == wanted, text
-
-
-def test_frames_of_a_board_are_encoded_and_decoded_as_by_the_driver(parts: Trier) -> None:
-    random = np.random.default_rng(4)
-    for size in (0, 1, 35, 248, 249, 250):
-        for high in (2, 256):
-            payload = random.integers(0, high, size).astype(np.uint8).tobytes()
-            wire = encode(Frame(4, 17, payload))
-            assert bytes(parts.script("return [...parts.encodeFrame(4, 17, arguments[0])]", list(payload))) == wire
-            again = "return new parts.FrameDecoder().feed(arguments[0]).map((one) => one && [...one.payload])"
-            assert parts.script(again, [7, 0, *wire, 0, *wire]) == [None, list(payload), list(payload)]
-            if size:
-                wrong = bytes([wire[0], wire[1] ^ 32, *wire[2:]])
-                assert [frame.payload for frame in FrameDecoder().feed(wrong)] == []
-                assert parts.script(again, list(wrong)) == [None]
-
-
-HEAR = """const [board, sent] = [globalThis.board, globalThis.sent];
-    const found = board.received(Uint8Array.from(arguments[0]));
-    return [found && found.closed.map(Number), found && found.known.map(Number), sent.splice(0).map((one) => one[1])]"""
-
-
-def test_keys_are_known_while_nothing_is_missing_of_what_the_board_told(parts: Trier) -> None:
-    parts.script("globalThis.sent = []; globalThis.board = new parts.ScannerBoard((bytes) => sent.push([...bytes]))")
-    hello = Hello(1, 0, 0, 7, 1, 0, 0, 1, 3, 1000, 0, 50_000, 0, 0, 0)
-
-    def hear(*messages: tuple[FromBoard, int]) -> tuple[list[int] | None, list[int] | None]:
-        wire = b"".join(encode(frame(message, number)) for message, number in messages)
-        closed, known, _ = parts.script(HEAR, list(wire))
-        return closed, known
-
-    assert hear((Heartbeat(0, 1, 3), 9)) == (None, None)
-    assert hear((hello, 10)) == ([0, 0, 0], [0, 0, 0])
-    assert hear((Heartbeat(5, 0b101, 3), 11)) == ([1, 0, 1], [1, 1, 1])
-    assert hear((Event(6, 1, 1), 12)) == ([1, 1, 1], [1, 1, 1])
-    # A frame is missing, which may have been an EVENT or a LOST: a HEARTBEAT alone does not say that all can be read.
-    assert hear((Event(7, 1, 0), 14)) == ([0, 0, 0], [0, 0, 0])
-    assert hear((Heartbeat(8, 0b100, 3), 16)) == ([0, 0, 0], [0, 0, 0])
-    assert hear((Heartbeat(9, 0b100, 3), 17)) == ([0, 0, 1], [1, 1, 1])
-    assert hear((Lost(0b100, 3), 18), (Heartbeat(9, 0b101, 3), 19)) == ([1, 0, 0], [1, 1, 0])
-    # A sound frame that such a board cannot send: nothing holds any more.
-    assert hear((Heartbeat(9, 0b1101, 4), 20), (Event(9, 7, 1), 21)) == ([0, 0, 0], [0, 0, 0])
-    assert hear((Heartbeat(9, 0b1, 3), 22)) == ([0, 0, 0], [0, 0, 0])
-    assert hear((Heartbeat(9, 0b1, 3), 23)) == ([1, 0, 0], [1, 1, 1])
-    assert parts.script(HEAR, list(b"\x05damaged\x00"))[1] == [0, 0, 0]
-
-
-def test_ghosts_of_a_matrix_without_diodes_are_unknown(parts: Trier) -> None:
-    parts.script("globalThis.sent = []; globalThis.board = new parts.ScannerBoard((bytes) => sent.push([...bytes]))")
-    hello = Hello(1, WITHOUT_DIODES, 0, 7, 1, 0, 0, 3, 4, 1000, 0, 50_000, 0, 0, 0)
-    random = np.random.default_rng(8)
-    parts.script(HEAR, list(encode(frame(hello, 0))))
-    for number in range(1, 40):
-        closed = int(random.integers(0, 1 << 12) & random.integers(0, 1 << 12))
-        _, known, _ = parts.script(HEAR, list(encode(frame(Heartbeat(0, closed, 12), number))))
-        wanted = ~ambiguous(closed, 3, 4)
-        assert known == [wanted >> key & 1 for key in range(12)]
-
-
-def test_values_and_bytes_become_the_codes_that_python_makes_of_them(parts: Trier) -> None:
+def test_values_become_the_codes_that_python_makes_of_them(parts: Trier) -> None:
     random = np.random.default_rng(6)
     for joint in (
         Calibration(0, "a", "deg", 0, -250.0, 1000, 250.0),
@@ -882,22 +481,6 @@ def test_values_and_bytes_become_the_codes_that_python_makes_of_them(parts: Trie
         told = parts.script("return arguments[1].map((value) => parts.codeOf(arguments[0], value))", coded, values)
         recorded = Joint(joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
         assert told == np.clip(recorded.code(np.array(values)), 0, 65535).astype(int).tolist()
-        line = SensorCalibration("a", 31, -12.5, 222, 95.25)
-        meaning = GloveCalibration(sensors=(line,))
-        ends = {name: getattr(line, name) for name in ("raw_a", "value_a", "raw_b", "value_b")}
-        told = parts.script("return parts.codesOfBytes(arguments[0], arguments[1])", coded, ends)
-        same = Calibration(**{**coded, "column": 0, "unit": "deg"})
-        assert told == list(codes_of_bytes(same, meaning))
-
-
-def test_a_calibration_that_was_written_is_read(parts: Trier) -> None:
-    lines = (SensorCalibration('a "b" \\', 1, -0.5, 255, 1e-3), SensorCalibration("index_mpj", 96, 0.0, 161, 90.0))
-    text = GloveCalibration(subject="anna", sensors=lines).to_toml()
-    inline = 'unit = "deg"\nsensor = [\n { name = "x", raw_a = 9, value_a = 0.0, raw_b = 16, value_b = 9.5 },\n]\n'
-    read = "return [...parts.parseCalibration(arguments[0])]"
-    fields = ("raw_a", "value_a", "raw_b", "value_b")
-    assert parts.script(read, text) == [[line.name, {name: getattr(line, name) for name in fields}] for line in lines]
-    assert parts.script(read, inline) == [["x", dict(zip(fields, (9, 0, 16, 9.5), strict=True))]]
 
 
 def test_a_table_in_csv_is_split_as_python_splits_it(parts: Trier) -> None:

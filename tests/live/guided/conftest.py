@@ -12,7 +12,6 @@ from typing import Any
 
 import pytest
 from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -22,7 +21,6 @@ from thenar.drivers.emulated.scanner import EmulatedScanner
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.simulator.playing.performance import Performance
 
-from ..web.conftest import FLAGS
 from ..web.conftest import Browser as PageBrowser
 
 PATIENCE_S = 60
@@ -86,19 +84,14 @@ class Browser(PageBrowser):
 
 
 @pytest.fixture(scope="module")
-def drivers(tool: Callable[[str], str]) -> Iterator[Callable[[int], Browser]]:
+def drivers(new_chromium: Callable[..., webdriver.Chrome]) -> Iterator[Callable[[int], Browser]]:
     """Return the browsers of a module, by number: each is started when it is first asked for."""
     with ExitStack() as stack:
         made: list[Browser] = []
 
         def browser(number: int) -> Browser:
             while len(made) <= number:
-                options = webdriver.ChromeOptions()
-                options.binary_location = tool("chromium")
-                for flag in FLAGS:
-                    options.add_argument(flag)
-                options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-                driver = webdriver.Chrome(options=options, service=Service(tool("chromedriver")))
+                driver = new_chromium("--window-size=1400,1000")
                 stack.callback(driver.quit)
                 made.append(Browser(driver))
             return made[number]

@@ -11,7 +11,6 @@ from typing import Any
 import msgspec
 import pytest
 from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
@@ -22,7 +21,6 @@ from thenar.runtime.policy import Policy
 from thenar.runtime.web.live import LivePage
 from thenar.simulator.playing.bench import Bench
 
-FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1400,1000")
 PATIENCE_S = 30
 # The answer is the candidate of each frame.
 FRANK = Policy(lead=0.0, dwell_us=0)
@@ -83,13 +81,8 @@ class Browser:
 
 
 @pytest.fixture(scope="module")
-def chromium(tool: Callable[[str], str]) -> Iterator[Browser]:
-    options = webdriver.ChromeOptions()
-    options.binary_location = tool("chromium")
-    for flag in FLAGS:
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service(executable_path=tool("chromedriver")))
+def chromium(new_chromium: Callable[..., webdriver.Chrome]) -> Iterator[Browser]:
+    driver = new_chromium("--window-size=1400,1000")
     yield Browser(driver)
     driver.quit()
 

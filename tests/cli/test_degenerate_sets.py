@@ -7,14 +7,9 @@ import sys
 import warnings
 from pathlib import Path
 
-import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from thenar.cli import run
-from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import winners
 from thenar.stability.cases import degenerate
 from thenar.stability.cases.statistics import lopsided
 from thenar.stability.inputs.small_sets import parity
@@ -120,41 +115,3 @@ def test_an_exclusive_or_is_placed_told_and_built_without_a_word_too_few(
     assert "at 1 node no switch gains anything alone" in table
     command(capsys, "compile", path, "-o", tmp_path / "build", "--folds", 0)
     assert json.loads((tmp_path / "build" / "build.json").read_bytes())["zero_gain_nodes"] == 1
-
-
-def test_degrees_by_an_unheard_of_unit_are_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "columns.toml").write_text('label = "grasp"\n[[joints]]\ncolumns = ["j"]\ngrid = 1e200\n')
-    (tmp_path / "table.csv").write_text("grasp,j\na,-3e203\nb,1.4e200\n")
-    given = (tmp_path / "table.csv", "-o", tmp_path / "set.grasps", "--columns", tmp_path / "columns.toml")
-    assert command(capsys, "import", *given)[0] == 0
-    assert command(capsys, "info", tmp_path / "set.grasps", "--plot", tmp_path / "set.png")[0] == 0
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.integers(1, 5), st.integers(1, 4), st.integers(1, 3), st.data())
-def test_boosting_anything_small_is_finite_and_answers_a_class_that_has_rows(
-    rows: int, classes: int, columns: int, data: st.DataObject
-) -> None:
-    labels = np.array(data.draw(st.lists(st.integers(0, classes - 1), min_size=rows, max_size=rows)))
-    values = st.sampled_from([0.0, 1.0, -0.0, 5e-324, 65535.0, 1e308, -1e308, float("nan")])
-    X = np.array(data.draw(st.lists(values, min_size=rows * columns, max_size=rows * columns))).reshape(rows, columns)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        stumps, losses = boost(X, labels, classes, rounds=30)
-        scores = stumps.scores(X)
-    assert np.isfinite(scores).all()
-    assert np.isfinite(losses).all()
-    if stumps.n_rounds:
-        assert set(winners(scores)) <= set(labels)
-
-
-def test_a_set_is_what_its_name_says() -> None:
-    sets = degenerate.UNSOLVABLE | degenerate.SOLVABLE
-    assert len(sets["one row"]) == 1
-    assert len(np.unique(sets["one class"].labels)) == 1
-    assert min(np.bincount(sets["a class of one row"].labels)) == 1
-    assert len(sets["a type without rows"].taxonomy.types) > len(np.unique(sets["a type without rows"].labels))
-    assert len(np.unique(sets["33 types of one row each"].labels)) == len(sets["33 types of one row each"]) == 33
-    assert (sets["one switch"].switches.shape[1], sets["one switch"].codes.shape[1]) == (1, 0)
-    assert (sets["one joint"].switches.shape[1], sets["one joint"].codes.shape[1]) == (0, 1)
-    assert (sets["no switch that varies"].switches == sets["no switch that varies"].switches[0]).all()

@@ -1,1 +1,0 @@
-"""The page, its pictures, and their measurements."""
