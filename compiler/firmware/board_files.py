@@ -74,16 +74,6 @@ def harness_of(board: Board) -> Harness:
     return Harness(name="board", buses=(BusWiring(device="bus", clock_hz=board.bus.clock_hz, chips=board.chips),))
 
 
-def switches_of(ports: Sequence[Port]) -> list[list[int]]:
-    """Return the numbers of the build's switches that each reading shows: the ports of the early exit."""
-    return [list(port.elements) for port in ports]
-
-
-def exits_early(board: Board, ports: Sequence[Port]) -> bool:
-    """Return whether a scan of the readings `ports` may end before the last; a single reading is always made."""
-    return board.early_exit and len(ports) > 1
-
-
 def follows_segments(board: Board, names: Names) -> bool:
     """Return whether a glove on this board follows segments: its build has segment costs, and the part enough RAM."""
     model, ram = names.segments, board.microcontroller.ram
@@ -109,8 +99,7 @@ def shortest_scan_us(
         cycles += cycles // 10
     if recognises:
         lookups = tables.n_switches // 2 + tables.n_joints
-        predictions = len(ports) if exits_early(board, ports) else 1
-        cycles += predictions * (_PREDICTION + lookups * (_LOOKUP + _CLASS * tables.n_classes))
+        cycles += _PREDICTION + lookups * (_LOOKUP + _CLASS * tables.n_classes)
         cycles += _STATE * (tables.n_classes + 1) * segments
     return 50 * ceil((seconds + cycles / board.clock_hz) * 1e6 / 50)
 
@@ -141,7 +130,6 @@ def config_of(
 
 _MOST_GRASPS = 255  # a grasp is a byte on the line, and 255 means none
 _MOST_RAM = 3 / 8  # for segments; lines, keys and stack need some 900 bytes
-_WHOLE_US = 50_000  # between whole scans of a board that sends no heartbeats
 _BYTE = 0xFF
 _NUMBERS_A_LINE = 14
 
@@ -152,7 +140,7 @@ def board_files(name: str, names: Names, layout: Layout, board: Board, mode: Mod
     name  of the build, also used for its classifier's files; a name that words.check_name allows
     mode  "scan", or "glove", which also recognises
 
-    `config_of` and `switches_of` give the arguments for the protocol's files; `whole_folder` takes all files. Raises
+    `config_of` gives the argument for the protocol's files; `whole_folder` takes all files. Raises
     FirmwareError if the board lacks a switch or, for a glove, a joint; if there are more than 255 grasp types; or if a
     scan takes longer than scan_us.
     """
@@ -171,7 +159,7 @@ def board_files(name: str, names: Names, layout: Layout, board: Board, mode: Mod
     joints = _joints(name, names, layout, board) if mode == "glove" else {}
     files |= joints
     if mode == "glove":
-        files["thenar_turn.c"] = _glove_turn(name, names, board, bool(joints), exits_early(board, ports))
+        files["thenar_turn.c"] = _glove_turn(name, names, board, bool(joints))
     else:
         files |= _layer(board).channels_files(board)
         files["thenar_turn.c"] = portable("scan_turn.c", chips=len(ports), channels=board.channels)
@@ -204,21 +192,16 @@ def _joints(identifier: str, names: Names, layout: Layout, board: Board) -> dict
     return files | layer.uart_files(board, glove.uart, glove.baud)
 
 
-def _glove_turn(identifier: str, names: Names, board: Board, joints: bool, early_exit: bool) -> str:
-    switches, model = tuple(switch.name for switch in names.switches), names.segments
-    whole_us = board.heartbeat_us or _WHOLE_US
-    if segments := model is not None and follows_segments(board, names):
-        whole_us = min(whole_us, model.tick_us)
+def _glove_turn(identifier: str, names: Names, board: Board, joints: bool) -> str:
+    switches = tuple(switch.name for switch in names.switches)
     return portable(
         "glove_turn.c",
         name=identifier,
         joints=joints,
         attended=joints and board.cyberglove is not None,
         chips=bool(board.chips),
-        early_exit=early_exit,
         ghosts=board.matrix is not None and not board.matrix.diodes,
-        whole_us=whole_us,
-        segments=segments,
+        segments=follows_segments(board, names),
         many_keys=len(key_names(board, switches)) > _BYTE,
         keys_of_switches=_keys_of_switches(board, switches),
         rejects=names.rejection is not None,

@@ -241,27 +241,6 @@ def test_a_board_that_lacks_a_kept_switch_is_refused(generate: Generate) -> None
         generate(UNO + PINS.replace("s2", "s5"))
 
 
-def test_early_exit_reads_port_by_port_and_now_and_then_everything(generate: Generate) -> None:
-    early = generate(UNO + "early_exit = true\nheartbeat_us = 20_000\nscan_us = 3000\n" + CHIPS_TOML, "glove")
-    assert "thenar_my_hand_decided(&glove, port, grasp)" in early["thenar_turn.c"]
-    assert "#define WHOLE_US UINT32_C(20000)" in early["thenar_turn.c"]
-    assert "decided" not in generate(UNO + "scan_us = 3000\n" + CHIPS_TOML, "glove")["thenar_turn.c"]
-
-
-def test_of_a_single_reading_nothing_can_be_left_out_and_there_is_no_early_exit(
-    generate: Generate, make_tables: MakeTables
-) -> None:
-    one = '[[chip]]\nkind = "mcp23017"\naddress = 0x20\npins = { GPA0 = "s0", GPA1 = "s1", GPB5 = "s2" }\n'
-    for chips, early in ((one, False), (CHIPS_TOML, True)):
-        text = UNO + "scan_us = 3000\n" + chips
-        files = generate(UNO + "early_exit = true\nscan_us = 3000\n" + chips, "glove")
-        assert (files != generate(text, "glove")) == early
-        asked = [parse_board(each) for each in (text, UNO + "early_exit = true\n" + text.removeprefix(UNO))]
-        tables = make_tables(switches=3, joints=0)
-        whole, stopping = (config_of(board, ("s0", "s1", "s2"), tables, recognises=True) for board in asked)
-        assert (whole != stopping) == early
-
-
 def test_nobody_can_ask_for_more_scans_than_the_board_makes(make_tables: MakeTables) -> None:
     """The wire alone sets a bound from below: 48 and 39 SCL periods at 400 kHz."""
     names, tables = ("s0", "s1", "s2"), make_tables(switches=3, joints=3, classes=14)
