@@ -272,7 +272,7 @@ class Making:
         self.harness = harness(names) if callable(harness) else harness
         self.scan, self.unread = None, ""
         if self.harness is not None:
-            self.scan = plan_scan(names, self.integers, self.harness, kept.switches, kept.codes)
+            self.scan = plan_scan(names, self.harness)
             joints = [grasp_set.joint_names[joint] for joint in trained.joints]
             self.unread = unread_joints(self.harness, self.scan, joints)
         self.comparison = compare(trained.model, self.integers, kept.switches, kept.codes)

@@ -59,14 +59,14 @@ def _layer(board: Board) -> Layer:
     return sketch_layer if board.avr is None else avr_layer
 
 
-def readings(board: Board, switches: Sequence[str], tables: IntegerTables) -> tuple[Port, ...]:
+def readings(board: Board, switches: Sequence[str]) -> tuple[Port, ...]:
     """Return the readings of the board's chips that show a build's `switches`, in the order in which they are made.
 
-    Each chip has as few readings as possible; those that can change the scores of `tables` most per microsecond come
-    first. A board without chips has none. Raises FirmwareError if the board lacks a switch.
+    Each chip has as few readings as possible. A board without chips has none. Raises FirmwareError if the
+    board lacks a switch.
     """
     check_switches(board, switches)
-    return plan_scan(switches, tables, harness_of(board)).ports if board.chips and switches else ()
+    return plan_scan(switches, harness_of(board)).ports if board.chips and switches else ()
 
 
 def harness_of(board: Board) -> Harness:
@@ -84,7 +84,7 @@ def shortest_scan_us(
     board: Board, switches: Sequence[str], tables: IntegerTables, *, recognises: bool, segments: bool = False
 ) -> int:
     """Return the longest duration of a scan in microseconds, with all work done once per scan, rounded up to 50."""
-    ports = readings(board, switches, tables)
+    ports = readings(board, switches)
     rows, columns = rows_and_columns(board, switches)
     cycles = _SCAN + _KEY * rows * columns
     seconds = 0.0
@@ -150,12 +150,12 @@ def board_files(name: str, names: Names, layout: Layout, board: Board, mode: Mod
         raise FirmwareError(
             f"{len(answers_of(names))} grasp types: a board can report {_MOST_GRASPS}; compile fewer grasp types"
         )
-    ports = readings(board, switches, layout.tables)
+    ports = readings(board, switches)
     about = _about_glove(board, names) if mode == "glove" else _about_scanner(board)
     files = {f"{part}.h": portable(f"{part}.h") for part in ("thenar_clock", "thenar_due")}
     files |= {"thenar_due.c": portable("thenar_due.c"), "thenar_turn.h": portable("thenar_turn.h", about=about)}
     files |= _layer(board).base_files(board, about)
-    files |= _inputs(board, switches, layout)
+    files |= _inputs(board, switches)
     joints = _joints(name, names, layout, board) if mode == "glove" else {}
     files |= joints
     if mode == "glove":
@@ -169,8 +169,8 @@ def board_files(name: str, names: Names, layout: Layout, board: Board, mode: Mod
     return files
 
 
-def _inputs(board: Board, switches: Sequence[str], layout: Layout) -> dict[str, str]:
-    ports = readings(board, switches, layout.tables)
+def _inputs(board: Board, switches: Sequence[str]) -> dict[str, str]:
+    ports = readings(board, switches)
     layer, header = _layer(board), portable("thenar_keys.h", what=_inputs_in_words(board), chips=len(ports))
     files = {"thenar_keys.h": header}
     if board.matrix is not None or board.pins or not switches:

@@ -65,7 +65,7 @@ class System:
         if build.scan is not None:
             check_harness(build.scan, harness, names)
             return build.scan
-        return plan_scan(names, build.tables, harness)
+        return plan_scan(names, harness)
 
     @property
     def switch_names(self) -> tuple[str, ...]:

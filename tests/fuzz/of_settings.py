@@ -54,7 +54,7 @@ def _glove(data: bytes, folder: Path) -> None:
     parse_harness(harness_to_toml(found), "written.toml")
     ports_of_whole_glove(found, found.switches)
     Sources(found, found.switches, whole_scan(found, found.switches))
-    scan = plan_scan(_kept(), _build().tables, found)
+    scan = plan_scan(_kept(), found)
     scan_us(scan, found)
     spec_files(_build().manifest, None, found)
 

@@ -27,8 +27,6 @@ from ..points import How, Time
 from .machine import on_a_pi
 from .wirings import Wiring
 
-# Number of evenly spaced frames that decide the order of ports; all frames decide how often a scan then ends early.
-_ORDERING = 200
 NO_TIME = Time(0.0, "wire")
 # The request byte for a record of a CyberGlove.
 ASKING_US = sending_us(len(POLL), 115_200)
@@ -177,8 +175,7 @@ def scan_times(
     if not len(names):
         return ScanTimes(0.0, 0.0, 0, 0, "wire", 0.0)
     harness = wiring.harness_of(names)
-    rows = np.linspace(0, len(bits) - 1, min(_ORDERING, len(bits))).astype(np.intp)
-    scan = plan_scan(names, tables, harness, bits[rows], codes[rows])
+    scan = plan_scan(names, harness)
     wanted = zip(harness.scanners, scan.scanners, scan.board_channels, strict=True)
     boards = [(board, channels) for board, keys, channels in wanted if keys or channels]
     streams = [

@@ -1,7 +1,6 @@
 import re
 from collections.abc import Callable, Mapping
 
-import numpy as np
 import pytest
 from msgspec.structs import replace
 
@@ -12,7 +11,6 @@ from thenar.compiler.firmware.board_files import (
     config_of,
     readings,
     shortest_scan_us,
-    switches_of,
     whole_folder,
 )
 from thenar.compiler.firmware.layout import arrange
@@ -142,24 +140,10 @@ def test_each_reading_says_which_key_every_bit_is_and_at_what_level_it_is_closed
     assert found == {(0, 0x12): ([0x80, 0x80], 0xFF, {0: 0, 14: 1}), (1, 0x02): ([0], 0, {1: 2})}
 
 
-def test_what_changes_scores_most_per_microsecond_is_read_first(make_tables: MakeTables) -> None:
-    tables = make_tables(switches=3, joints=0)
-    board = parse_board(UNO + CHIPS_TOML)
+def test_a_board_without_chips_has_no_readings() -> None:
     names = ("s0", "s1", "s2")
-    for strong, first in (((0, 1), [[0, 1], [2]]), ((2,), [[2], [0, 1]])):
-        rows = np.zeros_like(tables.switch_rows)
-        rows[list(strong), 0] = 900
-        weighed = IntegerTables(
-            bias=tables.bias,
-            switch_rows=rows,
-            thresholds=(),
-            joint_rows=(),
-            switch_means=rows,
-            joint_means=tables.joint_means,
-            scale=1.0,
-        )
-        assert switches_of(readings(board, names, weighed)) == first
-    assert readings(parse_board(UNO + PINS), names, tables) == ()
+    assert [list(port.elements) for port in readings(parse_board(UNO + CHIPS_TOML), names)] == [[0, 1], [2]]
+    assert readings(parse_board(UNO + PINS), names) == ()
 
 
 def test_the_clock_of_the_bus_is_never_faster_than_the_board_says(generate: Generate) -> None:

@@ -50,7 +50,7 @@ def test_a_full_scan_takes_what_the_runtime_predicts_with_a_system_call_a_transa
     tables, names = random_tables(switches, joints, 5), names_of(switches)
     times = scan_times(names, tables, wiring, *frames(switches, joints, 20), CALL)
     harness = wiring.harness_of(names)
-    scan = plan_scan(names, tables, harness)
+    scan = plan_scan(names, harness)
     assert times.full_us == pytest.approx(scan_us(scan, harness, CALL.call_us).us)
     assert times.early_us <= times.full_us
     assert (times.ports, times.chips, times.how) == (len(scan.ports), len(harness.buses[0].chips), "wire")
@@ -61,8 +61,7 @@ def test_a_scan_that_ends_early_takes_what_scanning_the_frames_one_by_one_comes_
     tables, names, wiring = random_tables(switches, 16, 6), names_of(switches), Wiring("mcp23017", 400_000)
     bits, codes = frames(switches, 16)
     harness = wiring.harness_of(names)
-    # Of no more frames than decide on the order of ports, so that it is the same.
-    scan = plan_scan(names, tables, harness, bits, codes)
+    scan = plan_scan(names, harness)
     costs, ports = Costs(scan.ports, harness), [sum(1 << s for _, s in port.switches) for port in scan.ports]
     early, taken_us, looks = EarlyExit(Scorer(tables), ports), list[float](), 0
     for frame, code in zip(bits, codes, strict=True):

@@ -65,16 +65,16 @@ typedef struct {
     uint8_t keys[8u * MOST_PORTS]; /* of the reply's bits */
 } port_at;
 
-/* In the order of reading: those that can change the scores most per microsecond come first. */
+/* In the order of reading. */
 static const port_at ports[PORTS] PROGMEM = {
-    /* pca9555 at 0x21, port 0: palm radial, palm ulnar */
-    {1u, 0x00u, 1u, {0x00u}, 0xFFu, {
-        0x04u, 0x05u, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu,
-    }},
     /* mcp23017 at 0x20, ports AB: thumb tip, index tip, index middle, middle tip */
     {0u, 0x12u, 2u, {0x80u, 0x80u}, 0xFFu, {
         0x00u, 0x01u, 0x02u, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu,
         0x03u, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu,
+    }},
+    /* pca9555 at 0x21, port 0: palm radial, palm ulnar */
+    {1u, 0x00u, 1u, {0x00u}, 0xFFu, {
+        0x04u, 0x05u, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu,
     }},
 };
 
