@@ -99,7 +99,7 @@ def _screened(
         columns = survey.columns(choice, survey.cuts.everything)
         some, training = survey.read(choice, survey.cuts.everything, few=True), survey.training(choice)
         names, tabled = survey.names(choice), (_TABLED,)
-        calls.append(price.call(QUICK_PRICE_S, some, names, columns, tabled, training, survey.equipment, None))
+        calls.append(price.call(QUICK_PRICE_S, some, names, columns, tabled, training, survey.equipment, False))
     found = []
     for choice, (priced,) in zip(choices, survey.cache.ask(f"times{stage}", calls), strict=True):
         us = priced.fastest_us(survey.transfer(choice).us)
