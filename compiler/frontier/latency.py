@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.live.decision import Decision, SequentialTest, Standing
 from thenar.runtime.policy import Policy
-from thenar.runtime.scores import LANE_OFFSET, Scorer
+from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.segmenting.live import LiveSegments
 from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables
@@ -94,11 +94,11 @@ def decisions(tables: IntegerTables, frames: Stretches, policy: Deciding) -> Dec
     """Return the decisions of `thenar run` under `policy` on these frames, each whole and seen once, by both devices at
     the same time; by segments: the held types.
     """
-    decider, scorer = decider_of(tables, policy), Scorer(tables)
+    decider = decider_of(tables, policy)
     found: list[Decided] = []
     lanes = map(tuple, (frames.scores + LANE_OFFSET).tolist())
     for stretch, row in zip(frames.times, lanes, strict=True):
-        for time_us, held in decider.stay(stretch, Standing(row, scorer)):
+        for time_us, held in decider.stay(stretch, Standing(row)):
             if not found or held != found[-1][1]:
                 found.append((time_us, held))
     return Decisions(
@@ -114,7 +114,7 @@ def decider_of(tables: IntegerTables, policy: Deciding) -> Decider:
     if policy.error_rate is None:
         return _Hysteresis(Decision(policy.lead_steps(tables.scale), policy.dwell_us, policy.hold_us))
     test = _Test(tables.n_classes, tables.scale, policy.error_rate, policy.hold_us, policy.spacing_us)
-    return _Tests(test, Scorer(tables))
+    return _Tests(test)
 
 
 class _Segments:
@@ -199,8 +199,8 @@ class _Tests:
     setting the clock back: a test only depends on elapsed time.
     """
 
-    def __init__(self, test: _Test, scorer: Scorer) -> None:
-        self._test, self._scorer = test, scorer
+    def __init__(self, test: _Test) -> None:
+        self._test = test
         self._back_us = 0
 
     def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
@@ -225,7 +225,7 @@ class _Tests:
 
     def _summed(self, standing: Standing, frames: int) -> Standing:
         """Return the sum of `frames` equal frames."""
-        return standing if frames == 1 else Standing(tuple(frames * lane for lane in standing.lanes), self._scorer)
+        return standing if frames == 1 else Standing(tuple(frames * lane for lane in standing.lanes))
 
     def _leave_out(self, left: range, frames: int) -> int:
         """Skip all whole tests of `frames` frames within `left`; return their total number of frames."""

@@ -38,7 +38,7 @@ def choices_to_mark(
 
 
 def marks_of(named: dict[Candidate, str], closes: Sequence[Close], survey: Survey) -> tuple[Mark, ...]:
-    """Return the marks of those choices that were fully evaluated, with the paper's rounds and whole scans."""
+    """Return the marks of those choices that were fully evaluated, with the paper's rounds."""
     found, tabled = [], papers_tables(survey.search)
     for close in closes:
         screened = close.screened

@@ -60,7 +60,7 @@ class Health:
             self._grasp = grasp.grasp
         if switches is not None and switches.time_us > self._switches_us:
             self._switches_us = switches.time_us
-            read = self._all & ~(switches.lost | switches.unread)
+            read = self._all & ~switches.lost
             self._switch_rate.frame(switches.time_us)
             self._stuck.frame(switches.closed, read)
             self._chattering.frame(switches.time_us, switches.closed, read)

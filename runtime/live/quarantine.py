@@ -52,8 +52,6 @@ from ..tables import HIGHEST_CODE, IntegerTables
 
 # Time for which contacts must stay the same before a grasp is evaluated.
 SETTLED_US = 100_000
-# Interval at which all switches must be read, if scans may end early.
-WHOLE_US = 50_000
 # Average number of grasps between two false alarms.
 GRASPS = 1_000
 # Evidence is counted in sixteenths of a nat.
@@ -328,14 +326,13 @@ class Quarantine:
         time_us = frame.time_us
         if time_us <= self._seen_us:
             return
-        self._seen_us, read = time_us, self._all & ~(frame.lost | frame.unread)
+        self._seen_us, read = time_us, self._all & ~frame.lost
         chattering = self._chattering.switches
         self._chattering.frame(time_us, frame.closed, read)
         stuck = self._stuck
         if chattering != self._chattering.switches:
             self._sort()
-        # In a scan that ended early, the other switches are unknown.
-        if stuck is None or frame.unread:
+        if stuck is None:
             return
         if (state := (frame.closed, read, lost)) == self._state and self._weighed:
             return
