@@ -92,7 +92,7 @@ class StuckTest:
     """
 
     def __init__(self, build: Build) -> None:
-        """Find nothing in a build of an older version, which does not hold how often its switches are closed."""
+        """Take a build that says how often its switches are closed."""
         tables, switches = build.tables, build.manifest.switches
         least, most = (
             np.array([list(bytes.fromhex(text)) for text in texts], np.int64)
@@ -279,7 +279,7 @@ class Quarantine:
         switches, joints = build.manifest.switches, build.manifest.joints
         self._names = {False: [switch.name for switch in switches], True: [joint.name for joint in joints]}
         self._fits, self._active, self._all = fits, active, (1 << len(switches)) - 1
-        # A build of an older version has no field for how often its switches are closed.
+        # Only compiled builds say how often their switches are closed.
         self._stuck = StuckTest(build) if switches and switches[0].closed_least else None
         self._chattering, self._drift = Chattering(len(switches)), JointDrift(build.tables)
         self._wrong: dict[tuple[bool, int], str] = {}

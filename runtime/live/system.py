@@ -11,7 +11,6 @@ from ..calibration import Meaning, load_calibration, numbers_of, place_of
 from ..harness.wiring import Harness, StreamWiring
 from ..policy import Policy
 from ..scanning.plan import check_harness, plan_scan
-from ..scanning.ports import wired_names
 from ..scanning.propose import own_joints
 from ..scanning.scanmap import ScanMap
 from ..sources.base import slowest_us
@@ -58,7 +57,7 @@ class System:
     @staticmethod
     def map_of(build: Build, harness: Harness) -> ScanMap:
         """Return the build's own scan map, or one that is planned now. Raises HarnessError if the two do not fit."""
-        names = wired_names(harness, build.manifest.switches)
+        names = [switch.name for switch in build.manifest.switches]
         if build.scan is not None:
             check_harness(build.scan, harness, names)
             return build.scan

@@ -1,5 +1,4 @@
 from collections.abc import Callable
-from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -21,9 +20,10 @@ SECOND = 1_000_000
 def build(make_build: MakeBuild) -> Build:
     """Four switches that were on in the SHARES of the recordings, four grasp types, two joints."""
     made = make_build(switches=4, joints=2)
-    rows = np.array([[40, -40, 80, 0], [100, 0, 0, -100], [200, -100, 0, 0], [0, 4, 8, -8]], np.int16)
-    means = np.rint(rows * np.array(SHARES)[:, np.newaxis]).astype(np.int16)
-    return Build(made.manifest, replace(made.tables, switch_rows=rows, switch_means=means))
+    switches = tuple(
+        changed(switch, closed_share=share) for switch, share in zip(made.manifest.switches, SHARES, strict=True)
+    )
+    return Build(changed(made.manifest, switches=switches), made.tables)
 
 
 def grasp(name: str, health: str = "ok") -> LiveGrasp:
@@ -44,12 +44,10 @@ def of_types(build: Build, count: int, types: int = 4) -> list[str]:
     return [build.grasps[number % types] for number in range(count)]
 
 
-def test_shares_of_on_are_told_and_in_older_builds_read_off_the_tables(build: Build) -> None:
-    assert on_shares(build) == pytest.approx(SHARES)
-    flat = Build(build.manifest, replace(build.tables, switch_rows=np.zeros((4, 4), np.int16)))
-    assert all(np.isnan(on_shares(flat)))
-    told = tuple(changed(switch, closed_share=0.125) for switch in build.manifest.switches)
-    assert on_shares(Build(changed(build.manifest, switches=told), build.tables)) == [0.125] * 4
+def test_shares_of_on_are_those_of_the_build(build: Build) -> None:
+    assert on_shares(build) == list(SHARES)
+    untold = tuple(changed(switch, closed_share=None) for switch in build.manifest.switches)
+    assert all(np.isnan(on_shares(Build(changed(build.manifest, switches=untold), build.tables))))
 
 
 def test_patience_is_the_number_of_misses_that_chance_does_not_explain() -> None:

@@ -225,7 +225,7 @@ def test_without_quarantine_the_fault_is_named_and_nothing_is_left_out(make_buil
     assert (last.health, last.lost) == ("ok", ())
 
 
-def test_builds_of_older_versions_find_no_stuck_switch(make_build: MakeBuild) -> None:
+def test_builds_that_do_not_say_how_often_switches_close_find_no_stuck_switch(make_build: MakeBuild) -> None:
     hand = Hand(make_build(classes=CLASSES, switches=SWITCHES, joints=0))
     for closed in drawn(closing(), 60, 3):
         hand.grasp(closed, stuck=1)

@@ -9,9 +9,8 @@ from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, ScannerWiring, SpiWiring
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.manifest import Calibration, Switch, Threshold
 from thenar.runtime.scanning.plan import Costs, check_harness, plan_scan
-from thenar.runtime.scanning.ports import whole_scan, wired_names
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_board, propose_harness
 from thenar.runtime.scanning.scanmap import check_switches, scanmap_from_bytes, scanmap_to_bytes
 from thenar.runtime.scanning.timing import overlapped_us, scan_us
@@ -82,13 +81,6 @@ def test_a_name_that_looks_like_a_level_and_is_a_switch_of_the_wiring_is_one() -
     harness = glove(ChipWiring(kind="mcp23017", address=0x20, pins={"GPA0": "t0>7"}), ads1115(0, "t0"))
     scan = whole_scan(harness, ["t0>7", "t0>8"])
     assert [(port.switches, port.levels) for port in scan.ports] == [(((0, 0),), ()), ((), ((8, 1),))]
-
-
-def test_a_level_of_an_older_build_is_found_on_a_converter_and_on_a_comparators_pin() -> None:
-    threshold = Threshold(83, 0.41, Calibration(0, "t0", "N", 0, 0.0, 100, 1.0))
-    old = [Switch(0, "t0", 0.1, threshold), Switch(1, "s0", 0.1)]
-    assert wired_names(glove(ads1115(0, "t0")), old) == ["t0>83", "s0"]
-    assert wired_names(glove(ChipWiring(kind="mcp23017", address=0x20, pins={"GPA0": "t0"})), old) == ["t0", "s0"]
 
 
 @pytest.mark.parametrize(
