@@ -29,9 +29,7 @@ def decode_document(data: bytes, kind: type[_T], what: str, called: str, largest
             return msgspec.json.decode(data, type=kind)
     except (ValueError, RecursionError) as wrong:
         raise BuildError(f"{what} is not a build's: {wrong}") from None
-    raise BuildError(
-        f"{what} has schema {found}, this thenar reads {schema}: compile the build again with this one"
-    )
+    raise BuildError(f"{what} has schema {found}, this thenar reads {schema}: compile the build again with this one")
 
 
 def encode_document(document: Struct) -> bytes:
