@@ -89,7 +89,7 @@ def of_board(scene: Played, keys: int, baud: int, hz: int, seconds: float) -> Fo
     return Found(what, 1e6 / period_us, sent_hz(), run.switches_hz, run)
 
 
-def of_bus(scene: Played, what: str, harness: Harness, seconds: float, *, full: bool) -> Found:
+def of_bus(scene: Played, what: str, harness: Harness, seconds: float) -> Found:
     """Measure a bus that is scanned without a pause, together with a CyberGlove.
 
     The wire would allow more scans in the time in which SCL neither ran nor had to rest.
@@ -106,17 +106,17 @@ def of_bus(scene: Played, what: str, harness: Harness, seconds: float, *, full: 
 
             wired = with_glove(bench.harness, glove(scene, f"{folder}/cyberglove"))
             with _metered(busy_s) as share, shown(scene, bench):
-                run = _ran(scene.folder, wired, seconds, folder, bench.environment, "full" if full else "early")
+                run = _ran(scene.folder, wired, seconds, folder, bench.environment)
     return Found(what, run.switches_hz / share(), run.switches_hz, run.switches_hz, run)
 
 
 def _ran(
-    build: Path, harness: Harness, seconds: float, folder: str, environment: Mapping[str, str] | None = None, *how: str
+    build: Path, harness: Harness, seconds: float, folder: str, environment: Mapping[str, str] | None = None
 ) -> Rate:
     """Run livewire.py on the emulated devices."""
     path = Path(folder, "glove.toml")
     path.write_text(harness_to_toml(harness))
-    command = [sys.executable, str(LIVEWIRE), "rate", str(build), str(path), str(seconds), *how]
+    command = [sys.executable, str(LIVEWIRE), "rate", str(build), str(path), str(seconds)]
     done = subprocess.run(
         command, env=os.environ | dict(environment or {}), capture_output=True, text=True, check=False
     )

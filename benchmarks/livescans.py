@@ -14,15 +14,11 @@ from liveplay import Played, glove, with_glove
 from liverates import LIVEWIRE
 from livewire import SCANS, Scanned
 
-from thenar.runtime.calibration import CodeTables
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.policy import Policy
-from thenar.runtime.scanning.decided import EarlyExit
-from thenar.runtime.scanning.plan import Costs, plan_scan
+from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
-from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import scan_us
 from thenar.simulator.playing.bench import Bench
 
@@ -47,15 +43,14 @@ class Scan:
 
 
 def compared(scene: Played, clock_hz: int = CLOCK_HZ) -> Iterator[Scan]:
-    """Yield all 160 in full; the kept ones on the same glove and on a separate glove, in full and ended early."""
+    """Yield all 160; the kept ones on the same glove and on a separate glove."""
     full, reduced = wired(scene, scene.performance.switch_names, clock_hz), wired(scene, scene.kept, clock_hz)
     yield _measured(scene, full, "all", "all 160 switches")
     for harness, where in (
         (full, "kept switches on the glove of 160"),
         (reduced, "kept switches on a separate glove"),
     ):
-        for which, how in (("full", "in full"), ("early", "ended early")):
-            yield _measured(scene, harness, which, f"{where}, {how}")
+        yield _measured(scene, harness, "kept", where)
 
 
 def wired(scene: Played, names: tuple[str, ...], clock_hz: int) -> Harness:
@@ -76,7 +71,7 @@ def _measured(scene: Played, harness: Harness, which: str, what: str) -> Scan:
             with subprocess.Popen(
                 command, text=True, env=seen, stdin=subprocess.PIPE, stdout=subprocess.PIPE
             ) as client:
-                return Scan(what, _predicted_us(scene, harness, which, rows), *_scanned(scene, bench, client, rows))
+                return Scan(what, _predicted_us(scene, harness, which), *_scanned(scene, bench, client, rows))
 
 
 def _scanned(scene: Played, bench: Bench, client: "subprocess.Popen[str]", rows: Iterable[int]) -> tuple[float, ...]:
@@ -89,7 +84,7 @@ def _scanned(scene: Played, bench: Bench, client: "subprocess.Popen[str]", rows:
     for row in rows:
         sensors = scene.performance.sensors[row].tobytes()
         bench.show(scene.performance.switches[row].tolist(), sensors)
-        client.stdin.write(sensors.hex() + "\n")
+        client.stdin.write("\n")
         client.stdin.flush()
         found.append(msgspec.json.decode(client.stdout.readline(), type=Scanned))
     sent = (bench.i2c.counters(0).total_bytes - before) / (SCANS * len(found))
@@ -99,27 +94,8 @@ def _scanned(scene: Played, bench: Bench, client: "subprocess.Popen[str]", rows:
     return us, python_us, fmean(f.ioctls for f in found) / SCANS, sent
 
 
-def _predicted_us(scene: Played, harness: Harness, which: str, rows: Iterable[int]) -> float:
-    """Return the calculated time of a scan on the wire, averaged over the rows."""
+def _predicted_us(scene: Played, harness: Harness, which: str) -> float:
+    """Return the calculated time of a scan on the wire."""
     if which == "all":
         return scan_us(whole_scan(harness, harness.switches), harness).us
-    scan = plan_scan(scene.kept, scene.build.tables, harness)
-    return scan_us(scan, harness).us if which == "full" else fmean(_until_decided(scene, harness, scan, rows))
-
-
-def _until_decided(scene: Played, harness: Harness, scan: ScanMap, rows: Iterable[int]) -> Iterator[float]:
-    """Yield for each row the time of the ports that are read until the scan is decided."""
-    build, costs = scene.build, Costs(scan.ports, harness)
-    groups = [sum(1 << switch for switch in port.elements) for port in scan.ports]
-    early = EarlyExit(build.scorer, groups, lead=Policy().lead_steps(build.tables.scale))
-    sensors = [sensor.name for sensor in scene.performance.calibration.sensors]
-    codes = CodeTables(build.manifest.joints, sensors, scene.performance.calibration)
-    for row in rows:
-        early.start(codes.codes(scene.performance.sensors[row].tobytes()))
-        read = taken = 0
-        for port, group in enumerate(groups):
-            taken += costs.after(read, port)
-            read |= 1 << port
-            if early.after(port, scene.keys[row] & group):
-                break
-        yield taken / 1e3
+    return scan_us(plan_scan(scene.kept, harness), harness).us

@@ -1,8 +1,8 @@
 """The live side of the benchmark's wires, in a separate process like `thenar run`; benchmarks/live.py starts it.
 
-    python benchmarks/livewire.py rate BUILD GLOVE.toml SECONDS [full]   all sinks on: frames per second, and their cost
-    python benchmarks/livewire.py scans BUILD GLOVE.toml all|full|early  one bus: the glove's bytes a line in, the
-                                                                         times of some scans a line out
+    python benchmarks/livewire.py rate BUILD GLOVE.toml SECONDS    all sinks on: frames per second, and their cost
+    python benchmarks/livewire.py scans BUILD GLOVE.toml all|kept  one bus: the times of some scans a line out, for each
+                                                                   line in
 
 Both print JSON.
 """
@@ -17,11 +17,11 @@ from typing import Any
 
 import msgspec
 import smbus2.smbus2
-from liveplay import STATUS, read_along
+from liveplay import read_along
 
 import thenar.drivers.i2c.node
 from thenar.runtime import Build, Glove
-from thenar.runtime.frames import GloveFrame, Newest, SwitchFrame, now_us
+from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.live.sources import Sources, Taken
 from thenar.runtime.live.system import System
@@ -30,7 +30,6 @@ from thenar.runtime.sources.i2c import I2cDevice
 
 SCANS = 4
 _START_S = 20.0
-_LONGEST_US = 1_000_000
 
 
 class Rate(msgspec.Struct):
@@ -75,7 +74,7 @@ class Counted:
         return taken
 
 
-def rate(build: str, glove: str, seconds: float, which: str = "early") -> Rate:
+def rate(build: str, glove: str, seconds: float) -> Rate:
     """Run with all sinks on for `seconds`, once all devices are ready."""
     with TemporaryDirectory() as name:
         folder = Path(name)
@@ -85,7 +84,6 @@ def rate(build: str, glove: str, seconds: float, which: str = "early") -> Rate:
             preshapes="barrett_bh8",
             sinks=["jsonl:/dev/null", f"unix:{folder}/socket"],
             record=folder / "run.mcap",
-            full_scan=which == "full",
             status=True,
         )
         with run, read_along(folder / "socket"):
@@ -152,21 +150,17 @@ class Ioctls:
 
 
 def scans(build: str, glove: str, which: str) -> None:
-    """Scan the only bus: all wired switches, the kept ones in full, or until the scan is decided."""
+    """Scan the only bus: all wired switches, or the kept ones."""
     system = System.of(Build.load(build), load_harness(glove))
     scan = whole_scan(system.harness, system.harness.switches) if which == "all" else system.scan
-    device, newest = I2cDevice(system.harness, 0, scan), Newest[GloveFrame]()
-    if which == "early":
-        device.end_early(system.early_exit, system.joints(), newest)
+    device = I2cDevice(system.harness, 0, scan)
     device.open()
     ioctls = Ioctls()
     ioctls.stand_in()
     print(device.bus.way, flush=True)
-    for line in sys.stdin:
+    for _ in sys.stdin:
         found, before = Scanned([], [], 0), ioctls.count
         for _ in range(SCANS):
-            now = now_us()
-            newest.take(GloveFrame(now, bytes.fromhex(line), STATUS), now, _LONGEST_US)
             start, cpu_ns, inside_ns = time.perf_counter(), time.thread_time_ns(), ioctls.cpu_ns
             device.read(1.0)
             python_ns = time.thread_time_ns() - cpu_ns - (ioctls.cpu_ns - inside_ns)
@@ -179,6 +173,6 @@ def scans(build: str, glove: str, which: str) -> None:
 if __name__ == "__main__":
     verb, *arguments = sys.argv[1:]
     if verb == "rate":
-        print(msgspec.json.encode(rate(arguments[0], arguments[1], float(arguments[2]), *arguments[3:])).decode())
+        print(msgspec.json.encode(rate(arguments[0], arguments[1], float(arguments[2]))).decode())
     else:
         scans(*arguments)

@@ -199,7 +199,6 @@ OURS = tuple(
     for name, how in (
         ("logitboost", "100 rounds, the paper's"),
         ("logit", "default settings"),
-        ("sum", "default settings"),
         ("pairs", "default settings"),
         (AUTO, "chosen by inner folds"),
     )

@@ -37,7 +37,6 @@ QUICK_SETS = ("icub", "aml")
 CURVE_MODELS = (
     "logitboost",
     "logit",
-    "sum",
     "pairs",
     "auto",
     "logistic regression",

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 
 _SEARCHED = ("repeats", "finalists", "seed", "by")
-_WORDS = ("inputs", "placement", "rounds, bits", "wiring", "scan", "decision")
+_WORDS = ("inputs", "placement", "rounds, bits", "wiring", "decision")
 _TIMES, _SIZES = ("frame", "latency, 99 %"), ("flash", "RAM")
 
 
@@ -228,7 +228,6 @@ def _cells(point: "Point", rated: Sequence[str]) -> tuple[Text, ...]:
         way_of(setting),
         f"{setting.rounds if is_usual(setting) else training_of(setting)}, {setting.width}",
         wiring_of(setting),
-        setting.scan if setting.clock_hz else "",
         setting.decision,
         *rated,
         f"{duration(point.frame.us)} {point.frame.how}",

@@ -93,7 +93,6 @@ class _SinkOption(click.Option):
     metavar="FOLDER",
     help="Folder for recordings of the page.  [default: recordings]",
 )
-@click.option("--full-scan", is_flag=True, help="Read all ports in every scan, even if the rest cannot matter.")
 @click.option("--status", is_flag=True, help="Report the glove's health once a second, in the view and to all sinks.")
 @click.option("--frames", metavar="N", type=click.IntRange(1), help="Stop after N frames.")
 @click.option("--lead", type=Number(0), help="Lead in score units that a new grasp type needs.")
@@ -123,7 +122,6 @@ def command(
     web: str | None,
     web_token: bool,
     recordings: Path | None,
-    full_scan: bool,
     status: bool,
     frames: int | None,
     **deciding: Any,
@@ -153,7 +151,7 @@ def command(
     policy = _policy(**deciding)
     if replay is None:
         viewed = _is_viewed(sinks)
-        asked: dict[str, Any] = {"preshapes": preshape, "record": record, "full_scan": full_scan, "status": status}
+        asked: dict[str, Any] = {"preshapes": preshape, "record": record, "status": status}
         asked |= {"change_while_held": change_while_held, "task": task}
         asked |= {"sinks": sinks or (() if viewed else ("jsonl:-",)), "policy": policy, "recordable": web is not None}
         page = None
@@ -169,7 +167,7 @@ def command(
 
 
 _WEB = ("web_token", "recordings")
-_LIVE = ("record", "web", *_WEB, "full_scan", "status")
+_LIVE = ("record", "web", *_WEB, "status")
 _POLICY = ("lead", "dwell_ms", "max_lost", "grace_ms", "no_quarantine", "error_rate", "spacing_ms", "lag_ms")
 
 

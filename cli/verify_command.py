@@ -96,11 +96,6 @@ def _print(found: "Verification") -> None:
         f"margin above {found.safe_margin:g} steps: {found.covered} rows, of which {found.covered_changed} change class"
     )
     _print_worst(console, found.worst)
-    if found.scan is not None:
-        console.print(
-            f"scan map: {found.scan.mean_read:.2f} of {found.scan.ports} ports read on average until a row is decided; "
-            f"rows that change class because of that: {found.scan.changed}"
-        )
     whose = {0: "trials not trained on", found.trials: "trials trained on"}.get(
         found.trained_on, f"{found.trained_on} of {trials} trained on"
     )

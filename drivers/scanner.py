@@ -12,7 +12,6 @@ from .scanner_datagrams import DatagramCounts, DatagramLink, is_datagram_port
 from .scanner_link import Break, Received, ScannerLink, SerialLink
 from .scanner_protocol import (
     DEGRADED,
-    EARLY,
     NO_GRASP,
     STATES,
     UNREAD,
@@ -64,14 +63,12 @@ class BoardGrasp(NamedTuple):
               None: unknown
     margin    the best score minus the second, in steps of the build's tables, clipped to 65535
     degraded  whether an input was missing
-    early     whether the scan ended as soon as the rest of the switches could not matter
     """
 
     time_us: int
     number: int | None
     margin: int
     degraded: bool
-    early: bool
 
 
 class BoardSegment(NamedTuple):
@@ -321,8 +318,7 @@ class Scanner(Closing):
         if isinstance(message, Segment):
             self.segment = BoardSegment(time_us, message.number, number, STATES[message.state])
         else:
-            flags = message.flags
-            self.grasp = BoardGrasp(time_us, number, message.margin, bool(flags & DEGRADED), bool(flags & EARLY))
+            self.grasp = BoardGrasp(time_us, number, message.margin, bool(message.flags & DEGRADED))
 
     def _measures(self, message: Channels) -> None:
         if message.token == self._token:

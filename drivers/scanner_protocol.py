@@ -52,8 +52,8 @@ UNREAD, MOST_BITS = 0xFFFF, 15
 # The grasp number in GRASP if it is unknown, and in SEGMENT if nothing is held; the states of a SEGMENT.
 NO_GRASP = 255
 STATES = ("none", "forming", "held", "releasing")
-# Flags of GRASP: an input was missing; the scan ended early because the remaining switches could not matter.
-DEGRADED, EARLY = 0x01, 0x02
+# Flag of GRASP: an input was missing.
+DEGRADED = 0x01
 
 
 @dataclass(frozen=True, slots=True)
@@ -332,7 +332,7 @@ class Grasp(Fixed):
     time_us  when the frame was read
     grasp    number of the grasp type in the build's order; the one after the last: nothing is held; NO_GRASP: unknown
     margin   the best score minus the second, in steps of the build's tables, clipped to 65535
-    flags    DEGRADED, EARLY
+    flags    DEGRADED
     """
 
     KIND: ClassVar[int] = 0x06

@@ -17,14 +17,11 @@ class Detail(msgspec.Struct, frozen=True):
     """A moment.
 
     closed         a character per kept switch, in the build's order: "1" closed, "0" open
-    unread         "1" for those that were left unread, for which `closed` means nothing
     joints         the value of each joint of the build, in its unit; None while they are lost
-    probabilities  of every class of the build, in order, from the newest frame without unread inputs; None while too
-                   little can be read
+    probabilities  of every class of the build, in order; None while too little can be read
     """
 
     closed: str
-    unread: str
     joints: tuple[float, ...] | None
     probabilities: tuple[float, ...] | None
 
@@ -45,7 +42,6 @@ class Details:
         frame = moment.switches
         return Detail(
             closed=self._bits(0 if frame is None else frame.closed),
-            unread=self._bits(0 if frame is None else frame.unread),
             joints=None if moment.codes is None else self._values(moment.codes),
             probabilities=self._probabilities(moment.scores, moment.refused) if moment.scores else None,
         )

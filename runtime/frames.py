@@ -43,16 +43,13 @@ class SwitchFrame:
     time_us  when the last port was read
     closed   which switches are closed
     lost     which could not be read, because a port is silent (their bits in `closed` mean nothing)
-    unread   which were left unread, because with the joints of `glove` (None: lost) the leader could no longer be
-             overtaken; combined with another frame of the glove, nothing would be certain
-    glove    the glove's frame to combine this one with, if the scan could have ended because of it; None: the newest
+    glove    the record of the joints that was read with it, as in a row of both; None: the newest goes with it
     taxels   the codes of the harness's taxels, in order, None for those that were not read; None: none was
     """
 
     time_us: int
     closed: Mask
     lost: Mask = 0
-    unread: Mask = 0
     glove: GloveFrame | None = None
     taxels: tuple[int | None, ...] | None = None
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Protocol, Self
 
 from .build import Build
 from .calibration import AngleReader
-from .frames import PERIODS, GloveFrame, now_us
+from .frames import GloveFrame, now_us
 from .harness.loading import load_harness
 from .harness.wiring import Harness
 from .harness.writing import harness_to_toml
@@ -65,8 +64,6 @@ class Glove:
         A new .mcap file for the raw frames and the predictions.
     recordable : bool
         Whether recordings may begin later (`new_recording`): all sensors are read, as for `record`.
-    full_scan : bool
-        Whether every scan reads all ports, even if the rest cannot matter.
     task : str or path, optional
         A task of `thenar teach`: sinks get the hand's progress in it, whenever it changes.
     status : bool
@@ -125,7 +122,6 @@ class Glove:
         sinks: Sequence[str | Sink] = (),
         record: str | PathLike[str] | None = None,
         recordable: bool = False,
-        full_scan: bool = False,
         status: bool = False,
         task: str | PathLike[str] | None = None,
         stop: Event | None = None,
@@ -140,7 +136,7 @@ class Glove:
         self.recorder: LiveRecorder | None = None
         # A recording is for training: it holds all sensors.
         whole = recordable or record is not None
-        devices = system.sources(full_scan=full_scan, all_sensors=whole)
+        devices = system.sources(all_sensors=whole)
         self._recognizer, self.sources = system.recognizer(), devices
         self.feed: Feed = self.sources if feed is None else feed
         self._selector = None
@@ -190,7 +186,7 @@ class Glove:
         """
         if self.stop.is_set():
             raise StopIteration
-        taken = self._with_record(self.feed.take())
+        taken = self.feed.take()
         now = taken.time_us
         moment = self._recognizer.step(now, time_ns() // 1000, taken.switches, taken.glove)
         grasp = moment.grasp
@@ -206,7 +202,8 @@ class Glove:
         if progress is not None:
             self._fanout.task(progress)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None, moment.codes)
-        self._leave_out(now)
+        if self._recognizer.quarantine.found != self._quarantined:
+            self._quarantined, self._due_us = self._recognizer.quarantine.found, now
         if now >= self._due_us or self.sources.changed:
             self._look(now)
         self.frames += 1
@@ -232,26 +229,6 @@ class Glove:
     def reports(self) -> tuple[SinkReport, ...]:
         """Return the state of every sink."""
         return self._fanout.reports()
-
-    def _with_record(self, taken: Taken) -> Taken:
-        """Return the frames, with a record of the joints if they come on demand and the switches cannot decide without:
-        it is requested, and awaited for as long as records are current.
-        """
-        if self.feed is not self.sources:
-            return taken
-        end_us = taken.time_us + PERIODS * (self.sources.glove_period_us or 0)
-        while taken.time_us < end_us and self._recognizer.wants_record(taken.time_us, taken.switches, taken.glove):
-            self.sources.ask()
-            more = self.sources.take(end_us - taken.time_us)
-            taken = replace(more, arrived=(*taken.arrived, *more.arrived))
-        return taken
-
-    def _leave_out(self, now: int) -> None:
-        """Let no scan end early because of quarantined inputs, and report them at once."""
-        quarantine = self._recognizer.quarantine
-        if quarantine.found != self._quarantined:
-            self._quarantined, self._due_us = quarantine.found, now
-            self.sources.leave_out(*quarantine.out)
 
     def _angles_of(self, measured: GloveFrame | None) -> JointAngles | None:
         if measured is not self._measured:

@@ -3,7 +3,7 @@
 Positions are in mm, x to the right and y up, on the glove laid flat: a right hand, palm up, or as in a layout. If they
 are unknown, switches and taxels are placed in a grid, in the build's order, and `placed` is false. Its bytes are
 canonical: fields in the order of the structs below, without spaces, one newline at the end. `build.json` holds its
-SHA-256; builds of older versions have no such file, and are drawn as a grid.
+SHA-256.
 """
 
 import re
@@ -110,13 +110,13 @@ class HandDrawing(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 def load_hand(folder: Path, manifest: Manifest) -> HandDrawing:
-    """Return the drawing in the build's folder, or a grid if the build has none.
+    """Return the drawing in the build's folder.
 
     Raises BuildError, naming the file, if it is missing, damaged, or of another build.
     """
-    if manifest.hand_sha256 is None:
-        return grid_hand(manifest)
     path = folder / HAND_NAME
+    if manifest.hand_sha256 is None:
+        raise BuildError(f"{path} is not described by build.json: compile the build again")
     return hand_from_bytes(read_member(path, MAX_BYTES, manifest.hand_sha256), manifest, str(path))
 
 
@@ -128,7 +128,7 @@ def hand_to_bytes(hand: HandDrawing) -> bytes:
 def hand_from_bytes(data: bytes, manifest: Manifest, what: str = HAND_NAME) -> HandDrawing:
     """Return the drawing in a `hand.json`, whose name in messages is `what`.
 
-    Raises BuildError if it is oversized, no such document, of a newer schema, or of another build.
+    Raises BuildError if it is oversized, no such document, of another schema, or of another build.
     """
     hand = decode_document(data, HandDrawing, what, "a drawing of a hand", MAX_BYTES, SCHEMA)
     for wrong in _contradictions(hand, manifest):

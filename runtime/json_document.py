@@ -1,4 +1,4 @@
-"""The JSON documents of a build: canonical bytes, read within a limit and up to a schema."""
+"""The JSON documents of a build: canonical bytes, read within a limit and of one schema."""
 
 from typing import TypeVar
 
@@ -16,22 +16,20 @@ class _SchemaVersion(Struct, frozen=True):
     schema: int
 
 
-def decode_document(data: bytes, kind: type[_T], what: str, called: str, largest: int, newest: int) -> _T:
+def decode_document(data: bytes, kind: type[_T], what: str, called: str, largest: int, schema: int) -> _T:
     """Return a JSON document of a build, whose name in messages is `what`, and whose kind is `called`.
 
-    Raises BuildError if it has more than `largest` bytes, is no such document, or of a schema beyond `newest`.
+    Raises BuildError if it has more than `largest` bytes, is no such document, or of another schema than `schema`.
     """
     if len(data) > largest:
         raise BuildError(f"{what} has {len(data)} bytes, {called} has at most {largest}")
     try:
-        schema = msgspec.json.decode(data, type=_SchemaVersion).schema
-        if 1 <= schema <= newest:
+        found = msgspec.json.decode(data, type=_SchemaVersion).schema
+        if found == schema:
             return msgspec.json.decode(data, type=kind)
     except (ValueError, RecursionError) as wrong:
         raise BuildError(f"{what} is not a build's: {wrong}") from None
-    if schema > newest:
-        raise BuildError(f"{what} has schema {schema}, this thenar reads up to {newest}: update thenar")
-    raise BuildError(f"{what} has schema {schema}, the first was 1: it is not a build of thenar")
+    raise BuildError(f"{what} has schema {found}, this thenar reads {schema}: compile the build again with this one")
 
 
 def encode_document(document: Struct) -> bytes:

@@ -20,7 +20,7 @@ Inputs = Literal["both", "switches", "joints"]
 TableBits = Literal[8, 16]
 By = Literal["trial", "subject", "object", "session"]
 Of = Literal["pooled", "within subject", "new subject", "new object", "new session"]
-Protocol = Literal["training", "honest", "nested"]
+Protocol = Literal["training", "nested"]
 Unit = Literal["trials", "frames"]
 Count = Annotated[int, Meta(ge=0, le=2**53)]
 Code = Annotated[int, Meta(ge=0, le=65535)]
@@ -98,8 +98,7 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     apart_mm, at_most_taxels, budget_us : float, int, float; or None
         Minimum distance between kept elements, maximum number of taxels, and maximum scan time.
     refuse : float
-        The share of grasps that may be refused if no row has nothing held; 0: none is. Builds of older versions leave
-        it out, and refuse nothing either.
+        The share of grasps that may be refused if no row has nothing held; 0: none is.
     """
 
     prune: Count = _written(0)
@@ -230,8 +229,8 @@ class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     may have several, each a switch with a separate name.
 
     closed_least, closed_most  for each grasp type, in 255ths, the share of a subject's trials in which it is closed, of
-                               the subject with the least and the most; "" in builds of older versions
-    closed_share  the share of all rows in which it is closed; None in builds of older versions
+                               the subject with the least and the most; "" if unknown
+    closed_share  the share of all rows in which it is closed; None if unknown
     """
 
     column: Count
@@ -275,11 +274,10 @@ class Proof(Struct, frozen=True, forbid_unknown_fields=True):
 class Recognised(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """An accuracy as counts, of trials (the majority of a trial's frames) or of frames.
 
-    protocol  "training": on the training rows; "nested": on folds, with the placement chosen anew in each; "honest":
-              the same, in builds of older versions, by the ensemble instead of the integers
+    protocol  "training": on the training rows; "nested": on folds, with the placement chosen anew in each
     folds     their number; seed: of those that are cut at random
     of        what is new in the tested rows
-    low, high the 95 % interval; None in builds of older versions
+    low, high the 95 % interval; None if unknown
     """
 
     protocol: Protocol
@@ -393,9 +391,9 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     zero_gain_nodes  decisions of the placement's tree at which no switch alone gained anything; left out if there are
                      none
     scan_sha256      of scan.json; left out if the build was compiled for no harness
-    hand_sha256      of hand.json; None in builds of older versions
+    hand_sha256      of hand.json
     fitting          how the fit was chosen; left out if the options leave no choice
-    faults           accuracy under faults of inputs, on the training rows; None in builds of older versions
+    faults           accuracy under faults of inputs, on the training rows
     detection        how well the build detects whether something is held, on the training rows and on folds
     rejection        the rejection rules; None if NONE is one of the grasps, or nothing is refused
     segments         costs of segments learnt from streams; None: there were none to learn from
@@ -446,7 +444,6 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
             return self.fitting
         asked = self.options
         given: dict[Name, Given | None] = {"max_bins": asked.max_bins, **asked.settings}
-        # For other trainers, older versions wrote the first two as well.
         if asked.trainer not in (AUTO, PAPERS_TRAINER):
             return Fitting(asked.trainer, given)
         boosted = {name: getattr(asked, name) for name in ("rounds", "shrinkage", "tolerance")}

@@ -26,7 +26,7 @@ def manifest_to_bytes(manifest: Manifest) -> bytes:
 def manifest_from_bytes(data: bytes, what: str = "build.json") -> Manifest:
     """Return the manifest in a `build.json`, whose name in messages is `what`.
 
-    Raises BuildError if it is oversized, no such document, of a newer schema, or altered.
+    Raises BuildError if it is oversized, no such document, of another schema, or altered.
     """
     manifest = decode_document(data, Manifest, what, "a build", MAX_BYTES, SCHEMA)
     if data != encode_document(manifest) or manifest.checksum != _checksum(manifest):

@@ -3,8 +3,7 @@
 A frame is refused for its candidate, the grasp type with the largest score, in three cases: that score is below the
 type's minimum; fewer or more switches are closed than the type's minimum and maximum; or more joints than `outside` are
 beyond the type's ranges. All of these are integers, so Python and C refuse the same frames. Lost inputs are left out: a
-lost or unread switch may be closed or open, a lost joint lies within, and the score is judged only in frames without
-lost or unread inputs.
+lost switch may be closed or open, a lost joint lies within, and the score is judged only in frames without lost inputs.
 """
 
 import math
@@ -46,7 +45,6 @@ class Rejector:
         lost: Mask,
         codes: Sequence[int] | None,
         *,
-        unread: Mask = 0,
         lost_joints: Mask = 0,
     ) -> bool:
         """Return whether nothing is held.
@@ -55,8 +53,8 @@ class Rejector:
         ----------
         lanes : sequence of int
             The K scores, each 2^15 too high, as in `Scorer.lanes`.
-        closed, lost, unread : int
-            Masks of the kept switches that are closed, lost, and left unread.
+        closed, lost : int
+            Masks of the kept switches that are closed and lost.
         codes : sequence of int or None
             The joints' codes; None: all are lost.
         lost_joints : int
@@ -64,13 +62,12 @@ class Rejector:
         """
         best = max(lanes)
         candidate = lanes.index(best)
-        doubtful = lost | unread
-        whole = not (doubtful or lost_joints or codes is None)
+        whole = not (lost or lost_joints or codes is None)
         if best < self._least[candidate] and whole:
             return True
         fewest, most = self._closed[candidate]
-        seen = (closed & ~doubtful).bit_count()
-        if seen > most or seen + doubtful.bit_count() < fewest:
+        seen = (closed & ~lost).bit_count()
+        if seen > most or seen + lost.bit_count() < fewest:
             return True
         if codes is None:
             return False

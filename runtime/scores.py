@@ -8,7 +8,7 @@ offset 2^15 per lane, added once, keeps every lane positive while it is read out
 import math
 from bisect import bisect_left
 from collections.abc import Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import compress
 from operator import getitem, not_
 from struct import Struct
@@ -23,8 +23,6 @@ from .tables import HIGHEST_CODE, IntegerTables
 LANE_OFFSET = 1 << 15
 # Switches are looked up eight at a time: a byte of a mask indexes its sum of rows.
 _EIGHT = 8
-# Number of classes of `reach` results kept in total: about 2 MB.
-_KEPT = 1 << 16
 # A sensor's byte has no more codes than these; a finer stream reuses the entries.
 _MOST_CODES = 1 << 12
 
@@ -54,8 +52,6 @@ class Scorer:
         self.joint_rows = [_packed(rows, offsets) for _, rows in binned]
         self.thresholds: list[list[int]] = [thresholds.tolist() for thresholds, _ in binned]
         self._by_code = [*map(_RowsByCode, self.thresholds, self.joint_rows)]
-        # For a set of unread switches: the joints are unread as well, and scored as if they were lost.
-        self.joints_bit: Mask = 1 << tables.n_switches
         self._pairs = [
             (
                 *pair.joints,
@@ -66,7 +62,6 @@ class Scorer:
         ]
         # Of all joints lost.
         self.joints_lost = sum(self.joint_means) + self._pair_sum((0,) * tables.n_joints)
-        self.reach = lru_cache(maxsize=_KEPT // tables.n_classes)(self._reach)
 
     @cached_property
     def row_sums(self) -> list[list[int]]:
@@ -122,17 +117,6 @@ class Scorer:
             _check_codes(array, values)
         return values
 
-    def _reach(self, leader: int, unread: Mask) -> tuple[int, ...]:
-        """Return the `reaches` of a leader as plain integers, cached for repeated sets; with those of the joints if
-        `unread` has the bit `joints_bit`.
-        """
-        switches = [number for number in range(self.tables.n_switches) if unread >> number & 1]
-        found = reaches(self.tables, leader, switches)
-        if unread & self.joints_bit:
-            found = found + joint_reaches(self.tables, leader)
-        steps: list[int] = found.tolist()
-        return tuple(steps)
-
 
 class _RowsByCode(dict[int, int]):
     """The rows of a joint by its codes: a code is looked up among the thresholds on first use."""
@@ -147,33 +131,6 @@ class _RowsByCode(dict[int, int]):
             self.clear()
         row = self[code] = self._rows[bisect_left(self._thresholds, code)]
         return row
-
-
-def reaches(tables: IntegerTables, leader: int, switches: Sequence[int]) -> NDArray[np.int64]:
-    """Return, for every class (K,), the most steps by which `switches`, unread, can bring it closer to class `leader`.
-
-    A switch adds nothing when open, its row when closed, its mean row when lost. So against a leader l, an unread
-    switch s can bring class r at most  max(0, row_sr - row_sl, mean_sr - mean_sl)  closer, and several switches at most
-    the sum of these, since each is independent. For a single class that sum is reached, by some state of the switches;
-    so it is the exact maximum, not only a bound. The leader's own is 0.
-    """
-    both = (rows[list(switches)].astype(np.int64) for rows in (tables.switch_rows, tables.switch_means))
-    closed, lost = (rows - rows[:, leader, np.newaxis] for rows in both)
-    found: NDArray[np.int64] = np.maximum(0, np.maximum(closed, lost)).sum(axis=0)
-    return found
-
-
-def joint_reaches(tables: IntegerTables, leader: int) -> NDArray[np.int64]:
-    """Return, for every class (K,), the most steps by which reading all joints, scored so far as if they were lost, can
-    bring it closer to class `leader`: whatever their codes are, or with joints really lost, which adds nothing. Each is
-    independent and may be at its worst bin: it is the exact maximum.
-    """
-    found = np.zeros(tables.n_classes, np.int64)
-    for unit in tables.units:
-        rows = tables.all_choices(unit)[1].sum(axis=0)
-        gains = rows - rows[-1]
-        found += (gains - gains[:, leader, np.newaxis]).max(axis=0)
-    return found
 
 
 class LiveScores:

@@ -242,13 +242,6 @@ class IntegerTables:
         terms = np.stack([rows[first], more_rows[second], pair.rows[at[first], more_at[second]]])
         return np.column_stack([one[first], other[second]]), terms.astype(np.int64)
 
-    @property
-    def jointless(self) -> NDArray[np.int64]:
-        """The bias plus the contribution of all joints while they are lost, (K,)."""
-        lost = [self.all_choices(unit)[1].sum(axis=0)[-1] for unit in self.units]
-        found: NDArray[np.int64] = np.sum([self.bias.astype(np.int64), *lost], axis=0)
-        return found
-
     def steps_of(self, joint: int) -> NDArray[np.int64]:
         """Return the codes after which a joint's contribution changes, in order: its thresholds, and its pair's."""
         paired = (t for pair in self.pairs for a, t in zip(pair.joints, pair.thresholds, strict=True) if a == joint)

@@ -21,8 +21,6 @@ from thenar.runtime.harness.wiring import (
     SpiWiring,
     StreamWiring,
 )
-from thenar.runtime.scanning import plan
-from thenar.runtime.scanning import plan as order
 from thenar.runtime.scanning.timing import port_us, select_us
 from thenar.runtime.taxels import TaxelSettings
 
@@ -89,11 +87,6 @@ def test_the_times_are_those_of_the_arithmetic() -> None:
     for place, us in times.items():
         assert us == f"{known[place]:.1f}"
     assert f"{select_us(400_000):.1f}" == "51.3"
-
-
-def test_the_limits_of_the_search_are_those_of_the_code() -> None:
-    assert f"Up to {order.EXACT} ports" in PAGE
-    assert f"Of more than {plan.FRAMES} rows, {plan.FRAMES} evenly spaced" in PAGE
 
 
 def test_the_error_shown_is_the_error_raised(tmp_path: Path) -> None:

@@ -132,9 +132,9 @@ class Recognising(ScannerBoard):
 
     number = 1
 
-    def scan(self, closed: int, now: int, *, unread: int = 0, whole: bool = True) -> list[bytes]:
+    def scan(self, closed: int, now: int, *, unread: int = 0) -> list[bytes]:
         flags = DEGRADED if self.number == NO_GRASP else 0
-        return [*super().scan(closed, now, unread=unread, whole=whole), *self.recognised(self.number, 7, flags, now)]
+        return [*super().scan(closed, now, unread=unread), *self.recognised(self.number, 7, flags, now)]
 
 
 @slow

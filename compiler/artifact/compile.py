@@ -223,7 +223,7 @@ def _sound(options: Options) -> Options:
         # Nothing is left to choose. Options with rounds mean LogitBoost.
         trainer, given = AUTO if only.trainer == PAPERS_TRAINER else only.trainer, dict(only.settings)
     values = {name: float(value) if isinstance(value, int) else value for name, value in given.items()}
-    # The first of several names is what older versions used, and is not written.
+    # The first of several names is the default, and is not written.
     usual = {each.name: each.default for each in TRAINERS[only.trainer].settings if each.names}
     own: dict[str, Any] = {n: value for n, value in values.items() if value is not None and value != usual.get(n)}
     shared = {name: own.pop(name, None) for name in SHARED}
@@ -272,7 +272,7 @@ class Making:
         self.harness = harness(names) if callable(harness) else harness
         self.scan, self.unread = None, ""
         if self.harness is not None:
-            self.scan = plan_scan(names, self.integers, self.harness, kept.switches, kept.codes)
+            self.scan = plan_scan(names, self.harness)
             joints = [grasp_set.joint_names[joint] for joint in trained.joints]
             self.unread = unread_joints(self.harness, self.scan, joints)
         self.comparison = compare(trained.model, self.integers, kept.switches, kept.codes)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from thenar.runtime.live.decision import Decision, SequentialTest, Standing
 from thenar.runtime.manifest import Inputs, Options
 from thenar.runtime.policy import Policy
-from thenar.runtime.scores import LANE_OFFSET, Scorer
+from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.segmenting.decoder import decode, emissions
 from thenar.runtime.segmenting.model import SegmentModel
 
@@ -201,7 +201,7 @@ def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Options]) -> tuple
         if stream.subject == subject:
             part = read.rows(stream.rows)
             lanes = integer_scores(tables, part.switches, part.codes)
-            found = _Decoded(lanes, Scorer(tables), model, counts, tables.scale)
+            found = _Decoded(lanes, model, counts, tables.scale)
             for name, (states, announced) in found.every().items():
                 parts[name].append((stream.continued, part.labels, states, announced))
     return kind, subject, {name: score_streams(every, model.n_types) for name, every in parts.items()}
@@ -226,7 +226,6 @@ class _Decoded:
     """Scores (T, K + 1) of a stream, and each method's result: states, and announcements in time."""
 
     lanes: NDArray[np.int32]
-    scorer: Scorer
     model: SegmentModel
     counts: Counts
     scale: float
@@ -251,7 +250,7 @@ class _Decoded:
         """Return the states (rules, T) that the rules announce."""
         none, states = self.model.n_types, []
         for tick, row in enumerate((self.lanes + LANE_OFFSET).tolist()):
-            standing = Standing(tuple(row), self.scorer)
+            standing = Standing(tuple(row))
             decided = [rule.update(tick * TICK_US, standing) for rule in rules]
             states.append([none if each is None else each for each in decided])
         return np.array(states, np.intp).T

@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from thenar.runtime.build import ENSEMBLE_NAME, Build, read_member
 from thenar.runtime.errors import BuildError
 from thenar.runtime.manifest import Faults, Unit
-from thenar.runtime.scanning.decided import Decided
-from thenar.runtime.scanning.scanmap import ScanMap
-from thenar.runtime.tables import IntegerTables
 
 from ..boosting.stumps import Stumps
 from ..evaluation.rates import rated
@@ -58,18 +55,6 @@ class Counted(Struct, frozen=True):
         return self.integers / self.total
 
 
-class ScanCheck(Struct, frozen=True):
-    """The result of scanning rows port by port until they are decided.
-
-    ports is the number of ports of the scan map, mean_read how many of them were read on average; changed counts the
-    rows whose grasp type differs from that of a complete scan.
-    """
-
-    ports: int
-    mean_read: float
-    changed: int
-
-
 class NothingHeld(Struct, frozen=True):
     """How many rows show grasps, and how many of these are predicted as nothing held; the same for rows in which
     nothing is held.
@@ -88,7 +73,7 @@ class Verification(Struct, frozen=True, kw_only=True):
     integers, in steps. covered counts rows whose margin exceeds safe_margin, covered_changed those of them that change.
     recognised counts trials of grasps, and frames where trials have several; independent says that each recorded row is
     a trial. The build was trained on trained_on of the trials. nothing_held is present if the build can predict that
-    nothing is held. worst looks beyond the rows; scan is present if the build has a scan map, firmware if requested.
+    nothing is held. worst looks beyond the rows; firmware is present if requested.
     """
 
     rows: int
@@ -105,7 +90,6 @@ class Verification(Struct, frozen=True, kw_only=True):
     recognised: tuple[Counted, ...]
     worst: WorstCase
     changed: tuple[ChangedRow, ...]
-    scan: ScanCheck | None
     holds: bool
     firmware: FirmwareVerification | None = None
     nothing_held: NothingHeld | None = None
@@ -166,7 +150,6 @@ def _verified(build: Build, model: Model, grasp_set: GraspSet, progress: Progres
     comparison = compare(model, build.tables, bits, codes, progress)
     names = [switch.name for switch in build.manifest.switches]
     worst = worst_case(model, build.tables, comparison, build.grasps, names)
-    scan = None if build.scan is None else check_scan(build.scan, build.tables, bits, codes, comparison.deployed)
     grasps, empty = np.array(build.grasps), grasp_set.is_none
     predicted = predicted_classes(build.tables, build.manifest.rejection, bits, codes)
     says = build.none if build.rejector is None else len(grasps)
@@ -186,8 +169,7 @@ def _verified(build: Build, model: Model, grasp_set: GraspSet, progress: Progres
         recognised=_recognised(comparison.trained, predicted, grasps, grasp_set),
         worst=worst,
         changed=_changed(comparison, grasps, grasp_set),
-        scan=scan,
-        holds=comparison.holds and worst.holds and not (scan and scan.changed),
+        holds=comparison.holds and worst.holds,
         nothing_held=None if says is None else _nothing_held(predicted == says, empty),
     )
 
@@ -287,29 +269,6 @@ def _load_ensemble(folder: Path, build: Build) -> Model:
     if foreign:
         raise BuildError(f"{path} belongs to another build: compile the build again")
     return model
-
-
-def check_scan(
-    scan: ScanMap,
-    tables: IntegerTables,
-    bits: NDArray[np.bool_],
-    codes: NDArray[np.uint16],
-    deployed: NDArray[np.intp],
-) -> ScanCheck:
-    """Scan all rows, bits (n, s) and codes (n, j), port by port.
-
-    deployed (n,) are the classes that the integers predict after a complete scan.
-    """
-    ports = [port.elements for port in scan.ports]
-    frames = Decided(tables, ports, bits, codes)
-    pending = np.ones(len(frames), bool)
-    read, changed = 0, 0
-    for number in range(len(ports)):
-        read += int(np.count_nonzero(pending))
-        leaders, decided = frames.after((2 << number) - 1)
-        changed += int(np.count_nonzero(leaders[pending & decided] != deployed[pending & decided]))
-        pending &= ~decided
-    return ScanCheck(len(ports), read / len(frames), changed)
 
 
 def _recognised(

@@ -114,7 +114,6 @@ class Board(_Table, frozen=True):
     scan_us: Annotated[int, Meta(ge=100, le=60_000_000)] = 1000
     state_us: Microseconds = 0
     heartbeat_us: Microseconds = 50_000
-    early_exit: bool = False
     debounce: BoardDebounce = BoardDebounce()
     wifi: Wifi | None = None
     pins: dict[str, str] = {}
@@ -272,8 +271,6 @@ def _of_inputs(board: Board) -> Iterator[Fault]:
         )
     if not there and board.taxels is None:
         yield (), "no switch is wired: add [pins], [matrix] or [[chip]] tables"
-    if board.early_exit and not board.chips:
-        yield ("early_exit",), "has no effect without [[chip]]: only chips are read one after another; leave it out"
     if board.cyberglove is not None and board.analog:
         yield ("analog",), "[cyberglove] is given too: joints come from only one of them"
 

@@ -59,29 +59,19 @@ def _layer(board: Board) -> Layer:
     return sketch_layer if board.avr is None else avr_layer
 
 
-def readings(board: Board, switches: Sequence[str], tables: IntegerTables) -> tuple[Port, ...]:
+def readings(board: Board, switches: Sequence[str]) -> tuple[Port, ...]:
     """Return the readings of the board's chips that show a build's `switches`, in the order in which they are made.
 
-    Each chip has as few readings as possible; those that can change the scores of `tables` most per microsecond come
-    first. A board without chips has none. Raises FirmwareError if the board lacks a switch.
+    Each chip has as few readings as possible. A board without chips has none. Raises FirmwareError if the
+    board lacks a switch.
     """
     check_switches(board, switches)
-    return plan_scan(switches, tables, harness_of(board)).ports if board.chips and switches else ()
+    return plan_scan(switches, harness_of(board)).ports if board.chips and switches else ()
 
 
 def harness_of(board: Board) -> Harness:
     """Return the board's chips as a harness of one bus."""
     return Harness(name="board", buses=(BusWiring(device="bus", clock_hz=board.bus.clock_hz, chips=board.chips),))
-
-
-def switches_of(ports: Sequence[Port]) -> list[list[int]]:
-    """Return the numbers of the build's switches that each reading shows: the ports of the early exit."""
-    return [list(port.elements) for port in ports]
-
-
-def exits_early(board: Board, ports: Sequence[Port]) -> bool:
-    """Return whether a scan of the readings `ports` may end before the last; a single reading is always made."""
-    return board.early_exit and len(ports) > 1
 
 
 def follows_segments(board: Board, names: Names) -> bool:
@@ -94,7 +84,7 @@ def shortest_scan_us(
     board: Board, switches: Sequence[str], tables: IntegerTables, *, recognises: bool, segments: bool = False
 ) -> int:
     """Return the longest duration of a scan in microseconds, with all work done once per scan, rounded up to 50."""
-    ports = readings(board, switches, tables)
+    ports = readings(board, switches)
     rows, columns = rows_and_columns(board, switches)
     cycles = _SCAN + _KEY * rows * columns
     seconds = 0.0
@@ -109,8 +99,7 @@ def shortest_scan_us(
         cycles += cycles // 10
     if recognises:
         lookups = tables.n_switches // 2 + tables.n_joints
-        predictions = len(ports) if exits_early(board, ports) else 1
-        cycles += predictions * (_PREDICTION + lookups * (_LOOKUP + _CLASS * tables.n_classes))
+        cycles += _PREDICTION + lookups * (_LOOKUP + _CLASS * tables.n_classes)
         cycles += _STATE * (tables.n_classes + 1) * segments
     return 50 * ceil((seconds + cycles / board.clock_hz) * 1e6 / 50)
 
@@ -141,7 +130,6 @@ def config_of(
 
 _MOST_GRASPS = 255  # a grasp is a byte on the line, and 255 means none
 _MOST_RAM = 3 / 8  # for segments; lines, keys and stack need some 900 bytes
-_WHOLE_US = 50_000  # between whole scans of a board that sends no heartbeats
 _BYTE = 0xFF
 _NUMBERS_A_LINE = 14
 
@@ -152,7 +140,7 @@ def board_files(name: str, names: Names, layout: Layout, board: Board, mode: Mod
     name  of the build, also used for its classifier's files; a name that words.check_name allows
     mode  "scan", or "glove", which also recognises
 
-    `config_of` and `switches_of` give the arguments for the protocol's files; `whole_folder` takes all files. Raises
+    `config_of` gives the argument for the protocol's files; `whole_folder` takes all files. Raises
     FirmwareError if the board lacks a switch or, for a glove, a joint; if there are more than 255 grasp types; or if a
     scan takes longer than scan_us.
     """
@@ -162,16 +150,16 @@ def board_files(name: str, names: Names, layout: Layout, board: Board, mode: Mod
         raise FirmwareError(
             f"{len(answers_of(names))} grasp types: a board can report {_MOST_GRASPS}; compile fewer grasp types"
         )
-    ports = readings(board, switches, layout.tables)
+    ports = readings(board, switches)
     about = _about_glove(board, names) if mode == "glove" else _about_scanner(board)
     files = {f"{part}.h": portable(f"{part}.h") for part in ("thenar_clock", "thenar_due")}
     files |= {"thenar_due.c": portable("thenar_due.c"), "thenar_turn.h": portable("thenar_turn.h", about=about)}
     files |= _layer(board).base_files(board, about)
-    files |= _inputs(board, switches, layout)
+    files |= _inputs(board, switches)
     joints = _joints(name, names, layout, board) if mode == "glove" else {}
     files |= joints
     if mode == "glove":
-        files["thenar_turn.c"] = _glove_turn(name, names, board, bool(joints), exits_early(board, ports))
+        files["thenar_turn.c"] = _glove_turn(name, names, board, bool(joints))
     else:
         files |= _layer(board).channels_files(board)
         files["thenar_turn.c"] = portable("scan_turn.c", chips=len(ports), channels=board.channels)
@@ -181,8 +169,8 @@ def board_files(name: str, names: Names, layout: Layout, board: Board, mode: Mod
     return files
 
 
-def _inputs(board: Board, switches: Sequence[str], layout: Layout) -> dict[str, str]:
-    ports = readings(board, switches, layout.tables)
+def _inputs(board: Board, switches: Sequence[str]) -> dict[str, str]:
+    ports = readings(board, switches)
     layer, header = _layer(board), portable("thenar_keys.h", what=_inputs_in_words(board), chips=len(ports))
     files = {"thenar_keys.h": header}
     if board.matrix is not None or board.pins or not switches:
@@ -204,21 +192,16 @@ def _joints(identifier: str, names: Names, layout: Layout, board: Board) -> dict
     return files | layer.uart_files(board, glove.uart, glove.baud)
 
 
-def _glove_turn(identifier: str, names: Names, board: Board, joints: bool, early_exit: bool) -> str:
-    switches, model = tuple(switch.name for switch in names.switches), names.segments
-    whole_us = board.heartbeat_us or _WHOLE_US
-    if segments := model is not None and follows_segments(board, names):
-        whole_us = min(whole_us, model.tick_us)
+def _glove_turn(identifier: str, names: Names, board: Board, joints: bool) -> str:
+    switches = tuple(switch.name for switch in names.switches)
     return portable(
         "glove_turn.c",
         name=identifier,
         joints=joints,
         attended=joints and board.cyberglove is not None,
         chips=bool(board.chips),
-        early_exit=early_exit,
         ghosts=board.matrix is not None and not board.matrix.diodes,
-        whole_us=whole_us,
-        segments=segments,
+        segments=follows_segments(board, names),
         many_keys=len(key_names(board, switches)) > _BYTE,
         keys_of_switches=_keys_of_switches(board, switches),
         rejects=names.rejection is not None,

@@ -20,18 +20,15 @@ from .board import Board, check_switches, keys_of
 from .board_files import (
     board_files,
     config_of,
-    exits_early,
     follows_segments,
     key_ports,
-    readings,
     segments_in_words,
-    switches_of,
     whole_folder,
 )
 from .choose import Fit, fit_for, smallest_fit
 from .classifier import LIBRARY_NAME, Library
 from .layout import Ports, ports_of_scan
-from .protocol import decided_files, protocol_files
+from .protocol import protocol_files
 from .sensors import Sensors
 from .targets import TARGETS, Target
 from .targets.base import Mode
@@ -134,8 +131,6 @@ class Firmware:
         files = protocol_files(config) | board_files(name, names, library.layout, board, self.mode)
         if glove:
             files |= library.files | (library.segments if segments else {})
-            if exits_early(board, ports := readings(board, switches, tables)):
-                files |= decided_files(name, tables, names.grasps, switches_of(ports))
         return whole_folder(name, board, self.mode, files)
 
 

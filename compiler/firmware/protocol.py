@@ -1,31 +1,20 @@
-"""The portable C of a scanner board: frames, protocol, debouncing, and the early exit of a scan.
+"""The portable C of a scanner board: frames, protocol and debouncing.
 
 The C does no input or output: it takes bytes and times as arguments and returns bytes. It matches
-`drivers.scanner_protocol`, `drivers.emulated.scanner_board.ScannerBoard`, `drivers.debounce.Debouncer` and
-`runtime.scanning.decided.EarlyExit` byte for byte, given the same scans, times and received bytes.
+`drivers.scanner_protocol`, `drivers.emulated.scanner_board.ScannerBoard` and `drivers.debounce.Debouncer` byte for
+byte, given the same scans, times and received bytes.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from textwrap import wrap
 
 from thenar.drivers.scanner_protocol import MOST_ASKED, MOST_BITS, SetChannels, SetRate
 from thenar.firmware_templates.rendering import render
-from thenar.runtime.scanning.decided import EarlyExit
-from thenar.runtime.scores import Scorer
-from thenar.runtime.tables import IntegerTables
 
 from . import FirmwareError
-from .words import comment
 
 # The capacity of a HEARTBEAT in a frame whose length is one byte.
 MOST_KEYS = 1960
 _FOREVER_US, _LONGEST_DEBOUNCE_US, _MOST_BOARDS, _MOST_PLACES = (1 << 32) - 1, 0xFFFF, (1 << 32) - 1, 0xFFFF
-_MOST_PORTS = 256
-# No score leads another by as much: sums are -32767 to 32767.
-_NEVER = 0xFFFF
-# For lines of numbers and names, before they are indented.
-_WIDTH = 100
 
 _PORTABLE = ("thenar_time.h", *(f"thenar_{part}.{end}" for part in ("frames", "debounce", "board") for end in "hc"))
 
@@ -99,54 +88,3 @@ def protocol_files(config: BoardConfig) -> dict[str, str]:
         "thenar_config.h": render("board/thenar_config.h.j2", config=config),
         **{name: render(f"board/{name}.j2", config=config) for name in _PORTABLE},
     }
-
-
-def decided_files(
-    name: str, tables: IntegerTables, grasps: Sequence[str], ports: Sequence[Sequence[int]]
-) -> dict[str, str]:
-    """Return name -> text of thenar_NAME_decided.h and .c.
-
-    name    C identifier of the build                        grasps  names of its K classes
-    ports   the switches of each port, in the order in which ports are read; each switch of the build is in one of them
-
-    Raises FirmwareError where there are no ports, more than 256, or a switch is in none; SettingError where a switch is
-    in two, or is not in the build.
-    """
-    masks = [sum(1 << switch for switch in port) for port in ports]
-    scorer = Scorer(tables)
-    early = EarlyExit(scorer, masks)
-    if not 1 <= len(ports) <= _MOST_PORTS:
-        raise FirmwareError(f"a scan of {len(ports)} ports: early exit needs 1 to {_MOST_PORTS}")
-    if missing := (1 << tables.n_switches) - 1 & ~sum(masks):
-        raise FirmwareError(
-            f"no port reads switch {missing.bit_length() - 1}: early exit needs every switch of the build"
-        )
-    names = [comment(grasp) for grasp in grasps]
-    values = {
-        "name": name,
-        "guard": f"THENAR_{name.upper()}",
-        "grasps": names,
-        "columns": wrap(", ".join(names), _WIDTH),
-        "n_ports": len(ports),
-        "ports": [
-            line for number, port in enumerate(ports) for line in wrap(f"port {number}: {_listed(port)}", _WIDTH)
-        ],
-        "tables": [_hurdles(scorer, early.unread(port), names) for port in range(len(ports) - 1)],
-    }
-    return {f"thenar_{name}_decided.{end}": render(f"board/thenar_NAME_decided.{end}.j2", **values) for end in "hc"}
-
-
-def _hurdles(scorer: Scorer, unread: int, grasps: Sequence[str]) -> list[dict[str, object]]:
-    """Return the required lead of each leader over every class, in steps, as lines of C."""
-    rows: list[dict[str, object]] = []
-    for leader, grasp in enumerate(grasps):
-        steps = [
-            0 if competitor == leader else min(most + (competitor < leader), _NEVER)
-            for competitor, most in enumerate(scorer.reach(leader, unread))
-        ]
-        rows.append({"leader": grasp, "steps": wrap(", ".join(map(str, steps)), _WIDTH)})
-    return rows
-
-
-def _listed(port: Sequence[int]) -> str:
-    return ("switches " if len(port) > 1 else "switch ") + ", ".join(map(str, port)) if port else "no switch"

@@ -12,20 +12,20 @@ from ..evaluation.rates import Rate
 from ..trainers.base import TRAINERS, Training
 from .finalists import Close
 from .latency import POLICIES
-from .points import DecisionKind, Latency, Point, Recipe, Scan, Time, front
+from .points import DecisionKind, Latency, Point, Recipe, Time, front
 from .price import PricedTables, Wired
 from .screen import Screened
 from .search import Candidate, Shape
 from .survey import Cuts, Judged
 from .timing.classify_times import Classified
-from .timing.scan_times import ASKING_US, NO_TIME
+from .timing.scan_times import NO_TIME
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Design:
     """One design of a finalist: these tables in this layout, and the scan of its switches (None: it reads none).
 
-    record    time of reading the joints; scan_kind "demand": only in frames in which the switches do not decide
+    transfer  time of reading the joints
     measured  time of classifying, simulated or measured; None: the model's estimate
     """
 
@@ -33,8 +33,7 @@ class Design:
     tables: PricedTables
     classified: Classified
     wired: Wired | None
-    scan_kind: Scan
-    record: Time
+    transfer: Time
     measured: Time | None = None
 
     @property
@@ -55,53 +54,17 @@ class Design:
     @property
     def scan(self) -> Time:
         """Time of reading the switches."""
-        if self.wired is None:
-            return Time(0.0, "wire")
-        times = self.wired.scan
-        us = {"full": times.full_us, "early": times.early_us, "demand": times.alone_us}[self.scan_kind]
-        return Time(us, times.how)
-
-    @property
-    def asked(self) -> float:
-        """The share of frames in which the joints are read."""
-        return self.wired.scan.asked if self.scan_kind == "demand" and self.wired is not None else 1.0
-
-    @property
-    def transfer(self) -> Time:
-        """Mean time of reading the joints; on demand with the request byte."""
-        if self.scan_kind != "demand":
-            return self.record
-        return Time(self.asked * (self.record.us + ASKING_US), self.record.how)
+        return Time(0.0, "wire") if self.wired is None else Time(self.wired.scan.us, self.wired.scan.how)
 
     @property
     def classify(self) -> Time:
-        """Total time of classifying: a scan that may end early looks at the scores after every port that it reads; as
-        with the scan's time, this is the mean over frames.
-        """
-        once, looks = self.measured or Time(self.classified.us, self.classified.how), 1.0
-        if self.wired is not None and self.scan_kind != "full":
-            scan = self.wired.scan
-            looks = scan.early_ports if self.scan_kind == "early" else max(scan.alone_ports, 1.0) + scan.asked
-        return Time(once.us * looks, once.how)
+        """Time of classifying."""
+        return self.measured or Time(self.classified.us, self.classified.how)
 
     @property
     def frame(self) -> Time:
-        """Time of reading everything, on separate lines in parallel, and classifying; on demand in sequence."""
-        both = self.scan.us + self.transfer.us if self.scan_kind == "demand" else max(self.scan.us, self.transfer.us)
-        return Time(both + self.classify.us, self.classify.how)
-
-    @property
-    def slow_us(self) -> float | None:
-        """Time of a frame in which the joints are read, unless they are read in every frame."""
-        if self.scan_kind != "demand" or self.wired is None:
-            return None
-        once = self.measured or Time(self.classified.us, self.classified.how)
-        return self.wired.scan.full_us + self.record.us + ASKING_US + 2 * once.us
-
-    @property
-    def decisions(self) -> tuple[DecisionKind, ...]:
-        """The decisions that its scans allow."""
-        return tuple(POLICIES) if self.scan_kind == "full" else ("single",)
+        """Time of reading everything, on separate lines in parallel, and classifying."""
+        return Time(max(self.scan.us, self.transfer.us) + self.classify.us, self.classify.how)
 
 
 Latencies = Mapping[tuple[Design, DecisionKind], Latency]
@@ -112,15 +75,9 @@ def designs(close: Close, read: Time = NO_TIME) -> Iterator[Design]:
     for tables in close.priced:
         for classified in tables.classified:
             if not close.screened.columns:
-                yield Design(close, tables, classified, None, "full", read)
+                yield Design(close, tables, classified, None, read)
             for wired in tables.wired:
-                # Skip early ends that never save anything, as with boards.
-                kinds: list[Scan] = ["full", "early"] if wired.scan.early_us < wired.scan.full_us else ["full"]
-                # Requests to a CyberGlove: if every frame needs a record, streaming is better.
-                if read.how in ("formula", "measured", "wire") and read.us and wired.scan.asked < 1.0:
-                    kinds.append("demand")
-                for kind in kinds:
-                    yield Design(close, tables, classified, wired, kind, read)
+                yield Design(close, tables, classified, wired, read)
 
 
 def best_designs(several: Sequence[Design]) -> tuple[list[Design], list[Design]]:
@@ -179,22 +136,6 @@ def _effort(design: Design) -> tuple[float, ...]:
     return (*parts, design.scan.us, design.classified.flash, design.tables.tabled.rounds)
 
 
-def with_whole_scans(kept: Sequence[Design]) -> list[Design]:
-    """Return the designs, each once, and for those whose scans may end early also their designs with whole scans, which
-    all decisions except single frames need.
-    """
-    found = {_identity(design): design for design in kept}
-    for design in kept:
-        whole = replace(design, scan_kind="full")
-        found.setdefault(_identity(whole), whole)
-    return list(found.values())
-
-
-def _identity(design: Design) -> tuple[object, ...]:
-    wired = design.wired and (design.wired.wiring, design.wired.clock_hz)
-    return id(design.close), design.tables.tabled, design.classified, wired, design.scan_kind
-
-
 def points_of(
     several: Sequence[Design],
     latencies: Latencies,
@@ -212,7 +153,7 @@ def points_of(
     """
     fronts = _fronts(several, latencies)
     ordered = sorted(several, key=lambda design: (design.frame.us, design.n_switches))
-    found = [(design, kind) for design in ordered for kind in design.decisions if fronts[design, kind]]
+    found = [(design, kind) for design in ordered for kind in POLICIES if fronts[design, kind]]
     return tuple(
         _point(
             number,
@@ -235,7 +176,7 @@ def _fronts(several: Sequence[Design], latencies: Latencies) -> dict[tuple[Desig
         for design in best:
             found[design, "single"] += (name,)
     for kind in POLICIES:
-        waits = {design: latencies[design, kind].mean_us for design in several if kind in design.decisions}
+        waits = {design: latencies[design, kind].mean_us for design in several}
         for design in front(list(waits), waits.__getitem__, lambda design: design.rate):
             found[design, kind] += ("latency",)
     return found
@@ -277,7 +218,6 @@ def _point(
             rounds=tabled.rounds if TRAINERS.named(training.trainer).staged else None,
             width=tabled.shape.width,
             layout=design.classified.layout,
-            scan=design.scan_kind,
             decision=kind,
             wiring="" if wired is None else wired.wiring,
             clock_hz=0 if wired is None else wired.clock_hz,
@@ -302,6 +242,5 @@ def _point(
         chips=0 if wired is None else wired.scan.chips,
         compile_s=round(close.choosing_s + design.tables.seconds, 2),
         fronts=fronts,
-        asked=design.asked,
         joints=joints,
     )

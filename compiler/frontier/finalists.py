@@ -127,7 +127,7 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
             tuple(dict.fromkeys([*worthwhile(judged[one.choice][1]), papers_tables(searches[one.choice])])),
             survey.training(one.choice),
             survey.equipment,
-            (cuts.screening[0], survey.training(one.choice, cuts.screening[0])),
+            True,
         )
         for one in chosen
     ]

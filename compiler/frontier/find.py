@@ -27,10 +27,10 @@ from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..text import INDEPENDENT, sentence
 from .cache import Cache, Report, Store
-from .designs import Design, Latencies, best_designs, designs, lucks, points_of, with_whole_scans
+from .designs import Design, Latencies, best_designs, designs, lucks, points_of
 from .equipment import equipment_for
 from .finalists import Close, finalists, look_closely
-from .latency import Pace, latencies
+from .latency import POLICIES, Pace, latencies
 from .marks import choices_to_mark, marks_of, own_build
 from .measure import measured
 from .moving import Moving
@@ -47,10 +47,6 @@ from .words import csv_bytes
 RecordTime = Literal["formula", "wire"]
 FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.sqlite"
 _DOCUMENTS = frozenset({FRONTIER_NAME, TABLE_NAME, *(f"{name}.svg" for name in PICTURES)})
-_EARLY = (
-    "Scans that end early are tried with decisions on single frames: a dwell with a lead reads on for longer, and a "
-    "sequential test needs whole scans."
-)
 # Placements to screen with the other trainers, as a multiple of the finalists.
 _WIDER = 3
 # Number of placements to try with fewer joints.
@@ -314,12 +310,11 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
     closes = look_closely(survey, finalists(screened, list(named), search.finalists))
     every = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
     by_time, by_switches = best_designs(every)
-    kept, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
+    kept, skipped = measured(list(dict.fromkeys([*by_time, *by_switches])), survey.equipment, survey.cache)
     luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
     points = points_of(kept, _latencies(survey, stream, kept), luck, survey.names, survey.training, survey.some_joints)
     picked, tried = wanted.pick(points), _tried(screened, closes, search)
     claimed = [sentence(INDEPENDENT)] if survey.grasp_set.independent else []
-    early = [_EARLY] if any(design.scan_kind == "early" for design in kept) else []
     return Frontier(
         schema=SCHEMA,
         thenar=version("thenar"),
@@ -338,19 +333,19 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
         machine=survey.equipment.model.machine,
         folds=search.folds,
         repeats=len(survey.cuts.repeats),
-        combinations=sum(len(design.decisions) for design in every) + len(tried),
+        combinations=len(POLICIES) * len(every) + len(tried),
         points=points,
         tried=tried,
         curves=curves,
         marks=(*marks_of(named, closes, survey), *own),
-        skipped=(*lacking, *claimed, *skipped, *early, stream.what),
+        skipped=(*lacking, *claimed, *skipped, stream.what),
         picked=None if picked is None else picked.number,
         wanted=wanted.words,
     )
 
 
 def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latencies:
-    """Return the latency of every design with every decision that it allows, by tables trained on rows outside the
+    """Return the latency of every design with every decision, by tables trained on rows outside the
     stream of held-out rows.
     """
     fold, grouped = survey.cuts.screening[0], dict[Candidate, list[Design]]()
@@ -363,10 +358,7 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
             fold.train,
             survey.columns(choice, fold),
             stream.with_elements(survey.elements(choice.levels, fold)).with_joints(survey.joints(choice, fold)),
-            tuple(
-                Pace(design.tables.tabled, design.frame.us, design.decisions, design.slow_us, design.asked)
-                for design in mine
-            ),
+            tuple(Pace(design.tables.tabled, design.frame.us) for design in mine),
             survey.training(choice, fold),
             moving and moving.reading(survey.elements(choice.levels, fold), survey.joints(choice, fold)),
         )
@@ -376,7 +368,7 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
         (design, kind): latency
         for mine, found in zip(grouped.values(), survey.cache.ask(calls), strict=True)
         for design, several in zip(mine, found, strict=True)
-        for kind, latency in zip(design.decisions, several, strict=True)
+        for kind, latency in zip(POLICIES, several, strict=True)
     }
 
 

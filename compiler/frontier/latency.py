@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.live.decision import Decision, SequentialTest, Standing
 from thenar.runtime.policy import Policy
-from thenar.runtime.scanning.decided import Decided as Undecided
-from thenar.runtime.scores import LANE_OFFSET, Scorer
+from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.segmenting.live import LiveSegments
 from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables
@@ -84,12 +83,12 @@ def decisions(tables: IntegerTables, frames: Stretches, policy: Deciding) -> Dec
     """Return the decisions of `thenar run` under `policy` on these frames, each whole and seen once, by both devices at
     the same time; by segments: the held types.
     """
-    decide, scorer = decider_of(tables, policy), Scorer(tables)
+    decide = decider_of(tables, policy)
     changes: list[int] = []
     types: list[int | None] = []
     lanes = map(tuple, (frames.scores + LANE_OFFSET).tolist())
     for stretch, row in zip(frames.times, lanes, strict=True):
-        standing = Standing(row, scorer)
+        standing = Standing(row)
         for time_us in stretch:
             held = decide(time_us, standing)
             if not types or held != types[-1]:
@@ -125,7 +124,7 @@ def _by_segments(tables: IntegerTables, model: SegmentModel | None) -> Decide:
 
 Times = NDArray[np.int64]
 
-# The policies of `thenar run`. Scans that end early decide like single frames.
+# The policies of `thenar run`.
 POLICIES: Mapping[DecisionKind, Policy | None] = MappingProxyType(
     {
         "single": Policy(lead=0.0, dwell_us=0),
@@ -137,17 +136,10 @@ POLICIES: Mapping[DecisionKind, Policy | None] = MappingProxyType(
 
 
 class Pace(Struct, frozen=True):
-    """Tables that predict every `frame_us`, and the methods that decide on their predictions.
-
-    slow_us  time of a frame in which the switches do not decide and the joints are read, a share `asked` of all; then
-             frame_us is the mean. None: all frames take equally long
-    """
+    """Tables that predict every `frame_us`."""
 
     tabled: Tabled
     frame_us: float
-    decisions: tuple[DecisionKind, ...]
-    slow_us: float | None = None
-    asked: float = 1.0
 
 
 @stored(6)
@@ -161,28 +153,21 @@ def latencies(
     moving: Moving | None = None,
 ) -> tuple[tuple[Latency, ...], ...]:
     """Train on some rows, on the switches `columns` and the joints; return the latencies on a stream for every pace
-    and each of its decisions. The stream holds none of the rows.
+    and each of POLICIES. The stream holds none of the rows.
 
     moving  the same rows with those in which nothing is held: segments use tables trained with these rows, and costs
             learnt from them. None: segments have the default costs
     """
     wanted = tuple(dict.fromkeys(pace.tabled for pace in paces))
-    asked = any(pace.slow_us is not None for pace in paces)
-    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, wanted, training, lost=asked)}
-    whole = tuple(dict.fromkeys(pace.tabled for pace in paces if "segments" in pace.decisions))
-    learnt = moving.segmenting(columns, whole, training) if moving and whole else {}
+    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, wanted, training)}
+    learnt = moving.segmenting(columns, wanted, training) if moving else {}
 
     def of(pace: Pace, kind: DecisionKind) -> Latency:
         if kind == "segments" and pace.tabled in learnt:
             return latency(learnt[pace.tabled][0], columns, stream, pace.frame_us, learnt[pace.tabled][1])
         return latency(tables[pace.tabled], columns, stream, pace.frame_us, POLICIES[kind])
 
-    return tuple(
-        tuple(of(pace, kind) for kind in pace.decisions)
-        if pace.slow_us is None
-        else (latency_on_demand(tables[pace.tabled], columns, stream, pace),)
-        for pace in paces
-    )
+    return tuple(tuple(of(pace, kind) for kind in POLICIES) for pace in paces)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -218,31 +203,6 @@ def latency(
     held = _Held(begun_us[stream.arrivals], begun_us[stream.ends], stream.types[stream.arrivals])
     predicted_us = decided.frames * step_us + takes_us
     return _measured(held, *_waits_and_errors(predicted_us, decided.types, held), takes_us)
-
-
-def latency_on_demand(tables: IntegerTables, columns: Sequence[int], stream: Stream, pace: Pace) -> Latency:
-    """Return the latency of decisions on single frames whose time depends on the state: short if the switches decide,
-    otherwise longer by the joints.
-    """
-    assert pace.slow_us is not None
-    _check(tables, columns, stream, pace.frame_us)
-    quick_us = pace.slow_us if pace.asked >= 1 else (pace.frame_us - pace.asked * pace.slow_us) / (1 - pace.asked)
-    slow, quick = (max(round(us), 1) for us in (pace.slow_us, quick_us))
-    begun_us = stream.at_us - stream.at_us[0]
-    bits, codes = stream.bits[:, list(columns)], stream.codes
-    winners = integer_scores(tables, bits, codes).argmax(axis=1)
-    everything = Undecided(tables, [tuple(range(tables.n_switches))], bits, codes, on_demand=True)
-    steps_us = np.where(everything.after(1)[1], quick, slow)
-    predicted, types, now = list[int](), list[int](), 0
-    states = zip(begun_us[1:].tolist(), steps_us.tolist(), winners.tolist(), strict=False)
-    for ends_us, step_us, winner in states:
-        if now < ends_us:
-            predicted.append(now + step_us)
-            types.append(winner)
-            # Further frames of the state give the same prediction; the last may end after it.
-            now += -(-(ends_us - now) // step_us) * step_us
-    held = _Held(begun_us[stream.arrivals], begun_us[stream.ends], stream.types[stream.arrivals])
-    return _measured(held, *_waits_and_errors(np.array(predicted), np.array(types), held), quick)
 
 
 def decided_on(

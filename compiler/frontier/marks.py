@@ -8,7 +8,6 @@ from thenar.runtime.build import Build
 from thenar.runtime.manifest import PAPERS_TRAINER
 
 from ..evaluation.rates import Rate
-from ..placement.elements import Element, above
 from ..placement.methods.base import BEST, PAPERS
 from ..recordings.graspset import GraspSet
 from .equipment import Equipment
@@ -39,7 +38,7 @@ def choices_to_mark(
 
 
 def marks_of(named: dict[Candidate, str], closes: Sequence[Close], survey: Survey) -> tuple[Mark, ...]:
-    """Return the marks of those choices that were fully evaluated, with the paper's rounds and whole scans."""
+    """Return the marks of those choices that were fully evaluated, with the paper's rounds."""
     found, tabled = [], papers_tables(survey.search)
     for close in closes:
         screened = close.screened
@@ -67,21 +66,19 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     if not options or (names and not fitting):
         raise FrontierError(f"{folder} cannot be built for {equipment.model.target}: leave --build out, or --target")
     joints = [joint.name for joint in manifest.joints]
-    sources = _places([switch.source for switch in manifest.switches], grasp_set.element_names, folder)
-    above_codes = [0 if switch.threshold is None else switch.threshold.code for switch in manifest.switches]
-    bits = above(grasp_set.switches, grasp_set.taxels, tuple(map(Element, sources, above_codes)))
-    codes = grasp_set.codes[:, _places(joints, [joint.name for joint in grasp_set.joints], folder)]
-    scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.overhead).full_us for wiring in fitting]
+    _check([switch.source for switch in manifest.switches], grasp_set.element_names, folder)
+    _check(joints, [joint.name for joint in grasp_set.joints], folder)
+    scans = [scan_times(names, wiring, equipment.overhead).us for wiring in fitting]
     frame_us = max(min(scans, default=0.0), equipment.records.of(len(joints)).us) + options[0].us
     return Mark(
         f"build {folder.name}", len(names), Rate.counted((pooled[0].correct,), pooled[0].total, of="pooled"), frame_us
     )
 
 
-def _places(names: Sequence[str], there: Sequence[str], folder: Path) -> list[int]:
+def _check(names: Sequence[str], there: Sequence[str], folder: Path) -> None:
+    """Raise FrontierError if the recordings lack an input of the build."""
     for name in names:
         if name not in there:
             raise FrontierError(
                 f"{folder} reads {name!r}, which the recordings do not hold: it was compiled from others"
             )
-    return [there.index(name) for name in names]

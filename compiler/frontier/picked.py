@@ -4,8 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from msgspec.structs import replace
-
 from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.drivers.spi.chips import SPI_CHIPS
 from thenar.runtime.files import read_file
@@ -77,10 +75,7 @@ class Picked:
             if given is not None and setting.wiring == AS_WIRED:
                 return given
             joints = () if setting.inputs == "switches" else self.point.joints or self.joints
-            made = Wiring(setting.wiring, setting.clock_hz).harness_of(kept, joints)
-            if setting.scan == "demand" and made.cyberglove is not None:
-                return replace(made, cyberglove=replace(made.cyberglove, mode="demand"))
-            return made
+            return Wiring(setting.wiring, setting.clock_hz).harness_of(kept, joints)
 
         return harness_of
 

@@ -100,8 +100,8 @@ _LATENCY = _Cost(
 
 
 def _waited(point: Point) -> float | None:
-    """Return the mean latency, at least a frame (older frontiers have less); None if every grasp was missed."""
-    return None if point.latency.missed >= 1 else max(point.latency.mean_us, point.frame.us)
+    """Return the mean latency; None if every grasp was missed."""
+    return None if point.latency.missed >= 1 else point.latency.mean_us
 
 
 def pictures(frontier: Frontier, kind: Literal["svg", "png"], *, letters: bool = False) -> Mapping[str, bytes]:

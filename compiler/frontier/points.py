@@ -12,7 +12,7 @@ from thenar.runtime.names import fault, shortened
 
 from ..evaluation.rates import Rate
 
-SCHEMA = 2
+SCHEMA = 3
 MAX_BYTES = 64 << 20
 
 # measured: wall time on this machine. simulated: cycles of the real firmware in a simulator. wire: calculated from
@@ -20,7 +20,6 @@ MAX_BYTES = 64 << 20
 # formula: the vendor's, from a single source. given: by the user. guess: measured elsewhere, times an assumed factor.
 # unknown: left out of every sum.
 How = Literal["measured", "simulated", "wire", "model", "formula", "given", "guess", "unknown"]
-Scan = Literal["full", "early", "demand"]
 DecisionKind = Literal["single", "dwell", "sequential", "segments"]
 # The population of a rate: left-out subjects, or rows of all subjects in random folds of whole trials.
 By = Literal["new subject", "pooled"]
@@ -72,7 +71,6 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     rounds: Annotated[int, Meta(ge=1, le=10**6)] | None
     width: Annotated[int, Meta(ge=4, le=16)]
     layout: str
-    scan: Scan
     decision: DecisionKind
     wiring: str
     clock_hz: Annotated[int, Meta(ge=0, le=12_000_000)]
@@ -107,9 +105,8 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     luck        the optimism of picking the best of all that was tried (`evaluation.luck`)
     frames      the rate of single frames, uncorrected (None: a trial has one frame)
     other_rate  the other of the two, uncorrected (None: only one subject)
-    scan        reading the switches (the mean if it ends early); transfer: the joints (on demand, the mean)
-    frame       max(scan, transfer) + classify: the two use separate lines; on demand the sum of all three
-    asked       the share of frames in which the joints are read: below 1 on demand
+    scan        reading the switches; transfer: the joints
+    frame       max(scan, transfer) + classify: the two use separate lines
     flash, ram  bytes of the classifier on its target; of the tables alone on host and pi
     fronts      the fronts that it is on: "frame", "switches", "latency"
     """
@@ -132,7 +129,6 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     chips: Count
     compile_s: Amount
     fronts: tuple[str, ...] = ()
-    asked: Share = 1.0
     joints: tuple[str, ...] = ()
 
 
@@ -259,15 +255,13 @@ def frontier_to_bytes(frontier: Frontier) -> bytes:
 def frontier_from_bytes(data: bytes, what: str = "frontier.json") -> Frontier:
     """Return the frontier of a `frontier.json`; messages refer to it as `what`.
 
-    Raises FrontierError if it is oversized, no such document, of a newer schema, or inconsistent.
+    Raises FrontierError if it is oversized, no such document, of another schema, or inconsistent.
     """
     if len(data) > MAX_BYTES:
         raise FrontierError(f"{what} has {len(data)} bytes, a frontier has at most {MAX_BYTES}")
     schema = _decode(data, _Version, what).schema
-    if schema > SCHEMA:
-        raise FrontierError(f"{what} has schema {schema}, this thenar reads up to {SCHEMA}: update thenar")
-    if schema < SCHEMA:
-        raise FrontierError(f"{what} is from an older thenar, whose rates were of rows: run thenar frontier again")
+    if schema != SCHEMA:
+        raise FrontierError(f"{what} has schema {schema}, this thenar reads {SCHEMA}: run thenar frontier again")
     frontier = _decode(data, Frontier, what)
     for name in {*frontier.grasps, *(name for point in frontier.points for name in point.switches)}:
         if reason := fault(name):

@@ -94,7 +94,7 @@ def _screened(survey: Survey, choices: Sequence[Candidate], rates: Mapping[Candi
         columns = survey.columns(choice, survey.cuts.everything)
         some, training = survey.read(choice, survey.cuts.everything, few=True), survey.training(choice)
         names, tabled = survey.names(choice), (_TABLED,)
-        calls.append(price.call(some, names, columns, tabled, training, survey.equipment, None))
+        calls.append(price.call(some, names, columns, tabled, training, survey.equipment, False))
     found = []
     for choice, (priced,) in zip(choices, survey.cache.ask(calls), strict=True):
         us = priced.fastest_us(survey.transfer(choice).us)

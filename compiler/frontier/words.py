@@ -14,7 +14,7 @@ from .points import Frontier, Mark, Point, Recipe, Time
 
 COLUMNS = (
     *("number", "fronts", "n_switches", "inputs", "method", "parameter", "rounds", "width", "layout"),
-    *("wiring", "clock_hz", "scan", "decision", "rate_of", "rate", "rate_low", "rate_high", "luck"),
+    *("wiring", "clock_hz", "decision", "rate_of", "rate", "rate_low", "rate_high", "luck"),
     *(
         "frames_of",
         "frames",
@@ -30,7 +30,7 @@ COLUMNS = (
         "transfer_how",
     ),
     *("classify_us", "classify_how", "frame_us", "frame_how", "latency_mean_us", "latency_p99_us", "missed", "wrong"),
-    *("flash", "ram", "ports", "chips", "compile_s", "switches", "asked", "joints"),
+    *("flash", "ram", "ports", "chips", "compile_s", "switches", "joints"),
 )
 
 # Only written if a point's trainer, or one of its settings, is not the default.
@@ -220,13 +220,13 @@ def _values(point: Point) -> Iterator[object]:
     setting, latency = point.setting, point.latency
     yield from (point.number, _list(point.fronts), len(point.switches), setting.inputs)
     yield from (setting.placement.method, setting.placement.parameter, setting.rounds, setting.width, setting.layout)
-    yield from (setting.wiring, setting.clock_hz, setting.scan, setting.decision)
+    yield from (setting.wiring, setting.clock_hz, setting.decision)
     yield from (*_rate(point.rate), point.luck, *_rate(point.frames), *_rate(point.other_rate))
     for time in (point.scan, point.transfer, point.classify, point.frame):
         yield from _time(time)
     yield from (latency.mean_us, latency.p99_us, latency.missed, latency.wrong)
-    yield from (point.flash, point.ram, point.ports, point.chips, point.compile_s, _list(point.switches), point.asked)
-    yield _list(point.joints)
+    yield from (point.flash, point.ram, point.ports, point.chips, point.compile_s)
+    yield from (_list(point.switches), _list(point.joints))
 
 
 def _rate(rate: Rate | None) -> tuple[object, ...]:

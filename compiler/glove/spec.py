@@ -12,7 +12,7 @@ from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Detected, Faults, Manifest, Recognised, Switch
 from thenar.runtime.names import list_names
 from thenar.runtime.scanning.plan import check_harness, unwired
-from thenar.runtime.scanning.ports import whole_scan, wired_names
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import own_joints, propose_cyberglove, propose_harness
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us, scanner_us, taxels_us
@@ -49,7 +49,7 @@ class Expected(Struct, frozen=True):
     boards_us    a full bitmap of each scanner board, with its kept taxels' conversions and codes
     glove_us     between records of the CyberGlove with `sensors` sensors, the build's joints; None without joints
     rates        the accuracy measured when the build was compiled
-    faults       the accuracy on the training rows under the worst faults; None in specs of older builds
+    faults       the accuracy on the training rows under the worst faults
     detection    the detection rates of nothing held
     """
 
@@ -140,7 +140,7 @@ def glove_spec(
     if not manifest.switches:
         raise SpecError("the build keeps no switch, so there is no glove to build: compile it with --inputs both")
     wired = _harness(manifest, scan, harness)
-    asked = wired_names(wired, manifest.switches)
+    asked = [switch.name for switch in manifest.switches]
     read = whole_scan(wired, asked) if scan is None else scan
     names = elements_of(wired, asked)
     known = hand if hand is not None and hand.knows(names) else None
@@ -177,7 +177,7 @@ def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) 
         if scan is not None:
             raise SpecError("the build was compiled for a specific wiring: name its glove.toml with --glove")
         return propose_harness(names, cyberglove=propose_cyberglove([joint.name for joint in manifest.joints]))
-    names = wired_names(harness, manifest.switches)
+    names = [switch.name for switch in manifest.switches]
     if scan is not None:
         check_harness(scan, harness, names)
     if lacking := unwired(harness, names):
@@ -243,10 +243,10 @@ def _remarks(
             )
     refs = {sensor.name: sensor.ref for sensor in switches}
     measured: dict[str, list[Switch]] = {}
-    for name, switch in zip(wired_names(harness, manifest.switches), manifest.switches, strict=True):
-        if switch.threshold is not None and name in refs:
+    for switch in manifest.switches:
+        if switch.threshold is not None and switch.name in refs:
             yield (
-                f"{refs[name]} is a level of the pad {switch.source}: set its comparator to "
+                f"{refs[switch.name]} is a level of the pad {switch.source}: set its comparator to "
                 f"{switch.threshold.value:g} {switch.threshold.taxel.unit}; it is {switch.closed}"
             )
         elif switch.threshold is not None:

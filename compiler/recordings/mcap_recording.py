@@ -58,7 +58,7 @@ class _Grasp:
 
     def whole(self, session: Session) -> bool:
         """Return whether everything that the session records was read."""
-        read = self.switches is not None and not self.switches.lost | self.switches.unread
+        read = self.switches is not None and not self.switches.lost
         read = read and len(self.counts) == len(session.taxels) and None not in self.counts
         # A byte of 0 means that a sensor was not measured.
         measured = not session.sensors or (self.glove is not None and 0 not in self.glove.sensors)

@@ -28,7 +28,7 @@ from ..frontier.words import (
 )
 from ..hand import HandShape
 from ..pictures import PALETTE
-from ..text import DASH, NBSP, counted, interval, microseconds, percent, sentence
+from ..text import DASH, NBSP, counted, interval, microseconds, sentence
 from .content import PlainTable
 from .hand import HandPicture, hand_picture
 
@@ -200,9 +200,7 @@ def _facts(point: Point, frontier: Frontier) -> Iterable[tuple[str, str]]:
     yield "Wiring", f"{_wiring(point)}; {counted(point.ports, 'port')}, {counted(point.chips, 'chip')}"
     layout = setting.layout and f"; {setting.layout}"
     yield "Tables", f"{trainer_of(setting)}, {setting.width} bits{layout}"
-    asked = f"the joints are read in {percent(point.asked)} of frames, where the switches do not decide"
-    ending = {"full": "full", "early": "ends early", "demand": asked}[setting.scan]
-    yield "Scan", f"{_time(point.scan)}; {ending}" if point.switches else DASH
+    yield "Scan", _time(point.scan) if point.switches else DASH
     yield "Joints", DASH if setting.inputs == "switches" else _time(point.transfer)
     yield "Classify", _time(point.classify)
     yield "Frame", _time(point.frame)

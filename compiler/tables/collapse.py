@@ -121,23 +121,6 @@ def first_codes(*thresholds: NDArray[np.uint16]) -> NDArray[np.int64]:
     return codes[codes <= HIGHEST_CODE]
 
 
-def added(one: ScoreTables, other: ScoreTables) -> ScoreTables:
-    """Return tables whose scores are the sums of the scores of two tables with the same inputs and classes.
-
-    At most one of the two has lines or pairs.
-    """
-    thresholds, joint_rows = [], []
-    parts = zip(one.thresholds, one.joint_rows, other.thresholds, other.joint_rows, strict=True)
-    for steps, rows, more_steps, more_rows in parts:
-        codes = first_codes(steps, more_steps)
-        thresholds.append((codes[1:] - 1).astype(np.uint16))
-        joint_rows.append(rows[np.searchsorted(steps, codes)] + more_rows[np.searchsorted(more_steps, codes)])
-    bias, switch_rows = one.bias + other.bias, one.switch_rows + other.switch_rows
-    return ScoreTables(
-        bias, switch_rows, tuple(thresholds), tuple(joint_rows), one.lines + other.lines, one.pairs + other.pairs
-    )
-
-
 # The models that trainers return: score tables, or an ensemble that collapses to them.
 Model = Stumps | ScoreTables
 

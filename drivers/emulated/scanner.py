@@ -138,13 +138,13 @@ class ScannerBoard:
         due += [self._analog_at] * (self.analog.analog_us > 0)
         return min(due, default=None)
 
-    def scan(self, closed: Mask, now: int, *, unread: Mask = 0, whole: bool = True) -> list[bytes]:
+    def scan(self, closed: Mask, now: int, *, unread: Mask = 0) -> list[bytes]:
         """Read the keys and the converter, and return the due frames.
 
-        unread  keys that were not read and keep their state      whole  whether all were tried, so unread ones are lost
+        unread  keys that could not be read: they keep their state and are lost
         """
         self._scan_at = None
-        sent = self._keys(closed, unread, whole, now) if self._scanned or whole else []
+        sent = self._keys(closed, unread, now)
         if self._reported != self._faults() and now >= self._faults_at:
             self._reported, self._faults_at = self._faults(), now + _FAULTS_EVERY_US
             sent.append(self._sent(Faults(self._clock(now), *self._reported, 0)))
@@ -220,11 +220,11 @@ class ScannerBoard:
         self._asked, self.segment = wanted, replace(self.segment, time_us=self._clock(now))
         return [self._sent(self.segment)]
 
-    def _keys(self, closed: Mask, unread: Mask, whole: bool, now: int) -> list[bytes]:
+    def _keys(self, closed: Mask, unread: Mask, now: int) -> list[bytes]:
         """Process a scan and return the frames about keys. The first scan reports all of them, and has no changes."""
         before, lost, first = self._closed, self._lost, not self._scanned
         self._closed = before & unread | self._read(closed) & ~unread
-        self._lost = unread if whole else lost & unread
+        self._lost = unread
         self._scanned = True
         if self.rate.state_us:
             sent = self._due_state(now)

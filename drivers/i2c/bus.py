@@ -162,7 +162,7 @@ class _Converting:
         self._conversions: dict[int, Conversion] = {}
         self._left: deque[int] = deque()
         self.converts: int | None = None
-        # A conversion from a scan that ended early is not stopped: the chip accepts no other before it is over.
+        # A conversion from a scan that was broken off is not stopped: the chip accepts no other before it is over.
         self.until = 0.0
 
     def add(self, step: int, conversion: Conversion) -> None:

@@ -172,7 +172,7 @@ def _wrong(switches: Sequence[str], frames: Sequence[SwitchFrame]) -> Iterator[s
     """Yield remarks on switches that were closed in all frames, and on those that changed faster than a hand."""
     chattering, seen, closed = Chattering(len(switches)), 0, (1 << len(switches)) - 1
     for frame in frames:
-        read = ~(frame.lost | frame.unread)
+        read = ~frame.lost
         chattering.frame(frame.time_us, frame.closed, read)
         seen, closed = seen | read, closed & (frame.closed | ~read)
     shaking = chattering.switches

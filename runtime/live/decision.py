@@ -25,89 +25,46 @@ whose results and evidence are dropped at the next whole frame.
 
 import math
 from dataclasses import dataclass, field
-from operator import add
 
-from ..frames import Mask
-from ..scores import Scorer, odds, softmax
+from ..scores import odds, softmax
 
 
 class Standing:
-    """The K scores of a frame (2^15 too high, unread switches left out), and the possible effect of unread switches.
-
-    Without unread switches every number here is that of the frame. With some, `margin`, `lead` and `probability` are
-    the minimum over all states of the unread switches, closed, open or lost: the true ones are no less. The bit
-    `Scorer.joints_bit` among them says that the joints are unread, too.
-
-    For a build that refuses frames there are K + 1 of them (`or_none`), and none is the last class.
+    """The K scores of a frame (2^15 too high). For a build that refuses frames there are K + 1 of them (`or_none`), and
+    none is the last class.
     """
 
-    __slots__ = ("_odds", "_others", "_scorer", "_unread", "candidate", "lanes")
+    __slots__ = ("_odds", "candidate", "lanes")
 
-    def __init__(self, lanes: tuple[int, ...], scorer: Scorer, unread: Mask = 0) -> None:
+    def __init__(self, lanes: tuple[int, ...]) -> None:
         self.lanes = lanes
         self.candidate = lanes.index(max(lanes))
-        self._scorer, self._unread = scorer, unread
-        self._others = self._nearest(self.candidate) if unread else lanes
         self._odds = 0.0, 0.0
-
-    @property
-    def whole(self) -> bool:
-        """Whether nothing was left unread."""
-        return not self._unread
-
-    @property
-    def certain(self) -> bool:
-        """Whether the candidate wins whatever the unread switches are; of equal scores the lowest number wins."""
-        return self._others.index(max(self._others)) == self.candidate
-
-    def leads(self, lead: int) -> bool:
-        """Return whether the candidate wins, by `lead` steps at least, whatever the unread inputs are."""
-        best = self.lanes[self.candidate]
-        others = ((number, score) for number, score in enumerate(self._others) if number != self.candidate)
-        return all(score + max(lead, number < self.candidate) <= best for number, score in others)
 
     @property
     def margin(self) -> int:
         """The candidate's lead over the second best, in steps."""
-        second, best = sorted(self._others)[-2:]
+        second, best = sorted(self.lanes)[-2:]
         return best - second
 
     def lead(self, held: int) -> int:
         """Return the candidate's lead over class `held`, in steps."""
-        return self.lanes[self.candidate] - self._others[held]
+        return self.lanes[self.candidate] - self.lanes[held]
 
     def contradicts(self, held: int, lead: int) -> bool:
-        """Return whether the candidate is not `held` and may lead it by `lead` steps: with unread switches, whether any
-        state of them gives that lead.
-        """
-        if self.candidate == held:
-            return False
-        most = self._reach(held)[self.candidate] if self._unread else 0
-        return self.lanes[self.candidate] - self.lanes[held] + most >= lead
+        """Return whether the candidate is not `held` and leads it by `lead` steps."""
+        return self.candidate != held and self.lead(held) >= lead
 
     def probability(self, number: int, scale: float) -> float:
         """Return the softmax of class `number`, at `scale` steps per unit."""
-        if self._unread and number != self.candidate:
-            return softmax(self._nearest(number), number, scale)
         of, total = self._odds
         if of != scale:
-            self._odds = scale, (total := odds(self._others, scale))
-        return softmax(self._others, number, scale, total)
+            self._odds = scale, (total := odds(self.lanes, scale))
+        return softmax(self.lanes, number, scale, total)
 
     def or_none(self, lead: int) -> "Standing":
         """Return the same with none, the last class, `lead` steps above the best, or below it if that is negative."""
-        return Standing((*self.lanes, max(self.lanes) + lead), self._scorer, self._unread)
-
-    def _reach(self, number: int) -> tuple[int, ...]:
-        """Return how much closer to class `number` the unread switches can bring each class; none is left as it is."""
-        classes = self._scorer.tables.n_classes
-        if number == classes:
-            return (0,) * (classes + 1)
-        return (*self._scorer.reach(number, self._unread), *(0,) * (len(self.lanes) - classes))
-
-    def _nearest(self, number: int) -> tuple[int, ...]:
-        """Return the scores with every other class as near to class `number`, or as far above it, as it can come."""
-        return tuple(map(add, self.lanes, self._reach(number)))
+        return Standing((*self.lanes, max(self.lanes) + lead))
 
 
 @dataclass(slots=True)
@@ -196,10 +153,7 @@ class SequentialTest:
         self.threshold = math.ceil(self.scale * math.log((self.classes - 1) / self.error_rate))
 
     def update(self, time_us: int, standing: Standing, *, whole: bool = True) -> int | None:
-        """Return the class of the last test that ended, None if none did lately; `whole`: no input is lost.
-
-        No switch of the frame may have been left unread.
-        """
+        """Return the class of the last test that ended, None if none did lately; `whole`: no input is lost."""
         if self.held is not None and time_us - self._decided_us > self.longest_us:
             self.held = None
         under_way = bool(self._sums) and time_us - self._began_us <= self.longest_us

@@ -2,11 +2,10 @@
 
 Switches that are never, or always, closed are compared with how often they were closed in the training recordings.
 
-The build holds that share; in builds of older versions a switch's mean row is its row times the share. A held grasp is
-one observation, however many frames it lasts. If a switch is closed in a share p of grasps, it stays open throughout n
-of them with a probability of at most (1 - p)^n, and closed with at most p^n, given that grasps are distributed as in
-the recordings. Because people also repeat one grasp for long, a switch is only suspected once half of the grasp types
-were seen since its other state was last seen.
+The build holds that share. A held grasp is one observation, however many frames it lasts. If a switch is closed in a
+share p of grasps, it stays open throughout n of them with a probability of at most (1 - p)^n, and closed with at most
+p^n, given that grasps are distributed as in the recordings. Because people also repeat one grasp for long, a switch is
+only suspected once half of the grasp types were seen since its other state was last seen.
 
 The quarantine (quarantine.py) finds faults from all other inputs and leaves those inputs out of the prediction.
 """
@@ -14,8 +13,6 @@ The quarantine (quarantine.py) finds faults from all other inputs and leaves tho
 import math
 from collections import Counter
 from collections.abc import Sequence
-
-import numpy as np
 
 from ..build import Build
 from ..frames import Mask, SwitchFrame
@@ -60,7 +57,7 @@ class Health:
             self._grasp = grasp.grasp
         if switches is not None and switches.time_us > self._switches_us:
             self._switches_us = switches.time_us
-            read = self._all & ~(switches.lost | switches.unread)
+            read = self._all & ~switches.lost
             self._switch_rate.frame(switches.time_us)
             self._stuck.frame(switches.closed, read)
             self._chattering.frame(switches.time_us, switches.closed, read)
@@ -131,19 +128,9 @@ class FrameRate:
 
 
 def on_shares(build: Build) -> list[float]:
-    """Return, for every switch, the share of the recordings in which it was closed; nan if unknown: in builds of older
-    versions, if its row is all zeros.
-    """
-    stored = [switch.closed_share for switch in build.manifest.switches]
-    known = [share for share in stored if share is not None]
-    if len(known) == len(stored):
-        return known
-    tables = build.tables
-    rows, means = tables.switch_rows.astype(np.float64), tables.switch_means.astype(np.float64)
-    weight = (rows * rows).sum(axis=1)
-    shares = np.divide((rows * means).sum(axis=1), weight, out=np.full(len(rows), np.nan), where=weight > 0)
-    found: list[float] = np.clip(shares, 0.0, 1.0).tolist()
-    return found
+    """Return, for every switch, the share of the recordings in which it was closed; nan if unknown."""
+    shares = (switch.closed_share for switch in build.manifest.switches)
+    return [math.nan if share is None else share for share in shares]
 
 
 def patience(share: float) -> float:

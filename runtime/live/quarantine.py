@@ -52,8 +52,6 @@ from ..tables import HIGHEST_CODE, IntegerTables
 
 # Time for which contacts must stay the same before a grasp is evaluated.
 SETTLED_US = 100_000
-# Interval at which all switches must be read, if scans may end early.
-WHOLE_US = 50_000
 # Average number of grasps between two false alarms.
 GRASPS = 1_000
 # Evidence is counted in sixteenths of a nat.
@@ -94,7 +92,7 @@ class StuckTest:
     """
 
     def __init__(self, build: Build) -> None:
-        """Find nothing in a build of an older version, which does not hold how often its switches are closed."""
+        """Take a build that says how often its switches are closed."""
         tables, switches = build.tables, build.manifest.switches
         least, most = (
             np.array([list(bytes.fromhex(text)) for text in texts], np.int64)
@@ -281,7 +279,7 @@ class Quarantine:
         switches, joints = build.manifest.switches, build.manifest.joints
         self._names = {False: [switch.name for switch in switches], True: [joint.name for joint in joints]}
         self._fits, self._active, self._all = fits, active, (1 << len(switches)) - 1
-        # A build of an older version has no field for how often its switches are closed.
+        # Only compiled builds say how often their switches are closed.
         self._stuck = StuckTest(build) if switches and switches[0].closed_least else None
         self._chattering, self._drift = Chattering(len(switches)), JointDrift(build.tables)
         self._wrong: dict[tuple[bool, int], str] = {}
@@ -328,14 +326,13 @@ class Quarantine:
         time_us = frame.time_us
         if time_us <= self._seen_us:
             return
-        self._seen_us, read = time_us, self._all & ~(frame.lost | frame.unread)
+        self._seen_us, read = time_us, self._all & ~frame.lost
         chattering = self._chattering.switches
         self._chattering.frame(time_us, frame.closed, read)
         stuck = self._stuck
         if chattering != self._chattering.switches:
             self._sort()
-        # In a scan that ended early, the other switches are unknown.
-        if stuck is None or frame.unread:
+        if stuck is None:
             return
         if (state := (frame.closed, read, lost)) == self._state and self._weighed:
             return

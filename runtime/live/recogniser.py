@@ -63,16 +63,12 @@ class LiveRecognizer:
         switch_period_us: int | None = None,
         glove_period_us: int | None = None,
         policy: Policy | None = None,
-        on_demand: bool = False,
     ) -> None:
         """Take the names of the CyberGlove's sensors in wire order, and periods; None: there is no such device.
 
-        on_demand: records come only on request (`wants_record`). Joints that nobody read are not lost if the switches
-        decide without them.
-
         Raises SettingError if the CyberGlove cannot serve the build.
         """
-        self._policy, self._scorer, self._grasps = policy or Policy(), build.scorer, build.manifest.classes
+        self._policy, self._grasps = policy or Policy(), build.manifest.classes
         tables = build.tables
         self._scale, self._all_switches = tables.scale, (1 << tables.n_switches) - 1
         self._reads_switches = switch_period_us is not None and tables.n_switches > 0
@@ -89,40 +85,12 @@ class LiveRecognizer:
         lag_us, model = self._policy.lag_us, build.manifest.segmenting
         self._segments = None if lag_us is None else LiveSegments(model, build.grasps, lag_us)
         self._rejector, self._none_leads = build.rejector, build.none_leads
-        self._whole_for_us, self._whole_until_us = PERIODS * model.tick_us, -1
-        self._whole: tuple[tuple[int, ...], bool] = (), False
         self._number = 0
-        self._alone = LiveScores(build.scorer) if on_demand else None
-
-    def wants_record(self, now_us: int, switches: SwitchFrame | None, glove: GloveFrame | None) -> bool:
-        """Return whether to request a record: one newer than this frame, which cannot decide without, or one newer
-        than the last tick of the segments.
-        """
-        if self._alone is None:
-            return False
-        segments = self._segments
-        if segments and segments.due(now_us) and (glove is None or glove.time_us <= now_us - segments.tick_us):
-            return True
-        # If no switch is read any more, records come as often as switches would.
-        silent = switches is None or not self._all_switches & ~switches.lost
-        since_us = now_us - self._longest_us if silent or switches is None else min(switches.time_us, now_us)
-        if glove is not None and glove.time_us >= since_us:
-            return False
-        return self._without_joints(self._trusted(switches, 0)) is None
 
     def _trusted(self, frame: SwitchFrame | None, joints_lost: Mask) -> SwitchFrame | None:
         """Return the frame with the quarantined switches marked as lost."""
         out = self.quarantine.left_out(self._all_switches if frame is None else frame.lost, joints_lost)[0]
         return replace(frame, lost=frame.lost | out) if out and frame is not None else frame
-
-    def _without_joints(self, frame: SwitchFrame | None) -> Standing | None:
-        """Return the leader of a frame whatever the joints are; None if they matter, or may not be left unread."""
-        if self._alone is None or frame is None:
-            return None
-        lost, unread = frame.lost, frame.unread & ~frame.lost
-        lanes = self._alone.lanes(frame.closed & ~unread & ~lost, lost)
-        standing = Standing(lanes, self._scorer, unread | self._scorer.joints_bit)
-        return standing if standing.leads(self._lead) else None
 
     def step(self, now_us: int, unix_us: int, switches: SwitchFrame | None, glove: GloveFrame | None) -> Moment:
         """Return the prediction at `now_us`, given the frames since the last step (None: none).
@@ -132,77 +100,37 @@ class LiveRecognizer:
         newest = self._switches
         if switches is not None and switches is not newest.frame and self._reads_switches:
             newest.take(switches, now_us, self._longest_us)
-        frame = newest.frame if now_us <= newest.expires_us else None
-        # Unread ports are certain only with the joints by which their scan ended; and a frame that was passed once
-        # stays the newest, so every scan that can end early includes the joints' frame.
-        codes = self._joints.codes(now_us, glove if frame is None or frame.glove is None else frame.glove)
+        read = newest.frame if now_us <= newest.expires_us else None
+        codes = self._joints.codes(now_us, glove if read is None or read.glove is None else read.glove)
         late = codes is not None and self._joints.late(now_us)
         if codes:
             self.quarantine.look_at_joints(self._joints.newest.time_us, codes)
-        read, joints_lost, known = frame, self._all_joints if codes is None else 0, None
-        if self._alone is not None and (codes is None or late):
-            known = self._without_joints(frame := self._trusted(read, 0))
-        if known is None:
-            frame = self._trusted(read, joints_lost)
-        else:
-            codes, late = None, False
+        joints_lost = self._all_joints if codes is None else 0
+        frame = self._trusted(read, joints_lost)
         dull = self.quarantine.out[1] | (self._joints.lost if codes else 0)
         if codes is not self._scored[0] or dull != self._scored[1]:
             self._scores.joints(codes, dull)
             self._scored = codes, dull
-        standing, lost = self._standing(frame) if known is None or frame is None else (known, frame.lost)
-        missing = self._missing.of(lost, dull | joints_lost * (known is None))
+        closed, lost = (0, self._all_switches) if frame is None else (frame.closed & ~frame.lost, frame.lost)
+        standing = Standing(lanes := self._scores.lanes(closed, lost))
+        missing = self._missing.of(lost, dull | joints_lost)
         if read is not None:
-            self.quarantine.look(read, standing.lanes, lost)
-        whole = self._whole_scores(now_us, frame, standing, codes, dull)
+            self.quarantine.look(read, lanes, lost)
+        refused = False
         if self._rejector is not None:
-            standing = standing.or_none(self._none_leads[whole[1]])
+            refused = self._rejector.refuses(lanes, closed, lost, codes, lost_joints=dull)
+            standing = standing.or_none(self._none_leads[refused])
         seen_us = max(newest.time_us, self._joints.newest.time_us)
         if missing.too_much:
             self._decider.forget()
             decided = None
         else:
             decided = self._decider.update(max(seen_us, 0), standing, whole=not (missing.names or late))
-        scores, refused = (None, False) if missing.too_much else whole
+        scores, refused = (None, False) if missing.too_much else (lanes, refused)
         segment = Segment() if self._segments is None else self._segments.update(now_us, scores, refused)
         grasp = self._published(now_us, unix_us, standing, missing, decided, seen_us, segment, late)
         self._number += 1
         return Moment(grasp, switches, glove, codes, scores=scores, refused=refused)
-
-    def _standing(self, frame: SwitchFrame | None) -> tuple[Standing, Mask]:
-        """Return the leader, and the lost inputs: unread switches are lost, unless the candidate is certain without.
-
-        They always are certain if the scan was ended by an `EarlyExit` with the codes of this step; with others, the
-        frame may have been left unread too early.
-        """
-        if frame is None:
-            return Standing(self._scores.lanes(0, self._all_switches), self._scorer), self._all_switches
-        lost, unread = frame.lost, frame.unread & ~frame.lost
-        if unread and self._policy.error_rate is None:
-            standing = Standing(self._scores.lanes(frame.closed & ~unread, lost), self._scorer, unread)
-            if standing.certain:
-                return standing, lost
-        lost |= unread
-        return Standing(self._scores.lanes(frame.closed & ~lost, lost), self._scorer), lost
-
-    def _whole_scores(
-        self, now_us: int, frame: SwitchFrame | None, standing: Standing, codes: Sequence[int] | None, dull: Mask
-    ) -> tuple[tuple[int, ...], bool]:
-        """Return the scores of the newest frame without unread inputs, and whether the build refuses it; if that is
-        more than two ticks old, those of this one, in which unread inputs count as lost.
-        """
-        if standing.whole or now_us > self._whole_until_us:
-            closed, lost, lanes = 0, self._all_switches, standing.lanes
-            if frame is not None:
-                closed, lost = frame.closed, frame.lost | frame.unread
-            if not standing.whole:
-                lanes = self._scores.lanes(closed & ~lost, lost)
-            refuses = None if self._rejector is None else self._rejector.refuses
-            found = lanes, refuses is not None and refuses(lanes, closed, lost, codes, lost_joints=dull)
-            if not standing.whole:
-                return found
-            self._whole_until_us, self._whole = now_us + self._whole_for_us, found
-        return self._whole
 
     def _published(
         self,

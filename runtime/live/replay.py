@@ -167,9 +167,7 @@ class _Inputs:
         if frame.taxels is not None:
             self._levels = self._taxels.read(frame.time_us, frame.taxels)
         turn, (closed, lost) = self._turn, self._levels
-        return replace(
-            frame, closed=turn(frame.closed) | closed, lost=turn(frame.lost) | lost, unread=turn(frame.unread)
-        )
+        return replace(frame, closed=turn(frame.closed) | closed, lost=turn(frame.lost) | lost)
 
     def recognizer(self, switch_period_us: int | None, glove_period_us: int | None) -> LiveRecognizer:
         return LiveRecognizer(

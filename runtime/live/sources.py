@@ -11,12 +11,11 @@ from typing import Generic, Protocol, Self, TypeVar
 
 from thenar.drivers.errors import DeviceError, SettingError
 
-from ..calibration import Joints
 from ..frames import GloveFrame, Mask, Newest, SwitchFrame, now_us
 from ..harness.wiring import Harness
 from ..published import Count, DeviceHealth
 from ..scanning.scanmap import ScanMap
-from ..sources.base import SOURCES, ExitOf, Source
+from ..sources.base import SOURCES, Source
 
 # The state of a device before the first attempt to open it.
 NOT_YET = "not opened yet"
@@ -249,13 +248,11 @@ class Arrivals:
             return fresh[0]
         if time_us < 0:
             return None
-        closed = lost = unread = 0
-        glove, taxels = None, _joined_taxels([frame.taxels for frame in fresh if frame.taxels is not None])
+        closed = lost = 0
+        taxels = _joined_taxels([frame.taxels for frame in fresh if frame.taxels is not None])
         for frame in fresh:
-            closed, lost, unread = closed | frame.closed, lost | frame.lost, unread | frame.unread
-            if frame.unread and glove is None:
-                glove = frame.glove
-        return SwitchFrame(time_us, closed, lost | silent, unread, glove, taxels)
+            closed, lost = closed | frame.closed, lost | frame.lost
+        return SwitchFrame(time_us, closed, lost | silent, taxels=taxels)
 
     def _lose(self, now_us: int) -> None:
         """Join the parts again, if one may have stopped sending: that is reported once."""
@@ -281,9 +278,7 @@ class Sources:
 
     switch_names  the wanted switches, in the order of the frames' bits: a build's kept switches
     scan          the ports of the I2C expanders to read, in order
-    early         ends scans early if one device reads all switches, given the joints' codes; None: nothing does
     sensors       the joints' sensors in use; None: all, and all the time
-    on_demand     whether a record of the joints comes only on request (`ask`)
 
     changed       whether a device came, went or failed differently since this was last set to False
 
@@ -296,10 +291,7 @@ class Sources:
         harness: Harness,
         switch_names: Sequence[str],
         scan: ScanMap,
-        early: tuple[ExitOf, Joints] | None = None,
         sensors: Sequence[str] | None = None,
-        *,
-        on_demand: bool = False,
     ) -> None:
         made = [(kind, source) for kind in SOURCES.values() for source in kind.sources(harness, switch_names, scan)]
         self._devices = tuple(source for _, source in made)
@@ -308,26 +300,13 @@ class Sources:
         self._arrivals = Arrivals(len(switch_names), [reader.owned for reader in self._readers])
         if sensors is not None:
             for glove in self._gloves:
-                glove.read_only(sensors, on_demand=on_demand)
-        alone = [reader for reader in self._readers if reader.owned]
-        if early is not None and len(alone) == 1:
-            alone[0].end_early(*early, self._arrivals.glove)
+                glove.read_only(sensors)
         self.take: Callable[..., Taken] = partial(self._arrivals.take, self._patience_us)
         self.changed = True
         self._keepers = [
             Keeper[SwitchFrame | GloveFrame](source.name, source, self._taking(source), self._change)
             for source in self._devices
         ]
-
-    def ask(self) -> None:
-        """Request a record of the joints now, if they come on demand."""
-        for glove in self._gloves:
-            glove.ask()
-
-    def leave_out(self, switches: Mask, joints: Mask) -> None:
-        """Set the switches and joints that are scored as lost, though they are read."""
-        for reader in self._readers:
-            reader.leave_out(switches, joints)
 
     def _change(self) -> None:
         self.changed = True

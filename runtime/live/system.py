@@ -7,18 +7,14 @@ from pathlib import Path
 from thenar.drivers.calibration import GloveCalibration
 
 from ..build import Build
-from ..calibration import Joints, Meaning, load_calibration, numbers_of, place_of
-from ..frames import Mask
+from ..calibration import Meaning, load_calibration, numbers_of, place_of
 from ..harness.wiring import Harness, StreamWiring
 from ..policy import Policy
-from ..scanning.decided import EarlyExit
 from ..scanning.plan import check_harness, plan_scan
-from ..scanning.ports import wired_names
 from ..scanning.propose import own_joints
 from ..scanning.scanmap import ScanMap
 from ..sources.base import slowest_us
 from ..taxels import calibration_of, in_counts
-from .quarantine import WHOLE_US
 from .recogniser import LiveRecognizer
 from .sources import Sources
 
@@ -61,11 +57,11 @@ class System:
     @staticmethod
     def map_of(build: Build, harness: Harness) -> ScanMap:
         """Return the build's own scan map, or one that is planned now. Raises HarnessError if the two do not fit."""
-        names = wired_names(harness, build.manifest.switches)
+        names = [switch.name for switch in build.manifest.switches]
         if build.scan is not None:
             check_harness(build.scan, harness, names)
             return build.scan
-        return plan_scan(names, build.tables, harness)
+        return plan_scan(names, harness)
 
     @property
     def switch_names(self) -> tuple[str, ...]:
@@ -89,7 +85,6 @@ class System:
             switch_period_us=slowest_us(self.harness, self.scan, "switches"),
             glove_period_us=slowest_us(self.harness, self.scan, "joints"),
             policy=self.policy,
-            on_demand=self.on_demand,
         )
 
     @property
@@ -101,12 +96,6 @@ class System:
         return numbers_of(device.joints)
 
     @property
-    def on_demand(self) -> bool:
-        """Whether records are requested only if the switches cannot decide: a sequential test needs them all."""
-        glove, reads = self.harness.cyberglove, self.build.tables.n_switches > 0 < self.build.tables.n_joints
-        return reads and glove is not None and glove.mode == "demand" and self.policy.error_rate is None
-
-    @property
     def read_sensors(self) -> tuple[str, ...]:
         """The sensors that a run reads, in wire order: those of the build's joints, or all if it has none, or if the
         harness sets no mask.
@@ -115,32 +104,12 @@ class System:
         some = tuple(name for name in self.sensor_names if name in joints)
         return some if some and glove is not None and glove.mask else self.sensor_names
 
-    def sources(self, *, full_scan: bool = False, all_sensors: bool = False) -> Sources:
-        """Return the devices; with `full_scan`, and for a sequential test, every scan goes to its end; with
-        `all_sensors` the CyberGlove also sends the sensors that the build does not use, whether or not they decide.
+    def sources(self, *, all_sensors: bool = False) -> Sources:
+        """Return the devices; with `all_sensors` the CyberGlove also sends the sensors that the build does not use.
 
         Raises SettingError if the calibration of the taxels cannot serve the build.
         """
-        early = None if full_scan or self.policy.error_rate is not None else (self.early_exit, self.joints())
         sensors = None if all_sensors else self.read_sensors
         taxels = calibration_of(self.harness.taxel_settings)
         scan = in_counts(self.scan, self.build.manifest.switches, taxels)
-        return Sources(self.harness, self.switch_names, scan, early, sensors, on_demand=self.on_demand)
-
-    def early_exit(self, ports: Sequence[Mask]) -> EarlyExit:
-        """Return a test that ends a scan of these ports early without changing any decision. Segments, and builds that
-        refuse frames, need whole scans: every half tick a scan goes to its end.
-
-        Pass to `start` the codes of the glove record that the recogniser will get with the scan.
-        """
-        policy = self.policy
-        lead = policy.lead_steps(self.build.tables.scale)
-        every_us = self.build.manifest.segmenting.tick_us // 2 if policy.lag_us is not None else WHOLE_US
-        whole_us = every_us if policy.lag_us is not None or policy.quarantine else None
-        return EarlyExit(self.build.scorer, ports, lead=lead, on_demand=self.on_demand, whole_us=whole_us)
-
-    def joints(self) -> Joints:
-        """Return a converter of the CyberGlove's records to the build's joint codes."""
-        period_us = slowest_us(self.harness, self.scan, "joints")
-        grace_us = self.policy.grace_of(period_us or 0)
-        return Joints(self.build.manifest.joints, self.sensor_names, self._meaning, period_us, grace_us)
+        return Sources(self.harness, self.switch_names, scan, sensors)

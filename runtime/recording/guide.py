@@ -319,7 +319,7 @@ class Guide:
         if session.switches or session.taxels:
             if self._switches is None or now_us - self._switches.time_us > oldest_us:
                 return f"the {'switches' if session.switches else 'taxels'} are silent"
-            if lost := self._switches.lost | self._switches.unread:
+            if lost := self._switches.lost:
                 names = [name for place, name in enumerate(session.switches) if lost >> place & 1]
                 return f"switches cannot be read: {list_names(names)}"
             codes = self._switches.taxels or (None,) * len(session.taxels)

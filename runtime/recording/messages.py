@@ -4,11 +4,11 @@ std_msgs/msg/String and std_msgs/msg/UInt8MultiArray are CDR, little-endian: the
 the fields, each aligned to its size (OMG DDSI-RTPS 2.5, 10.2; the lengths of strings and sequences are uint32, and a
 string's counts its NUL).
 
-A switch's byte has bit 0 set when it is closed, bit 1 when it could not be read, bit 2 when it was left unread: 0 open,
-1 closed, 2 or more not known. Where switches were left unread because of a record of the glove, that record follows
-them: its time in microseconds of the host's monotonic clock (8 bytes, little-endian), then its bytes. The bytes of a
-glove are its sensors in wire order, then its status byte if it sends one. The codes of taxels, two bytes each,
-little-endian, FFFF for one that was not read, come before the switches that were read with them.
+A switch's byte has bit 0 set when it is closed, bit 1 when it could not be read: 0 open, 1 closed, 2 or more not known.
+Where a record of the joints was read with the switches, as in a row of both, that record follows them: its time in
+microseconds of the host's monotonic clock (8 bytes, little-endian), then its bytes. The bytes of a glove are its
+sensors in wire order, then its status byte if it sends one. The codes of taxels, two bytes each, little-endian, FFFF
+for one that was not read, come before the switches that were read with them.
 """
 
 from collections.abc import Sequence
@@ -74,22 +74,21 @@ def _unpack(layout: Struct, message: bytes) -> tuple[bytes, ...] | tuple[int, ..
         raise McapError(f"has {len(message)} bytes, too few for what its channel carries") from None
 
 
-_CLOSED, _LOST, _UNREAD = 1, 2, 4
+_CLOSED, _LOST = 1, 2
 _TIME_BYTES = 8
 _SPREAD = [bytes(byte >> bit & 1 for bit in range(8)) for byte in range(256)]
 
 
 def switch_bytes(frame: SwitchFrame, switches: int, sensors: int) -> bytes:
-    """Return a byte for each of `switches`, and the record of `sensors` that the frame depends on, if any.
+    """Return a byte for each of `switches`, and the record of `sensors` that was read with them, if any.
 
     Raises FrameError if the frame has other numbers of them.
     """
-    if (frame.closed | frame.lost | frame.unread) >> switches:
+    if (frame.closed | frame.lost) >> switches:
         raise FrameError(f"a frame has bits beyond the {switches} recorded switches")
     states = _spread(frame.closed, switches)
-    if frame.lost or frame.unread:
-        lost, unread = _spread(frame.lost, switches), _spread(frame.unread, switches)
-        states = bytes(a + _LOST * b + _UNREAD * c for a, b, c in zip(states, lost, unread, strict=True))
+    if frame.lost:
+        states = bytes(a + _LOST * b for a, b in zip(states, _spread(frame.lost, switches), strict=True))
     if frame.glove is None:
         return states
     return states + frame.glove.time_us.to_bytes(_TIME_BYTES, "little") + glove_bytes(frame.glove, sensors)
@@ -101,14 +100,13 @@ def switch_frame(time_us: int, data: bytes, switches: int, sensors: int) -> Swit
     if len(states) < switches or 0 < len(rest) < _TIME_BYTES:
         raise McapError(f"holds {len(data)} bytes, but its session names {switches} switches")
     array = np.frombuffer(states, np.uint8)
-    if switches and int(array.max()) > _CLOSED | _LOST | _UNREAD:
+    if switches and int(array.max()) > _CLOSED | _LOST:
         raise McapError(f"holds a switch in state {int(array.max())}")
     glove_us = int.from_bytes(rest[:_TIME_BYTES], "little")
     return SwitchFrame(
         time_us,
         closed=_gather(array, _CLOSED),
         lost=_gather(array, _LOST),
-        unread=_gather(array, _UNREAD),
         glove=glove_frame(glove_us, rest[_TIME_BYTES:], sensors) if rest else None,
     )
 

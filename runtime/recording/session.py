@@ -5,7 +5,6 @@ that was resumed holds one for every time that it was begun, each with its own c
 """
 
 import re
-from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -19,9 +18,7 @@ from ..policy import Policy
 from ..taxels import TaxelCalibration
 
 METADATA = "thenar"
-# Collections are of version 3: since 2 a trial says when it began, since 3 one may be undone or skipped. All else is
-# written as version 1.
-VERSION = 3
+VERSION = 1
 # Limits of any glove, taxonomy and patience. A file that exceeds them is damaged, or made to fill the memory.
 _MOST_SWITCHES, _MOST_SENSORS, _MOST_TYPES, _MOST_OBJECTS = 65_536, 255, 10_000, 1000
 MOST_TRIALS = 1_000_000
@@ -86,7 +83,7 @@ class Session(msgspec.Struct, frozen=True, kw_only=True):
     switches     names of the switches, in the order of the frames' bits
     sensors      names of the CyberGlove's sensors, in wire order
     calibration  of the CyberGlove, if one was given
-    policy       the rules of decisions; None: there were none, or an early version did not record them
+    policy       the rules of decisions; None: there were none
     collection   what was collected; None: an unlabelled run
     taxels       names of the taxels, in the order of the frames' codes
     taxel_calibration  of the taxels, if one was given
@@ -107,7 +104,7 @@ class Session(msgspec.Struct, frozen=True, kw_only=True):
 
 
 _FIELDS = fields(Session)
-# Written only if there are any: a glove without taxels is recorded as before.
+# Written only if there are any: a glove without taxels has no such keys.
 _OF_TAXELS = ("taxels", "taxel_calibration")
 
 
@@ -115,7 +112,7 @@ def to_metadata(session: Session) -> dict[str, str]:
     """Return `session` as the keys and texts of a Metadata record."""
     written = [field.name for field in _FIELDS if session.taxels or field.name not in _OF_TAXELS]
     texts = {name: _text(getattr(session, name)) for name in written}
-    return {"version": str(1 if session.collection is None else VERSION), **texts}
+    return {"version": str(VERSION), **texts}
 
 
 def from_metadata(texts: dict[str, str]) -> Session:
@@ -124,15 +121,12 @@ def from_metadata(texts: dict[str, str]) -> Session:
     # No more digits than any version will have, and than int() accepts.
     if not re.fullmatch("[0-9]{1,9}", version):
         raise McapError(f"its version is {shortened(repr(version), 20)}, not a number: it was not recorded by thenar")
-    if int(version) > VERSION:
-        raise McapError(f"it is of version {version}, this thenar reads up to {VERSION}: update thenar")
+    if int(version) != VERSION:
+        raise McapError(f"it is of version {version}, this thenar reads {VERSION}: use the thenar that recorded it")
     for field in _FIELDS:
         if field.required and field.name not in texts:
             raise McapError(f"its metadata lack {field.name!r}: damaged, or not recorded by thenar")
     session = Session(**{field.name: _value(field, texts) for field in _FIELDS if field.name in texts})
-    if session.policy is not None and "lag_us" not in texts["policy"]:
-        # From an early version, which had no segments.
-        session = msgspec.structs.replace(session, policy=replace(session.policy, lag_us=None))
     _check_names(session)
     return session
 

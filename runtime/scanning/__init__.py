@@ -1,1 +1,1 @@
-"""Scan maps: the fewest transactions that read the kept switches, in the order that decides earliest."""
+"""Scan maps: the fewest transactions that read the kept switches."""

@@ -1,101 +1,27 @@
-"""From a harness and a build's tables to its scan map: the fewest transactions, in the order that decides earliest.
+"""From a harness to the scan map of a build: the fewest transactions, and their costs.
 
-Units stay together, such as the ports behind one channel of a mux; the rest is ordered for the least expected cost. A
-unit is a port, or a row of units without anything in between. Costs are wire times in integer nanoseconds, so that sums
-do not depend on order; the cost of an order is the sum over its ports.
+Units stay together, such as the ports behind one channel of a mux. A unit is a port, or a row of units without anything
+in between. Costs are wire times in integer nanoseconds, so that sums do not depend on order.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from fractions import Fraction
+from collections.abc import Iterator, Sequence
 from typing import Union
 
-import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
 from ..errors import HarnessError
 from ..harness.wiring import Harness
 from ..names import list_names
-from ..tables import IntegerTables
-from .decided import Decided, reach_of
 from .ports import whole_scan
 from .scanmap import Port, ScanMap
 from .timing import mux_of, port_us, reading_of, select_us, selections, waiting_us
 
-# Up to this many ports every order is evaluated (2^n sets of ports); above, a heuristic searches for a good one.
-EXACT = 10
-
-Order = tuple[int, ...]
 Unit = Union[int, Sequence["Unit"]]  # noqa: UP007 (an alias of itself has to be quoted)
-# Cost of reading a port, the last argument, after a set of ports: bit p is port p.
-Cost = Callable[[int, int], int]
-# Cost and order of walking through item number i after a set of ports.
-_Step = Callable[[int, int], tuple[int, Order]]
 
 
-def arranged(units: Sequence[Unit], cost: Cost) -> Order:
-    """Return all ports of all `units` in an order of low cost; the lowest up to EXACT ports."""
-    best = _exact if len(ports_in(units)) <= EXACT else _searched
-
-    def through(read: int, unit: Unit) -> tuple[int, Order]:
-        if isinstance(unit, int):
-            return cost(read, unit), (unit,)
-        masks = [sum(1 << port for port in ports_in(each)) for each in unit]
-        return best(read, masks, lambda seen, number: through(seen, unit[number]))
-
-    return through(0, units)[1]
-
-
-def ports_in(unit: Unit) -> Order:
+def ports_in(unit: Unit) -> tuple[int, ...]:
     """Return the ports of a unit, in order."""
     return (unit,) if isinstance(unit, int) else tuple(port for each in unit for port in ports_in(each))
-
-
-def _exact(read: int, items: Sequence[int], step: _Step) -> tuple[int, Order]:
-    """Return the least cost of walking through all `items` (sets of ports) after `read`, and how (Held, Karp 1962)."""
-    best: list[tuple[int, Order]] = [(0, ())]
-    for some in range(1, 1 << len(items)):
-        ways = []
-        for last in (index for index in range(len(items)) if some >> index & 1):
-            others = some ^ 1 << last
-            seen = read | sum(item for index, item in enumerate(items) if others >> index & 1)
-            (before, way), (further, ports) = best[others], step(seen, last)
-            ways.append((before + further, way + ports))
-        best.append(min(ways))
-    return best[-1]
-
-
-def _searched(read: int, items: Sequence[int], step: _Step) -> tuple[int, Order]:
-    """Return a low cost of walking through all `items` after `read`, and how.
-
-    It builds the order from the back: last comes the item that saves most by not being first. Then neighbours are
-    exchanged while that helps.
-    """
-    left, order = list(range(len(items))), list[int]()
-    while left:
-        seen = read | sum(items[index] for index in left)
-        last = min(left, key=lambda index: step(seen & ~items[index], index)[0] - step(read, index)[0])
-        left.remove(last)
-        order.insert(0, last)
-    found = _walked(read, items, step, order)
-    improved = True
-    while improved:
-        improved = False
-        for place in range(len(order) - 1):
-            other = [*order[:place], order[place + 1], order[place], *order[place + 2 :]]
-            tried = _walked(read, items, step, other)
-            if tried[0] < found[0]:
-                order, found, improved = other, tried, True
-    return found
-
-
-def _walked(read: int, items: Sequence[int], step: _Step, order: Sequence[int]) -> tuple[int, Order]:
-    total, ports = 0, Order()
-    for index in order:
-        further, way = step(read, index)
-        total, ports = total + further, ports + way
-        read |= items[index]
-    return total, ports
 
 
 # A channel of a mux, a whole mux, or a port that needs none.
@@ -157,39 +83,16 @@ class Costs:
         own = sum(self._ns[port] + self._waits[port] for port in ports)
         return own + sum(ns for room, ns in self._rooms if not room & ~inside)
 
-    def expected(self, frames: Decided) -> Cost:
-        """Return the time to read a port, summed over all `frames` that are not decided before.
-
-        The first counts in every frame, because nothing stops a scan before it.
-        """
-
-        def cost(read: int, port: int) -> int:
-            return self.after(read, port) * (frames.undecided(read) if read else len(frames))
-
-        return cost
-
 
 def _numbers(ports: int) -> Iterator[int]:
     return (port for port in range(ports.bit_length()) if ports >> port & 1)
 
 
-# With more recorded frames than this, evenly spaced ones decide the order.
-FRAMES = 5000
-
-
-def plan_scan(
-    switch_names: Sequence[str],
-    tables: IntegerTables,
-    harness: Harness,
-    bits: NDArray[np.bool_] | None = None,
-    codes: NDArray[np.uint16] | None = None,
-) -> ScanMap:
+def plan_scan(switch_names: Sequence[str], harness: Harness) -> ScanMap:
     """Return the scan map that reads a build's switches, named in the build's order, in `harness`.
 
-    For every chip it takes the fewest transactions, and no more selections than channels; ports behind one channel stay
-    together. bits (n, s) and codes (n, j), if given, are recorded frames: the order is then the one with the least
-    average wire time until a scan may stop (exact up to EXACT ports). Without frames, the ports that can change scores
-    most per microsecond come first. Raises HarnessError if a switch is wired to nothing.
+    For every chip it takes the fewest transactions, and no more selections than channels: ports behind one channel stay
+    together. Raises HarnessError if a switch is wired to nothing.
     """
     if lacking := unwired(harness, switch_names):
         raise HarnessError(
@@ -197,15 +100,7 @@ def plan_scan(
             "add what is missing to its file, or let --propose write one"
         )
     scan = whole_scan(harness, switch_names)
-    ports = [port.elements for port in scan.ports]
-    costs = Costs(scan.ports, harness)
-    if bits is None or not len(bits):
-        order = _by_reach(costs.units, [reach_of(tables, port) for port in ports], costs)
-    else:
-        rows = np.linspace(0, len(bits) - 1, min(FRAMES, len(bits))).astype(np.intp)
-        chosen = np.zeros((len(rows), 0), np.uint16) if codes is None else codes[rows]
-        order = arranged(costs.units, costs.expected(Decided(tables, ports, bits[rows], chosen)))
-    return replace(scan, ports=tuple(scan.ports[port] for port in order))
+    return replace(scan, ports=tuple(scan.ports[port] for port in ports_in(Costs(scan.ports, harness).units)))
 
 
 def check_harness(scan: ScanMap, harness: Harness, switch_names: Sequence[str]) -> None:
@@ -254,14 +149,3 @@ def _pins(port: Port, harness: Harness) -> list[tuple[int, int]]:
     except LookupError:
         return []
     return [] if any(bit >= len(pins) for bit, _ in port.switches) else [(pins[bit], n) for bit, n in port.switches]
-
-
-def _by_reach(unit: Unit, reaches: Sequence[int], costs: Costs) -> Order:
-    """Return the ports of a unit by their reach per time, the furthest first, its inner units likewise."""
-    if isinstance(unit, int):
-        return (unit,)
-
-    def pace(each: Unit) -> Fraction:
-        return Fraction(sum(reaches[port] for port in ports_in(each)), costs.of(each))
-
-    return tuple(port for each in sorted(unit, key=pace, reverse=True) for port in _by_reach(each, reaches, costs))

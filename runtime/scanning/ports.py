@@ -6,25 +6,11 @@ from itertools import combinations
 from thenar.drivers.i2c.chips import Chip, Reading
 
 from ..harness.wiring import ChipWiring, Harness, SpiWiring
-from ..manifest import Switch
-from ..names import level_name, taxel_and_code
+from ..names import taxel_and_code
 from .scanmap import SCHEMA, BoardLevel, Pair, Port, ScanMap, StreamRead
 
 # The levels of each taxel: (code, number of the switch) pairs, ascending.
 Levels = Mapping[str, tuple[Pair, ...]]
-
-
-def wired_names(harness: Harness, switches: Sequence[Switch]) -> list[str]:
-    """Return the names of a build's switches in a harness: for a level "pad3>57", whatever an older build calls it,
-    unless a comparator's pin has its name.
-    """
-    pins = set(harness.switches)
-    return [
-        switch.name
-        if switch.threshold is None or switch.name in pins
-        else level_name(switch.threshold.taxel.name, switch.threshold.code)
-        for switch in switches
-    ]
 
 
 def levels_of(harness: Harness, switch_names: Sequence[str]) -> Levels:

@@ -90,7 +90,7 @@ def scanmap_to_bytes(scan: ScanMap) -> bytes:
 def scanmap_from_bytes(data: bytes, what: str = "scan.json") -> ScanMap:
     """Return the scan map of a `scan.json`, whose name in messages is `what`.
 
-    Raises BuildError if it is oversized, no such document, of a newer schema, not canonical, or reads an input twice.
+    Raises BuildError if it is oversized, no such document, of another schema, not canonical, or reads an input twice.
     """
     scan = decode_document(data, ScanMap, what, "a scan map", MAX_BYTES, SCHEMA)
     if data != scanmap_to_bytes(scan):

@@ -2,7 +2,7 @@
 
     /thenar/grasp     the grasp type, probability, state, segment and health, on change and `rate` times a second
     /thenar/scores    score and probability of every grasp type, with `grasp`
-    /thenar/switches  names of the switches that are closed, lost or unread, with `grasp`
+    /thenar/switches  names of the switches that are closed or lost, with `grasp`
     /thenar/joints    angles of calibrated joints in rad, and the codes that are scored, with `grasp`
     /thenar/preshape  the preshape, on change and once a second
     /thenar/task      if a task is followed: its step, on change and once a second
@@ -66,7 +66,6 @@ class Switches(msgspec.Struct, frozen=True):
 
     closed: tuple[str, ...]
     lost: tuple[str, ...]
-    unread: tuple[str, ...]
 
 
 class Angle(msgspec.Struct, frozen=True):
@@ -272,11 +271,7 @@ def _switches(moment: "Moment", build: "Build") -> Switches:
     def named(mask: int) -> tuple[str, ...]:
         return tuple(name for bit, name in enumerate(names) if mask >> bit & 1)
 
-    return Switches(
-        closed=named(frame.closed & ~(frame.lost | frame.unread)),
-        lost=named(frame.lost),
-        unread=named(frame.unread & ~frame.lost),
-    )
+    return Switches(closed=named(frame.closed & ~frame.lost), lost=named(frame.lost))
 
 
 def _joints(moment: "Moment", build: "Build") -> JointValues:

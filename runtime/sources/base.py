@@ -8,18 +8,14 @@ from typing import Any, Literal
 from thenar.drivers.debounce import Debouncer
 from thenar.drivers.members import Members
 
-from ..calibration import Joints
-from ..frames import GloveFrame, Mask, Newest, SwitchFrame
+from ..frames import GloveFrame, Mask, SwitchFrame
 from ..harness.wiring import Debounce, Harness
 from ..published import Count
-from ..scanning.decided import EarlyExit
 from ..scanning.scanmap import ScanMap
 
 # A device is expected back at least this often, however fast it is: a shorter limit would mistake a busy computer, or
 # the 16 ms for which a USB serial adapter may buffer bytes, for a cut cable.
 SHORTEST_US = 10_000
-
-ExitOf = Callable[[Sequence[Mask]], EarlyExit]
 
 
 class Source(ABC):
@@ -65,24 +61,10 @@ class Source(ABC):
         """Return the fault of an open device; "" if there is none."""
         return ""
 
-    def read_only(self, sensors: Sequence[str], *, on_demand: bool) -> None:  # noqa: B027
-        """Allow the source to leave other sensors than these out of its frames, as 0, and, `on_demand`, to deliver
-        frames only when one is requested. Called before `open`; sources of switches, and those that send by themselves,
-        ignore it.
+    def read_only(self, sensors: Sequence[str]) -> None:  # noqa: B027
+        """Allow the source to leave other sensors than these out of its frames, as 0. Called before `open`; sources of
+        switches, and those that send by themselves, ignore it.
         """
-
-    def ask(self) -> None:  # noqa: B027
-        """Request a frame, on demand."""
-
-    def end_early(self, exit_of: ExitOf, joints: Joints, glove: Newest[GloveFrame]) -> None:  # noqa: B027
-        """Allow the source, which reads all switches, to leave those unread that cannot change a result.
-
-        `exit_of` makes, from the switches of each port, the test of when a scan may stop, given the codes that `joints`
-        makes from the newest record of the `glove`. A source that reads everything at once ignores it.
-        """
-
-    def leave_out(self, switches: Mask, joints: Mask) -> None:  # noqa: B027
-        """Take the switches and joints that are scored as lost, though they are read, for scans that end early."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,6 @@
 """The CyberGlove of a harness."""
 
 from collections.abc import Iterator, Sequence
-from threading import Event
 
 from thenar.drivers.cyberglove import CyberGlove, GloveInfo
 from thenar.drivers.cyberglove_protocol import shortest_us
@@ -27,7 +26,6 @@ class GloveDevice(Source):
         self.period_us = glove_period_us(wiring)
         self.longest_us = PERIODS * self.period_us
         self._wiring, self._unplugged = wiring, False
-        self._asked: Event | None = None
         self.info: GloveInfo | None = None
         self.driver = self._driver(None)
 
@@ -36,16 +34,15 @@ class GloveDevice(Source):
         return CyberGlove(
             wiring.port,
             baud=None if wiring.baud == "auto" else wiring.baud,
-            mode="stream" if wiring.mode == "stream" else "poll",
+            mode=wiring.mode,
             rate_hz=wiring.rate_hz,
             sensors=self.sensors,
             only=only,
             filtered=wiring.filter,
         )
 
-    def read_only(self, sensors: Sequence[str], *, on_demand: bool = False) -> None:
+    def read_only(self, sensors: Sequence[str]) -> None:
         """Request only these sensors from the box: the others are 0 in the frames, which no sensor value is."""
-        self._asked = Event() if on_demand else None
         self.driver = self._driver(
             tuple(place for place, name in enumerate(self._wiring.sensor_names) if name in sensors)
         )
@@ -55,14 +52,10 @@ class GloveDevice(Source):
         self.info = self.driver.open()
 
     def read(self, timeout_s: float) -> GloveFrame | None:
-        """Return the next record that holds a measurement; on demand, the requested one."""
-        if self._asked is not None and not self._asked.wait(timeout_s):
-            return None
+        """Return the next record that holds a measurement."""
         timed = self.driver.read(timeout_s)
         if timed is None:
             return None
-        if self._asked is not None:
-            self._asked.clear()
         time_us, record = timed
         self._unplugged = record.fault == "unplugged"
         return None if self._unplugged else GloveFrame(time_us, self._whole(record.sensors), record.status)
@@ -75,11 +68,6 @@ class GloveDevice(Source):
         for place, byte in zip(self.info.places, sensors, strict=True):
             whole[place] = byte
         return bytes(whole)
-
-    def ask(self) -> None:
-        """Request a record now; on demand, the glove waits for this."""
-        if self._asked is not None:
-            self._asked.set()
 
     def counts(self) -> tuple[Count, ...]:
         """Return the driver's counters."""

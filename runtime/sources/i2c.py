@@ -1,26 +1,21 @@
-"""I2C buses of a harness, their ports read in the order of a scan map, to the end or until the rest cannot matter."""
+"""I2C buses of a harness, their ports read in the order of a scan map."""
 
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from thenar.drivers.i2c.bus import ChipAt, I2cBus, Interleaved, PortRead
 from thenar.drivers.i2c.chips import Conversion, Converter
 from thenar.drivers.spi.chips import SpiChip
 
-from ..calibration import Joints
-from ..frames import PERIODS, GloveFrame, Mask, Newest, Rewired, SwitchFrame, now_us
+from ..frames import PERIODS, Mask, Rewired, SwitchFrame, now_us
 from ..harness.wiring import Debounce, Harness
 from ..names import list_names
 from ..published import Count
 from ..scanning.scanmap import Port, ScanMap
 from ..scanning.timing import reading_of, scan_us
 from ..taxels import TaxelCalibration, Taxels, calibration_of
-from .base import SHORTEST_US, ExitOf, Source, SourceKind, debouncer_of, pause_us
-
-if TYPE_CHECKING:
-    from ..scanning.decided import EarlyExit
+from .base import SHORTEST_US, Source, SourceKind, debouncer_of, pause_us
 
 # Delay between attempts on a bus without any chip, to avoid a busy loop.
 _NOBODY_THERE_S = 0.01
@@ -108,27 +103,17 @@ class I2cDevice(Source):
         self._reads = [PortRead(chips.index(port.chip), reading_of(port, harness)) for port in ports]
         self._scan: Interleaved | None = None
         self._groups: list[list[int]] = []
-        self._early: tuple[EarlyExit, Joints, Newest[GloveFrame]] | None = None
-        self._held_up = self._whole_us = 0
+        self._held_up = 0
 
     @property
     def taxels(self) -> tuple[PortLevels, ...]:
         """The taxels that are read."""
         return tuple(port for port in self._ports if isinstance(port, PortLevels))
 
-    def end_early(self, exit_of: ExitOf, joints: Joints, glove: Newest[GloveFrame]) -> None:
-        """End scans as soon as the unread ports cannot change the result."""
-        self._early = exit_of([port.targets for port in self._ports]), joints, glove
-
-    def leave_out(self, switches: Mask, joints: Mask) -> None:
-        """Score these as lost in scans that end early."""
-        if self._early is not None:
-            self._early[0].left_out = switches, joints
-
     def open(self) -> None:
         """Open the bus and set up its chips."""
         self.bus.open()
-        self._groups = self._grouped(range(len(self._reads)), alone=self._early is not None)
+        self._groups = self._grouped(range(len(self._reads)))
         self._scan = self.bus.interleaved([[self._reads[port] for port in group] for group in self._groups])
 
     def scan(self, chip: int | None = None) -> Interleaved:
@@ -136,9 +121,9 @@ class I2cDevice(Source):
         ports = [port for port, read in enumerate(self._reads) if chip is None or read.chip == chip]
         return self.bus.interleaved([[self._reads[port] for port in group] for group in self._grouped(ports)])
 
-    def _grouped(self, ports: Sequence[int], *, alone: bool = False) -> list[list[int]]:
-        """Return the ports that are read together: all but slow conversions, if a scan goes to its end."""
-        slow = [port for port in ports if alone or _takes_time(self._reads[port])]
+    def _grouped(self, ports: Sequence[int]) -> list[list[int]]:
+        """Return the ports that are read together: all but slow conversions."""
+        slow = [port for port in ports if _takes_time(self._reads[port])]
         together = [port for port in ports if port not in slow]
         return [*([together] if together else []), *([port] for port in slow)]
 
@@ -150,22 +135,14 @@ class I2cDevice(Source):
             # A chip held the bus: the readings before that are out of date.
             frame = SwitchFrame(frame.time_us, 0, self.owned)
             self._held_up += 1
-        elif not self.owned & ~(frame.lost | frame.unread):
+        elif not self.owned & ~frame.lost:
             time.sleep(min(timeout_s, _NOBODY_THERE_S))
         return frame
 
     def _scanned(self) -> SwitchFrame:
         assert self._scan is not None
-        closed = lost = unread = 0
+        closed = lost = 0
         codes: list[int | None] = [None] * self._taxels
-        glove: GloveFrame | None = None
-        ends = False
-        if self._early is not None:
-            early, joints, newest = self._early
-            ends = early.whole_us is None or now_us() - self._whole_us < early.whole_us
-            # On demand, no scan ends because of a record: the switches that it leaves unread matter for none.
-            glove = None if early.on_demand else newest.frame
-            early.start(joints.codes(now_us(), glove))
         for group, replies in zip(self._groups, self._scan, strict=False):
             for number, reply in zip(group, replies, strict=True):
                 port = self._ports[number]
@@ -173,13 +150,8 @@ class I2cDevice(Source):
                 closed, lost = closed | shut, lost | silent
                 if isinstance(port, PortLevels):
                     codes[port.place] = reply
-            if ends and early.after(group[0], shut, silent):
-                unread = early.unread(group[0])
-                break
-        if not unread:
-            self._whole_us = now_us()
         taxels = tuple(codes) if any(code is not None for code in codes) else None
-        return SwitchFrame(now_us(), closed, lost, unread, glove, taxels)
+        return SwitchFrame(now_us(), closed, lost, taxels=taxels)
 
     def counts(self) -> tuple[Count, ...]:
         """Return the numbers of transfers, of scans too slow to count, and of each chip's failures."""

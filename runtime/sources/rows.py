@@ -335,7 +335,7 @@ class RowSource(Source):
             if over := self._pauses.over(time_us, known):
                 self._debouncer.forget(over)
             closed = self._debouncer.update(time_us, closed, known) & known
-        return SwitchFrame(time_us, closed, self.owned & ~known, 0, glove, tuple(row) if self._grids else None)
+        return SwitchFrame(time_us, closed, self.owned & ~known, glove, tuple(row) if self._grids else None)
 
     def _code(self, grid: "_Grid", value: float | None) -> int | None:
         if value is None:

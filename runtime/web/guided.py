@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from thenar.drivers.closing import Closing
 
-from ..frames import Mask, SwitchFrame
+from ..frames import SwitchFrame
 from ..live.sources import DeviceState
 from ..published import NONE
 from ..recording.guide import Guide, Key, Stage, Trial
@@ -134,9 +134,8 @@ class GuidePage(Closing):
 
 
 def _letters(frame: SwitchFrame, switches: int) -> str:
-    unknown: Mask = frame.lost | frame.unread
     return "".join(
-        "x" if unknown >> number & 1 else "1" if frame.closed >> number & 1 else "0" for number in range(switches)
+        "x" if frame.lost >> number & 1 else "1" if frame.closed >> number & 1 else "0" for number in range(switches)
     )
 
 

@@ -114,8 +114,8 @@ def test_a_harness_without_devices_is_refused(thenar: Thenar, tmp_path: Path) ->
 class Recognising(ScannerBoard):
     """A board that recognises grasp type 2 whenever it scans, held as its seventh grasp."""
 
-    def scan(self, closed: int, now: int, *, unread: int = 0, whole: bool = True) -> list[bytes]:
-        keys = super().scan(closed, now, unread=unread, whole=whole)
+    def scan(self, closed: int, now: int, *, unread: int = 0) -> list[bytes]:
+        keys = super().scan(closed, now, unread=unread)
         return [*keys, *self.recognised(2, 100, 0, now), *self.segmented(7, 2, 2, now)]
 
 

@@ -41,7 +41,7 @@ def _one_way_to_train() -> Iterator[None]:
     """Let each trainer have one set of settings: how they choose is tested where it is done."""
     with pytest.MonkeyPatch.context() as patched:
         few = {"max_bins": 4}
-        for name, more in {"logit": {}, "pairs": {"pairs": 1, "pair_bins": 2}, "sum": {"rounds": 2}}.items():
+        for name, more in {"logit": {}, "pairs": {"pairs": 1, "pair_bins": 2}}.items():
             patched.setattr(TRAINERS[name], "tried", (few | more,))
         yield
 

@@ -121,7 +121,6 @@ def test_a_reader_that_goes_away_leaves_no_traceback(set_file: Path, build_folde
         ("run.mcap", "--period-us", ("500",)),
         ("run.mcap", "--status", ()),
         ("set.grasps", "--record", ("more.mcap",)),
-        ("set.grasps", "--full-scan", ()),
         ("set.grasps", "--status", ()),
         ("set.grasps", "--lead", ("1",)),
         ("set.grasps", "--error-rate", ("0.1",)),

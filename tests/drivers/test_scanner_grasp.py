@@ -7,7 +7,7 @@ import pytest
 from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.scanner import BoardGrasp, BoardSegment, Scanner
-from thenar.drivers.scanner_protocol import DEGRADED, EARLY, NO_GRASP
+from thenar.drivers.scanner_protocol import DEGRADED, NO_GRASP
 
 KEYS = 12
 EVERY = (1 << KEYS) - 1
@@ -39,15 +39,14 @@ def test_there_is_no_grasp_of_a_board_that_only_scans(scanner: Scanner) -> None:
     assert scanner.grasp is None
 
 
-@pytest.mark.parametrize("flags", [0, DEGRADED, EARLY, DEGRADED | EARLY, 0xFC])
+@pytest.mark.parametrize("flags", [0, DEGRADED, 0xFE])
 def test_what_the_board_recognised_is_told_with_its_time(board: EmulatedScanner, scanner: Scanner, flags: int) -> None:
     began = monotonic_ns() // 1000
     board.recognise(5, 291, flags)
     until(scanner, lambda: scanner.grasp is not None)
     assert scanner.grasp is not None
     assert began <= scanner.grasp.time_us <= monotonic_ns() // 1000
-    told = bool(flags & DEGRADED), bool(flags & EARLY)
-    assert scanner.grasp == BoardGrasp(scanner.grasp.time_us, 5, 291, *told)
+    assert scanner.grasp == BoardGrasp(scanner.grasp.time_us, 5, 291, bool(flags & DEGRADED))
 
 
 def test_no_grasp_has_no_number_and_a_margin_beyond_the_frame_is_the_largest(

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from thenar.compiler.firmware.board import parse_board
-from thenar.compiler.firmware.board_files import board_files, config_of, readings, switches_of, whole_folder
+from thenar.compiler.firmware.board_files import board_files, config_of, whole_folder
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import arrange
-from thenar.compiler.firmware.protocol import decided_files, protocol_files
+from thenar.compiler.firmware.protocol import protocol_files
 from thenar.compiler.firmware.targets.base import Mode
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.manifest import Calibration, Manifest, Options, Origin, Proof, Switch
@@ -51,10 +51,10 @@ CASES: dict[str, tuple[str, Mode, tuple[str, ...]]] = {
     "matrix": (MATRIX.format("true"), "scan", ()),
     "matrix without diodes that recognises": (MATRIX.format("false"), "glove", ()),
     "chips": (CHIPS, "scan", ()),
-    "chips that stop early": (f"early_exit = true\n{SLOW}{CHIPS}", "glove", ()),
+    "chips that recognise": (SLOW + CHIPS, "glove", ()),
 }
 GLOVES: dict[str, tuple[str, Mode, tuple[str, ...]]] = {
-    "chips and a CyberGlove": (f"early_exit = true\n{SLOW}{CHIPS}[cyberglove]\nuart = 3\n", "glove", SENSORS_18),
+    "chips and a CyberGlove": (f"{SLOW}{CHIPS}[cyberglove]\nuart = 3\n", "glove", SENSORS_18),
     "taxels on channels of their own": (
         '[taxels]\ninputs = ["ADC0", "ADC9"]\nnames = ["t0", "t1"]\n' + PINS,
         "scan",
@@ -115,8 +115,6 @@ def files_of(part: str, text: str, mode: Mode, joints: tuple[str, ...]) -> dict[
     files |= board_files("hand", manifest, layout, board, mode)
     if mode == "glove":
         files |= classifier_files("hand", manifest, layout, avr=True)
-    if board.early_exit:
-        files |= decided_files("hand", tables, GRASPS, switches_of(readings(board, SWITCHES, tables)))
     return whole_folder("hand", board, mode, files)
 
 

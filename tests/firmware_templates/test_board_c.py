@@ -13,7 +13,6 @@ from thenar.drivers import scanner_protocol
 from thenar.drivers.emulated.scanner import ScannerBoard
 from thenar.drivers.scanner_protocol import (
     DEGRADED,
-    EARLY,
     NO_GRASP,
     Event,
     Faults,
@@ -88,12 +87,7 @@ class Board:
         self.config = config
         self.library = shared_library({**protocol_files(config), "port.c": PORT})
         self.library.thenar_board_scan_us.restype = ctypes.c_uint32
-        self.library.thenar_board_scanned.argtypes = [
-            ctypes.c_char_p,
-            ctypes.c_char_p,
-            ctypes.c_bool,
-            ctypes.c_uint32,
-        ]
+        self.library.thenar_board_scanned.argtypes = [ctypes.c_char_p, ctypes.c_char_p, ctypes.c_uint32]
         self._line = Line(self._take)
         ctypes.c_void_p.in_dll(self.library, "line").value = ctypes.cast(self._line, ctypes.c_void_p).value
         self.full = False
@@ -124,10 +118,10 @@ class Board:
         self.boot(0)
         self.scan(0, 0)
 
-    def scan(self, closed: int, clock_us: int, *, unread: int = 0, whole: bool = True) -> bytes:
+    def scan(self, closed: int, clock_us: int, *, unread: int = 0) -> bytes:
         keys = self.config.keys
         known = State(((1 << keys) - 1) & ~unread, keys).payload()
-        self.library.thenar_board_scanned(State(closed, keys).payload(), known, whole, clock_us % WRAP)
+        self.library.thenar_board_scanned(State(closed, keys).payload(), known, clock_us % WRAP)
         if self.config.channels:
             codes = codes_at(clock_us % WRAP, self.config.channels)
             array = (ctypes.c_uint16 * len(codes))(*codes)
@@ -181,9 +175,9 @@ class Model(ScannerBoard):
     def _read(self, closed: int) -> int:
         return closed
 
-    def scan(self, closed: int, now: int, *, unread: int = 0, whole: bool = True) -> list[bytes]:
+    def scan(self, closed: int, now: int, *, unread: int = 0) -> list[bytes]:
         self.codes, due_at = codes_at(self._clock(now), self.analog.channels), self._analog_at
-        sent = super().scan(closed, now, unread=unread, whole=whole)
+        sent = super().scan(closed, now, unread=unread)
         self._analog_at = due_at if self.full else self._analog_at
         return sent
 
@@ -212,11 +206,10 @@ def eight(shared_library: SharedLibrary) -> Board:
 
 @dataclass(frozen=True)
 class Scan:
-    """Keys, of which those there are count; those that were not read, and whether it was tried."""
+    """Keys, of which those there are count; those that could not be read."""
 
     closed: int
     unread: int = 0
-    whole: bool = True
 
 
 @dataclass(frozen=True)
@@ -273,7 +266,7 @@ STEPS: st.SearchStrategy[list[tuple[int, Step]]] = st.lists(
         st.one_of(st.just(1000), st.integers(0, 60_000), st.sampled_from([0, 1_000_000]), st.integers(0, LONGEST_US)),
         st.one_of(
             st.builds(Scan, KEYS),
-            st.builds(Scan, KEYS, st.sampled_from([0, 1 << 5, -1]) | KEYS, st.booleans()),
+            st.builds(Scan, KEYS, st.sampled_from([0, 1 << 5, -1]) | KEYS),
             st.builds(Received, st.one_of(ASKED, ASKED, UNKNOWN, st.binary(max_size=30))),
             st.builds(Recognised, st.sampled_from([0, 1, 255]), SHORT, st.integers(0, 3)),
             st.builds(Segmented, st.integers(0, 2) | SHORT, st.sampled_from([0, 1, 255]), st.integers(0, 3)),
@@ -289,10 +282,10 @@ def stepped(board: Board, model: Model, step: Step, now: int) -> tuple[bytes, li
     """Let both take a step, and return what both send."""
     clock = now + model.clock_us
     match step:
-        case Scan(closed, unread, whole):
+        case Scan(closed, unread):
             every = (1 << board.config.keys) - 1
-            sent = board.scan(closed & every, clock, unread=unread & every, whole=whole)
-            return sent, model.scan(closed & every, now, unread=unread & every, whole=whole)
+            sent = board.scan(closed & every, clock, unread=unread & every)
+            return sent, model.scan(closed & every, now, unread=unread & every)
         case Received(data):
             return board.receive(data, clock), model.receive(data, now)
         case Recognised(grasp, margin, flags):
@@ -337,11 +330,10 @@ def test_it_begins_with_an_end_and_a_hello(eight: Board) -> None:
     assert (hello.rows, hello.columns, hello.flags, hello.board, hello.time_us) == (1, 8, 0, 1, 5)
 
 
-def test_it_says_nothing_of_keys_before_its_first_whole_scan_and_then_all(eight: Board) -> None:
+def test_it_says_nothing_of_keys_before_its_first_scan_and_then_all(eight: Board) -> None:
     get_state = scanner_protocol.encode(frame(GetState(), 0))
     eight.boot(0)
     assert eight.receive(get_state, 10) == b""
-    assert eight.scan(0b111, 20, unread=0b11, whole=False) == b""
     assert eight.receive(get_state, 200_000) == b""
     assert said(eight.scan(0b101, 200_010)) == [Heartbeat(200_010, 0b101, 8)]
     assert said(eight.receive(get_state, 200_020)) == [Heartbeat(200_020, 0b101, 8)]
@@ -360,8 +352,7 @@ def test_keys_that_cannot_be_read_are_told_when_they_change_and_before_every_hea
     assert said(eight.scan(0, 2000, unread=0b1010)) == [Event(2000, 2, 0), Lost(0b1010, 8)]
     assert eight.scan(0, 3000, unread=0b1010) == b""
     assert said(eight.scan(0, 50_000, unread=0b1010)) == [Lost(0b1010, 8), Heartbeat(50_000, 0b10, 8)]
-    # They were left out on purpose: one of them was read, of the others nothing is new.
-    assert said(eight.scan(0b10, 51_000, unread=0b1111_1000, whole=False)) == [Lost(0b1000, 8)]
+    assert said(eight.scan(0b10, 51_000, unread=0b1000)) == [Lost(0b1000, 8)]
     assert said(eight.scan(0, 52_000)) == [Event(52_000, 1, 0), Lost(0, 8)]
     assert said(eight.scan(0, 100_000)) == [Heartbeat(100_000, 0, 8)]
 
@@ -427,9 +418,9 @@ def test_a_grasp_is_told_when_it_changes_and_after_every_heartbeat(eight: Board)
             (1, 3, 0),  # after the HEARTBEAT at boot
             (2, 3, 0),
             (3, 4, 0),  # another
-            (4, 4, EARLY),
+            (4, 4, 0),
             (5, 4, DEGRADED),  # an input is missing
-            (6, 4, DEGRADED | EARLY),
+            (6, 4, DEGRADED),
             (7, NO_GRASP, 0),
             (8, NO_GRASP, 0),
         ]
@@ -437,8 +428,8 @@ def test_a_grasp_is_told_when_it_changes_and_after_every_heartbeat(eight: Board)
     ]
     assert told == [1, 3, 5, 7]
     eight.receive(scanner_protocol.encode(frame(GetState(), 0)), 9)
-    assert said(eight.grasp(NO_GRASP, 0xFFFF, EARLY, 10)) == [Grasp(10, NO_GRASP, 0xFFFF, EARLY)]
-    assert eight.grasp(NO_GRASP, 0xFFFF, EARLY, 11) == b""
+    assert said(eight.grasp(NO_GRASP, 0xFFFF, DEGRADED, 10)) == [Grasp(10, NO_GRASP, 0xFFFF, DEGRADED)]
+    assert eight.grasp(NO_GRASP, 0xFFFF, DEGRADED, 11) == b""
 
 
 def test_segments_are_told_to_those_who_asked_when_they_change_and_after_every_heartbeat(
@@ -487,9 +478,9 @@ def test_what_is_due_and_finds_no_room_is_due_at_the_next_scan(eight: Board, sta
 def test_bits_beyond_the_last_key_are_not_sent(shared_library: SharedLibrary) -> None:
     board = Board(shared_library, replace(CONFIGS["8 keys"], columns=9, state_us=1000, heartbeat_us=0))
     board.boot(0)
-    board.library.thenar_board_scanned(b"\xff\xff", b"\0\0", True, 0)
+    board.library.thenar_board_scanned(b"\xff\xff", b"\0\0", 0)
     assert said(board.sent(), 9) == [State(0, 9), Lost(0x1FF, 9), Heartbeat(0, 0, 9)]
-    board.library.thenar_board_scanned(b"\xff\xff", b"\xff\xff", True, 1000)
+    board.library.thenar_board_scanned(b"\xff\xff", b"\xff\xff", 1000)
     assert said(board.sent(), 9) == [State(0x1FF, 9), Lost(0, 9)]
 
 

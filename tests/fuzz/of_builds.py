@@ -177,7 +177,7 @@ def _frontier() -> list[bytes]:
     )
     wirings = (("mcp23017", 400_000), ("as wired", 400_000), ("board", 1_000_000))
     settings = [
-        points.Recipe(way, "both", 4, 8, "", "full", "single", wiring, clock_hz, 16, None)
+        points.Recipe(way, "both", 4, 8, "", "single", wiring, clock_hz, 16, None)
         for way, (wiring, clock_hz) in zip(ways, wirings, strict=True)
     ]
     found = points.Frontier(

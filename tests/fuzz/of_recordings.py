@@ -103,7 +103,7 @@ def _recognised() -> bytes:
     for number in range(4):
         time_us = 10_000 * number
         glove = GloveFrame(time_us, bytes(range(60 + number, 78 + number)), 3)
-        frame = SwitchFrame(time_us, closed=number % (1 << len(names)), lost=number == 2, unread=0, glove=glove)
+        frame = SwitchFrame(time_us, closed=number % (1 << len(names)), lost=number == 2, glove=glove)
         found = recognizer.step(time_us + 5, _CLOCK_NS // 1000 + time_us, frame, glove).grasp
         messages += [
             (layout.GLOVE, time_us, encode_bytes(glove_bytes(glove, 18))),

@@ -51,7 +51,7 @@ def _glove(data: bytes, folder: Path) -> None:
     parse_harness(harness_to_toml(found), "written.toml")
     ports_of_whole_glove(found, found.switches)
     Sources(found, found.switches, whole_scan(found, found.switches))
-    scan = plan_scan(_kept(), _build().tables, found)
+    scan = plan_scan(_kept(), found)
     scan_us(scan, found)
     spec_files(_build().manifest, None, found)
 
@@ -63,7 +63,7 @@ _BOARDS = (
     'part = "atmega2560"\n[matrix]\nrows = ["PA0", "PA1"]\ncolumns = ["PC0", "PC1", "PC2"]\ndiodes = true\n'
     'settle_us = 20\nswitches = [["finger_0", "finger_1", "finger_2"], ["finger_3", "finger_4", "finger_5"]]\n'
     "[cyberglove]\nuart = 1\nbaud = 115200\nsensors = 18\nrate_hz = 90\n",
-    'part = "atmega328p"\nearly_exit = true\nscan_us = 3000\n[bus]\nclock_hz = 400000\n[[chip]]\nkind = "mcp23017"\n'
+    'part = "atmega328p"\nscan_us = 3000\n[bus]\nclock_hz = 400000\n[[chip]]\nkind = "mcp23017"\n'
     'address = 0x20\npins = { GPA0 = "finger_0", GPB0 = "finger_1", GPA2 = "finger_2" }\n[[chip]]\n'
     'kind = "tca6424a"\naddress = 0x22\nclosed = "high"\n'
     'pins = { P00 = "finger_3", P21 = "finger_4", P22 = "finger_5" }\n'

@@ -37,12 +37,11 @@ def test_probabilities_are_those_of_the_build_and_joints_are_in_their_unit(
     random = np.random.default_rng(seed)
     for build in (made, Build(replace(made.manifest, joints=degrees, rejection=rejection), made.tables)):
         bits, codes = random.random(6) < 0.5, random.integers(1, 256, 3)
-        frame = SwitchFrame(0, mask(bits), unread=0b100)
+        frame = SwitchFrame(0, mask(bits))
         scores = build.scorer.lanes(bits, codes)
         moment = Moment(make_grasp(7), frame, None, codes.tolist(), scores=scores)
         detail = Details(build)(moment)
         assert [letter == "1" for letter in detail.closed] == bits.tolist()
-        assert detail.unread == "001000"
         found = build.recognise(bits, codes)
         assert detail.probabilities is not None
         assert len(detail.probabilities) == len(build.manifest.classes)

@@ -36,8 +36,8 @@ def manifest(make_tables: Callable[..., IntegerTables], describe: Callable[[Inte
     return replace(made, switches=(*made.switches[:3], *levels))
 
 
-def test_a_build_without_a_drawing_is_drawn_as_a_grid(tmp_path: Path, manifest: Manifest) -> None:
-    hand = load_hand(tmp_path, manifest)
+def test_without_positions_switches_and_taxels_are_drawn_as_a_grid(manifest: Manifest) -> None:
+    hand = grid_hand(manifest)
     assert not hand.placed
     assert [(each.name, each.bit) for each in hand.switches] == [("s0", 0), ("s1", 1), ("s2", 2)]
     assert [(each.name, each.levels) for each in hand.taxels] == [("pad", ((90, 4), (200, 5), (500, 3)))]
@@ -80,7 +80,7 @@ def _in(kind: str, key: str, value: object) -> Callable[[dict[str, Any]], object
     [
         (_without("joints"), "missing required field"),
         (_set("more", 1), "unknown field"),
-        (_set("schema", 2), "has schema 2, this thenar reads up to 1: update thenar"),
+        (_set("schema", 2), "has schema 2, this thenar reads 1: compile the build again"),
         (_set("radius_mm", 0), "radius_mm"),
         (_set("outline", [[0, 1e9]]), r"outline"),
         (_set("outline", [[0, 1]] * 70_000), "outline"),

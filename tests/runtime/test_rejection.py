@@ -1,4 +1,4 @@
-"""Refusing frames: live ones as whole arrays, and what is lost or unread never speaks against a grasp."""
+"""Refusing frames: live ones as whole arrays, and what is lost never speaks against a grasp."""
 
 import numpy as np
 from hypothesis import given
@@ -58,14 +58,14 @@ def test_what_is_lost_is_refused_only_where_every_value_of_it_would_be(
 
 @given(_rejections(), _scores, _masks, _masks)
 def test_joints_and_scores_that_are_not_whole_are_not_judged(
-    rejection: Rejection, scores: list[int], closed: int, unread: int
+    rejection: Rejection, scores: list[int], closed: int, lost: int
 ) -> None:
     best, lanes = scores.index(max(scores)), [score + LANE_OFFSET for score in scores]
-    found = Rejector(rejection).refuses(lanes, closed, 0, None, unread=unread)
+    found = Rejector(rejection).refuses(lanes, closed, lost, None)
     narrow = Rejector(replace(rejection, ranges=((),) * K))
-    whole = narrow.refuses(lanes, closed, 0, [], unread=unread)
+    whole = narrow.refuses(lanes, closed, lost, [])
     fewest, most = rejection.closed[best]
-    seen = (closed & ~unread).bit_count()
-    beyond = seen > most or seen + unread.bit_count() < fewest
+    seen = (closed & ~lost).bit_count()
+    beyond = seen > most or seen + lost.bit_count() < fewest
     assert found == beyond
-    assert whole == (beyond or (not unread and scores[best] < rejection.least_scores[best]))
+    assert whole == (beyond or (not lost and scores[best] < rejection.least_scores[best]))

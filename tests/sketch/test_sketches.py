@@ -54,7 +54,7 @@ CASES = {
         "glove",
     ),
     "glove, CyberGlove": (
-        f"{ESP}early_exit = true\nscan_us = 3000\n[wifi]\nport = 6000\n{ON_CHIPS}[cyberglove]\nuart = 2\n",
+        f"{ESP}scan_us = 3000\n[wifi]\nport = 6000\n{ON_CHIPS}[cyberglove]\nuart = 2\n",
         "glove",
     ),
     "glove, matrix": (PICO + IN_MATRIX.replace("GPIO23", "GPIO26") + "false\n[cyberglove]\n", "glove"),
@@ -219,7 +219,7 @@ def recognised(build: Any, bits: np.ndarray, codes: np.ndarray) -> tuple[int, in
 
 
 def recognises(host: Scanner, expected: tuple[int, int]) -> None:
-    """Read until the board says so; where its scan ended early, the margin is that of what it had read."""
+    """Read until the board says so."""
     end = monotonic() + LONG_S
     while (grasp := host.grasp) is None or not _says(grasp, expected):
         host.read(0.05)
@@ -227,8 +227,7 @@ def recognises(host: Scanner, expected: tuple[int, int]) -> None:
 
 
 def _says(grasp: BoardGrasp, expected: tuple[int, int]) -> bool:
-    number, margin = expected
-    return not grasp.degraded and grasp.number == number and (grasp.early or grasp.margin == margin)
+    return not grasp.degraded and (grasp.number, grasp.margin) == expected
 
 
 @pytest.mark.parametrize("case", ["glove, converter", *(f"{part}, converter" for part in CHIPS)])

@@ -1,4 +1,4 @@
-"""The time of a scan: arithmetic of the wire, the overhead of calls and firmware, and early ends on recorded frames."""
+"""The time of a scan: arithmetic of the wire, and the overhead of calls and firmware."""
 
 import os
 import time
@@ -9,29 +9,21 @@ from fcntl import ioctl
 from math import fsum
 from statistics import median
 
-import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
-from thenar.drivers.cyberglove_protocol import POLL, SENSORS, sending_us, sensors_with
+from thenar.drivers.cyberglove_protocol import SENSORS, sensors_with
 from thenar.drivers.i2c.chips import Reading
 from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring
-from thenar.runtime.scanning.decided import Decided
 from thenar.runtime.scanning.plan import Costs, plan_scan
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import analog_us, conversions_us, glove_us, reading_of, scanner_us
-from thenar.runtime.tables import IntegerTables
 
 from ...firmware.targets import TARGETS
 from ..points import How, Time
 from .machine import on_a_pi
 from .wirings import Wiring
 
-# Number of evenly spaced frames that decide the order of ports; all frames decide how often a scan then ends early.
-_ORDERING = 200
 NO_TIME = Time(0.0, "wire")
-# The request byte for a record of a CyberGlove.
-ASKING_US = sending_us(len(POLL), 115_200)
 # Overhead of one transfer on a Raspberry Pi. Doubtful: a kernel trace of a Pi 3 has 20 us from the call to the adapter
 # and 6 us back; others measured 300 us (Pi Zero) with an older library.
 PI_CALL_US = 30.0
@@ -136,49 +128,29 @@ def _mean_us(call: Callable[[], object], converted: Callable[[], object]) -> flo
 
 @dataclass(frozen=True, slots=True)
 class ScanTimes:
-    """Times of reading the kept switches, in microseconds.
+    """Time of reading the kept switches.
 
-    full_us   every port is read
-    early_us  the mean over recorded frames, each scan ended as soon as it is decided; early ends of separate buses are
-              not modelled: they are read one after another, as `scan_us` of the runtime adds them up
-    ports     transactions of a whole scan, where a board's frame is one; chips: a board is one
-    how       "wire", "model" if firmware cycles are included, or "guess" if a guess is
-    early_ports  mean number of ports of chips read then, over the same frames: the scores are checked after each
-    alone_us, alone_ports  the same if the joints are read after the switches, unless these decide
-    asked     the share of frames in which they do not
+    us     microseconds of a scan; buses are read one after another, as `scan_us` of the runtime adds them up
+    ports  transactions, where a board's frame is one; chips: a board is one
+    how    "wire", "model" if firmware cycles are included, or "guess" if a guess is
     """
 
-    full_us: float
-    early_us: float
+    us: float
     ports: int
     chips: int
     how: How
-    early_ports: float
-    alone_us: float = 0.0
-    alone_ports: float = 0.0
-    asked: float = 1.0
 
 
-def scan_times(
-    names: Sequence[str],
-    tables: IntegerTables,
-    wiring: Wiring,
-    bits: NDArray[np.bool_],
-    codes: NDArray[np.uint16],
-    overhead: Overhead = WIRE_ONLY,
-) -> ScanTimes:
-    """Return the scan times of a build's switches `names`, in its order, over frames bits (n, s), codes (n, j).
+def scan_times(names: Sequence[str], wiring: Wiring, overhead: Overhead = WIRE_ONLY) -> ScanTimes:
+    """Return the scan times of a build's switches `names`, in its order.
 
     overhead is added to every transaction; a board has the overhead of thenar's firmware for scanning its keys before
-    it sends. Boards and buses work in parallel, so the slowest counts. Scans end here when the grasp type is certain,
-    which serves decisions on single frames: a decision with a lead reads on until that is certain as well, and a
-    sequential test needs whole scans. Raises HarnessError if a switch has no place.
+    it sends. Boards and buses work in parallel, so the slowest counts. Raises HarnessError if a switch has no place.
     """
     if not len(names):
-        return ScanTimes(0.0, 0.0, 0, 0, "wire", 0.0)
+        return ScanTimes(0.0, 0, 0, "wire")
     harness = wiring.harness_of(names)
-    rows = np.linspace(0, len(bits) - 1, min(_ORDERING, len(bits))).astype(np.intp)
-    scan = plan_scan(names, tables, harness, bits[rows], codes[rows])
+    scan = plan_scan(names, harness)
     wanted = zip(harness.scanners, scan.scanners, scan.board_channels, strict=True)
     boards = [(board, channels) for board, keys, channels in wanted if keys or channels]
     streams = [
@@ -186,25 +158,11 @@ def scan_times(
     ]
     rows_us = (float(stream.period_us) for stream in streams)
     board_us = max((*(_board_us(*board) for board in boards), *rows_us), default=0.0)
-    ports = [port.elements for port in scan.ports]
-    known = Decided(tables, ports, bits, codes)
-    full_us, early_us, early_ports = _bus_us(scan, harness, known, overhead) if ports else (0.0, 0.0, 0.0)
-    alone_us, alone_ports, asked = early_us, early_ports, 1.0
-    if tables.n_joints and len(bits):
-        unknown = Decided(tables, ports, bits, codes, on_demand=True)
-        asked = unknown.undecided((1 << len(ports)) - 1) / len(bits)
-        if ports:
-            _, alone_us, alone_ports = _bus_us(scan, harness, unknown, overhead)
     return ScanTimes(
-        full_us=max(full_us, board_us),
-        early_us=max(early_us, board_us),
+        us=max(_bus_us(scan, harness, overhead), board_us),
         ports=len(scan.ports) + len(boards) + len(streams),
         chips=len({(port.bus, port.chip) for port in scan.ports}) + len(boards),
         how="model" if boards else overhead.how,
-        early_ports=early_ports,
-        alone_us=max(alone_us, board_us),
-        alone_ports=alone_ports,
-        asked=asked,
     )
 
 
@@ -219,23 +177,19 @@ def _board_us(board: ScannerWiring, channels: int) -> float:
     return max(keys_us, analog_us(channels, board.baud), conversions_us(board, channels))
 
 
-def _bus_us(scan: ScanMap, harness: Harness, frames: Decided, overhead: Overhead) -> tuple[float, float, float]:
-    """Return the time of a whole scan of the chips, and the mean time and number of ports of one that ends early."""
-    costs = Costs(scan.ports, harness)
-    always = overhead.scan_us + overhead.key_us * len(scan.switches)
-    whole, weighted, shares, read = [always], [always], list[float](), 0
+def _bus_us(scan: ScanMap, harness: Harness, overhead: Overhead) -> float:
+    """Return the time of a scan of the chips, if there are any."""
+    if not scan.ports:
+        return 0.0
+    costs, read = Costs(scan.ports, harness), 0
+    us = [overhead.scan_us + overhead.key_us * len(scan.switches)]
     for number, port in enumerate(scan.ports):
         # Selecting a channel is a transaction as well.
         wire_ns = costs.after(read, number)
         selected = wire_ns > costs.after(read | 1 << number, number)
-        us = wire_ns / 1000 + overhead.reading_us(reading_of(port, harness)) + overhead.call_us * selected
-        # The first port is always read: nothing stops a scan before it.
-        share = frames.undecided(read) / len(frames) if read and len(frames) else 1.0
-        whole.append(us)
-        weighted.append(us * share)
-        shares.append(share)
+        us.append(wire_ns / 1000 + overhead.reading_us(reading_of(port, harness)) + overhead.call_us * selected)
         read |= 1 << number
-    return fsum(whole), fsum(weighted), fsum(shares)
+    return fsum(us)
 
 
 @dataclass(frozen=True, slots=True)

@@ -188,8 +188,7 @@ export class View {
     const lost = new Set(frame.lost), gone = [];
     for (const [name, bit] of this.bits) {
       gone[bit] = lost.has(name);
-      // Unread switches keep their last state.
-      if (frame.unread[bit] !== "1") this.closed[bit] = !gone[bit] && frame.closed[bit] === "1";
+      this.closed[bit] = !gone[bit] && frame.closed[bit] === "1";
     }
     if (this.bits.size) {
       const names = [...this.bits].filter(([, bit]) => this.closed[bit]).map(([name]) => name);

@@ -26,7 +26,6 @@ LOGIT = {"penalty": 0.5, "smoothness": 1.0, "max_bins": 8}
 TRAINERS: tuple[dict[str, Any], ...] = (
     {"trainer": "logit", **LOGIT},
     {"trainer": "logitboost", "rounds": 4},
-    {"trainer": "sum", "rounds": 3, "linear": 1, **LOGIT},
     {"trainer": "pairs", "pairs": 2, "pair_bins": 4, **LOGIT},
     {"trainer": "logit", "linear": 1, **LOGIT},
 )

@@ -50,5 +50,4 @@ def _two_ways_to_train() -> Iterator[None]:
         patched.setattr(TRAINERS["logitboost"], "tried", ({"rounds": 2}, {"rounds": 5}))
         patched.setattr(TRAINERS["logit"], "tried", ({"penalty": 1.0, "max_bins": 4},))
         patched.setattr(TRAINERS["pairs"], "tried", ({"max_bins": 4, "pairs": 1, "pair_bins": 2},))
-        patched.setattr(TRAINERS["sum"], "tried", ({"rounds": 2, "max_bins": 4},))
         yield

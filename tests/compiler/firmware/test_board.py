@@ -50,12 +50,12 @@ def test_every_table_of_the_file_arrives(tmp_path: Path) -> None:
     file = tmp_path / "board.toml"
     file.write_text(
         f"{MEGA}clock_hz = 8_000_000\nbaud = 500_000\nboard = 7\nscan_us = 2000\nstate_us = 4000\nheartbeat_us = 0\n"
-        "early_exit = true\n[debounce]\npress_us = 5000\nrelease_us = 10_000\n[bus]\nclock_hz = 100_000\n"
+        "[debounce]\npress_us = 5000\nrelease_us = 10_000\n[bus]\nclock_hz = 100_000\n"
         f"{CHIP}[cyberglove]\nuart = 2\nbaud = 38_400\nsensors = 22\nrate_hz = 50.0\njoints = {['j'] + [''] * 21}\n"
     )
     board = load_board(file)
     assert (board.part, board.clock_hz, board.baud, board.board) == ("atmega2560", 8_000_000, 500_000, 7)
-    assert (board.scan_us, board.state_us, board.heartbeat_us, board.early_exit) == (2000, 4000, 0, True)
+    assert (board.scan_us, board.state_us, board.heartbeat_us) == (2000, 4000, 0)
     assert (board.debounce.press_us, board.debounce.release_us, board.bus.clock_hz) == (5000, 10_000, 100_000)
     assert [(chip.kind, chip.address, chip.pins) for chip in board.chips] == [("mcp23017", 0x20, {"GPA0": "a"})]
     assert board.cyberglove is not None
@@ -66,7 +66,7 @@ def test_what_is_left_out_has_its_default_and_debouncing_is_off() -> None:
     board = parse_board(UNO + PINS)
     assert board == Board(part="atmega328p", pins={"a": "PD2", "b": "PD3"})
     assert (board.clock_hz, board.baud, board.scan_us, board.heartbeat_us) == (16_000_000, 1_000_000, 1000, 50_000)
-    assert (board.debounce.press_us, board.debounce.release_us, board.state_us, board.early_exit) == (0, 0, 0, False)
+    assert (board.debounce.press_us, board.debounce.release_us, board.state_us) == (0, 0, 0)
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,6 @@ def test_what_is_left_out_has_its_default_and_debouncing_is_off() -> None:
         (UNO + CHIP.replace("mcp23017", "pcf8574"), "the firmware cannot read a pcf8574: it reads mcp23017"),
         (UNO + CHIP + "mux = { address = 0x70, channel = 0 }", "chip[0].mux: the firmware cannot select multiplexer"),
         (UNO + "clock_hz = 1_000_000\nbaud = 62_500\n" + CHIP, "bus.clock_hz: must be at most a 16th"),
-        (UNO + "early_exit = true\n" + PINS, "early_exit: has no effect without [[chip]]"),
         (UNO + "baud = 921_600\n" + PINS, "baud: a UART at 16000000 Hz cannot make 921600 baud within 2.5%"),
         (UNO + "clock_hz = 16_000_001\n" + PINS, "clock_hz: must be a multiple of 400"),
         (MEGA + "clock_hz = 20_000_000\n" + PINS, "an atmega2560 runs at 16000000 Hz at most"),

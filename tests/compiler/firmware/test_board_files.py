@@ -1,7 +1,6 @@
 import re
 from collections.abc import Callable, Mapping
 
-import numpy as np
 import pytest
 from msgspec.structs import replace
 
@@ -12,7 +11,6 @@ from thenar.compiler.firmware.board_files import (
     config_of,
     readings,
     shortest_scan_us,
-    switches_of,
     whole_folder,
 )
 from thenar.compiler.firmware.layout import arrange
@@ -142,24 +140,10 @@ def test_each_reading_says_which_key_every_bit_is_and_at_what_level_it_is_closed
     assert found == {(0, 0x12): ([0x80, 0x80], 0xFF, {0: 0, 14: 1}), (1, 0x02): ([0], 0, {1: 2})}
 
 
-def test_what_changes_scores_most_per_microsecond_is_read_first(make_tables: MakeTables) -> None:
-    tables = make_tables(switches=3, joints=0)
-    board = parse_board(UNO + CHIPS_TOML)
+def test_a_board_without_chips_has_no_readings() -> None:
     names = ("s0", "s1", "s2")
-    for strong, first in (((0, 1), [[0, 1], [2]]), ((2,), [[2], [0, 1]])):
-        rows = np.zeros_like(tables.switch_rows)
-        rows[list(strong), 0] = 900
-        weighed = IntegerTables(
-            bias=tables.bias,
-            switch_rows=rows,
-            thresholds=(),
-            joint_rows=(),
-            switch_means=rows,
-            joint_means=tables.joint_means,
-            scale=1.0,
-        )
-        assert switches_of(readings(board, names, weighed)) == first
-    assert readings(parse_board(UNO + PINS), names, tables) == ()
+    assert [list(port.elements) for port in readings(parse_board(UNO + CHIPS_TOML), names)] == [[0, 1], [2]]
+    assert readings(parse_board(UNO + PINS), names) == ()
 
 
 def test_the_clock_of_the_bus_is_never_faster_than_the_board_says(generate: Generate) -> None:
@@ -239,27 +223,6 @@ def test_a_board_that_only_scans_needs_no_joints(generate: Generate) -> None:
 def test_a_board_that_lacks_a_kept_switch_is_refused(generate: Generate) -> None:
     with pytest.raises(FirmwareError, match="no pin or key for s2, which the build keeps"):
         generate(UNO + PINS.replace("s2", "s5"))
-
-
-def test_early_exit_reads_port_by_port_and_now_and_then_everything(generate: Generate) -> None:
-    early = generate(UNO + "early_exit = true\nheartbeat_us = 20_000\nscan_us = 3000\n" + CHIPS_TOML, "glove")
-    assert "thenar_my_hand_decided(&glove, port, grasp)" in early["thenar_turn.c"]
-    assert "#define WHOLE_US UINT32_C(20000)" in early["thenar_turn.c"]
-    assert "decided" not in generate(UNO + "scan_us = 3000\n" + CHIPS_TOML, "glove")["thenar_turn.c"]
-
-
-def test_of_a_single_reading_nothing_can_be_left_out_and_there_is_no_early_exit(
-    generate: Generate, make_tables: MakeTables
-) -> None:
-    one = '[[chip]]\nkind = "mcp23017"\naddress = 0x20\npins = { GPA0 = "s0", GPA1 = "s1", GPB5 = "s2" }\n'
-    for chips, early in ((one, False), (CHIPS_TOML, True)):
-        text = UNO + "scan_us = 3000\n" + chips
-        files = generate(UNO + "early_exit = true\nscan_us = 3000\n" + chips, "glove")
-        assert (files != generate(text, "glove")) == early
-        asked = [parse_board(each) for each in (text, UNO + "early_exit = true\n" + text.removeprefix(UNO))]
-        tables = make_tables(switches=3, joints=0)
-        whole, stopping = (config_of(board, ("s0", "s1", "s2"), tables, recognises=True) for board in asked)
-        assert (whole != stopping) == early
 
 
 def test_nobody_can_ask_for_more_scans_than_the_board_makes(make_tables: MakeTables) -> None:

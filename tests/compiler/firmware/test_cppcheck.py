@@ -81,8 +81,7 @@ CASES: dict[str, tuple[str, Mode, str, Mapping[str, int]]] = {
     "glove, analog": ("avr328p", "glove", PINS + ANALOG, {}),
     "glove, CyberGlove": ("avr2560", "glove", CHIPS + CYBERGLOVE, {}),
     "sketch, scan, Wi-Fi": ("esp32", "scan", "[wifi]\n" + ON_GPIO, {}),
-    "sketch, glove, chips": ("rp2040", "glove", "early_exit = true\nscan_us = 3000\n" + CHIPS + CYBERGLOVE, {}),
-    "glove, early exit": ("avr2560", "glove", "early_exit = true\n" + CHIPS + CYBERGLOVE, {}),
+    "sketch, glove, chips": ("rp2040", "glove", "scan_us = 3000\n" + CHIPS + CYBERGLOVE, {}),
 }
 PART = {"avr328p": "atmega328p", "avr2560": "atmega2560", "esp32": "esp32", "rp2040": "rp2040"}
 

@@ -22,26 +22,12 @@ Tool = Callable[[str], str]
 
 PINS = "\n".join(f's{number} = "PD{number + 2}"' for number in range(6)) + '\ns6 = "PB0"\ns7 = "PB1"\ns8 = "PB2"\n'
 CHIP = "pins = { " + ", ".join(f'GP{"AB"[n // 7]}{n % 7} = "s{n}"' for n in range(9)) + " }\n"
-MORE = "pins = { " + ", ".join(f'GPA{n - 3} = "s{n}"' for n in range(3, 9)) + " }\n"
 CYBERGLOVE = '[cyberglove]\nsensors = 18\njoints = ["j0", "j1", "j2"' + ', ""' * 15 + "]\n"
 BOARDS = {
     "scan pins": ("scan", "atmega328p", "[pins]\n" + PINS),
     "scan chip": ("scan", "atmega2560", '[[chip]]\nkind = "mcp23017"\naddress = 0x20\n' + CHIP),
     "glove analog": ("glove", "atmega328p", "[pins]\n" + PINS + '[analog]\nj0 = "ADC0"\nj1 = "ADC1"\nj2 = "ADC2"\n'),
     "glove chip": ("glove", "atmega2560", '[[chip]]\nkind = "mcp23017"\naddress = 0x20\n' + CHIP + CYBERGLOVE),
-    "glove early, of one reading": (
-        "glove",
-        "atmega2560",
-        'early_exit = true\n[[chip]]\nkind = "mcp23017"\naddress = 0x20\n' + CHIP + CYBERGLOVE,
-    ),
-    "glove early": (
-        "glove",
-        "atmega2560",
-        'early_exit = true\n[[chip]]\nkind = "mcp23008"\naddress = 0x20\n'
-        'pins = { GP0 = "s0", GP1 = "s1", GP2 = "s2" }\n[[chip]]\nkind = "mcp23017"\naddress = 0x21\n'
-        + MORE
-        + CYBERGLOVE,
-    ),
 }
 PLATFORM = {target.part: name for name, target in TARGETS.items()}
 COMPILERS = {"avr": "avr-gcc", "cortex": "arm-none-eabi-gcc", "rv32": "riscv64-unknown-elf-gcc", "host": "gcc"}

@@ -35,7 +35,6 @@ part = "atmega328p"
 
 GLOVE_BOARD = """\
 part = "atmega2560"
-early_exit = true
 [[chip]]
 kind = "mcp23017"
 address = 0x20

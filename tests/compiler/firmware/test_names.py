@@ -11,7 +11,6 @@ from msgspec.structs import replace
 
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import arrange
-from thenar.compiler.firmware.protocol import decided_files
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.names import fault
@@ -66,7 +65,6 @@ def test_whatever_names_hold_the_c_compiles_without_a_warning(
     )
     library = Library("hand", manifest, layout, avr=True, notes=tuple(names))
     files = TARGETS["host"].files(library)
-    files |= decided_files("hand", tables, manifest.grasps, [(0, 1), (2, 3, 4)])
     arduino = TARGETS["arduino"].files(library)
     plainly = TARGETS["arduino"].files(Library("hand", plain, layout, avr=True))
     for name, text in (files | arduino).items():

@@ -6,13 +6,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.protocol import MOST_KEYS, BoardConfig, decided_files, protocol_files
-from thenar.drivers.errors import SettingError
-from thenar.runtime.tables import IntegerTables
+from thenar.compiler.firmware.protocol import MOST_KEYS, BoardConfig, protocol_files
 
 Tool = Callable[[str], str]
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-c")
@@ -24,27 +21,7 @@ COMPILERS = {
     "cortex-m0plus": ("arm-none-eabi-gcc", "-mcpu=cortex-m0plus", "-mthumb", "-Os"),
     "cortex-m4": ("arm-none-eabi-gcc", "-mcpu=cortex-m4", "-mthumb", "-Os"),
 }
-# What the classifier's header says that the others need.
-SCORES = """#include <stdbool.h>
-#include <stdint.h>
-typedef uint8_t thenar_palm_class;
-typedef struct {{ int16_t scores[{classes}]; }} thenar_palm;
-"""
 CONFIGS = [BoardConfig(1, 1), BoardConfig(1, 33, press_us=5000, release_us=10_000), BoardConfig(40, 49, diodes=False)]
-
-
-def tables(classes: int = 4, switches: int = 6) -> IntegerTables:
-    random = np.random.default_rng(3)
-
-    def rows(*shape: int) -> np.ndarray:
-        return random.integers(-90, 91, shape).astype(np.int16)
-
-    return IntegerTables(rows(classes), rows(switches, classes), (), (), rows(switches, classes), rows(0, classes), 1.0)
-
-
-def decided(classes: int = 4, name: str = "grasp") -> dict[str, str]:
-    grasps = [f"{name} {number}" for number in range(classes)]
-    return decided_files("palm", tables(classes), grasps, [(0, 1, 2), (3, 4), (5,)])
 
 
 def write(files: dict[str, str], folder: Path) -> list[str]:
@@ -54,14 +31,9 @@ def write(files: dict[str, str], folder: Path) -> list[str]:
     return [name for name in files if name.endswith(".c")]
 
 
-def of_a_board(config: BoardConfig, classes: int = 4) -> dict[str, str]:
-    return {**protocol_files(config), **decided(classes), "thenar_palm.h": SCORES.format(classes=classes)}
-
-
 def test_the_files_of_a_board() -> None:
     parts = {f"thenar_{part}.{end}" for part in ("frames", "debounce", "board") for end in "hc"}
     assert protocol_files(BoardConfig(1, 8)).keys() == {"thenar_config.h", "thenar_time.h", *parts}
-    assert decided().keys() == {"thenar_palm_decided.h", "thenar_palm_decided.c"}
 
 
 def test_the_configuration_is_what_the_preprocessor_sees(tool: Tool, tmp_path: Path) -> None:
@@ -83,7 +55,7 @@ def test_the_configuration_is_what_the_preprocessor_sees(tool: Tool, tmp_path: P
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_compilers_have_nothing_to_say(tool: Tool, tmp_path: Path, compiler: str, number: int) -> None:
     program, *options = COMPILERS[compiler]
-    sources = write(of_a_board(CONFIGS[number]), tmp_path)
+    sources = write(protocol_files(CONFIGS[number]), tmp_path)
     command = [tool(program), *options, *STRICT, *sources]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -123,35 +95,10 @@ def test_a_board_that_the_protocol_cannot_describe_is_refused(wrong: dict[str, i
         BoardConfig(**{**right, **wrong})
 
 
-@pytest.mark.parametrize(
-    ("ports", "error", "said"),
-    [
-        ([], FirmwareError, "a scan of 0 ports"),
-        ([[]] * 257, FirmwareError, "a scan of 257 ports: early exit needs 1 to 256"),
-        ([(0, 1, 2), (4, 5)], FirmwareError, "no port reads switch 3"),
-        ([(0, 1, 2), (2, 3, 4, 5)], SettingError, "read by two ports"),
-        ([(0, 1, 2), (3, 4, 5, 6)], SettingError, "is not in the build"),
-    ],
-)
-def test_ports_that_do_not_make_a_scan_are_refused(
-    ports: list[tuple[int, ...]], error: type[Exception], said: str
-) -> None:
-    with pytest.raises(error, match=said):
-        decided_files("palm", tables(), ["a", "b", "c", "d"], ports)
-
-
-def test_names_of_grasp_types_cannot_leave_their_comments() -> None:
-    text = decided(name="*/ ü")["thenar_palm_decided.c"]
-    assert "* / \\xfc 0" in text
-    assert text.isascii()
-
-
 def test_lines_are_120_columns_at_most() -> None:
-    """Of more classes than fit on a line, too."""
-    for text in of_a_board(BoardConfig(40, 49), classes=200).values():
+    for text in protocol_files(BoardConfig(40, 49)).values():
         assert max(map(len, text.splitlines())) <= 120
 
 
 def test_the_same_board_gives_the_same_bytes() -> None:
     assert protocol_files(BoardConfig(2, 8)) == protocol_files(BoardConfig(2, 8))
-    assert decided() == decided()

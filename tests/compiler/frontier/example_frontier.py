@@ -20,7 +20,6 @@ from thenar.compiler.frontier.points import (
     PlacementChoice,
     Point,
     Recipe,
-    Scan,
     Time,
     Tried,
     frontier_from_bytes,
@@ -38,20 +37,20 @@ TRANSFER_US = 1736.1  # 20 bytes at 115200 baud
 _PARTS = ("thumb", "index", "middle", "ring", "little", "palm")
 SWITCHES = tuple(f"{_PARTS[number * 7 % 6]}-{number:03d}" for number in range(N_SWITCHES))
 
-# inputs, switches, method, parameter, rounds, width, wiring, its clock in kHz, scan, scan us, classify us, decision,
+# inputs, switches, method, parameter, rounds, width, wiring, its clock in kHz, scan us, classify us, decision,
 # rate, latency us: mean and 99th percentile
 _POINTS: tuple[tuple[Any, ...], ...] = (
-    ("switches", 6, "elimination", 6, 20, 4, "mcp23017", 1000, "full", 48.0, 61.5, "single", 0.712, 1450, 5900),
-    ("switches", 10, "elimination", 10, 40, 5, "mcp23017", 1000, "full", 48.0, 97.9, "single", 0.801, 1380, 5200),
-    ("switches", 16, "elimination", 16, 60, 6, "mcp23017", 1000, "full", 48.0, 150.6, "dwell", 0.866, 2100, 6400),
-    ("switches", 24, "id3-cost", 24, 80, 8, "tca6424a", 1000, "full", 58.0, 231.4, "sequential", 0.918, 2650, 6900),
-    ("switches", 33, "elimination", 33, 100, 8, "mcp23017", 1000, "early", 96, 344.0, "sequential", 0.929, 2910, 7400),
-    ("switches", 50, "id3-ccp", 50, 120, 8, "mcp23017", 400, "early", 241.0, 429.0, "sequential", 0.934, 3260, 9100),
-    ("joints", 0, "elimination", 0, 150, 8, "as wired", 0, "full", 0.0, 298.2, "single", 0.952, 5900, 11800),
-    ("both", 8, "elimination", 8, 150, 8, "mcp23017", 1000, "full", 48.0, 330.0, "sequential", 0.978, 6400, 12900),
-    ("both", 16, "elimination", 16, 200, 8, "as wired", 400, "full", 118.0, 421.3, "sequential", 0.988, 7200, 15100),
-    ("both", 33, "elimination", 33, 300, 12, "board", 1000, "full", 330.0, 905.7, "dwell", 0.9915, 9800, 24600),
-    ("both", 12, "id3-rep", 0.25, 80, 6, "pca9555", 400, "full", 122.0, 363.0, "single", 0.961, 5200, 10400),
+    ("switches", 6, "elimination", 6, 20, 4, "mcp23017", 1000, 48.0, 61.5, "single", 0.712, 1450, 5900),
+    ("switches", 10, "elimination", 10, 40, 5, "mcp23017", 1000, 48.0, 97.9, "single", 0.801, 1380, 5200),
+    ("switches", 16, "elimination", 16, 60, 6, "mcp23017", 1000, 48.0, 150.6, "dwell", 0.866, 2100, 6400),
+    ("switches", 24, "id3-cost", 24, 80, 8, "tca6424a", 1000, 58.0, 231.4, "sequential", 0.918, 2650, 6900),
+    ("switches", 33, "elimination", 33, 100, 8, "mcp23017", 1000, 96, 344.0, "sequential", 0.929, 2910, 7400),
+    ("switches", 50, "id3-ccp", 50, 120, 8, "mcp23017", 400, 241.0, 429.0, "sequential", 0.934, 3260, 9100),
+    ("joints", 0, "elimination", 0, 150, 8, "as wired", 0, 0.0, 298.2, "single", 0.952, 5900, 11800),
+    ("both", 8, "elimination", 8, 150, 8, "mcp23017", 1000, 48.0, 330.0, "sequential", 0.978, 6400, 12900),
+    ("both", 16, "elimination", 16, 200, 8, "as wired", 400, 118.0, 421.3, "sequential", 0.988, 7200, 15100),
+    ("both", 33, "elimination", 33, 300, 12, "board", 1000, 330.0, 905.7, "dwell", 0.9915, 9800, 24600),
+    ("both", 12, "id3-rep", 0.25, 80, 6, "pca9555", 400, 122.0, 363.0, "single", 0.961, 5200, 10400),
 )  # fmt: skip
 
 # What each method recognises with so many switches.
@@ -174,7 +173,6 @@ def _point(
     width: int,
     wiring: str,
     clock_khz: int,
-    scan: Scan,
     scan_us: float,
     classify_us: float,
     decision: DecisionKind,
@@ -185,7 +183,7 @@ def _point(
     transfer_us = 0.0 if inputs == "switches" else TRANSFER_US
     layout = f"{8 * (1 + (width > 8))}-bit entries, {4 if kept > 8 else 2} switches per lookup"
     setting = Recipe(
-        PlacementChoice(method, parameter), inputs, rounds, width, layout, scan, decision, wiring, 1000 * clock_khz
+        PlacementChoice(method, parameter), inputs, rounds, width, layout, decision, wiring, 1000 * clock_khz
     )
     return Point(
         number=number,

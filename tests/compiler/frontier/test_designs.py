@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.frontier.designs import Design, best_designs, designs, lucks, points_of, with_whole_scans
+from thenar.compiler.frontier.designs import Design, best_designs, designs, lucks, points_of
 from thenar.compiler.frontier.finalists import Close
 from thenar.compiler.frontier.latency import POLICIES
 from thenar.compiler.frontier.points import Latency, PlacementChoice, Time
@@ -38,8 +38,8 @@ def judged(rate: float) -> Judged:
     )
 
 
-def close_of(switches: int = 20, rate: float = 0.9, early_us: float = 200.0, layout_us: float = 50.0) -> Close:
-    scan = ScanTimes(500.0, early_us, 4, 2, "wire", 1.5)
+def close_of(switches: int = 20, rate: float = 0.9, scan_us: float = 500.0, layout_us: float = 50.0) -> Close:
+    scan = ScanTimes(scan_us, 4, 2, "wire")
     wired = (Wired("mcp23017", 400_000, scan),) if switches else ()
     tables = PricedTables(TABLED, b"", (Classified("plain", layout_us, "model", 900, 30),), wired, 1.25)
     choice = PlacementChoice("id3", float(switches))
@@ -51,17 +51,6 @@ def close_of(switches: int = 20, rate: float = 0.9, early_us: float = 200.0, lay
 
 def simulated(design: Design, us: float) -> Design:
     return replace(design, measured=Time(us, "simulated"))
-
-
-def test_a_scan_that_may_end_early_looks_at_the_scores_once_a_port_that_it_reads() -> None:
-    whole, early = designs(close_of())
-    assert (whole.scan_kind, whole.scan.us, whole.classify.us) == ("full", 500.0, 50.0)
-    assert (early.scan_kind, early.scan.us, early.classify.us) == ("early", 200.0, 75.0)
-    assert early.frame.us == 275.0
-
-
-def test_where_no_frame_ends_a_scan_early_it_is_not_offered() -> None:
-    assert [design.scan_kind for design in designs(close_of(early_us=500.0))] == ["full"]
 
 
 def test_joints_alone_have_one_design_a_layout_and_wait_for_a_record() -> None:
@@ -102,22 +91,10 @@ def samples_of_trials(trials: int) -> Samples:
 
 
 def test_fronts_hold_the_quickest_and_the_smallest() -> None:
-    big, small = close_of(30, 0.95, early_us=100.0), close_of(5, 0.9, early_us=400.0)
+    big, small = close_of(30, 0.95, scan_us=100.0), close_of(5, 0.9, scan_us=400.0)
     by_time, by_switches = best_designs([*designs(small), *designs(big)])
     assert [design.n_switches for design in by_time] == [30]
     assert [design.n_switches for design in by_switches] == [5, 30]
-    assert by_switches[0].scan_kind == "early"
-
-
-def test_a_design_that_ends_early_is_joined_by_the_one_of_whole_scans_once() -> None:
-    whole, early = designs(close_of())
-    assert [design.scan_kind for design in with_whole_scans([early, early])] == ["early", "full"]
-    assert with_whole_scans([whole, early]) == [whole, early]
-
-
-def test_dwell_and_tests_are_for_whole_scans() -> None:
-    whole, early = designs(close_of())
-    assert (whole.decisions, early.decisions) == (tuple(POLICIES), ("single",))
 
 
 def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
@@ -125,7 +102,7 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
     # The model has the other one faster, the simulator the better one: so the other is beaten on time.
     assert other.frame.us < one.frame.us
     several = [simulated(one, 20.0), simulated(other, 60.0)]
-    waits = {(design, kind): WAIT for design in several for kind in design.decisions}
+    waits = {(design, kind): WAIT for design in several for kind in POLICIES}
     points = points_of(several, waits, {each.judged: 0.01 for each in several}, names, trained)
     assert [point.frame.us for point in points] == sorted(point.frame.us for point in points)
     fronts = {(len(point.switches), point.setting.decision): point.fronts for point in points}
@@ -149,7 +126,7 @@ def test_a_points_rate_and_the_lower_end_of_its_interval_are_less_its_luck() -> 
 
 def test_a_decision_that_is_quicker_is_on_its_own_front() -> None:
     one, other = (next(designs(close_of(n, rate))) for n, rate in ((20, 0.9), (10, 0.8)))
-    waits = {(design, kind): WAIT for design in (one, other) for kind in design.decisions}
+    waits = {(design, kind): WAIT for design in (one, other) for kind in POLICIES}
     waits[other, "sequential"] = replace_latency(WAIT, 10.0)
     points = points_of([one, other], waits, {each.judged: 0.0 for each in (one, other)}, names, trained)
     (found,) = (each for each in points if len(each.switches) == 10 and each.setting.decision == "sequential")
@@ -161,13 +138,8 @@ def replace_latency(latency: Latency, mean_us: float) -> Latency:
     return Latency(mean_us, latency.p99_us, latency.missed, latency.wrong)
 
 
-def test_measured_times_of_early_scans_count_every_look() -> None:
-    _, early = designs(close_of())
-    assert simulated(early, 100.0).classify == Time(150.0, "simulated")
-
-
 def test_a_point_says_its_trainer_and_every_setting_that_is_no_default() -> None:
-    (design, _) = designs(close_of())
+    (design,) = designs(close_of())
     choice = replace(design.close.screened.choice, trainer="logit")
     other = replace(design, close=replace(design.close, screened=replace(design.close.screened, choice=choice)))
     waits = dict.fromkeys(((other, kind) for kind in POLICIES), WAIT)

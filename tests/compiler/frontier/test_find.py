@@ -74,8 +74,7 @@ def first(tmp_path_factory: pytest.TempPathFactory, make_set: Make) -> tuple[Req
 
 def test_a_frame_is_reading_on_lines_of_their_own_and_classifying(first: tuple[Request, Frontier]) -> None:
     for point in first[1].points:
-        if point.setting.scan != "demand":
-            assert point.frame.us == pytest.approx(max(point.scan.us, point.transfer.us) + point.classify.us)
+        assert point.frame.us == pytest.approx(max(point.scan.us, point.transfer.us) + point.classify.us)
 
 
 def test_rows_in_which_nothing_is_held_change_no_rate(
@@ -106,11 +105,6 @@ def test_every_point_is_on_a_front_and_none_beats_those_of_its_own(first: tuple[
 def chosen_by(point: Point) -> float:
     """Return the rate before its correction."""
     return point.rate.mean + point.luck
-
-
-def test_scans_that_end_early_decide_on_single_frames(first: tuple[Request, Frontier]) -> None:
-    early = [point for point in first[1].points if point.setting.scan == "early"]
-    assert {point.setting.decision for point in early} <= {"single"}
 
 
 def test_subjects_are_left_out_where_there_are_several(first: tuple[Request, Frontier]) -> None:
@@ -413,7 +407,7 @@ def test_points_may_read_some_of_the_joints_and_what_is_built_of_them_reads_thes
         n = len(point.joints) if point.joints else 0 if point.setting.inputs == "switches" else 5
         assert point.setting.keep_joints == (len(point.joints) or None)
         assert set(point.joints) <= {joint.name for joint in grasp_set.joints}
-        if n and point.setting.scan != "demand":
+        if n:
             assert point.transfer.us == pytest.approx(250 * n + (n + 3) * 10e6 / 115_200)
     assert {each.keep_joints for each in found.tried} == {None, 2, 3, 4}
     chosen = picked(tmp_path / "out" / "frontier.json", fewer[0].number, grasp_set)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from thenar.compiler.frontier.latency import NOTHING, Stretches, decisions, stretches
 from thenar.runtime.live.decision import Decision, SequentialTest, Standing
 from thenar.runtime.policy import Policy
-from thenar.runtime.scores import LANE_OFFSET, Scorer
+from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables
 
 CLASSES, SCALE = 3, 4.0
@@ -19,7 +19,6 @@ def bare_tables(classes: int = CLASSES) -> IntegerTables:
 
 
 def frame_by_frame(frames: Stretches, policy: Policy) -> list[int]:
-    tables = bare_tables()
     decider: Decision | SequentialTest
     if policy.error_rate is None:
         decider = Decision(policy.lead_steps(SCALE), policy.dwell_us, policy.hold_us)
@@ -28,7 +27,7 @@ def frame_by_frame(frames: Stretches, policy: Policy) -> list[int]:
     found = []
     for times, scores in zip(frames.times, frames.scores, strict=True):
         for time_us in times:
-            standing = Standing(tuple((scores + LANE_OFFSET).tolist()), Scorer(tables))
+            standing = Standing(tuple((scores + LANE_OFFSET).tolist()))
             held = decider.update(time_us, standing)
             found.append(NOTHING if held is None else held)
     return found

@@ -96,12 +96,12 @@ def test_segments_alone_are_decided_at_learnt_costs_and_with_a_class_of_nothing_
     train, new = held_by(grasp_set, "S0"), np.flatnonzero(grasp_set.subjects == "S1")
     labels = np.where(grasp_set.is_none, -1, np.searchsorted(np.unique(grasp_set.labels), grasp_set.labels))
     stream = stream_of(grasp_set, labels, new, seed=1)
-    paces = (Pace(TABLED, 3000.0, ("single", "segments")),)
+    paces = (Pace(TABLED, 3000.0),)
     moving = Moving.of(grasp_set, train, seed=1)
     assert moving is not None
-    ((single, segments),) = latencies(held, train, columns, stream, paces, training, moving)
-    ((before, usual),) = latencies(held, train, columns, stream, paces, training)
-    assert single == before
+    ((*others, segments),) = latencies(held, train, columns, stream, paces, training, moving)
+    ((*before, usual),) = latencies(held, train, columns, stream, paces, training)
+    assert others == before
     made, model = moving.segmenting(columns, [TABLED], training)[TABLED]
     assert made.n_classes == held.n_classes + 1
     assert segments == latency(made, columns, stream, 3000.0, model)

@@ -1,7 +1,6 @@
 """Tables that are priced: a finalist's are those of the build, byte for byte."""
 
 from thenar.compiler.artifact.training import built_tables, integers_of, train
-from thenar.compiler.evaluation.folds import trial_folds
 from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.price import Tabled, price
 from thenar.compiler.frontier.search import Shape
@@ -21,10 +20,9 @@ def test_a_finalist_is_priced_with_what_its_build_holds_for_lost_inputs(grasp_se
     assert trained.training is not None
     names = names_of(grasp_set, trained.kept)
     equipment = Equipment(ClassifyModel("avr328p"), wirings(None), WIRE_ONLY)
-    fold = trial_folds(samples.labels, samples.trials, 2, 1)[0]
     asked = samples, names, trained.columns, (Tabled(20, Shape(options.width, options.table_bits)),), trained.training
-    (close,) = price(*asked, equipment, (fold, trained.training))
-    (quick,) = price(*asked, equipment, None)
+    (close,) = price(*asked, equipment, True)
+    (quick,) = price(*asked, equipment, False)
     built, means = built_tables(trained, samples, options), integers_of(trained, samples, options)
     assert close.content == tables_to_bytes(built) != quick.content == tables_to_bytes(means)
     assert close.classified == equipment.model.options(built)

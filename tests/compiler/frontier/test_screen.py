@@ -23,7 +23,7 @@ QUICK = (Classified("quick", 40.0, "model", 900, 30), Classified("small", 60.0, 
 
 
 def priced(*scans_us: float, classified: tuple[Classified, ...] = QUICK) -> PricedTables:
-    wired = tuple(Wired("mcp23017", 400_000, ScanTimes(us, us, 1, 1, "wire", 1.0)) for us in scans_us)
+    wired = tuple(Wired("mcp23017", 400_000, ScanTimes(us, 1, 1, "wire")) for us in scans_us)
     return PricedTables(Tabled(12, Shape(16)), b"", classified, wired, 0.1)
 
 

@@ -57,7 +57,6 @@ def test_it_begins_with_an_end_and_a_hello_and_tells_all_keys_once_it_has_scanne
     assert (hello.rows, hello.columns, hello.flags, hello.board, hello.time_us) == (2, 4, WITHOUT_DIODES, 77, 5)
     assert board.next_us() == 5
     assert board.receive(scanner_protocol.encode(frame(GetState(), 0)), 6) == []
-    assert board.scan(0, 6, unread=0b1, whole=False) == []
     assert said(board.scan(0b101, 7)) == [Heartbeat(7, 0b101, 8)]
     assert board.next_us() is None
     assert asked(board, GetState(), 8) == Heartbeat(8, 0b101, 8)
@@ -71,7 +70,7 @@ def test_keys_that_cannot_be_read_keep_their_state_and_are_told_when_they_change
     assert said(board.scan(0, 50_000, unread=0b1010)) == [Lost(0b1010, 8), Heartbeat(50_000, 0b10, 8)]
     get_state = scanner_protocol.encode(frame(GetState(), 0))
     assert said(board.receive(get_state, 50_001)) == [Lost(0b1010, 8), Heartbeat(50_001, 0b10, 8)]
-    assert said(board.scan(0b10, 51_000, unread=0b1111_1000, whole=False)) == [Lost(0b1000, 8)]
+    assert said(board.scan(0b10, 51_000, unread=0b1000)) == [Lost(0b1000, 8)]
     assert said(board.scan(0, 52_000)) == [Event(52_000, 1, 0), Lost(0, 8)]
     assert said(board.scan(0, 100_000)) == [Heartbeat(100_000, 0, 8)]
 

@@ -315,7 +315,7 @@ def test_names_are_text_wherever_they_are_shown(browser: Any) -> None:
         **{"time_us": 1_000_000, "number": 1, "grasp": SCRIPT, "candidate": SCRIPT, "probability": 1.0, "margin": 1},
         **{"health": "degraded", "switch_age_us": 1, "glove_age_us": None, "latency_us": 1, "lost": [image]},
         **{"state": "held", "segment": 1, "segment_type": SCRIPT, "segment_us": 0, "preshape": {"name": image}},
-        **{"closed": "1", "unread": "0", "joints": [], "taxels": {}, "probabilities": [1.0, 0.0]},
+        **{"closed": "1", "joints": [], "taxels": {}, "probabilities": [1.0, 0.0]},
     }
     report = {
         **{

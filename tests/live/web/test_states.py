@@ -22,7 +22,7 @@ BUILD = {
     **{"preshapes": False, "records": False, "empty_hand": True},
 }
 GRASP = LiveGrasp(0, 0, 0, "Add", "Add", 0.95, 9, "ok", 2_000, None, 2_000)
-DETAIL = {"closed": "110", "unread": "000", "joints": [], "taxels": {}, "probabilities": [0.95, 0.05], "late_us": 0}
+DETAIL = {"closed": "110", "joints": [], "taxels": {}, "probabilities": [0.95, 0.05], "late_us": 0}
 _INK = "return getComputedStyle(document.getElementById(arguments[0])).color"
 
 

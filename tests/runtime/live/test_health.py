@@ -1,5 +1,4 @@
 from collections.abc import Callable
-from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -21,9 +20,10 @@ SECOND = 1_000_000
 def build(make_build: MakeBuild) -> Build:
     """Four switches that were on in the SHARES of the recordings, four grasp types, two joints."""
     made = make_build(switches=4, joints=2)
-    rows = np.array([[40, -40, 80, 0], [100, 0, 0, -100], [200, -100, 0, 0], [0, 4, 8, -8]], np.int16)
-    means = np.rint(rows * np.array(SHARES)[:, np.newaxis]).astype(np.int16)
-    return Build(made.manifest, replace(made.tables, switch_rows=rows, switch_means=means))
+    switches = tuple(
+        changed(switch, closed_share=share) for switch, share in zip(made.manifest.switches, SHARES, strict=True)
+    )
+    return Build(changed(made.manifest, switches=switches), made.tables)
 
 
 def grasp(name: str, health: str = "ok") -> LiveGrasp:
@@ -31,25 +31,23 @@ def grasp(name: str, health: str = "ok") -> LiveGrasp:
     return changed(known, health=health)
 
 
-def hold(health: Health, grasps: list[str], closed: Callable[[int], int], lost: int = 0, unread: int = 0) -> None:
+def hold(health: Health, grasps: list[str], closed: Callable[[int], int], lost: int = 0) -> None:
     """Hold one grasp after the other for three frames each."""
     start = health.report(0).frames * 100
     for number, name in enumerate(grasps):
         for frame in range(3):
             time_us = start + number * 300 + frame * 100
-            health.update(grasp(name), SwitchFrame(time_us, closed(number), lost, unread))
+            health.update(grasp(name), SwitchFrame(time_us, closed(number), lost))
 
 
 def of_types(build: Build, count: int, types: int = 4) -> list[str]:
     return [build.grasps[number % types] for number in range(count)]
 
 
-def test_shares_of_on_are_told_and_in_older_builds_read_off_the_tables(build: Build) -> None:
-    assert on_shares(build) == pytest.approx(SHARES)
-    flat = Build(build.manifest, replace(build.tables, switch_rows=np.zeros((4, 4), np.int16)))
-    assert all(np.isnan(on_shares(flat)))
-    told = tuple(changed(switch, closed_share=0.125) for switch in build.manifest.switches)
-    assert on_shares(Build(changed(build.manifest, switches=told), build.tables)) == [0.125] * 4
+def test_shares_of_on_are_those_of_the_build(build: Build) -> None:
+    assert on_shares(build) == list(SHARES)
+    untold = tuple(changed(switch, closed_share=None) for switch in build.manifest.switches)
+    assert all(np.isnan(on_shares(Build(changed(build.manifest, switches=untold), build.tables))))
 
 
 def test_patience_is_the_number_of_misses_that_chance_does_not_explain() -> None:
@@ -93,10 +91,9 @@ def test_half_of_the_types_are_enough_to_suspect_a_switch(build: Build) -> None:
     assert health.report(0).stuck_open == ("s0", "s1", "s2", "s3")
 
 
-@pytest.mark.parametrize(("lost", "unread"), [(0b0010, 0), (0, 0b0010)])
-def test_a_switch_that_is_not_read_is_not_suspected(build: Build, lost: int, unread: int) -> None:
+def test_a_switch_that_is_not_read_is_not_suspected(build: Build) -> None:
     health = Health(build)
-    hold(health, of_types(build, 200), lambda number: 0, lost, unread)
+    hold(health, of_types(build, 200), lambda number: 0, lost=0b0010)
     assert health.report(0).stuck_open == ("s0", "s2", "s3")
 
 
@@ -129,7 +126,7 @@ def test_changes_while_a_switch_is_not_read_are_no_chatter(build: Build) -> None
 def test_a_switch_that_stays_closed_and_is_read_now_and_then_does_not_chatter(build: Build) -> None:
     health = Health(build)
     for number in range(250):
-        health.update(grasp("a"), SwitchFrame(number * SECOND // 100, 1 - number % 2, unread=number % 2))
+        health.update(grasp("a"), SwitchFrame(number * SECOND // 100, 1 - number % 2, lost=number % 2))
     assert health.report(0).chattering == ()
 
 

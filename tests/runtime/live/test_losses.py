@@ -8,19 +8,16 @@ import numpy as np
 import pytest
 
 from thenar.runtime import Build
-from thenar.runtime.calibration import Joints
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.recogniser import LiveRecognizer
 from thenar.runtime.policy import Policy
 from thenar.runtime.published import UNKNOWN, LiveGrasp
-from thenar.runtime.scanning.decided import EarlyExit
 from thenar.runtime.scores import Scorer
 
 MakeBuild = Callable[..., Build]
 
 SWITCHES, JOINTS = 6, 3
 ALL = (1 << SWITCHES) - 1
-PORTS = (0b000011, 0b001100, 0b110000)
 FRAME_US = 10_000
 ROWS = 240
 SHAKY = Policy(max_lost=1.0)
@@ -69,11 +66,9 @@ def losses(random: Random, frames: int) -> Iterator[tuple[int, bool]]:
 class Player:
     """Plays sequences of rows on one recogniser, and counts the "ok" lines that are wrong."""
 
-    def __init__(self, build: Build, policy: Policy, *, early: bool = False) -> None:
+    def __init__(self, build: Build, policy: Policy) -> None:
         self._live, self._grasps = recognizer(build, policy), build.grasps
         self._lead = policy.lead_steps(build.tables.scale)
-        self._exit = EarlyExit(build.scorer, PORTS, lead=self._lead) if early else None
-        self._joints = Joints(build.manifest.joints, NAMES, None, FRAME_US)
         self._now, self._last, self._confirmed = 0, UNKNOWN, False
         self.ok = self.changing = self.wrong = 0
 
@@ -85,16 +80,8 @@ class Player:
         for row, (lost, unplugged) in zip(rows, patterns, strict=True):
             self._now += FRAME_US
             glove = GloveFrame(self._now, row.sensors, 0 if unplugged else 1)
-            unread = self._unread(row, lost, glove)  # what is left unread is not missed
-            frame = SwitchFrame(self._now, row.closed & ~unread, lost & ~unread, unread, glove)
+            frame = SwitchFrame(self._now, row.closed, lost, glove)
             self._check(row, self._live.step(self._now, 0, frame, glove).grasp, whole=not (frame.lost or unplugged))
-
-    def _unread(self, row: Row, lost: int, glove: GloveFrame) -> int:
-        if self._exit is None:
-            return 0
-        self._exit.start(self._joints.codes(self._now, glove))
-        last = next(port for port in range(3) if self._exit.after(port, row.closed, lost) or port == 2)
-        return self._exit.unread(last)
 
     def _check(self, row: Row, found: LiveGrasp, *, whole: bool) -> None:
         if found.grasp != self._last:
@@ -111,17 +98,16 @@ class Player:
 
 
 POLICIES = {
-    "hysteresis": (Policy(), False),
-    "anything may be lost": (SHAKY, False),
-    "early exit": (SHAKY, True),
-    "no lead": (Policy(lead=0.0, dwell_us=30_000, hold_us=60_000, max_lost=1.0), True),
-    "sequential test": (Policy(error_rate=0.2, max_lost=1.0), False),
+    "hysteresis": Policy(),
+    "anything may be lost": SHAKY,
+    "no lead": Policy(lead=0.0, dwell_us=30_000, hold_us=60_000, max_lost=1.0),
+    "sequential test": Policy(error_rate=0.2, max_lost=1.0),
 }
 
 
-def played(build: Build, policy: Policy, early: bool, sequences: int, seed: int) -> Player:
+def played(build: Build, policy: Policy, sequences: int, seed: int) -> Player:
     """Play as many sequences, of which one at least begins at every row of a recording."""
-    rows, random, player = recording(build, seed), Random(seed), Player(build, policy, early=early)
+    rows, random, player = recording(build, seed), Random(seed), Player(build, policy)
     for number in range(sequences):
         first, frames = number % ROWS, random.randint(2, 24)
         taken = [rows[(first + place) % ROWS] for place in range(frames)]
@@ -133,7 +119,7 @@ def played(build: Build, policy: Policy, early: bool, sequences: int, seed: int)
 def test_no_ok_line_is_contradicted_by_its_own_frame_or_rests_on_frames_with_lost_inputs(
     make_build: MakeBuild, name: str
 ) -> None:
-    player = played(make_build(), *POLICIES[name], sequences=2 * ROWS, seed=1)
+    player = played(make_build(), POLICIES[name], sequences=2 * ROWS, seed=1)
     assert player.ok > ROWS
     assert player.changing > ROWS / 4
     assert player.wrong == 0
@@ -143,8 +129,8 @@ def test_no_ok_line_is_contradicted_by_its_own_frame_or_rests_on_frames_with_los
 def test_in_a_hundred_thousand_sequences_there_is_no_wrong_ok_line(make_build: MakeBuild) -> None:
     wrong = ok = 0
     for seed in range(4):
-        for policy, early in POLICIES.values():
-            player = played(make_build(seed), policy, early, 5000, seed)
+        for policy in POLICIES.values():
+            player = played(make_build(seed), policy, 5000, seed)
             wrong, ok = wrong + player.wrong, ok + player.ok
     assert ok > 100_000
     assert wrong == 0

@@ -1,7 +1,7 @@
 """Inputs that lie: found against an exact model of all others, taken for lost, and used again."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -19,7 +19,6 @@ from thenar.runtime.live.quarantine import (
     SETTLED_US,
     STUCK_CLOSED,
     STUCK_OPEN,
-    Quarantine,
     StuckTest,
 )
 from thenar.runtime.live.recogniser import LiveRecognizer, Moment
@@ -226,7 +225,7 @@ def test_without_quarantine_the_fault_is_named_and_nothing_is_left_out(make_buil
     assert (last.health, last.lost) == ("ok", ())
 
 
-def test_builds_of_older_versions_find_no_stuck_switch(make_build: MakeBuild) -> None:
+def test_builds_that_do_not_say_how_often_switches_close_find_no_stuck_switch(make_build: MakeBuild) -> None:
     hand = Hand(make_build(classes=CLASSES, switches=SWITCHES, joints=0))
     for closed in drawn(closing(), 60, 3):
         hand.grasp(closed, stuck=1)
@@ -324,13 +323,3 @@ def test_the_same_frames_and_times_find_the_same(make_build: MakeBuild) -> None:
     for closed in drawn(shares, 60, 9):
         assert first.grasp(closed, stuck=4) == again.grasp(closed, stuck=4)
     assert first.found == again.found != ()
-
-
-def test_scans_that_end_early_leave_switches_alone_that_they_did_not_read(make_build: MakeBuild) -> None:
-    quarantine = Quarantine(exact(make_build, closing()), lambda *_: True)
-    lanes: Sequence[int] = [1 << 15] * CLASSES
-    for number in range(100):
-        now_us = number * SETTLED_US
-        quarantine.look(SwitchFrame(now_us, 1 | number % 2 << 3, unread=1 << 5), lanes, 0)
-    quarantine.left_out(0, 0)
-    assert quarantine.found == ()

@@ -2,24 +2,19 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import event, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime import Build, FrameError
-from thenar.runtime.calibration import Joints
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.harness.wiring import Harness, ScannerWiring
 from thenar.runtime.live.recogniser import LiveRecognizer
-from thenar.runtime.live.system import System
 from thenar.runtime.policy import Policy
 from thenar.runtime.published import UNKNOWN, LiveGrasp
-from thenar.runtime.scanning.decided import EarlyExit
 from thenar.runtime.scores import Scorer
 
 MakeBuild = Callable[..., Build]
@@ -47,14 +42,12 @@ def recognizer(build: Build, policy: Policy = AT_ONCE, sensor_names: tuple[str, 
 
 
 @st.composite
-def schedules(draw: st.DrawFn, unread: bool = False) -> list[Arrival]:
+def schedules(draw: st.DrawFn) -> list[Arrival]:
     """Times that never fall, and what came in by then: frames of up to 300 us ago, or nothing."""
     now, found = 10_000, []
     for _ in range(draw(st.integers(1, 25))):
         now += draw(st.sampled_from([0, 1, 300, 700, 1000, 1400, 1401, 2000, 2001, 5000]))
         switches = draw(st.none() | st.builds(SwitchFrame, delays.map(now.__sub__), masks, st.just(0) | masks))
-        if switches is not None and unread:
-            switches = replace(switches, unread=draw(masks))
         bytes_ = st.binary(min_size=len(SENSORS), max_size=len(SENSORS))
         status = st.sampled_from([None, 0x81, 0x80, 0x87, 0x86])
         found.append((now, switches, draw(st.none() | st.builds(GloveFrame, delays.map(now.__sub__), bytes_, status))))
@@ -75,7 +68,7 @@ def flags(mask: int) -> np.ndarray:
 
 
 def definition(build: Build, arrivals: list[Arrival]) -> dict[str, Any]:
-    """What has to be said at the time of the last arrival, but for early exits."""
+    """What has to be said at the time of the last arrival."""
     now, tables = arrivals[-1][0], build.tables
     switches, glove = newest([arrival[1] for arrival in arrivals]), newest([arrival[2] for arrival in arrivals])
     no_switches = switches is None or now - switches.time_us > 2 * SWITCH_PERIOD
@@ -202,83 +195,6 @@ def test_what_does_not_fit_is_refused_with_our_own_errors(make_build: MakeBuild)
         recognizer(make_build(), sensor_names=("j0", "j1"))
 
 
-PORTS = (0b000011, 0b001100, 0b110000)
-
-
-@st.composite
-def scans(draw: st.DrawFn) -> list[tuple[int, int, bytes]]:
-    sensors = st.binary(min_size=len(SENSORS), max_size=len(SENSORS))
-    few = draw(st.lists(st.tuples(masks, sensors), min_size=1, max_size=4))
-    return [(draw(st.integers(1, 3)), *draw(st.sampled_from(few))) for _ in range(draw(st.integers(1, 30)))]
-
-
-@given(seed=st.integers(0, 20), scan=scans(), lead=st.sampled_from([0.0, 0.3, 1.0]))
-def test_early_exit_changes_no_decision_and_promises_no_more_than_the_whole_scan_holds(
-    make_build: MakeBuild, seed: int, scan: list[tuple[int, int, bytes]], lead: float
-) -> None:
-    build, policy = make_build(seed), Policy(lead=lead, dwell_us=2000, hold_us=5000)
-    whole, early = recognizer(build, policy), recognizer(build, policy)
-    exit_ = EarlyExit(build.scorer, PORTS, lead=policy.lead_steps(build.tables.scale))
-    joints, now = Joints(build.manifest.joints, SENSORS, None, GLOVE_PERIOD), 0
-    for wait, closed, sensors in scan:
-        now += wait * 500
-        glove = GloveFrame(now, sensors)
-        exit_.start(joints.codes(now, glove))
-        last = next((port for port in range(3) if exit_.after(port, closed)), 2)
-        unread = exit_.unread(last)
-        found = early.step(now, 0, SwitchFrame(now, closed & ~unread, 0, unread), glove).grasp
-        full = whole.step(now, 0, SwitchFrame(now, closed), glove).grasp
-        assert (found.grasp, found.candidate, found.health) == (full.grasp, full.candidate, full.health)
-        assert found.margin <= full.margin
-        assert found.probability <= full.probability * (1 + 1e-12)
-
-
-@settings(max_examples=15)
-@given(seed=st.integers(0, 20), hand=st.lists(st.tuples(masks, st.binary(min_size=4, max_size=4)), max_size=6))
-def test_early_exit_changes_no_segment_where_whole_scans_follow_the_hand(
-    make_build: MakeBuild, seed: int, hand: list[tuple[int, bytes]]
-) -> None:
-    """Every half tick a scan goes to its end, and the hand moves no more often than that."""
-    build, policy = make_build(seed), Policy(max_lost=1.0, lag_us=50_000)
-    half = build.manifest.segmenting.tick_us // 2
-    whole, early = recognizer(build, policy), recognizer(build, policy)
-    exit_ = EarlyExit(build.scorer, PORTS)
-    joints, states, ended = Joints(build.manifest.joints, SENSORS, None, GLOVE_PERIOD), set(), 0
-    for now in range(0, half * 40 * len(hand), 1000):
-        closed, sensors = hand[now // (40 * half)]
-        glove = GloveFrame(now, sensors)
-        exit_.start(joints.codes(now, glove))
-        last = next((port for port in range(3) if now % half and exit_.after(port, closed)), 2)
-        unread = exit_.unread(last)
-        ended += unread > 0
-        found = early.step(now, 0, SwitchFrame(now, closed & ~unread, 0, unread), glove).grasp
-        full = whole.step(now, 0, SwitchFrame(now, closed), glove).grasp
-        of = [(one.state, one.segment, one.segment_type, one.segment_us) for one in (found, full)]
-        assert of[0] == of[1]
-        states.add(of[0][0])
-    event(f"{sorted(states)}, {ended > 0}")
-
-
-def test_without_whole_scans_what_is_unread_counts_as_lost_for_segments(make_build: MakeBuild) -> None:
-    build, found, ended = make_build(), set(), 0
-    seen, lost = (recognizer(build, Policy(max_lost=1.0, lag_us=0)) for _ in range(2))
-    exit_, joints = EarlyExit(build.scorer, PORTS), Joints(build.manifest.joints, SENSORS, None, GLOVE_PERIOD)
-    for now in range(0, 24 * 400_000, 1000):
-        closed = now // 400_000
-        glove = GloveFrame(now, bytes(1 + closed * step % 255 for step in (31, 77, 101, 151)))
-        exit_.start(joints.codes(now, glove))
-        last = next((port for port in range(3) if exit_.after(port, closed)), 2)
-        unread = exit_.unread(last)
-        one = seen.step(now, 0, SwitchFrame(now, closed & ~unread, 0, unread), glove).grasp
-        other = lost.step(now, 0, SwitchFrame(now, closed & ~unread, unread), glove).grasp
-        # Once the last whole scan is two ticks old.
-        if now % 400_000 == 399_000:
-            assert one.segment_type == other.segment_type
-            found.add(one.segment_type)
-            ended += unread > 0
-    assert len(found) > 1 < ended
-
-
 def test_without_a_lag_there_are_no_segments(make_build: MakeBuild) -> None:
     live = recognizer(make_build(), Policy(lag_us=None))
     for now in range(0, 300_000, 1000):
@@ -299,26 +215,6 @@ def test_a_segment_has_the_probability_of_its_type_in_this_frame(make_build: Mak
             assert math.isclose(found.segment_probability, expected, rel_tol=1e-9)
             seen += found.segment_type != found.grasp
     assert seen
-
-
-def test_a_scan_ends_only_when_the_lead_that_the_decision_asks_for_is_sure(make_build: MakeBuild) -> None:
-    build, ends = make_build(), []
-    for lead in (0.0, 0.4):
-        system = System.of(
-            build,
-            Harness(name="any", scanners=(ScannerWiring(port="p", switches=NAMES),)),
-            Policy(lead, quarantine=False),
-        )
-        made = system.early_exit(PORTS)
-        expected = EarlyExit(build.scorer, PORTS, lead=round(lead * build.tables.scale))
-        found = []
-        for closed in range(1 << SWITCHES):
-            for exit_ in (made, expected):
-                exit_.start([5, 6, 7])
-            found += [made.after(port, closed) for port in range(3)]
-            assert found[-3:] == [expected.after(port, closed) for port in range(3)]
-        ends.append(found)
-    assert sum(ends[0]) > sum(ends[1]) > 0
 
 
 @pytest.mark.parametrize(
@@ -366,41 +262,9 @@ def test_after_unknown_the_first_candidate_is_decided_on_at_once(make_build: Mak
     assert found.grasp == found.candidate == held.candidate
 
 
-@pytest.mark.slow
-@given(seed=st.integers(0, 20), schedule=schedules(unread=True))
-def test_switches_left_unread_too_early_count_as_lost(
-    make_build: MakeBuild, seed: int, schedule: list[Arrival]
-) -> None:
-    """Whatever was left unread: an answer is either the same for all that it may have been, or degraded."""
-    build = make_build(seed)
-    live = recognizer(build)
-    for number, (now, switches, glove) in enumerate(schedule):
-        found = live.step(now, 0, switches, glove).grasp
-        past = [
-            (then, seen and replace(seen, lost=seen.lost | seen.unread, unread=0), record)
-            for then, seen, record in schedule[: number + 1]
-        ]
-        expected = definition(build, past)
-        if found.health == "ok":
-            assert found.candidate == definition_winner(build, past)
-        if found.lost == expected["lost"]:
-            assert (found.grasp, found.margin, found.health) == tuple(
-                expected[name] for name in ("grasp", "margin", "health")
-            )
-
-
-def definition_winner(build: Build, arrivals: list[Arrival]) -> str:
-    """The candidate, also where so much is lost that it would not be named."""
-    switches, glove = newest([arrival[1] for arrival in arrivals]), newest([arrival[2] for arrival in arrivals])
-    codes = [glove.sensors[SENSORS.index(f"j{number}")] for number in range(JOINTS)]
-    present = np.zeros(JOINTS, bool)
-    lanes = build.scorer.lanes_without(flags(switches.closed), np.array(codes), flags(switches.lost), present)
-    return build.grasps[int(np.argmax(lanes))]
-
-
 def test_a_sequential_test_takes_whole_frames_only(make_build: MakeBuild) -> None:
     live = recognizer(make_build(), Policy(error_rate=0.01, max_lost=1.0))
-    found = live.step(0, 0, SwitchFrame(0, 0, 0, 0b11), GloveFrame(0, b"\x05\x06\x07\x08")).grasp
+    found = live.step(0, 0, SwitchFrame(0, 0, 0b11), GloveFrame(0, b"\x05\x06\x07\x08")).grasp
     assert (found.health, found.lost) == ("degraded", ("s0", "s1"))
 
 
@@ -424,54 +288,3 @@ def test_a_replay_gives_the_same_answers(make_build: MakeBuild) -> None:
     first, second = (recognizer(make_build(), Policy()) for _ in range(2))
     for now, switches, glove in calls:
         assert first.step(now, 0, switches, glove).grasp == second.step(now, 0, switches, glove).grasp
-
-
-@pytest.mark.parametrize("policy", [AT_ONCE, Policy(lead=0.3, dwell_us=2000, hold_us=6000)])
-@pytest.mark.parametrize("seed", range(3))
-def test_records_on_demand_change_no_answer_against_records_all_the_time(
-    make_build: MakeBuild, policy: Policy, seed: int
-) -> None:
-    """Every frame once with a record of its own, and once with one only where it is asked for."""
-    build = make_build(seed, switches=SWITCHES, joints=JOINTS)
-    tables = build.tables  # switches must be able to outweigh joints, or every frame needs a record
-    rows = (tables.switch_rows * 5).clip(-900, 900).astype(np.int16)
-    build = Build(build.manifest, replace(tables, switch_rows=rows, switch_means=(rows // 2).astype(np.int16)))
-    always = recognizer(build, policy)
-    seldom = LiveRecognizer(
-        build,
-        sensor_names=SENSORS,
-        switch_period_us=SWITCH_PERIOD,
-        glove_period_us=GLOVE_PERIOD,
-        policy=policy,
-        on_demand=True,
-    )
-    random = np.random.default_rng(seed)
-    asked, last = 0, None
-    for number in range(400):
-        now = 10_000 + 1000 * number
-        frame = SwitchFrame(now - 20, int(random.integers(1 << SWITCHES)), int(random.integers(4) == 0))
-        record = GloveFrame(now - 20, random.integers(1, 256, len(SENSORS)).astype(np.uint8).tobytes())
-        if seldom.wants_record(now, frame, last):
-            asked, last = asked + 1, record
-            assert not seldom.wants_record(now, frame, record)
-        mine, theirs = seldom.step(now, 0, frame, last).grasp, always.step(now, 0, frame, record).grasp
-        assert (mine.grasp, mine.candidate, mine.lost) == (theirs.grasp, theirs.candidate, theirs.lost)
-    assert 0 < asked < 400
-
-
-def test_where_the_switches_have_fallen_silent_records_are_asked_for_as_often_as_they_would_come(
-    make_build: MakeBuild,
-) -> None:
-    seldom = LiveRecognizer(
-        make_build(switches=SWITCHES, joints=JOINTS),
-        sensor_names=SENSORS,
-        switch_period_us=SWITCH_PERIOD,
-        glove_period_us=GLOVE_PERIOD,
-        on_demand=True,
-    )
-    gone = SwitchFrame(1000, 0, (1 << SWITCHES) - 1)
-    record = GloveFrame(50_000, bytes(4))
-    for frame in (None, gone):
-        assert seldom.wants_record(50_000, frame, None)
-        assert not seldom.wants_record(51_000, frame, record)
-        assert seldom.wants_record(53_000, frame, record)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.runtime import Build
@@ -16,7 +16,6 @@ from thenar.runtime.live.recogniser import LiveRecognizer
 from thenar.runtime.manifest import Rejection
 from thenar.runtime.policy import Policy
 from thenar.runtime.published import NONE, UNKNOWN, LiveGrasp
-from thenar.runtime.scanning.decided import EarlyExit
 
 MakeBuild = Callable[..., Build]
 
@@ -121,32 +120,12 @@ def test_lost_switches_refuse_nothing_by_being_lost(build: Build) -> None:
     assert lasting(live, 0, 1, 1000, lost=0b010000)[0].grasp == NONE
 
 
-@settings(max_examples=20)
-@given(seed=st.integers(0, 20), hand=st.lists(masks, max_size=8))
-def test_early_exit_changes_no_answer_where_whole_scans_follow_the_hand(
-    make_build: MakeBuild, seed: int, hand: list[int]
-) -> None:
-    build, policy = refusing(make_build(seed, joints=0)), Policy(dwell_us=12_000, hold_us=100_000, lag_us=50_000)
-    half = build.manifest.segmenting.tick_us // 2
-    whole, early = recognizer(build, policy), recognizer(build, policy)
-    exit_ = EarlyExit(build.scorer, PORTS, lead=policy.lead_steps(build.tables.scale))
-    for now in range(0, half * 20 * len(hand), 500):
-        closed = hand[now // (20 * half)]
-        exit_.start([])
-        last = next((port for port in range(3) if now % half and exit_.after(port, closed)), 2)
-        unread = exit_.unread(last)
-        found = early.step(now, 0, SwitchFrame(now, closed & ~unread, 0, unread), None).grasp
-        full = whole.step(now, 0, SwitchFrame(now, closed), None).grasp
-        for name in ("grasp", "candidate", "health", "state", "segment", "segment_type", "segment_us"):
-            assert getattr(found, name) == getattr(full, name)
-
-
 @given(st.data())
 def test_with_none_a_standing_is_that_of_one_more_class(make_build: MakeBuild, data: st.DataObject) -> None:
     build = make_build(data.draw(st.integers(0, 9)), joints=0)
-    unread, lead = data.draw(masks), data.draw(st.integers(-40, 40))
-    lanes = build.scorer.lanes(np.array([data.draw(st.booleans()) and not unread >> s & 1 for s in range(6)]), [])
-    plain = Standing(lanes, build.scorer, unread)
+    lead = data.draw(st.integers(-40, 40))
+    lanes = build.scorer.lanes(np.array([data.draw(st.booleans()) for _ in range(6)]), [])
+    plain = Standing(lanes)
     both, none = plain.or_none(lead), len(lanes)
     assert both.candidate == (none if lead > 0 else plain.candidate)
     assert both.lanes[none] - max(lanes) == lead
@@ -154,7 +133,4 @@ def test_with_none_a_standing_is_that_of_one_more_class(make_build: MakeBuild, d
         if lead <= 0:
             assert both.lead(held) == plain.lead(held)
             assert both.contradicts(held, 5) == plain.contradicts(held, 5)
-    # None is refused or not whatever the unread switches are.
     assert both.contradicts(none, 5) == (lead <= -5)
-    assert both.leads(3) == (lead >= 3 if lead > 0 else plain.leads(3) and -lead >= 3)
-    assert both.whole == plain.whole == (not unread)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from thenar.runtime.live.decision import SequentialTest, Standing
-from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -15,11 +14,6 @@ MakeTables = Callable[..., IntegerTables]
 SCALE = 200.0
 FOREVER = 10**12
 FRAME_US = 10_000
-
-
-@pytest.fixture(scope="module")
-def scorer(make_tables: MakeTables) -> Scorer:
-    return Scorer(make_tables())
 
 
 def scores(random: np.random.Generator, true: int, classes: int, distance: float, frames: int) -> np.ndarray:
@@ -32,128 +26,126 @@ def scores(random: np.random.Generator, true: int, classes: int, distance: float
     return np.rint(SCALE * distance * x).astype(int) + 32768
 
 
-def run(test: SequentialTest, lanes: np.ndarray, scorer: Scorer) -> tuple[int | None, int]:
+def run(test: SequentialTest, lanes: np.ndarray) -> tuple[int | None, int]:
     """Feed frames until the first decision; return it and how many frames it took."""
     for number, row in enumerate(lanes.tolist()):
-        found = test.update(number * FRAME_US, Standing(tuple(row), scorer))
+        found = test.update(number * FRAME_US, Standing(tuple(row)))
         if found is not None:
             return found, number + 1
     return None, len(lanes)
 
 
-def wrong_share(
-    classes: int, error_rate: float, runs: int, scorer: Scorer, repeat: int = 1, spacing_us: int = 0
-) -> float:
+def wrong_share(classes: int, error_rate: float, runs: int, repeat: int = 1, spacing_us: int = 0) -> float:
     """Share of tests that end wrong; every frame comes `repeat` times, as from a hand that rests."""
     random, wrong = np.random.default_rng(11), 0
     for number in range(runs):
         true = number % classes
         lanes = np.repeat(scores(random, true, classes, 0.7, 150), repeat, axis=0)
-        found, _ = run(SequentialTest(classes, SCALE, error_rate, FOREVER, spacing_us), lanes, scorer)
+        found, _ = run(SequentialTest(classes, SCALE, error_rate, FOREVER, spacing_us), lanes)
         assert found is not None
         wrong += found != true
     return wrong / runs
 
 
 @pytest.mark.parametrize(("classes", "error_rate"), [(2, 0.1), (2, 0.02), (5, 0.1), (14, 0.1)])
-def test_it_errs_no_more_often_than_stated(classes: int, error_rate: float, scorer: Scorer) -> None:
+def test_it_errs_no_more_often_than_stated(classes: int, error_rate: float) -> None:
     runs = 1500
-    found = wrong_share(classes, error_rate, runs, scorer)
+    found = wrong_share(classes, error_rate, runs)
     assert found <= error_rate + 3 * math.sqrt(error_rate * (1 - error_rate) / runs)
 
 
-def test_the_threshold_is_not_needlessly_high_for_two_types(scorer: Scorer) -> None:
+def test_the_threshold_is_not_needlessly_high_for_two_types() -> None:
     """Wald's threshold errs less often than stated only by how far the last frame carries beyond it."""
-    assert wrong_share(2, 0.2, 1500, scorer) > 0.2 / 3
+    assert wrong_share(2, 0.2, 1500) > 0.2 / 3
 
 
-def test_frames_that_repeat_themselves_are_not_evidence_and_spacing_leaves_them_out(scorer: Scorer) -> None:
-    alike = wrong_share(5, 0.02, 800, scorer, repeat=8)
-    spaced = wrong_share(5, 0.02, 800, scorer, repeat=8, spacing_us=8 * FRAME_US)
+def test_frames_that_repeat_themselves_are_not_evidence_and_spacing_leaves_them_out() -> None:
+    alike = wrong_share(5, 0.02, 800, repeat=8)
+    spaced = wrong_share(5, 0.02, 800, repeat=8, spacing_us=8 * FRAME_US)
     assert alike > 3 * 0.02
     assert spaced <= 0.02 + 3 * math.sqrt(0.02 * 0.98 / 800)
 
 
-def test_a_lower_error_rate_takes_more_frames(scorer: Scorer) -> None:
+def test_a_lower_error_rate_takes_more_frames() -> None:
     def frames(error_rate: float) -> float:
         random = np.random.default_rng(3)
         rows = [scores(random, 0, 4, 0.7, 400) for _ in range(100)]
-        return float(np.mean([run(SequentialTest(4, SCALE, error_rate, FOREVER), row, scorer)[1] for row in rows]))
+        return float(np.mean([run(SequentialTest(4, SCALE, error_rate, FOREVER), row)[1] for row in rows]))
 
     assert frames(0.2) < frames(0.02) < frames(0.002)
 
 
-def test_it_decides_at_the_threshold_and_not_one_step_below(scorer: Scorer) -> None:
+def test_it_decides_at_the_threshold_and_not_one_step_below() -> None:
     threshold = math.ceil(SCALE * math.log(2 / 0.1))
     assert SequentialTest(3, SCALE, 0.1, FOREVER).threshold == threshold
-    assert SequentialTest(3, SCALE, 0.1, FOREVER).update(0, Standing((threshold, 0, 0), scorer)) == 0
-    assert SequentialTest(3, SCALE, 0.1, FOREVER).update(0, Standing((threshold, 1, 0), scorer)) is None
+    assert SequentialTest(3, SCALE, 0.1, FOREVER).update(0, Standing((threshold, 0, 0))) == 0
+    assert SequentialTest(3, SCALE, 0.1, FOREVER).update(0, Standing((threshold, 1, 0))) is None
 
 
-def test_an_answer_stands_until_the_next_or_until_its_time_is_over(scorer: Scorer) -> None:
+def test_an_answer_stands_until_the_next_or_until_its_time_is_over() -> None:
     test = SequentialTest(2, 1.0, 0.1, 100)
-    assert test.update(0, Standing((50, 0), scorer)) == 0
-    assert test.update(40, Standing((0, 0), scorer)) == 0
-    assert test.update(60, Standing((0, 50), scorer)) == 1
-    assert test.update(160, Standing((0, 0), scorer)) == 1
-    assert test.update(161, Standing((0, 0), scorer)) is None
+    assert test.update(0, Standing((50, 0))) == 0
+    assert test.update(40, Standing((0, 0))) == 0
+    assert test.update(60, Standing((0, 50))) == 1
+    assert test.update(160, Standing((0, 0))) == 1
+    assert test.update(161, Standing((0, 0))) is None
 
 
-def test_evidence_that_is_too_old_is_dropped(scorer: Scorer) -> None:
+def test_evidence_that_is_too_old_is_dropped() -> None:
     test = SequentialTest(2, 1.0, 0.1, 100)
-    assert test.update(0, Standing((2, 0), scorer)) is None
-    assert test.update(101, Standing((2, 0), scorer)) is None
-    assert test.update(201, Standing((2, 0), scorer)) == 0
+    assert test.update(0, Standing((2, 0))) is None
+    assert test.update(101, Standing((2, 0))) is None
+    assert test.update(201, Standing((2, 0))) == 0
 
 
-def test_a_frame_that_is_seen_twice_counts_once(scorer: Scorer) -> None:
+def test_a_frame_that_is_seen_twice_counts_once() -> None:
     test = SequentialTest(2, 1.0, 0.1, FOREVER)
-    assert [test.update(5, Standing((2, 0), scorer)) for _ in range(9)] == [None] * 9
-    assert test.update(6, Standing((2, 0), scorer)) == 0
+    assert [test.update(5, Standing((2, 0))) for _ in range(9)] == [None] * 9
+    assert test.update(6, Standing((2, 0))) == 0
 
 
-def test_frames_nearer_than_the_spacing_do_not_count(scorer: Scorer) -> None:
+def test_frames_nearer_than_the_spacing_do_not_count() -> None:
     test = SequentialTest(2, 1.0, 0.1, FOREVER, spacing_us=30)
-    assert [test.update(time_us, Standing((2, 0), scorer)) for time_us in (0, 10, 29)] == [None] * 3
-    assert test.update(30, Standing((2, 0), scorer)) == 0
+    assert [test.update(time_us, Standing((2, 0))) for time_us in (0, 10, 29)] == [None] * 3
+    assert test.update(30, Standing((2, 0))) == 0
 
 
-def test_forgetting_drops_the_answer_and_the_evidence(scorer: Scorer) -> None:
+def test_forgetting_drops_the_answer_and_the_evidence() -> None:
     test = SequentialTest(2, 1.0, 0.1, FOREVER)
-    test.update(0, Standing((50, 0), scorer))
-    test.update(1, Standing((2, 0), scorer))
+    test.update(0, Standing((50, 0)))
+    test.update(1, Standing((2, 0)))
     test.forget()
     assert test.held is None
-    assert test.update(1, Standing((2, 0), scorer)) is None
-    assert test.update(2, Standing((2, 0), scorer)) == 0
+    assert test.update(1, Standing((2, 0))) is None
+    assert test.update(2, Standing((2, 0))) == 0
 
 
 FOR_0, FOR_1 = (2, 0), (0, 2)
 
 
-def follow(frames: list[tuple[int, tuple[int, int], bool]], scorer: Scorer) -> list[int | None]:
+def follow(frames: list[tuple[int, tuple[int, int], bool]]) -> list[int | None]:
     """Return what two frames in agreement decide on, for up to 100 us, after each frame, whole or not."""
     test = SequentialTest(2, 1.0, 0.1, 100)
-    return [test.update(time_us, Standing(scores, scorer), whole=whole) for time_us, scores, whole in frames]
+    return [test.update(time_us, Standing(scores), whole=whole) for time_us, scores, whole in frames]
 
 
-def test_frames_with_lost_inputs_end_no_test_while_an_answer_of_whole_frames_holds(scorer: Scorer) -> None:
+def test_frames_with_lost_inputs_end_no_test_while_an_answer_of_whole_frames_holds() -> None:
     whole = [(0, FOR_0, True), (10, FOR_0, True)]
     lost = [(time_us, FOR_1, False) for time_us in (20, 110, 111, 112)]
-    assert follow(whole + lost, scorer) == [None, 0, 0, 0, None, 1]
+    assert follow(whole + lost) == [None, 0, 0, 0, None, 1]
 
 
-def test_frames_with_lost_inputs_are_left_aside_while_a_test_of_whole_frames_is_under_way(scorer: Scorer) -> None:
+def test_frames_with_lost_inputs_are_left_aside_while_a_test_of_whole_frames_is_under_way() -> None:
     frames = [(0, FOR_0, True), (10, FOR_1, False), (20, FOR_1, False), (30, FOR_0, True)]
-    assert follow(frames, scorer) == [None, None, None, 0]
+    assert follow(frames) == [None, None, None, 0]
 
 
-def test_a_test_of_whole_frames_that_takes_too_long_makes_room_for_frames_with_lost_inputs(scorer: Scorer) -> None:
+def test_a_test_of_whole_frames_that_takes_too_long_makes_room_for_frames_with_lost_inputs() -> None:
     frames = [(0, FOR_0, True), (100, FOR_1, False), (101, FOR_1, False), (102, FOR_1, False)]
-    assert follow(frames, scorer) == [None, None, None, 1]
+    assert follow(frames) == [None, None, None, 1]
 
 
-def test_a_whole_frame_drops_answer_and_evidence_of_frames_with_lost_inputs(scorer: Scorer) -> None:
+def test_a_whole_frame_drops_answer_and_evidence_of_frames_with_lost_inputs() -> None:
     answered = [(0, FOR_1, False), (10, FOR_1, False), (20, FOR_1, False)]
-    assert follow([*answered, (30, FOR_0, True), (40, FOR_0, True)], scorer) == [None, 1, 1, None, 0]
-    assert follow([*answered, (30, FOR_1, True), (40, FOR_1, True)], scorer) == [None, 1, 1, None, 1]
+    assert follow([*answered, (30, FOR_0, True), (40, FOR_0, True)]) == [None, 1, 1, None, 0]
+    assert follow([*answered, (30, FOR_1, True), (40, FOR_1, True)]) == [None, 1, 1, None, 1]

@@ -182,7 +182,7 @@ def test_nothing_is_joined_before_the_first_frame(joined: Joined) -> None:
 
 
 def test_a_part_alone_that_owns_everything_is_handed_on_as_it_is(joined: Joined) -> None:
-    frame = SwitchFrame(5, 0b01, 0, 0b10, GloveFrame(3, b"x"))
+    frame = SwitchFrame(5, 0b01, 0b10, GloveFrame(3, b"x"))
     assert joined(2, [LOW], [(6, 0, frame, LONGEST_US)], 6) is frame
 
 

@@ -39,9 +39,9 @@ def entries() -> list[Entry]:
     start = now_us()
     glove = GloveFrame(start + 20, b"\x01\xff", 3)
     return [
-        SwitchFrame(start + 10, 0b1010, lost=1 << 11, unread=0b1),
+        SwitchFrame(start + 10, 0b1010, lost=1 << 11),
         glove,
-        SwitchFrame(start + 25, 0b1, unread=0b110, glove=glove),
+        SwitchFrame(start + 25, 0b1, glove=glove),
         LiveGrasp(start + 30, 1, 0, "unknown", "cup", 0.0, 3, "degraded", 20, None, 10, ("s011",)),
         LiveGrasp(
             start + 40,

@@ -25,7 +25,6 @@ def test_switches_come_back_as_they_were(data: st.DataObject, switches: int, sen
         data.draw(times),
         closed=data.draw(masks),
         lost=data.draw(masks),
-        unread=data.draw(masks),
         glove=data.draw(st.none() | gloves(sensors)),
     )
     assert switch_frame(frame.time_us, switch_bytes(frame, switches, sensors), switches, sensors) == frame
@@ -38,10 +37,10 @@ def test_gloves_come_back_as_they_were(data: st.DataObject, sensors: int) -> Non
 
 
 def test_an_open_switch_is_0_a_closed_one_1_and_more_is_not_known() -> None:
-    assert list(switch_bytes(SwitchFrame(0, 0b0010, lost=0b0100, unread=0b1000), 4, 0)) == [0, 1, 2, 4]
+    assert list(switch_bytes(SwitchFrame(0, 0b1010, lost=0b1100), 4, 0)) == [0, 1, 2, 3]
 
 
-@pytest.mark.parametrize("field", ["closed", "lost", "unread"])
+@pytest.mark.parametrize("field", ["closed", "lost"])
 @pytest.mark.parametrize("switches", [0, 3, 8])
 def test_bits_of_switches_that_are_not_recorded_are_refused(field: str, switches: int) -> None:
     masks: dict[str, Any] = {field: 1 << switches}

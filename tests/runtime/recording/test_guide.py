@@ -119,7 +119,6 @@ def test_one_may_leave_at_any_time(guide: Guide, recorder: Recorder, presses: in
             "the CyberGlove is silent",
         ),
         ([SwitchFrame(COUNTDOWN_US, 0, lost=0b101)], "switches cannot be read: s000, s002"),
-        ([SwitchFrame(COUNTDOWN_US, 0, unread=1 << 11)], "switches cannot be read: s011"),
         (
             [SwitchFrame(COUNTDOWN_US, 0), GloveFrame(COUNTDOWN_US, b"12", 0b110)],
             "the CyberGlove is not plugged into its box",

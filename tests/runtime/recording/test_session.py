@@ -4,7 +4,6 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.runtime.errors import McapError
-from thenar.runtime.policy import Policy
 from thenar.runtime.recording.session import Session, from_metadata, to_metadata
 
 PLAN = (
@@ -21,8 +20,7 @@ def test_a_session_comes_back_from_its_texts(session: Session) -> None:
 
 def test_texts_are_readable_as_they_are(session: Session) -> None:
     texts = to_metadata(session)
-    assert texts["version"] == "3"
-    assert to_metadata(replace(session, collection=None))["version"] == "1"
+    assert texts["version"] == "1"
     assert texts["harness"] == 'name = "bänk"\n'
     assert texts["sensors"] == '["thumb","index"]'
     assert all(isinstance(text, str) for text in texts.values())
@@ -38,18 +36,10 @@ def test_what_has_a_default_may_be_missing(session: Session) -> None:
     assert from_metadata(needed) == from_metadata(texts)
 
 
-def test_a_session_of_before_there_were_segments_is_one_without(session: Session) -> None:
-    texts = to_metadata(replace(session, policy=Policy(lead=0.25)))
-    assert from_metadata(texts).policy == Policy(lead=0.25, lag_us=150_000)
-    older = json.loads(texts["policy"])
-    del older["lag_us"]
-    assert from_metadata({**texts, "policy": json.dumps(older)}).policy == Policy(lead=0.25, lag_us=None)
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"version": "4"}, "of version 4, this thenar reads up to 3: update thenar"),
+        ({"version": "4"}, "of version 4, this thenar reads 1: use the thenar that recorded it"),
         ({"version": "9" * 5000}, "not a number"),
         ({"version": "x"}, "its version is 'x', not a number"),
         ({"version": "²"}, "not a number"),

@@ -95,7 +95,7 @@ def test_ros_reads_every_message_by_the_definitions_in_the_file(recording: Path)
                 file, decoder_factories=[DecoderFactory()]
             ).iter_decoded_messages()
         ]
-    assert decoded[0] == ("/thenar/switches", bytes([4, 1, 0, 1, *[0] * 7, 2]))
+    assert decoded[0] == ("/thenar/switches", bytes([0, 1, 0, 1, *[0] * 7, 2]))
     assert decoded[1] == ("/thenar/glove", b"\x01\xff\x03")
     assert [data for topic, data in decoded if topic == "/thenar/grasp"] == ["unknown", "cup"]
     assert decoded[3][1].startswith('{"time_us":')

@@ -1,9 +1,5 @@
-"""Levels of taxels in scan maps: one conversion each, checked with the wiring, in the order that decides earliest."""
+"""Levels of taxels in scan maps: one conversion each, checked with the wiring."""
 
-from collections.abc import Callable, Sequence
-from itertools import permutations
-
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,17 +9,12 @@ from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, ScannerWiring, SpiWiring
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.manifest import Calibration, Switch, Threshold
-from thenar.runtime.scanning.decided import EarlyExit
 from thenar.runtime.scanning.plan import Costs, check_harness, plan_scan
-from thenar.runtime.scanning.ports import whole_scan, wired_names
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_board, propose_harness
-from thenar.runtime.scanning.scanmap import Port, check_switches, scanmap_from_bytes, scanmap_to_bytes
-from thenar.runtime.scanning.timing import overlapped_us, port_us, reading_of, scan_us
-from thenar.runtime.scores import Scorer
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.scanning.scanmap import check_switches, scanmap_from_bytes, scanmap_to_bytes
+from thenar.runtime.scanning.timing import overlapped_us, scan_us
 
-MakeTables = Callable[..., IntegerTables]
 START, READ, WAIT = 38 / 0.4 + 1.3, 48 / 0.4 + 1.3, 1317.0  # of an ADS1115 at 400 kHz
 
 
@@ -52,10 +43,8 @@ names = st.one_of(
 
 @settings(deadline=None)
 @given(kept=st.lists(names, unique=True, max_size=25))
-def test_all_levels_of_a_taxel_are_one_conversion_and_every_kept_name_is_read_once(
-    make_tables: MakeTables, kept: list[str]
-) -> None:
-    scan = plan_scan(kept, make_tables(switches=len(kept), joints=1), MIXED)
+def test_all_levels_of_a_taxel_are_one_conversion_and_every_kept_name_is_read_once(kept: list[str]) -> None:
+    scan = plan_scan(kept, MIXED)
     check_switches(scan, len(kept))
     check_harness(scan, MIXED, kept)
     assert scanmap_from_bytes(scanmap_to_bytes(scan)) == scan
@@ -94,13 +83,6 @@ def test_a_name_that_looks_like_a_level_and_is_a_switch_of_the_wiring_is_one() -
     assert [(port.switches, port.levels) for port in scan.ports] == [(((0, 0),), ()), ((), ((8, 1),))]
 
 
-def test_a_level_of_an_older_build_is_found_on_a_converter_and_on_a_comparators_pin() -> None:
-    threshold = Threshold(83, 0.41, Calibration(0, "t0", "N", 0, 0.0, 100, 1.0))
-    old = [Switch(0, "t0", 0.1, threshold), Switch(1, "s0", 0.1)]
-    assert wired_names(glove(ads1115(0, "t0")), old) == ["t0>83", "s0"]
-    assert wired_names(glove(ChipWiring(kind="mcp23017", address=0x20, pins={"GPA0": "t0"})), old) == ["t0", "s0"]
-
-
 @pytest.mark.parametrize(
     "change",
     [
@@ -114,18 +96,16 @@ def test_a_level_of_an_older_build_is_found_on_a_converter_and_on_a_comparators_
         {"closed_high": False},
     ],
 )
-def test_a_conversion_that_the_wiring_does_not_have_is_refused(
-    make_tables: MakeTables, change: dict[str, object]
-) -> None:
+def test_a_conversion_that_the_wiring_does_not_have_is_refused(change: dict[str, object]) -> None:
     harness = glove(ads1115(0, "t0", "t1"))
-    scan = plan_scan(["t0>7"], make_tables(switches=1), harness)
+    scan = plan_scan(["t0>7"], harness)
     with pytest.raises(HarnessError, match="reads other pins or keys than harness 'x'"):
         check_harness(replace(scan, ports=(replace(scan.ports[0], **change),)), harness, ["t0>7"])
 
 
-def test_taxels_that_are_wired_to_nothing_are_named(make_tables: MakeTables) -> None:
+def test_taxels_that_are_wired_to_nothing_are_named() -> None:
     with pytest.raises(HarnessError, match="'x' has no pin or key for t9>7, t1, which the build keeps"):
-        plan_scan(["t0>7", "t9>7", "t1"], make_tables(switches=3), glove(ads1115(0, "t0")))
+        plan_scan(["t0>7", "t9>7", "t1"], glove(ads1115(0, "t0")))
 
 
 def test_what_hangs_where_is_in_the_fingerprint_and_an_old_wirings_is_as_it_was() -> None:
@@ -192,47 +172,6 @@ def test_no_order_takes_less_than_what_the_plan_counts(data: st.DataObject) -> N
     assert counted / 1000 <= taken + 0.01
     # In the worst case the last conversion of each chip is waited for after the others'.
     assert taken <= counted / 1000 + sum(map(bool, taxels)) * (WAIT + START + READ)
-
-
-def expected_us(ports: Sequence[Port], harness: Harness, tables: IntegerTables, bits: np.ndarray) -> float:
-    """The mean wire time until the runtime's own early exit stops a scan of `ports`."""
-    early = EarlyExit(Scorer(tables), [sum(1 << number for number in port.elements) for port in ports])
-    total = 0.0
-    for row in bits:
-        closed = sum(1 << number for number in np.flatnonzero(row).tolist())
-        early.start([], closed, lost=0)
-        for place, port in enumerate(ports):
-            total += port_us(reading_of(port, harness), harness.line_of(port.bus).clock_hz)
-            if early.after(place, closed):
-                break
-    return total / len(bits)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_levels_come_in_the_order_that_decides_earliest(seed: int) -> None:
-    """Three taxels of several levels and an expander; no other order is faster on the frames, which are monotone."""
-    harness = glove(
-        ChipWiring(kind="ads7828", address=0x48, pins={"CH0": "t0", "CH1": "t1", "CH5": "t2"}),
-        ChipWiring(kind="mcp23008", address=0x20, pins={"GP0": "s0", "GP1": "s1"}),
-        spi=(SpiWiring(device="/dev/spidev0.0", kind="mcp3208", pins={"CH0": "t3"}),),
-    )
-    random = np.random.default_rng(seed)
-    kept = ["t0>100", "s0", "t1>900", "t0>2000", "t3>5", "t1>50", "t2>300", "s1", "t0>700"]
-    codes = random.integers(0, 4096, (80, 4)) * (random.random((80, 4)) < 0.6)
-    bits = np.array(
-        [
-            [row[int(name[1])] > int(name[3:]) if name[0] == "t" else random.random() < 0.4 for name in kept]
-            for row in codes
-        ]
-    )
-    rows = (random.normal(0, 60, (9, 4)) * np.exp(random.normal(0, 1.5, (9, 1)))).astype(np.int16)
-    none = np.zeros((0, 4), np.int16)
-    tables = IntegerTables(np.zeros(4, np.int16), rows, (), (), (rows * 0.4).astype(np.int16), none, 1.0)
-    scan = plan_scan(kept, tables, harness, bits)
-    times = {some: expected_us(some, harness, tables, bits) for some in permutations(scan.ports)}
-    assert len(times) == 120
-    assert times[scan.ports] == pytest.approx(min(times.values()), rel=1e-12)
-    assert max(times.values()) > 1.02 * min(times.values())
 
 
 # Proposals.

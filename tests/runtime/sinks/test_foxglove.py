@@ -185,7 +185,6 @@ def test_moments_come_as_they_were_published_with_their_times(
         assert came["/thenar/switches"] == {
             "closed": [name for bit, name in enumerate(names) if frame.closed >> bit & 1 and not frame.lost >> bit & 1],
             "lost": [name for bit, name in enumerate(names) if frame.lost >> bit & 1],
-            "unread": [],
         }
         types = came["/thenar/scores"]["types"]
         assert [(one["grasp"], one["score"]) for one in types] == list(zip(build.grasps, scores, strict=True))

@@ -5,10 +5,8 @@ from collections.abc import Callable, Iterator, Sequence
 import pytest
 
 from thenar.runtime import Build
-from thenar.runtime.calibration import Joints
-from thenar.runtime.frames import GloveFrame, Newest, SwitchFrame
+from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Debounce, Harness
-from thenar.runtime.scanning.decided import EarlyExit
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources import i2c as module
 from thenar.runtime.sources.i2c import I2cDevice
@@ -73,13 +71,6 @@ def frame(of: I2cDevice) -> SwitchFrame:
     return found
 
 
-class AtOnce(EarlyExit):
-    """Nothing matters after the first port."""
-
-    def after(self, port: int, closed: int, lost: int = 0) -> bool:
-        return True
-
-
 OFF = Debounce(enabled=False)
 
 
@@ -98,33 +89,6 @@ def test_a_bus_on_which_nobody_answers_is_not_asked_in_a_busy_loop(bench: Bench)
     bench.answers = [[None, None]]
     assert frame(device(OFF)).lost == 0b111_111
     assert bench.slept
-
-
-def test_nor_is_one_whose_first_chip_is_gone_and_whose_others_do_not_matter(
-    bench: Bench, make_build: MakeBuild
-) -> None:
-    build = make_build(joints=3)
-    joints, glove = Joints(build.manifest.joints, ("j0", "j1", "j2"), None, 10_000), Newest[GloveFrame]()
-    glove.take(GloveFrame(bench.now, b"\x10\x20\x30"), bench.now, 20_000)
-    made = device(OFF)
-    made.end_early(lambda ports: AtOnce(build.scorer, ports), joints, glove)
-    bench.answers = [[None]]
-    found = frame(made)
-    assert (found.lost, found.unread) == (0b000_111, 0b111_000)
-    assert bench.slept
-
-
-def test_every_so_often_a_scan_goes_to_its_end_whatever_is_decided(bench: Bench, make_build: MakeBuild) -> None:
-    build = make_build(joints=3)
-    joints, glove = Joints(build.manifest.joints, ("j0", "j1", "j2"), None, 10_000), Newest[GloveFrame]()
-    made = device(OFF)
-    made.end_early(lambda ports: AtOnce(build.scorer, ports, whole_us=450), joints, glove)
-    bench.groups, found = 2, []
-    for _ in range(12):
-        bench.answers = [[HIGH], [HIGH]]
-        found.append(not frame(made).unread)
-    # A port takes 100 us: after a whole scan, five begin within 450.
-    assert found == [True, *[False] * 5] * 2
 
 
 def test_what_was_read_before_a_chip_held_the_bus_up_is_no_news(bench: Bench) -> None:
@@ -184,14 +148,3 @@ def test_levels_are_debounced_as_switches_are(bench: Bench) -> None:
     bench.takes_us = 1000
     bench.answers = [[HIGH, code, 0] for code in (101, 100, 101, 101, 101)]
     assert [frame(made).closed for _ in range(5)] == [0b100] * 5
-
-
-def test_a_scan_that_ends_early_leaves_levels_unread(bench: Bench, make_build: MakeBuild) -> None:
-    build = make_build(joints=3)
-    joints, glove = Joints(build.manifest.joints, ("j0", "j1", "j2"), None, 10_000), Newest[GloveFrame]()
-    glove.take(GloveFrame(bench.now, b"\x10\x20\x30"), bench.now, 20_000)
-    made = measuring(OFF)
-    made.end_early(lambda ports: AtOnce(build.scorer, ports), joints, glove)
-    bench.answers = [[HIGH]]
-    found = frame(made)
-    assert (found.closed, found.lost, found.unread, found.taxels) == (0, 0, 0b1101, None)

@@ -92,7 +92,7 @@ def counted(source: RowSource) -> dict[str, int]:
 def test_a_row_is_switches_levels_taxels_and_joints_of_one_moment(play: Play) -> None:
     source, frames = play([(1_000_000, b"5,1,99,512,701,4095,1\n")])
     glove = GloveFrame(1_000_000, bytes((255, 1)))
-    assert frames == [SwitchFrame(1_000_000, 0b1110, 0, 0, glove, (701,)), glove]
+    assert frames == [SwitchFrame(1_000_000, 0b1110, 0, glove, (701,)), glove]
     assert source.owned == 0b1111
     assert counted(source) == {"rows": 1}
 
@@ -112,12 +112,12 @@ def test_grids_are_those_that_are_stated(number: int, code: int) -> None:
 def test_values_that_are_no_numbers_lose_their_inputs_and_no_others(play: Play) -> None:
     source, frames = play([(1_000_000, b"5,nan,0,600,,x?,0\n5,nan,0,600,,,0\n")])
     glove = GloveFrame(1_000_000, bytes((0, 128)))
-    assert frames == [SwitchFrame(1_000_000, 0b0001, 0b1110, 0, glove, (None,)), glove]
+    assert frames == [SwitchFrame(1_000_000, 0b0001, 0b1110, glove, (None,)), glove]
     assert counted(source) == {"rows": 1, "missing": 3, "misfits": 1}
 
 
 def test_columns_by_name_in_any_order_and_by_a_header(play: Play) -> None:
-    whole = SwitchFrame(0, 0b0100, 0, 0, GloveFrame(0, b"\x01\x80"), (0,))
+    whole = SwitchFrame(0, 0b0100, 0, GloveFrame(0, b"\x01\x80"), (0,))
     for line in (
         b'{"bend": 0, "flex": 0, "index": 0, "thumb": true, "more": 7, "pad": 0, "ms": 1}\n',
         b"bend:0,flex:0,index:0,thumb:1,pad:0,ms:1\n",
@@ -130,7 +130,7 @@ def test_columns_by_name_in_any_order_and_by_a_header(play: Play) -> None:
 
 def test_a_sender_that_names_its_columns_is_read_by_name_or_not_at_all(play: Play) -> None:
     source, frames = play([(0, b"ms,thumb,spare,idx,pad,flex,bend\n1,1,7,1023,0,0,0\n")])
-    assert frames[0] == SwitchFrame(0, 0b0100, 0b0001, 0, GloveFrame(0, b"\x01\x80"), (0,))
+    assert frames[0] == SwitchFrame(0, 0b0100, 0b0001, GloveFrame(0, b"\x01\x80"), (0,))
     assert source.trouble() == "its rows lack index: name columns in glove.toml as it does"
     source, frames = play([(0, b"a,b,c,d,e,f,g\n1,1,7,1023,0,0,0\n")])
     assert frames == []
@@ -171,7 +171,7 @@ def test_a_row_without_its_clock_is_left_out_and_one_without_a_sensor_is_not(pla
     source, frames = play([(10_000, chunk) for chunk in (*chunks, last)])
     assert counted(source) == {"rows": 2, "missing": 1, "untimed": 1, "wrong columns": 2}
     glove = GloveFrame(10_000, bytes((1, 0)))
-    assert frames[-2:] == [SwitchFrame(10_000, 0b0100, 0, 0, glove, (3,)), glove]
+    assert frames[-2:] == [SwitchFrame(10_000, 0b0100, 0, glove, (3,)), glove]
 
 
 def test_what_comes_twice_late_or_not_at_all_is_counted(play: Play) -> None:

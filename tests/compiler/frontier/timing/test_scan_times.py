@@ -1,13 +1,9 @@
-from math import fsum
-
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware.targets import timed
 from thenar.compiler.frontier.points import Time
-from thenar.compiler.frontier.timing.python_times import random_tables
 from thenar.compiler.frontier.timing.scan_times import (
     Overhead,
     ScanTimes,
@@ -22,11 +18,9 @@ from thenar.compiler.frontier.timing.wirings import BOARD, Wiring
 from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring
-from thenar.runtime.scanning.decided import EarlyExit
-from thenar.runtime.scanning.plan import Costs, plan_scan
+from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us, scanner_us
-from thenar.runtime.scores import Scorer
 
 CALL = Overhead("a call", call_us=7.0)
 wired = st.builds(
@@ -38,67 +32,30 @@ def names_of(count: int) -> list[str]:
     return [f"s{number}" for number in range(count)]
 
 
-def frames(switches: int, joints: int, n: int = 150) -> tuple[np.ndarray, np.ndarray]:
-    random = np.random.default_rng(switches)
-    return random.random((n, switches)) < 0.3, random.integers(0, 255, (n, joints)).astype(np.uint16)
-
-
-@given(st.integers(1, 140), st.sampled_from([0, 16]), wired)
-def test_a_full_scan_takes_what_the_runtime_predicts_with_a_system_call_a_transaction(
-    switches: int, joints: int, wiring: Wiring
-) -> None:
-    tables, names = random_tables(switches, joints, 5), names_of(switches)
-    times = scan_times(names, tables, wiring, *frames(switches, joints, 20), CALL)
+@given(st.integers(1, 140), wired)
+def test_a_scan_takes_what_the_runtime_predicts_with_a_system_call_a_transaction(switches: int, wiring: Wiring) -> None:
+    names = names_of(switches)
+    times = scan_times(names, wiring, CALL)
     harness = wiring.harness_of(names)
-    scan = plan_scan(names, tables, harness)
-    assert times.full_us == pytest.approx(scan_us(scan, harness, CALL.call_us).us)
-    assert times.early_us <= times.full_us
+    scan = plan_scan(names, harness)
+    assert times.us == pytest.approx(scan_us(scan, harness, CALL.call_us).us)
     assert (times.ports, times.chips, times.how) == (len(scan.ports), len(harness.buses[0].chips), "wire")
 
 
-@pytest.mark.parametrize("switches", [12, 33, 120])
-def test_a_scan_that_ends_early_takes_what_scanning_the_frames_one_by_one_comes_to(switches: int) -> None:
-    tables, names, wiring = random_tables(switches, 16, 6), names_of(switches), Wiring("mcp23017", 400_000)
-    bits, codes = frames(switches, 16)
-    harness = wiring.harness_of(names)
-    # Of no more frames than decide on the order of ports, so that it is the same.
-    scan = plan_scan(names, tables, harness, bits, codes)
-    costs, ports = Costs(scan.ports, harness), [sum(1 << s for _, s in port.switches) for port in scan.ports]
-    early, taken_us, looks = EarlyExit(Scorer(tables), ports), list[float](), 0
-    for frame, code in zip(bits, codes, strict=True):
-        closed = sum(1 << int(switch) for switch in np.flatnonzero(frame))
-        early.start(code.tolist())
-        read = 0
-        for port, group in enumerate(ports):
-            taken_us.append(costs.after(read, port) / 1000 + CALL.call_us * (1 + _selects(costs, read, port)))
-            read |= 1 << port
-            looks += 1
-            if early.after(port, closed & group):
-                break
-    times = scan_times(names, tables, wiring, bits, codes, CALL)
-    assert times.early_us == pytest.approx(fsum(taken_us) / len(bits))
-    assert times.early_ports == pytest.approx(looks / len(bits))
-    assert switches == 12 or times.early_us < times.full_us
-
-
-def _selects(costs: Costs, read: int, port: int) -> bool:
-    return costs.after(read, port) > costs.after(read | 1 << port, port)
-
-
 def test_on_an_avr_the_firmware_takes_its_time_for_scan_keys_readings_and_bytes() -> None:
-    tables, wiring, names = random_tables(20, 0, 4), Wiring("mcp23017", 400_000), names_of(20)
-    bare = scan_times(names, tables, wiring, *frames(20, 0))
-    there = scan_times(names, tables, wiring, *frames(20, 0), firmware_overhead("avr328p"))
+    wiring, names = Wiring("mcp23017", 400_000), names_of(20)
+    bare = scan_times(names, wiring)
+    there = scan_times(names, wiring, firmware_overhead("avr328p"))
     cycles = 520 + 40 * 20 + 2 * 530 + (2 + 1) * 560
-    assert there.full_us - bare.full_us == pytest.approx(cycles / 16)
+    assert there.us - bare.us == pytest.approx(cycles / 16)
     assert (bare.how, there.how) == ("wire", "model")
 
 
 def test_a_board_scans_its_keys_and_then_sends_its_whole_frame() -> None:
-    wiring, tables, own = Wiring(BOARD, 115_200), random_tables(33, 0, 4), board_overhead()
-    times = scan_times(names_of(33), tables, wiring, *frames(33, 0))
+    wiring, own = Wiring(BOARD, 115_200), board_overhead()
+    times = scan_times(names_of(33), wiring)
     line_us = scanner_us(wiring.harness_of(names_of(33)).scanners[0])
-    assert times.full_us == times.early_us == pytest.approx(line_us + own.scan_us + 33 * own.key_us)
+    assert times.us == pytest.approx(line_us + own.scan_us + 33 * own.key_us)
     assert (times.ports, times.chips, times.how) == (1, 1, "model")
 
 
@@ -107,20 +64,20 @@ def test_a_board_converts_each_taxel_once_however_many_levels_it_has(taxels: int
     """A taxel is converted in 14 cycles of 125 kHz; behind a multiplexer twice."""
     wiring, size = Wiring(BOARD, 1_000_000), 2 * taxels
     names = [f"pad{number // 2}>{100 * (number % 2 + 1)}" for number in range(size)]
-    times = scan_times(names, random_tables(size, 0, 4), wiring, *frames(size, 0))
-    assert times.full_us == pytest.approx(us)
+    times = scan_times(names, wiring)
+    assert times.us == pytest.approx(us)
     assert times.ports == 1
 
 
 def test_without_switches_there_is_nothing_to_read() -> None:
-    none = scan_times((), random_tables(0, 16, 4), Wiring("mcp23017", 400_000), *frames(0, 16))
-    assert none == ScanTimes(0.0, 0.0, 0, 0, "wire", 0.0)
+    none = scan_times((), Wiring("mcp23017", 400_000))
+    assert none == ScanTimes(0.0, 0, 0, "wire")
 
 
 def test_a_switch_without_a_place_is_an_error() -> None:
     wiring = Wiring("as wired", 400_000, propose_harness(["s0"]))
     with pytest.raises(HarnessError, match="s1"):
-        scan_times(names_of(2), random_tables(2, 0, 4), wiring, *frames(2, 0))
+        scan_times(names_of(2), wiring)
 
 
 @pytest.mark.parametrize("joints", [SENSORS_18[:1], SENSORS_18, SENSORS_22[::-1], ("index_dij",)])

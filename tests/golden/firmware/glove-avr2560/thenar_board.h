@@ -15,10 +15,9 @@
 /* Bytes of a bitmap of the keys: key k is bit k % 8 of byte k / 8. */
 #define THENAR_BITMAP_BYTES ((THENAR_KEYS + 7u) / 8u)
 
-/* Values of thenar_board_grasp: no grasp type was recognised; an input was missing; the scan ended early. */
+/* Values of thenar_board_grasp: no grasp type was recognised; an input was missing. */
 #define THENAR_NO_GRASP 0xFFu
 #define THENAR_GRASP_DEGRADED 0x01u
-#define THENAR_GRASP_EARLY 0x02u
 
 /* Provided by the port: take a whole frame to send, or return false if there is no room for it. */
 extern bool thenar_port_send(const uint8_t *frame, uint8_t length);
@@ -33,9 +32,9 @@ void thenar_board_receive(uint8_t byte, uint32_t now_us);
 void thenar_board_found(const uint8_t *known_bitmap);
 
 /* Take a scan, debounced, and send the messages that are due: EVENTs or a STATE, LOST, HEARTBEAT, ERROR. `known` are
-   the keys that were read; the others keep their state, and are lost if the scan was whole: none was left out on
-   purpose. No message about keys is sent before the first whole scan. */
-void thenar_board_scanned(const uint8_t *closed_bitmap, const uint8_t *known_bitmap, bool whole, uint32_t now_us);
+   the keys that were read; the others keep their state, and are lost. No message about keys is sent before the first
+   scan. */
+void thenar_board_scanned(const uint8_t *closed_bitmap, const uint8_t *known_bitmap, uint32_t now_us);
 
 /* Take the grasp type of the last scan; margin: best score less the second, in steps, at most 65535. It is sent if the
    grasp type or the degradation differs from the last message, and once after every HEARTBEAT. */

@@ -26,6 +26,6 @@
 #define THENAR_RELEASE_US 0u
 
 /* The lower limit of the scan period that a host can request. */
-#define THENAR_FASTEST_US UINT32_C(700)
+#define THENAR_FASTEST_US UINT32_C(650)
 
 #endif

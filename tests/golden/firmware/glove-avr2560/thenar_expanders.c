@@ -13,6 +13,7 @@
 #include "thenar_twi.h"
 
 #define CHIPS 2u
+#define PORTS 2u
 #define MOST_WRITTEN 7u
 #define MOST_READ 6u
 #define MOST_PORTS 2u
@@ -64,16 +65,16 @@ typedef struct {
     uint8_t keys[8u * MOST_PORTS]; /* of the reply's bits */
 } port_at;
 
-/* In the order of reading: those that can change the scores most per microsecond come first. */
-static const port_at ports[THENAR_KEYS_PORTS] PROGMEM = {
-    /* pca9555 at 0x21, port 0: palm radial, palm ulnar */
-    {1u, 0x00u, 1u, {0x00u}, 0xFFu, {
-        0x04u, 0x05u, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu,
-    }},
+/* In the order of reading. */
+static const port_at ports[PORTS] PROGMEM = {
     /* mcp23017 at 0x20, ports AB: thumb tip, index tip, index middle, middle tip */
     {0u, 0x12u, 2u, {0x80u, 0x80u}, 0xFFu, {
         0x00u, 0x01u, 0x02u, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu,
         0x03u, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu,
+    }},
+    /* pca9555 at 0x21, port 0: palm radial, palm ulnar */
+    {1u, 0x00u, 1u, {0x00u}, 0xFFu, {
+        0x04u, 0x05u, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu, 0xFFu,
     }},
 };
 
@@ -195,7 +196,8 @@ static void sort(const port_at *port, const uint8_t *reply, uint8_t *closed, uin
     }
 }
 
-bool thenar_keys_read(uint8_t number, uint8_t *closed, uint8_t *known)
+/* Add a reading to both bitmaps, and return whether it succeeded. */
+static bool add(uint8_t number, uint8_t *closed, uint8_t *known)
 {
     port_at port;
     uint8_t reply[MOST_PORTS];
@@ -219,8 +221,8 @@ bool thenar_keys_scan(uint8_t *closed, uint8_t *known)
 
     (void)memset(closed, 0, THENAR_BITMAP_BYTES);
     (void)memset(known, 0, THENAR_BITMAP_BYTES);
-    for (uint8_t port = 0u; port < THENAR_KEYS_PORTS; port++) {
-        fine = thenar_keys_read(port, closed, known) && fine;
+    for (uint8_t port = 0u; port < PORTS; port++) {
+        fine = add(port, closed, known) && fine;
     }
     return fine;
 }

@@ -16,10 +16,6 @@ void thenar_keys_begin(void);
    were read, and none can be a ghost. */
 bool thenar_keys_scan(uint8_t *closed, uint8_t *known);
 
-/* The number of readings in a scan; add reading `port` to both bitmaps, and return whether it succeeded. */
-#define THENAR_KEYS_PORTS 2u
-bool thenar_keys_read(uint8_t port, uint8_t *closed, uint8_t *known);
-
 /* Check one chip if that is due: whether it is still set up, or is back. */
 void thenar_keys_attend(uint32_t now_us);
 

@@ -9,7 +9,6 @@
 #include <string.h>
 
 #include "thenar_glove.h"
-#include "thenar_glove_decided.h"
 #include "thenar_board.h"
 #include "thenar_clock.h"
 #include "thenar_debounce.h"
@@ -66,7 +65,7 @@ static void lose(const uint8_t *known, bool joints)
     }
 }
 
-static void tell_grasp(uint8_t grasp, uint8_t flags, uint32_t now_us)
+static void tell_grasp(uint8_t grasp, uint32_t now_us)
 {
     const bool degraded = !joints_before || (switches_lost > 0u);
     const bool nothing = !joints_before && (switches_lost == THENAR_GLOVE_SWITCHES);
@@ -75,59 +74,27 @@ static void tell_grasp(uint8_t grasp, uint8_t flags, uint32_t now_us)
         thenar_board_grasp(THENAR_NO_GRASP, 0u, THENAR_GRASP_DEGRADED, now_us);
     } else {
         const uint8_t held = grasp;
+        const uint8_t flags = degraded ? THENAR_GRASP_DEGRADED : 0u;
 
-        const uint8_t all = (uint8_t)(flags | (degraded ? THENAR_GRASP_DEGRADED : 0u));
-
-        thenar_board_grasp(held, thenar_glove_margin(&glove), all, now_us);
+        thenar_board_grasp(held, thenar_glove_margin(&glove), flags, now_us);
     }
 }
 
-/* Unread keys keep their last state for the host, lost or not, so this is the period of whole scans. */
-#define WHOLE_US UINT32_C(50000)
-
-static uint32_t whole_at_us = 0u - WHOLE_US; /* so that the first scan is whole */
-
-/* Return whether this scan must read everything. */
-static bool whole_is_due(uint32_t now_us)
-{
-    const bool due = (now_us - whole_at_us) >= WHOLE_US;
-
-    if (due) {
-        whole_at_us = now_us;
-    }
-    return due;
-}
-
-/* Read port by port, until no state of the others could change the grasp type. The classifier gets the switches as
-   read, unread ones as open; debouncing applies only to the keys reported to the host. While an input is missing,
-   everything is read. */
 static void scan(uint32_t now_us)
 {
-    const bool joints = thenar_joints_read(&glove, now_us);
-    bool complete = joints && (switches_lost == 0u);
-    const bool whole = whole_is_due(now_us) || !complete;
-    bool decided = false;
     uint8_t closed[THENAR_BITMAP_BYTES];
     uint8_t known[THENAR_BITMAP_BYTES];
-    uint8_t grasp = THENAR_NO_GRASP;
+    (void)thenar_keys_scan(closed, known);
+    const bool joints = thenar_joints_read(&glove, now_us);
+    uint8_t grasp;
 
-    (void)memset(closed, 0, sizeof closed);
-    (void)memset(known, 0, sizeof known);
-    for (uint8_t port = 0u; (port < THENAR_KEYS_PORTS) && !decided; port++) {
-        complete = thenar_keys_read(port, closed, known) && complete;
-        show(closed);
-        grasp = thenar_glove_update(&glove);
-        decided = complete && !whole && (port < (THENAR_KEYS_PORTS - 1u))
-            && thenar_glove_decided(&glove, port, grasp);
-    }
     thenar_board_found(known);
     thenar_debounce(closed, known, now_us);
-    thenar_board_scanned(closed, known, !decided, now_us);
-    if (!decided) {
-        lose(known, joints);
-        grasp = thenar_glove_update(&glove);
-    }
-    tell_grasp(grasp, decided ? THENAR_GRASP_EARLY : 0u, now_us);
+    thenar_board_scanned(closed, known, now_us);
+    show(closed);
+    lose(known, joints);
+    grasp = thenar_glove_update(&glove);
+    tell_grasp(grasp, now_us);
 }
 
 void thenar_turn_begin(void)

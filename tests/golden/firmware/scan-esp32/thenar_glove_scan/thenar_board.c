@@ -408,7 +408,7 @@ static void take(uint16_t byte, uint8_t closed, uint32_t now_us)
 }
 
 /* Take the keys and send the messages that are due. The first call sends all keys. */
-static void take_all(const uint8_t *closed_bitmap, const uint8_t *known_bitmap, bool whole, uint32_t now_us)
+static void take_all(const uint8_t *closed_bitmap, const uint8_t *known_bitmap, uint32_t now_us)
 {
     bool news = false;
 
@@ -419,7 +419,7 @@ static void take_all(const uint8_t *closed_bitmap, const uint8_t *known_bitmap, 
         const uint8_t read = (uint8_t)(there & known_bitmap[byte]);
 
         take(byte, (uint8_t)((closed_bitmap[byte] & read) | (board.closed[byte] & unread)), now_us);
-        news = lose(byte, whole ? unread : (uint8_t)(board.lost[byte] & unread)) || news;
+        news = lose(byte, unread) || news;
     }
     if (schedule_due(&board.state)) {
         send_state();
@@ -428,12 +428,10 @@ static void take_all(const uint8_t *closed_bitmap, const uint8_t *known_bitmap, 
     board.scanned = true;
 }
 
-void thenar_board_scanned(const uint8_t *closed_bitmap, const uint8_t *known_bitmap, bool whole, uint32_t now_us)
+void thenar_board_scanned(const uint8_t *closed_bitmap, const uint8_t *known_bitmap, uint32_t now_us)
 {
     run_to(now_us);
-    if (whole || board.scanned) {
-        take_all(closed_bitmap, known_bitmap, whole, now_us);
-    }
+    take_all(closed_bitmap, known_bitmap, now_us);
     if (board.news && (board.error_in_us == 0u)) {
         send_error(now_us);
     }

@@ -20,7 +20,7 @@ static void scan(uint32_t now_us)
     (void)thenar_keys_scan(closed, known);
     thenar_board_found(known);
     thenar_debounce(closed, known, now_us);
-    thenar_board_scanned(closed, known, true, now_us);
+    thenar_board_scanned(closed, known, now_us);
 }
 
 void thenar_turn_begin(void)
