@@ -15,7 +15,7 @@ PEOPLE := $(if $(filter crowd,$(SCENE)),--subjects 4 --repetitions 6)
 
 PACKAGES := cli compiler drivers firmware_templates runtime simulator stability
 
-.PHONY: help demo test test-slow test-all pythons mutants lint format types bench soak fuzz docs dist check clean
+.PHONY: help demo test test-slow test-all pythons mutants lint format types size bench soak fuzz docs dist check clean
 
 help:           ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -23,7 +23,7 @@ help:           ## list the targets
 $(VENV)/installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install --quiet --editable ".[compiler,cluster,sim,stability,ros,ws,lsl,web,foxglove]" --group dev
+	$(BIN)/python -m pip install --quiet --editable ".[compiler,cluster,stability,ros,ws,lsl,web,foxglove]" --group dev
 	touch $@
 
 demo: $(VENV)/installed  ## recordings, rates, frontier, build, report, run: SCENE=crowd, or TABLE=examples/home_glove.csv
@@ -73,6 +73,9 @@ lint: $(VENV)/installed  ## ruff: rules and formatting; codespell: spelling, and
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/codespell *.md *.toml Makefile docs examples benchmarks $(PACKAGES)
+
+size: $(VENV)/installed  ## lines, tokens, classes and docstrings by room
+	$(BIN)/python benchmarks/size.py
 
 dist: $(VENV)/installed  ## the sdist and the wheel, in dist/, with their metadata checked
 	$(BIN)/python -m build

@@ -16,6 +16,7 @@ from .common import (
     OneOf,
     OutputFile,
     OutputFolder,
+    dask_option,
     existing_file,
     jobs_option,
     json_flag,
@@ -123,7 +124,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
         for name, given in PRESETS.items()
     ),
 )
-@method_option()
+@method_option
 @keep_option
 @levels_option
 @keep_joints_option
@@ -159,6 +160,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
     help="What the folds of the first accuracy leave out.  [default: subject if there are several, otherwise trial]",
 )
 @jobs_option()
+@dask_option
 @click.option(
     "--table-bits",
     type=click.Choice(["16", "8"]),

@@ -12,6 +12,7 @@ from .common import (
     OutputFile,
     OutputFolder,
     comma_separated,
+    dask_option,
     existing_file,
     jobs_option,
     json_flag,
@@ -90,6 +91,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
 )
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the first repeat.")
 @jobs_option()
+@dask_option
 @click.option(
     "--baselines",
     type=method_list,

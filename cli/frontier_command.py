@@ -8,13 +8,14 @@ import click
 from rich.text import Text
 
 from thenar.compiler.text import duration, interval
-from thenar.drivers.names import printable, shortened
+from thenar.drivers.names import printable
 from thenar.runtime.manifest import AUTO
 
 from .common import (
     Number,
     OneOf,
     OutputFolder,
+    dask_option,
     err,
     existing_file,
     existing_folder,
@@ -31,7 +32,7 @@ from .options import Training, asked_settings, method_list, trainer_option
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from thenar.compiler.frontier.points import Check, Frontier, Point
+    from thenar.compiler.frontier.points import Frontier, Point
     from thenar.compiler.frontier.search import Search
 
 
@@ -44,12 +45,6 @@ def _timed() -> tuple[str, ...]:
     from thenar.compiler.firmware.targets import timed
 
     return timed()
-
-
-def _address(_: click.Context, __: click.Parameter, text: str | None) -> str | None:
-    if text is not None and not all(text.partition("://")):
-        raise click.BadParameter(f"{shortened(repr(text))} is not an address such as tcp://10.0.0.5:8786")
-    return text
 
 
 @click.command("frontier", cls=Training)
@@ -107,13 +102,7 @@ def _address(_: click.Context, __: click.Parameter, text: str | None) -> str | N
     help="Choose points by left-out subjects, or by trials of all subjects.  [default: subject, if several]",
 )
 @jobs_option()
-@click.option(
-    "--dask",
-    "cluster",
-    callback=_address,
-    metavar="ADDRESS",
-    help="Work on the cluster of this Dask scheduler, such as tcp://host:8786.",
-)
+@dask_option
 @json_flag
 @click.pass_context
 def command(
@@ -132,7 +121,7 @@ def command(
     """Show the trade-off between accuracy and time: which switches, joints, rounds, tables, wirings and decisions pay.
 
     Every placement is screened by a nested cross-validation. Those near the front are refined, priced for the target,
-    simulated there, and put on one picture. OUTPUT gets frontier.json, frontier.csv, three pictures and store.jsonl,
+    simulated there, and put on one picture. OUTPUT gets frontier.json, frontier.csv, three pictures and store.sqlite,
     from which an interrupted run continues.
 
     \b
@@ -199,14 +188,12 @@ def _print(found: "Frontier", output: Path) -> None:
 
 
 def print_frontier(frontier: "Frontier") -> None:
-    """Print the points, the picked one bold; then the checks, the omissions, and the caption of the picture."""
+    """Print the points, the picked one bold; then the omissions, and the caption of the picture."""
     from thenar.compiler.frontier.words import LUCK, folds_of, summary
 
     console = out()
     console.print(_grid(frontier))
     console.print(Text(f"{folds_of(frontier)}. Accuracy in % with 95 % intervals. {LUCK} Flash, RAM: bytes.", "dim"))
-    for check in frontier.checks:
-        console.print(Text(_check(check)))
     for missing in frontier.skipped:
         console.print(Text(missing, "yellow"))
     console.print()
@@ -250,10 +237,3 @@ def _cells(point: "Point", rated: Sequence[str]) -> tuple[Text, ...]:
         f"{point.ram:,}",
     )
     return tuple(map(Text, texts))
-
-
-def _check(check: "Check") -> str:
-    return (
-        f"{check.what}, {check.how}: {check.n} times compared with the model, "
-        f"mean error {check.mean_error:.1%}, worst {check.worst_error:.1%}"
-    )

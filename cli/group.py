@@ -24,7 +24,7 @@ from thenar.drivers.names import shortened
 from .lines import echo
 
 COMMANDS = (
-    *("simulate", "plan", "import", "export", "merge", "split", "info", "place", "draw"),
+    *("simulate", "import", "export", "merge", "split", "info", "place", "draw"),
     *("evaluate", "frontier", "compile", "verify", "segment", "teach"),
     *("firmware", "spec", "run", "monitor", "calibrate", "record", "emulate", "doctor", "stability"),
 )

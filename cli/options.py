@@ -50,13 +50,10 @@ class _Scene(click.ParamType[str]):
 
 scene_name = _Scene()
 
-
-def method_option(destination: str = "method", default: str = "id3") -> Callable[[Command], Command]:
-    """Return the option --method; the command takes its value as `destination`, None if it is not given."""
-    help_text = f"How switches are chosen: see below.  [default: {default}]"
-    return click.option("--method", destination, type=method_name, metavar="NAME", help=help_text)
-
-
+# Its value is None if it is not given.
+method_option = click.option(
+    "--method", type=method_name, metavar="NAME", help="How switches are chosen: see below.  [default: id3]"
+)
 keep_option = click.option(
     "--keep", type=click.IntRange(1), metavar="M", help="Number of switches to keep, for methods that take it."
 )

@@ -10,7 +10,6 @@ import click
 from .common import (
     OutputFile,
     existing_file,
-    jobs_option,
     json_flag,
     keep_apart,
     out,
@@ -39,7 +38,7 @@ from .options import (
 if TYPE_CHECKING:
     from thenar.compiler.placement.constraints import Limits
     from thenar.compiler.placement.methods.base import Method
-    from thenar.compiler.placement.placement import Exactly, Placement, Standard
+    from thenar.compiler.placement.placement import Exactly, Placement
     from thenar.compiler.placement.ports import PortCosts
     from thenar.compiler.placement.tree import Tree
     from thenar.compiler.recordings.graspset import GraspSet
@@ -55,7 +54,6 @@ class _Asked:
     prune: int
     keep: int | None
     exact: bool
-    population: bool
     joints: bool
     levels: int | None
     keep_joints: int | None
@@ -67,7 +65,6 @@ class _Asked:
     budget_us: float | None
     robust: bool
     layout: Path | None
-    jobs: int
     show_tree: bool
     draw: Path | None
     output: Path | None
@@ -75,9 +72,9 @@ class _Asked:
     @property
     def chosen_by(self) -> "Method":
         """The requested method, or the usual one."""
-        from thenar.compiler.placement.methods.base import BEST, METHODS, PAPERS
+        from thenar.compiler.placement.methods.base import METHODS, PAPERS
 
-        return METHODS.named(self.method or (BEST if self.population else PAPERS))
+        return METHODS.named(self.method or PAPERS)
 
     def check(self) -> None:
         """Raise UsageError if options conflict."""
@@ -88,38 +85,19 @@ class _Asked:
         for wrong, reason in (
             (wants_json() and self.show_tree, "--tree is for people and --json for machines: give one of them"),
             (self.show_tree and not tree, "--tree prints the tree of the paper's ID3 only: leave it out"),
-            (self.draw is not None and not (tree or self.population), "--draw draws ID3's tree, or a --population"),
-            (
-                self.exact and self.population,
-                "--exact judges one placement and --population looks for one: take one of them",
-            ),
-            (
-                self.population and not method.by_number,
-                "--population takes a method that keeps M switches",
-            ),
-            (self.population and (self.levels or self.keep_joints), "--population takes no --levels or --keep-joints"),
-            (
-                self.population and (self.limited or self.robust),
-                "--population looks for the placement of many subjects: it takes no limits and no --robust",
-            ),
+            (self.draw is not None and not tree, "--draw draws the tree of the paper's ID3 only: leave it out"),
             (self.layout is not None and self.apart_mm is None, "--layout gives positions for --apart-mm: add that"),
             (self.joints and tree, "--joints is for methods other than the paper's ID3"),
         ):
             if wrong:
                 raise click.UsageError(reason)
         method.check_given(self.keep, self.prune)
-        if self.glove is not None and (self.population or not (method.uses_ports or self.budget_us is not None)):
+        if self.glove is not None and not (method.uses_ports or self.budget_us is not None):
             from thenar.compiler.placement.methods.base import METHODS
 
             heeding = ", ".join(name for name, each in METHODS.items() if each.uses_ports)
             raise click.UsageError(f"--glove gives the scan costs: use it with a --method that weighs them: {heeding}")
         keep_apart(self.grasps, self.glove, self.draw, self.output)
-
-    @property
-    def limited(self) -> bool:
-        """Whether the placement has any limits."""
-        given = (self.apart_mm, self.at_most, self.budget_us)
-        return bool(self.keep_these or self.never) or any(each is not None for each in given)
 
     def limits(self, grasp_set: "GraspSet") -> "Limits | None":
         """Return the limits of the placement."""
@@ -161,20 +139,10 @@ class _Asked:
     def found(self) -> "Placement":
         """Return the placement."""
         from thenar.compiler.placement.placement import place
-        from thenar.compiler.placement.population import place_for_population
         from thenar.compiler.recordings.graspset import GraspSet
 
         grasp_set, method = GraspSet.load(self.grasps), self.chosen_by
         with progress(f"choosing switches by {method.name}") as report:
-            if self.population:
-                return place_for_population(
-                    grasp_set,
-                    self.keep or 1,
-                    method=method.name,
-                    joints=self.joints,
-                    jobs=self.jobs,
-                    on_done=report,
-                )
             return place(
                 grasp_set,
                 float(self.prune if self.keep is None else self.keep),
@@ -192,7 +160,7 @@ class _Asked:
 
 @click.command("place", cls=WithMethods)
 @click.argument("grasps", type=existing_file)
-@method_option(default="id3; elimination with --population")
+@method_option
 @keep_option
 @levels_option
 @keep_joints_option
@@ -206,12 +174,8 @@ class _Asked:
     help="A glove.toml: the costs of its ports, for methods that weigh them.  [default: MCP23017]",
 )
 @click.option("--exact", is_flag=True, help="Also print the gap between the placement and the best of the same size.")
-@click.option("--population", is_flag=True, help="Choose one standard placement for many subjects.")
-@jobs_option("Worker processes of --population.")
 @click.option("--tree", "show_tree", is_flag=True, help="Also print ID3's tree.")
-@click.option(
-    "--draw", type=picture_file, help="Also draw ID3's tree, or a population's accuracy: an .svg or .png file."
-)
+@click.option("--draw", type=picture_file, help="Also draw ID3's tree: an .svg or .png file.")
 @click.option("-o", "--output", type=OutputFile(".json"), help="Also store the placement as JSON.")
 @overwrite_flag
 @json_flag
@@ -229,7 +193,6 @@ def command(**options: Any) -> None:
         thenar place set.grasps --method elimination --keep 16 --exact
         thenar place set.grasps --method id3-cost --keep 16 --glove glove.toml
         thenar place set.grasps --method elimination --keep 16 --keep-these thumb_distal_5 --apart-mm 8
-        thenar place crowd.grasps --population --keep 16 --draw subjects.svg
     """
     asked = _Asked(**options)
     asked.check()
@@ -250,27 +213,22 @@ def command(**options: Any) -> None:
 
 def _print(placement: "Placement") -> None:
     """Print the table of switches, their value, and remarks on how they were found."""
-    title = "Placement" if placement.study is None else "Standard placement"
     if placement.tree is not None:
-        switches = table(("column", "name", "gain, bits", "cumulative share"), title=title)
+        switches = table(("column", "name", "gain, bits", "cumulative share"), title="Placement")
         for kept in placement.switches:
             switches.add_row(str(kept.number), kept.name, f"{kept.gain_bits:.4f}", f"{kept.cumulative_share:.1%}")
     else:
-        switches = table(("order", "column", "name"), title=title)
+        switches = table(("order", "column", "name"), title="Placement")
         for order, kept in enumerate(placement.switches, 1):
             switches.add_row(str(order), str(kept.number), kept.name)
     out().print(switches)
-    if placement.study is not None:
-        _print_served(placement.study)
     for sentence in _sentences(placement):
         echo(sentence)
 
 
 def _sentences(placement: "Placement") -> Iterator[str]:
     kept = str(placement.sensors)
-    if placement.study is not None:
-        yield from _of_study(kept, placement.study)
-    elif placement.tree is not None:
+    if placement.tree is not None:
         tree, prune = placement.tree, placement.tree.min_samples
         yield (
             f"{kept}: {placement.gain_bits:.3f} of {placement.entropy_bits:.3f} bits of the grasp type; the tree has "
@@ -313,29 +271,3 @@ def _of_exact(exact: "Exactly", m: int, elements: str) -> Iterator[str]:
         )
     yield f"so this placement is at most {100 * (exact.alike - exact.least) / exact.pairs:.3f} points from the best"
     yield f"the best found: {', '.join(kept.name for kept in exact.best)}"
-
-
-def _of_study(kept: str, study: "Standard") -> Iterator[str]:
-    from thenar.compiler.placement.drawing import REFINED
-
-    yield (
-        f"{kept}, chosen by {study.method}, {REFINED[study.aim]}: this did best within the training subjects. "
-        f"Trained again on {study.rows} rows of all {study.subjects} subjects"
-    )
-    yield (
-        "refined: the switches chosen last are exchanged for the next ones if half of the training subjects then "
-        "predict the other half better. Counting badly served subjects more often was tried on 80 simulated hands; "
-        "it gained no more than redrawing the rows, and is not done"
-    )
-
-
-def _print_served(study: "Standard") -> None:
-    """Print the accuracy on held-out subjects."""
-    from thenar.compiler.placement.drawing import REFINED
-
-    columns = ("subjects", "placement", "mean, %", "worst tenth, %", "lowest, %")
-    served = table(columns, title=f"Accuracy on trials of {study.held_out} held-out subjects (new subject)")
-    for point in study.curve:
-        rates = (point.served.mean, point.served.worst_tenth, point.served.lowest)
-        served.add_row(str(point.subjects), REFINED[point.aim], *(f"{100 * rate:.1f}" for rate in rates))
-    out().print(served)

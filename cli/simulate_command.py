@@ -108,7 +108,7 @@ def command(
     loaded = load_scene(scene).varied(repetitions, seed, names, more, rest, subjects)
     with _located(scene):
         if output is not None:
-            keep_apart(own_file(scene), loaded.postures, output)
+            keep_apart(own_file(scene), output)
             _simulate(loaded, output, jobs, keep_unsettled=keep_unsettled)
         elif explain:
             from thenar.simulator.running.explain import explain as explained
@@ -288,9 +288,6 @@ def _expected(explanation: "Explanation") -> str:
 
 def _print_ablation(ablation: "Ablation") -> None:
     """Print the effect of each step on accuracy and time."""
-    from thenar.simulator.pipeline.effect import EFFECTS
-    from thenar.simulator.running.pipeline import DEFAULT_CONTACT
-
     console = out()
     whole = ablation.variants[0]
     columns = [f"{one.inputs}{what}" for one in whole.rates for what in ("", ", change")]
@@ -307,9 +304,6 @@ def _print_ablation(ablation: "Ablation") -> None:
         "each subject; accuracies in %, with 95 % intervals;\n"
         "changes in percentage points, of grasps that settled with and without; time of a few grasps, best of several"
     )
-    for variant in ablation.variants:
-        if variant.without is not None and EFFECTS[variant.without].model is not None:
-            console.print(f"without {variant.without}: {DEFAULT_CONTACT} closes the hands in its place")
 
 
 def _change(change: "Change | None") -> str:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .artifact.verify import FaultCheck, Verification, verify, verify_faults
     from .boosting.boost import BoostingError
     from .boosting.classifier import LogitBoostClassifier
+    from .cluster import dask_cluster
     from .evaluation.folds import EvaluationError
     from .evaluation.study import Study, evaluate
     from .firmware.targets import TARGETS
@@ -47,6 +48,7 @@ _HOMES = {
     ".artifact.verify": ("FaultCheck", "Verification", "verify", "verify_faults"),
     ".boosting.boost": ("BoostingError",),
     ".boosting.classifier": ("LogitBoostClassifier",),
+    ".cluster": ("dask_cluster",),
     ".evaluation.folds": ("EvaluationError",),
     ".evaluation.study": ("Study", "evaluate"),
     ".firmware.targets": ("TARGETS",),
@@ -96,6 +98,7 @@ __all__ = [
     "Verification",
     "compile",
     "compile_build",
+    "dask_cluster",
     "evaluate",
     "find_frontier",
     "grow_id3",

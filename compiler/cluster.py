@@ -1,24 +1,17 @@
-"""Independent tasks on the workers of a Dask cluster: same results as locally, each as soon as it is available.
-
-A task is pickled for its worker; large arrays are sent separately.
-"""
+"""Independent tasks on the workers of a Dask cluster: same results as locally, each as soon as it is available."""
 
 import asyncio
 import pickle
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import lru_cache
 from importlib.metadata import version
-from io import BytesIO
 from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, TypeVar
-from weakref import ref
-
-import numpy as np
-from numpy.typing import NDArray
 
 from thenar.drivers.errors import ThenarError
 from thenar.drivers.extras import optional
@@ -27,67 +20,14 @@ if TYPE_CHECKING:
     from distributed import Client, Future, Security
 
 
-# Arrays of at least this size are sent to the workers once, not with every task that holds them.
-SHARED_BYTES = 1 << 16
-
-
 class UnreadableError(ThenarError):
     """A worker cannot unpickle its task."""
 
 
-class SharedArrays:
-    """Large arrays, each sent to all workers with the first task that holds it, and freed there when freed here."""
-
-    def __init__(self, client: "Client") -> None:
-        self._client = client
-        self._sent: dict[int, tuple[ref[NDArray[Any]], Future[Any]]] = {}
-
-    def packed(self, piece: object) -> "list[bytes | Future[Any]]":
-        """Return the arguments of `run_packed` for a task."""
-        file = BytesIO()
-        packer = _Packer(file, pickle.HIGHEST_PROTOCOL)
-        packer.dump(piece)
-        return [file.getvalue(), *map(self._future, packer.arrays)]
-
-    def _future(self, array: NDArray[Any]) -> "Future[Any]":
-        number = id(array)
-        if number not in self._sent:
-            gone = ref(array, lambda _: self._sent.pop(number, None))
-            self._sent[number] = gone, self._client.scatter(array, broadcast=True, hash=False)
-        return self._sent[number][1]
-
-
-class _Packer(pickle.Pickler):
-    """Pickles all but large arrays, which it collects."""
-
-    def __init__(self, file: BytesIO, protocol: int) -> None:
-        super().__init__(file, protocol)
-        self.arrays: list[NDArray[Any]] = []
-
-    def persistent_id(self, part: Any) -> int | None:
-        if type(part) is not np.ndarray or part.nbytes < SHARED_BYTES or part.dtype.hasobject:
-            return None
-        self.arrays.append(part)
-        return len(self.arrays) - 1
-
-
-class _Unpacker(pickle.Unpickler):
-    """Reverses _Packer, given the arrays."""
-
-    def __init__(self, data: bytes, arrays: Sequence[NDArray[Any]]) -> None:
-        super().__init__(BytesIO(data))
-        self._arrays = arrays
-
-    def persistent_load(self, number: int) -> NDArray[Any]:
-        array = self._arrays[number]
-        array.flags.writeable = False  # other tasks share it
-        return array
-
-
-def run_packed(data: bytes, *arrays: NDArray[Any]) -> Any:
+def _run(pickled: bytes) -> Any:
     """Run a task in a worker."""
     try:
-        work, task = _Unpacker(data, arrays).load()
+        work, task = pickle.loads(pickled)  # noqa: S301 - of the program that this cluster works for
     except Exception as reason:
         raise UnreadableError(
             f"a worker with thenar {installed()} and Python {sys.version.split()[0]} cannot read its task ({reason})"
@@ -116,19 +56,51 @@ CONNECT_S = 5.0
 WORKERS_S = 10.0
 # Time without a result after which the workers are checked.
 PATIENCE_S = 10.0
-# Tasks that are submitted ahead, so that no worker waits for this process: for each of its threads, and at least.
-AHEAD_EACH, AHEAD = 4, 64
+# Tasks that are submitted ahead for each thread of a worker, so that none waits for this process.
+AHEAD = 3
+# Dask warns of tasks of more than 10 MB, whose data it would rather load itself.
+_LARGE_TASKS = {"distributed.admin.large-graph-warning-threshold": "1TB"}
 
 
 class ClusterError(ThenarError, BrokenExecutor):
     """A cluster is missing, lost its workers, or cannot run this program's tasks."""
 
 
+# The address of the scheduler whose cluster does the work.
+_address: ContextVar[str | None] = ContextVar("thenar cluster", default=None)
+
+
+@contextmanager
+def dask_cluster(address: str | None) -> Iterator[None]:
+    """Let the cluster of a Dask scheduler do the work of this block: of `evaluate`, `compile_build`, `find_frontier`.
+
+    Parameters
+    ----------
+    address : str or None
+        Of the scheduler, such as tcp://10.0.0.5:8786. None: this machine does the work. The results are the same.
+
+    Raises
+    ------
+    ClusterError
+        From the work, if there is no such cluster, or if it loses its workers.
+    """
+    before = _address.set(address)
+    try:
+        yield
+    finally:
+        _address.reset(before)
+
+
+def cluster_address() -> str | None:
+    """Return the address of the scheduler whose cluster does the work here; None if this machine does."""
+    return _address.get()
+
+
 def on_cluster(work: Callable[[Task], Result], tasks: Iterable[Task], address: str) -> Iterator[Result]:
     """Yield the results in the order of completion.
 
     work     and tasks are pickled, `work` by the name of its module: this version of thenar must be installed on the
-             cluster. An array of SHARED_BYTES or more that several tasks hold is sent to each worker once.
+             cluster
     address  of the scheduler, such as tcp://10.0.0.5:8786
 
     If a worker dies, the others redo its tasks. Work runs in threads of the workers (`dask worker --nthreads 1` keeps
@@ -204,22 +176,20 @@ def _wait_for_workers(client: "Client", address: str) -> None:
 
 
 def _results(client: "Client", address: str, work: Callable[[Task], Result], tasks: Iterable[Task]) -> Iterator[Result]:
-    arrays = SharedArrays(client)
+    import dask
+
     finished: SimpleQueue[Future[Any]] = SimpleQueue()
     begun: set[Future[Any]] = set()
     waiting = iter(tasks)
 
     def begin(number: int) -> None:
         for task in islice(waiting, number):
-            try:
-                arguments = arrays.packed((work, task))
-            except TimeoutError as reason:  # no worker accepts an array
-                raise _lost(address) from reason
-            future = client.submit(run_packed, *arguments, pure=False)
+            with dask.config.set(_LARGE_TASKS):
+                future = client.submit(_run, pickle.dumps((work, task), pickle.HIGHEST_PROTOCOL), pure=False)
             begun.add(future)
             future.add_done_callback(finished.put)
 
-    begin(max(AHEAD, AHEAD_EACH * sum(client.ncores().values())))
+    begin(AHEAD * max(sum(client.ncores().values()), 1))
     while begun:
         future = _next(finished, client, address)
         result = _result(future, client, address)

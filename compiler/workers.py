@@ -14,7 +14,7 @@ from concurrent.futures import BrokenExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any, Generic, TypeVar
 
-from .cluster import on_cluster
+from .cluster import cluster_address, on_cluster
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -30,21 +30,22 @@ _LOOK_S = 0.5
 
 
 def in_workers(
-    work: Callable[[Task], Result], tasks: Iterable[Task], jobs: int, cluster: str | None = None
+    work: Callable[[Task], Result], tasks: Iterable[Task], jobs: int, *, here: bool = False
 ) -> Iterator[Result]:
     """Yield the results in the order of completion.
 
     jobs     worker processes, as joblib counts them: -1 for all cores, 1 for this process alone; no more than
              MOST_JOBS. A worker runs one thread.
-    cluster  address of a Dask scheduler, such as tcp://10.0.0.5:8786: all of its workers do the work, and none here
+    here     even within `dask_cluster`, whose workers do the work otherwise, whatever `jobs`
 
     Workers end when this process does, however it ends.
 
     Raises BrokenExecutor if a worker is killed or cannot start, ClusterError (a subclass) if the cluster cannot do
     the work, and any exception of the work.
     """
-    if cluster is not None:
-        yield from on_cluster(work, tasks, cluster)
+    address = None if here else cluster_address()
+    if address is not None:
+        yield from on_cluster(work, tasks, address)
         return
     if jobs == 1:
         yield from map(work, tasks)

@@ -12,7 +12,6 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
         *("python_calamine", "pyarrow", "pandas", "h5py"),
     ),
     "cluster": ("dask", "distributed"),
-    "sim": ("mujoco",),
     "stability": ("mpmath",),
     "ros": ("cyclonedds",),
     "ws": ("websockets",),

@@ -144,13 +144,12 @@ ALLOWED = {
     "cli": PACKAGES,
 }
 
-# Third-party packages of the extras `compiler`, `cluster`, `sim` and `stability`, and of peers: a board has none.
+# Third-party packages of the extras `compiler`, `cluster` and `stability`, and of peers: a board has none.
 WORKSTATION_ONLY = {
     "sklearn",
     "scipy",
     "matplotlib",
     "joblib",
-    "mujoco",
     "threadpoolctl",
     "mpmath",
     "jinja2",

@@ -61,7 +61,7 @@ def results_of(grasps: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -
     common = ["compile", str(grasps), "--folds", "0", "--no-report"]
     assert run([*common, "-o", str(folder / "first"), "--propose", str(folder / "glove.toml")]) == 0
     assert run([*common, "-o", str(build), "--glove", str(folder / "glove.toml")]) == 0
-    assert run(["spec", str(build), "-o", str(spec)]) == 0
+    assert run(["spec", str(build), "--glove", str(folder / "glove.toml"), "-o", str(spec)]) == 0
     capsys.readouterr()
     assert run(["run", str(build), "--replay", str(grasps)]) == 0
     grasps_of_rows = capsys.readouterr().out
@@ -73,7 +73,9 @@ def results_of(grasps: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -
     return {
         "replay": digest(grasps_of_rows),
         "evaluation.json": digest(json.loads((folder / "evaluation.json").read_text())),
-        "curves": digest([(curve["method"], curve["sizes"], [r["correct"] for r in curve["rates"]]) for curve in curves]),
+        "curves": digest(
+            [(curve["method"], curve["sizes"], [r["correct"] for r in curve["rates"]]) for curve in curves]
+        ),
     } | {f"spec/{name}": digest for name, digest in digests(spec)}
 
 

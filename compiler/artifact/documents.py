@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 REPORT_NAME, TRY_NAME, SPEC_FOLDER = "report.html", "try.html", "spec"
 _TRAININGS = 40  # roughly, for the paper's tables
+# Of more subjects there are no such tables: every pair of subjects is a cell.
+_MOST_SUBJECTS = 30
 
 Progress = Callable[[int, int], None]
 
@@ -169,6 +171,8 @@ def _study(made: BuildReport, jobs: int, progress: Progress | None) -> "tuple[St
     settings = {name: value for name, value in fit.settings.items() if value is not None}
     if not asked.folds:
         return None, "The build was compiled without folds."
+    if (subjects := len(np.unique(made.grasp_set.subjects))) > _MOST_SUBJECTS:
+        return None, f"The paper's tables have a column for each subject: {subjects} are too many for a page."
     options = Options(
         folds=asked.folds,
         repeats=1,

@@ -40,7 +40,7 @@ from .training import integers_of, scores_of, segments_for, train
 
 Labels = NDArray[np.intp]
 _INNER = 4
-_LEARNT = 5500  # rows to learn from, at least two of each movement
+_LEARNT = 5500  # most rows to learn from
 _ERROR_RATE = 0.01  # of the sequential test
 # The methods compared, in the order of the table; the first is the one that a live glove uses.
 METHODS = {
@@ -150,16 +150,23 @@ def study_streams(
     )
 
 
-def _learning(grasp_set: GraspSet, kind: Inputs, subject: str) -> tuple[GraspSet, Samples, NDArray[np.intp]]:
+def _learning(
+    grasp_set: GraspSet, kind: Inputs, options: Options, subject: str
+) -> tuple[GraspSet, Samples, NDArray[np.intp]]:
     """Return the rows of all other subjects, as a set and as samples, and the numbers of those to learn from.
 
-    These are all rows, unless the usual frames of each movement are more than _LEARNT.
+    These are all rows, unless the usual frames of each movement are more than _LEARNT: then equally many of each
+    movement, or rows drawn from two of each.
     """
     own = grasp_set.rows(grasp_set.subjects != subject)
     samples = Samples.of(grasp_set, kind).rows(grasp_set.subjects != subject)
     movements = len(np.unique(samples.movements))
-    few = movements * FRAMES > _LEARNT
-    return own, samples, samples.balanced(max(2, _LEARNT // movements)) if few else np.arange(len(own))
+    if movements * FRAMES <= _LEARNT:
+        return own, samples, np.arange(len(own))
+    some = samples.balanced(max(2, _LEARNT // movements))
+    if len(some) > _LEARNT:
+        some = np.sort(np.random.default_rng(options.seed).choice(some, _LEARNT, replace=False))
+    return own, samples, some
 
 
 def _groups(own: GraspSet) -> NDArray[np.str_] | None:
@@ -168,7 +175,7 @@ def _groups(own: GraspSet) -> NDArray[np.str_] | None:
 
 def _chosen(grasp_set: GraspSet, kind: Inputs, options: Options, subject: str) -> tuple[str, Options]:
     """Return the options with the trainer and settings that suit all other subjects best."""
-    own, learning, some = _learning(grasp_set, kind, subject)
+    own, learning, some = _learning(grasp_set, kind, options, subject)
     training = train(learning.rows(some), options, groups=_groups(own.rows(some))).training
     assert training is not None
     settings: dict[str, Any] = dict(training.settings)
@@ -177,7 +184,7 @@ def _chosen(grasp_set: GraspSet, kind: Inputs, options: Options, subject: str) -
 
 def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Options]) -> tuple[Inputs, str, dict[str, Score]]:
     kind, subject, options = task
-    own, learning, some = _learning(grasp_set, kind, subject)
+    own, learning, some = _learning(grasp_set, kind, options, subject)
     samples, few = Samples.of(grasp_set, kind), learning.rows(some)
     trained = train(few, options)
     tables = integers_of(trained, few, options)

@@ -3,6 +3,7 @@
 import fcntl
 import os
 import platform
+import sqlite3
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,28 +12,26 @@ from hashlib import blake2b
 from inspect import signature
 from pathlib import Path
 from typing import Any, Generic, Literal, ParamSpec, TypeVar, get_type_hints
-from zlib import crc32
 
 import msgspec
 import numpy as np
 
 from thenar.drivers.closing import Closing
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.files import is_special, read_file, sync_folder
-from thenar.runtime.recording.writer import AppendedFile
+from thenar.runtime.files import is_special
 
 from ..workers import in_workers
 
-# Bytes; a frontier of the largest set makes a few million calls.
-LARGEST = 1 << 30
-HEADER = b'{"thenar":"store of results","schema":4}\n'
-# Older forms of calls and results, which cannot be looked up any more.
-OLD_HEADERS = tuple(b'{"thenar":"store of answers","schema":%d}\n' % n for n in (1, 2, 3))  # codespell:ignore answers
+_SQLITE = b"SQLite format 3\0"
+# Marks the files of stores among those of SQLite.
+_APPLICATION = int.from_bytes(b"then")
 
 # Where a function runs: on the cluster, if there is one; in workers on this machine, whose tools it uses; in this very
 # process, because it measures this machine, whose name is then part of the cache key.
 Place = Literal["cluster", "machine", "process"]
 Report = Callable[[int, int], None]
+# Steps of the progress of one round.
+ROUND = 100
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -56,9 +55,9 @@ class Stored(Generic[P, R]):
         # Workers find it by name, like any function.
         return self.function.__qualname__
 
-    def call(self, cost: float, /, *args: P.args, **kwargs: P.kwargs) -> "Call[R]":
-        """Return a call for `Cache.ask`, expected to take `cost` seconds of one core."""
-        return Call(self, args, kwargs, cost)
+    def call(self, *args: P.args, **kwargs: P.kwargs) -> "Call[R]":
+        """Return a call for `Cache.ask`."""
+        return Call(self, args, kwargs)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,7 +67,6 @@ class Call(Generic[R]):
     work: Stored[..., R]
     args: tuple[Any, ...]
     kwargs: Mapping[str, Any]
-    cost: float
 
     def __call__(self) -> R:
         """Compute and return the result."""
@@ -116,30 +114,18 @@ def stored(
     return lambda function: Stored(function, version, where, without)
 
 
-class _Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One result. `crc` is the CRC-32 of key and result: it detects lines damaged by a loss of power."""
-
-    key: str
-    crc: int
-    result: msgspec.Raw
-
-
 class Store(Closing):
     """The results in file `path`, for one run at a time; used as a context manager, or closed.
 
     scope  common dependencies of all results, such as the version of thenar. It is part of each key, so that one file
            may hold results of several scopes, which never mix.
 
-    The file is a header and one line of JSON per result. Results survive a kill once `put` has returned; a loss of
-    power costs at most the last second (see AppendedFile). A torn or damaged line is ignored; everything after the last
-    good line is cut off on opening. A store of an older form is emptied, and is `renewed`. Raises StoreError.
+    The file is a database of SQLite. Results survive a kill once `put` has returned. Raises StoreError.
     """
 
     def __init__(self, path: Path, scope: str) -> None:
-        self.renewed = False
-        self._path = path
-        self._scope = scope.encode()
-        self._results: dict[str, bytes] = {}
+        self._path, self._scope = path, scope.encode()
+        self._database: sqlite3.Connection | None = None
         if is_special(path):
             raise StoreError(f"{path} is a device or a pipe: name a file")
         with _opened(path):
@@ -147,114 +133,117 @@ class Store(Closing):
         try:
             with _opened(path):
                 fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                self._file = AppendedFile(path, self._read(read_file(path, LARGEST, StoreError)))
-            if self._file.size == 0:
-                self._append(HEADER)
-                sync_folder(path.parent)
+                head = os.pread(self._lock, len(_SQLITE), 0)
+            # SQLite takes a file of a few bytes for an empty one.
+            if head not in (b"", _SQLITE):
+                raise StoreError(f"{path} is no store of results: name another file")
+            self._connect()
         except BaseException:
-            os.close(self._lock)
+            self.close()
             raise
 
     def __len__(self) -> int:
         """Return the number of results, of all scopes."""
-        return len(self._results)
+        with self._asked() as database:
+            return int(database.execute("SELECT count(*) FROM results").fetchone()[0])
 
     def close(self) -> None:
         """Write everything to disk and unlock the file for other runs. May be called again."""
+        self.finish()
+        # Not before: closing any descriptor of a file takes SQLite's own locks from it.
         if self._lock >= 0:
-            self._file.close()
             os.close(self._lock)
             self._lock = -1
 
+    def finish(self) -> None:
+        """Write everything into the one file, which may be moved from then on. It stays locked for other runs."""
+        if self._database is not None:
+            self._database.close()
+            self._database = None
+
     def get(self, question: bytes, kind: type[R]) -> R | None:
         """Return the result, or None if there is none that decodes as `kind`, and it must be computed."""
-        data = self._results.get(self._key(question))
-        if data is None:
+        with self._asked() as database:
+            found = database.execute("SELECT result FROM results WHERE key = ?", (self._key(question),)).fetchone()
+        if found is None:
             return None
         try:
-            return msgspec.json.decode(data, type=kind)
-        except (ValueError, RecursionError):
+            return msgspec.json.decode(found[0], type=kind)
+        except (ValueError, TypeError, RecursionError):
             return None
 
     def put(self, question: bytes, result: object) -> None:
-        """Append the result, which replaces an older one. Raises StoreError, for example if the disk is full."""
-        key, data = self._key(question), msgspec.json.encode(result)
-        line = _Line(key, _crc(key, data), msgspec.Raw(data))
-        self._append(msgspec.json.encode(line) + b"\n")
-        self._results[key] = data
-
-    def _key(self, question: bytes) -> str:
-        return blake2b(self._scope + b"\0" + question, digest_size=16).hexdigest()
-
-    def _read(self, data: bytes) -> int:
-        """Read the results in `data`; return how many of its bytes are valid."""
-        if HEADER.startswith(data):
-            return 0  # new, or killed while the header was written
-        self.renewed = data.startswith(OLD_HEADERS)
-        if self.renewed:
-            return 0
-        if not data.startswith(HEADER):
-            raise StoreError(f"{self._path} is no store of results, or a newer thenar's: name another file")
-        kept = at = len(HEADER)
-        for line in data[len(HEADER) :].splitlines(keepends=True):
-            at += len(line)
-            if line.endswith(b"\n") and self._take(line):
-                kept = at
-        return kept
-
-    def _take(self, line: bytes) -> bool:
+        """Store the result, which replaces an older one. Raises StoreError, for example if the disk is full."""
+        row = self._key(question), msgspec.json.encode(result)
+        if self._database is None:
+            raise StoreError(f"{self._path} is closed")
         try:
-            read = msgspec.json.decode(line, type=_Line)
-        except (ValueError, RecursionError):
-            return False
-        data = bytes(read.result)
-        if read.crc != _crc(read.key, data):
-            return False
-        self._results[read.key] = data
-        return True
-
-    def _append(self, data: bytes) -> None:
-        if not self._file.append(data):
+            self._database.execute("INSERT OR REPLACE INTO results VALUES (?, ?)", row)
+        except sqlite3.Error as reason:
             raise StoreError(
-                f"{self._file.failure or f'{self._path} is closed'}; its {len(self)} results are kept: free some space "
-                "and run this again"
-            )
+                f"{self._path} cannot be written: {reason}; its {len(self)} results are kept: free some space and run "
+                "this again"
+            ) from reason
+
+    def _key(self, question: bytes) -> bytes:
+        return blake2b(self._scope + b"\0" + question, digest_size=16).digest()
+
+    def _connect(self) -> None:
+        """Open the database, or make it in an empty file."""
+        with self._asked(sqlite3.connect(self._path, isolation_level=None)) as database:
+            new = database.execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,)
+            if database.execute("PRAGMA application_id").fetchone() != (0 if new else _APPLICATION,):
+                raise StoreError(f"{self._path} is no store of results: name another file")
+            # Of one run: without shared memory. A kill loses nothing; a loss of power, at most the last results.
+            database.execute("PRAGMA locking_mode = EXCLUSIVE")
+            database.execute("PRAGMA journal_mode = WAL")
+            database.execute("PRAGMA synchronous = NORMAL")
+            if new:
+                database.execute(f"PRAGMA application_id = {_APPLICATION}")
+                database.execute("CREATE TABLE results (key BLOB PRIMARY KEY, result BLOB NOT NULL) WITHOUT ROWID")
+
+    @contextmanager
+    def _asked(self, opened: sqlite3.Connection | None = None) -> Iterator[sqlite3.Connection]:
+        """Yield the database, `opened` just now; turn an error of SQLite into a StoreError."""
+        self._database = opened or self._database
+        if self._database is None:
+            raise StoreError(f"{self._path} is closed")
+        try:
+            yield self._database
+        except sqlite3.OperationalError as reason:
+            raise StoreError(f"{self._path} cannot be read: {reason}") from reason
+        except sqlite3.Error as reason:
+            raise StoreError(f"{self._path} is no store of results: {reason}: name another file") from reason
 
 
 class Cache:
-    """Returns stored results at once, computes the others in workers and stores them; one progress over all stages.
+    """Returns stored results at once, computes the others in workers and stores them.
 
-    report   called with the done and total expected seconds of one core. When a stage begins, its actual cost replaces
-             the estimate; stored results cost nothing, so speed and remaining time stay correct.
-    jobs, cluster  as for in_workers. Results do not depend on either.
+    report   called with done and total: every call of `ask` is a round of the same weight, ROUND
+    rounds   how many rounds there will be
+    jobs     as for in_workers. Results do not depend on it.
     """
 
-    def __init__(self, store: Store, report: Report, *, jobs: int = -1, cluster: str | None = None) -> None:
-        self.jobs = jobs
-        self._store, self._report, self._cluster = store, report, cluster
-        self._costs: dict[str, float] = {}
-        self._done = 0.0
+    def __init__(self, store: Store, report: Report, rounds: int = 1, *, jobs: int = -1) -> None:
+        self._store, self._report, self._rounds, self._jobs = store, report, rounds, jobs
+        self._begun = 0
 
-    def expect(self, costs: Mapping[str, float]) -> None:
-        """Set the estimated costs of stages that have not begun."""
-        self._costs = {**costs, **self._costs}
-
-    def ask(self, stage: str, calls: Sequence[Call[R]]) -> list[R]:
+    def ask(self, calls: Sequence[Call[R]]) -> list[R]:
         """Return the results in the order of `calls`, all of one function; equal calls are computed once.
 
-        The most expensive calls begin first. Raises StoreError, exceptions of the function, and those of in_workers;
-        results computed until then are stored.
+        Raises StoreError, exceptions of the function, and those of in_workers; results computed until then are stored.
         """
+        self._begun += 1
         if not calls:
-            self._begin(stage, 0.0)
+            self._tell(1, 1)
             return []
         kind: type[R] = get_type_hints(calls[0].work.function)["return"]
         digests: dict[int, str] = {}
         questions = [call.question(digests) for call in calls]
         asked = dict(zip(questions, calls, strict=True))
         found = {key: known for key in asked if (known := self._store.get(key, kind)) is not None}
-        todo = sorted((key for key in asked if key not in found), key=lambda key: -asked[key].cost)
-        self._begin(stage, sum(asked[key].cost for key in todo))
+        todo = [key for key in asked if key not in found]
+        self._tell(len(found), len(asked))
         for number, result in self._found([asked[key] for key in todo], calls[0].work.where):
             key = todo[number]
             self._store.put(key, result)
@@ -263,21 +252,15 @@ class Cache:
             if read is None:
                 raise TypeError(f"the result of {asked[key].work.function.__name__} is no {kind} when read from JSON")
             found[key] = read
-            self._add(asked[key].cost)
+            self._tell(len(found), len(asked))
         return [found[key] for key in questions]
 
-    def _begin(self, stage: str, cost: float) -> None:
-        self._costs[stage] = cost
-        self._add(0.0)
-
     def _found(self, calls: Sequence[Call[R]], where: Place) -> Iterator[tuple[int, R]]:
-        jobs, cluster = (1 if where == "process" else self.jobs), (self._cluster if where == "cluster" else None)
-        return in_workers(_computed, enumerate(calls), jobs, cluster)
+        return in_workers(_computed, enumerate(calls), 1 if where == "process" else self._jobs, here=where != "cluster")
 
-    def _add(self, cost: float) -> None:
-        self._done += cost
-        total = sum(self._costs.values())
-        self._report(min(round(self._done), round(total)), round(total))
+    def _tell(self, done: int, calls: int) -> None:
+        """Report the share of this round that is done, and the rounds before it."""
+        self._report((self._begun - 1) * ROUND + ROUND * done // calls, self._rounds * ROUND)
 
 
 def _computed(numbered: tuple[int, Call[R]]) -> tuple[int, R]:
@@ -302,7 +285,3 @@ def _digest(array: np.ndarray[Any, Any]) -> str:
     shaped = f"{array.shape} {array.dtype.newbyteorder('<').str}\0".encode()
     data = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
     return blake2b(shaped + data.tobytes(), digest_size=16).hexdigest()
-
-
-def _crc(key: str, data: bytes) -> int:
-    return crc32(data, crc32(key.encode()))

@@ -9,9 +9,6 @@ from .timing.python_times import PythonCost
 from .timing.scan_times import NO_RECORDS, Overhead, Records, overhead_of
 from .timing.wirings import Wiring
 
-# Expected seconds.
-_CALIBRATION_S = 3.0
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Equipment:
@@ -35,5 +32,5 @@ def calibrate(target: str) -> tuple[PythonCost | None, Overhead]:
 
 def equipment_for(target: str, wirings: tuple[Wiring, ...], cache: Cache, records: Records = NO_RECORDS) -> Equipment:
     """Return the hardware options for `target`, measured here once."""
-    ((python, overhead),) = cache.ask("calibration", [calibrate.call(_CALIBRATION_S, target)])
+    ((python, overhead),) = cache.ask([calibrate.call(target)])
     return Equipment(ClassifyModel(target, python=python), wirings, overhead, records)

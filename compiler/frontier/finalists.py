@@ -19,10 +19,6 @@ from .survey import Cuts, Judged, Survey, Tally
 _USEFUL, _STEP, _LEVEL = 0.75, 0.003, 0.005
 # The share of errors below which differences do not count: too small for a screening of some hundred rows.
 _FEWEST = 0.002
-# Expected seconds of one core: of training twice, and of the layouts of all tables.
-PRICE_S = 3.0
-# The stage that trains finalists in all folds except the screening's.
-OTHERS = "finalists, other folds"
 # The share of the rows that more rounds than the paper's must win in the first repeat.
 _DEEPER = 0.002
 
@@ -112,20 +108,19 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
     cuts, choices = survey.cuts, [one.choice for one in chosen]
     searches = {choice: survey.search.alone(choice.trainer) for choice in choices}
     typical = survey.typical(choices)
-    survey.choose("finalists' placements", choices, cuts.others)
-    survey.choose_joints("finalists' joints", choices, cuts.others)
-    survey.settle("finalists' settings", typical, cuts.others)
-    fits = survey.fit("finalists", choices, cuts.screening, lambda one: (searches[one].stages, searches[one].tabled))
+    survey.choose(choices, cuts.others)
+    survey.choose_joints(choices, cuts.others)
+    survey.settle(typical, cuts.others)
+    fits = survey.fit(choices, cuts.screening, lambda one: (searches[one].stages, searches[one].tabled))
     rows = len(cuts.trials)
     depths = {one: depth_of(searches[one], [fits[one, fold] for fold in cuts.screening], rows) for one in choices}
-    fits |= survey.fit(OTHERS, choices, cuts.others, lambda one: (depths[one].stages, depths[one].tabled))
+    fits |= survey.fit(choices, cuts.others, lambda one: (depths[one].stages, depths[one].tabled))
     judged = {
         choice: _judged(cuts, depth, {fold: fits[choice, fold] for fold in (*cuts.screening, *cuts.others)})
         for choice, depth in depths.items()
     }
     calls = [
         price.call(
-            PRICE_S,
             survey.read(one.choice, cuts.everything),
             survey.names(one.choice),
             one.columns,
@@ -136,7 +131,7 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
         )
         for one in chosen
     ]
-    prices = survey.cache.ask("prices", calls)
+    prices = survey.cache.ask(calls)
     return tuple(
         Close(one, *judged[one.choice], priced, survey.choosing_s(one.choice))
         for one, priced in zip(chosen, prices, strict=True)

@@ -27,7 +27,6 @@ from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..text import INDEPENDENT, sentence
 from .cache import Cache, Report, Store
-from .costs import FEWER, LEARNT_S, WIDER, estimated_costs
 from .designs import Design, Latencies, best_designs, designs, lucks, points_of, with_whole_scans
 from .equipment import equipment_for
 from .finalists import Close, finalists, look_closely
@@ -46,13 +45,19 @@ from .timing.wirings import Wiring, reads_by_itself, wirings
 from .words import csv_bytes
 
 RecordTime = Literal["formula", "wire"]
-FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.jsonl"
+FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.sqlite"
 _DOCUMENTS = frozenset({FRONTIER_NAME, TABLE_NAME, *(f"{name}.svg" for name in PICTURES)})
 _EARLY = (
     "Scans that end early are tried with decisions on single frames: a dwell with a lead reads on for longer, and a "
     "sequential test needs whole scans."
 )
-_RENEWED = f"{STORE_NAME} had the form of an older thenar: everything was computed again"
+# Placements to screen with the other trainers, as a multiple of the finalists.
+_WIDER = 3
+# Number of placements to try with fewer joints.
+_FEWER = 5
+# Calls of `Cache.ask`: the calibration, five to screen, four with fewer joints, three with other trainers, six for the
+# finalists, the simulations, the latencies.
+_ROUNDS = 21
 _UNTIMED = (
     "the time of reading the joints ({}) is unknown and is left out of every frame time and latency: give it with "
     "--joint-us"
@@ -99,7 +104,6 @@ def find_frontier(
     filtered: bool = False,
     stream: GraspSet | None = None,
     jobs: int = -1,
-    cluster: str | None = None,
     report: Report | None = None,
 ) -> Frontier:
     """Find the trade-off of accuracy and time: the best switches, joints, rounds, tables, wirings and decisions.
@@ -138,11 +142,9 @@ def find_frontier(
     stream : GraspSet, optional
         Other recordings of the same glove, to measure decision latency on; usually the test rows of the first fold.
     jobs : int
-        Worker processes, -1 for all cores.
-    cluster : str, optional
-        Address of a Dask scheduler, whose workers do the work.
+        Worker processes, -1 for all cores. Within `thenar.compiler.dask_cluster`, its workers do the work.
     report : callable, optional
-        Called with the done and total expected seconds of one core.
+        Called with the done and total steps; every round of work has the same number of them.
 
     Returns
     -------
@@ -170,19 +172,18 @@ def find_frontier(
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
     made = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
-        cache = Cache(store, report or _unheard, jobs=jobs, cluster=cluster)
+        cache = Cache(store, report or _unheard, _ROUNDS, jobs=jobs)
         with _taken_back_if_refused(made):
             records = _records(grasp_set, harness, target, joint_us, record_time, filtered)
             equipment = equipment_for(target, _wirings(grasp_set, harness, target), cache, records)
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
             played = _stream(survey, stream)
             own = () if build is None else (own_build(build, grasp_set, equipment),)
-        cache.expect(estimated_costs(survey))
         untimed = (_UNTIMED.format(list_names(grasp_set.joint_names)),) if records.how == "unknown" else ()
-        renewed = (_RENEWED,) if store.renewed else ()
-        found = _found(survey, played, wanted or Wanted(), own, (*renewed, *untimed, *lacking))
+        found = _found(survey, played, wanted or Wanted(), own, (*untimed, *lacking))
         if output is not None:
-            # The store moves into the new folder as the same file, and must stay locked meanwhile.
+            # The store moves into the new folder as the same file, and stays locked meanwhile.
+            store.finish()
             publish_folder(_documents(found), output, kept_entries, FrontierError)
     return found
 
@@ -306,14 +307,14 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
             f"no placement that was tried can be built for {survey.equipment.model.target}: name other --methods or "
             "another --target"
         )
-    several = finalists(screened, (), WIDER * search.finalists)
-    screened += screen_fewer(survey, finalists([one for one in screened if one.choice.joints], (), FEWER))
+    several = finalists(screened, (), _WIDER * search.finalists)
+    screened += screen_fewer(survey, finalists([one for one in screened if one.choice.joints], (), _FEWER))
     screened += screen_others(survey, several)
     named = choices_to_mark(n_elements, survey.n_joints, search.trainers[0], most)
     closes = look_closely(survey, finalists(screened, list(named), search.finalists))
     every = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
     by_time, by_switches = best_designs(every)
-    kept, checks, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
+    kept, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
     luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
     points = points_of(kept, _latencies(survey, stream, kept), luck, survey.names, survey.training, survey.some_joints)
     picked, tried = wanted.pick(points), _tried(screened, closes, search)
@@ -342,7 +343,6 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
         tried=tried,
         curves=curves,
         marks=(*marks_of(named, closes, survey), *own),
-        checks=checks,
         skipped=(*lacking, *claimed, *skipped, *early, stream.what),
         picked=None if picked is None else picked.number,
         wanted=wanted.words,
@@ -359,7 +359,6 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
         grouped.setdefault(design.close.screened.choice, []).append(design)
     calls = [
         latencies.call(
-            2.0 + len(mine) * (LEARNT_S if moving else 1.0),
             survey.read(choice, fold),
             fold.train,
             survey.columns(choice, fold),
@@ -375,7 +374,7 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
     ]
     return {
         (design, kind): latency
-        for mine, found in zip(grouped.values(), survey.cache.ask("latencies", calls), strict=True)
+        for mine, found in zip(grouped.values(), survey.cache.ask(calls), strict=True)
         for design, several in zip(mine, found, strict=True)
         for kind, latency in zip(design.decisions, several, strict=True)
     }

@@ -1,17 +1,13 @@
 """Decision latency: the time from a hand's arrival in a grasp until `thenar run` decides on it.
 
-The runtime's `Decision`, `SequentialTest` and `LiveSegments` decide on a stream. In most of many equal frames in
-succession a decider does nothing, so it is shown only those frames in which something can happen.
+The runtime's `Decision`, `SequentialTest` and `LiveSegments` decide on a stream, played at 1 kHz at most.
 """
 
 import math
-from bisect import bisect_left
-from collections.abc import Iterator, Mapping, Sequence
-from copy import copy
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Protocol
 
 import numpy as np
 from msgspec import Struct
@@ -36,20 +32,13 @@ from .price import Tabled, tables_of
 from .stream import Stream
 
 NOTHING = -1
-# Only with at least this many frames left is it worth computing how many of them decide nothing.
-_WORTHWHILE = 4
+# The shortest time between two frames that are played.
+LEAST_STEP_US = 1_000
 
 # The deciding method: by candidates under a policy, or by segments, of a model (None: the default model).
 Deciding = Policy | SegmentModel | None
-# The decision from a frame's time on; None: nothing is decided.
-Decided = tuple[int, int | None]
-
-
-class Decider(Protocol):
-    """Processes stretches of equal frames, one after the other."""
-
-    def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
-        """Yield the decision at the first frame of a stretch, and again whenever it may have changed since."""
+# Takes a frame's time and standing; returns what is decided on, None for nothing.
+Decide = Callable[[int, Standing], int | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,172 +84,43 @@ def decisions(tables: IntegerTables, frames: Stretches, policy: Deciding) -> Dec
     """Return the decisions of `thenar run` under `policy` on these frames, each whole and seen once, by both devices at
     the same time; by segments: the held types.
     """
-    decider, scorer = decider_of(tables, policy), Scorer(tables)
-    found: list[Decided] = []
+    decide, scorer = decider_of(tables, policy), Scorer(tables)
+    changes: list[int] = []
+    types: list[int | None] = []
     lanes = map(tuple, (frames.scores + LANE_OFFSET).tolist())
     for stretch, row in zip(frames.times, lanes, strict=True):
-        for time_us, held in decider.stay(stretch, Standing(row, scorer)):
-            if not found or held != found[-1][1]:
-                found.append((time_us, held))
+        standing = Standing(row, scorer)
+        for time_us in stretch:
+            held = decide(time_us, standing)
+            if not types or held != types[-1]:
+                changes.append(time_us)
+                types.append(held)
     return Decisions(
-        np.array([time_us // frames.step_us for time_us, _ in found], np.int64),
-        np.array([NOTHING if held is None else held for _, held in found], np.intp),
+        np.array(changes, np.int64) // frames.step_us,
+        np.array([NOTHING if held is None else held for held in types], np.intp),
     )
 
 
-def decider_of(tables: IntegerTables, policy: Deciding) -> Decider:
+def decider_of(tables: IntegerTables, policy: Deciding) -> Decide:
     """Return the live recogniser's decider under `policy`."""
     if policy is None or isinstance(policy, SegmentModel):
-        return _Segments(tables, policy)
+        return _by_segments(tables, policy)
     if policy.error_rate is None:
-        return _Hysteresis(Decision(policy.lead_steps(tables.scale), policy.dwell_us, policy.hold_us))
-    test = _Test(tables.n_classes, tables.scale, policy.error_rate, policy.hold_us, policy.spacing_us)
-    return _Tests(test, Scorer(tables))
+        return Decision(policy.lead_steps(tables.scale), policy.dwell_us, policy.hold_us).update
+    test = SequentialTest(tables.n_classes, tables.scale, policy.error_rate, policy.hold_us, policy.spacing_us)
+    return test.update
 
 
-class _Segments:
-    """Segments of a model, None: the default, with the default lag. Frames between two ticks change nothing."""
+def _by_segments(tables: IntegerTables, model: SegmentModel | None) -> Decide:
+    """Return the decider by segments of a model, None: the default, with the default lag: the held type."""
+    model = model or SegmentModel.usual(tables.n_classes, has_none=False, scale=tables.scale)
+    live = LiveSegments(model, [str(number) for number in range(tables.n_classes)], Policy().lag_us or 0)
 
-    def __init__(self, tables: IntegerTables, model: SegmentModel | None) -> None:
-        model = model or SegmentModel.usual(tables.n_classes, has_none=False, scale=tables.scale)
-        self._live = LiveSegments(model, [str(number) for number in range(tables.n_classes)], Policy().lag_us or 0)
+    def decide(time_us: int, standing: Standing) -> int | None:
+        found = live.update(time_us, standing.lanes)
+        return None if found.state == "forming" else found.label
 
-    def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
-        """Yield the held type at the first frame of a stretch, and at each frame that takes a tick."""
-        place = 0
-        while place < len(times):
-            found = self._live.update(times[place], standing.lanes)
-            yield times[place], None if found.state == "forming" else found.label
-            place = bisect_left(times, True, place + 1, key=self._live.due)
-
-
-class _Hysteresis:
-    """Within a stretch a decision changes only once: its candidate takes over, and stays for the rest."""
-
-    def __init__(self, decision: Decision) -> None:
-        self._decision = decision
-
-    def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
-        """Yield the decision at the first frame of a stretch, and at the one that changes it."""
-        decision = self._decision
-        held = decision.update(times[0], standing)
-        yield times[0], held
-        if held != standing.candidate and self._changes(times[-1], standing):
-            # Candidate and support are constant: once the time for a change has come, it stays.
-            first = bisect_left(times, True, key=lambda time_us: self._changes(time_us, standing))
-            yield times[first], decision.update(times[first], standing)
-        decision.update(times[-1], standing)
-
-    def _changes(self, time_us: int, standing: Standing) -> bool:
-        """Whether the decision would change with a frame of this time, were it the next."""
-        return copy(self._decision).update(time_us, standing) != self._decision.held
-
-
-class _Test(SequentialTest):
-    """A sequential test that reports when it waits, how long it will, and when it begins again."""
-
-    __slots__ = ()
-
-    @property
-    def next_us(self) -> int:
-        """The earliest time at which a frame counts again."""
-        return 0 if self._counted_us is None else self._counted_us + max(self.spacing_us, 1)
-
-    @property
-    def stands_until_us(self) -> int:
-        """The latest time of a frame with which the decision remains valid."""
-        return self._decided_us + self.longest_us
-
-    @property
-    def goes_on_until_us(self) -> int:
-        """The latest time of a frame that still belongs to the running test."""
-        return self._began_us + self.longest_us
-
-    def ended_at(self, time_us: int) -> bool:
-        """Whether a test ended with the frame of this time."""
-        return not self._sums and self._counted_us == time_us
-
-    def quiet(self, lanes: tuple[int, ...], most: int) -> int:
-        """Return after how many frames of these scores, up to `most`, the running test is still undecided."""
-        best = lanes.index(max(lanes))
-        # Only the frames' best class gains on all others, but the best of the sums may lead it by enough to end.
-        if not self._sums or max(self._sums) - self._sums[best] >= self.threshold:
-            return 0
-        wanted = [self.threshold + total - self._sums[best] for total in self._sums]
-        gains = [lanes[best] - lane for lane in lanes]
-        del wanted[best], gains[best]
-        # It ends with the first frame after which the best leads every other class by the threshold.
-        pairs = zip(wanted, gains, strict=True)
-        return max(min(most, (left - 1) // gain if gain else most) for left, gain in pairs if left > 0)
-
-
-class _Tests:
-    """Frames that do not count are skipped. Frames that decide nothing are added up at once. After two tests in a
-    stretch with the same decision, each further one would repeat the second; whole numbers of them are skipped by
-    setting the clock back: a test only depends on elapsed time.
-    """
-
-    def __init__(self, test: _Test, scorer: Scorer) -> None:
-        self._test, self._scorer = test, scorer
-        self._back_us = 0
-
-    def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
-        """Yield the decision at the first frame of a stretch, and again whenever it may have changed since."""
-        place, frames = 0, 1
-        ended: tuple[int, int | None] | None = None  # the last test that ended here, and its decision while valid
-        while place < len(times):
-            held = self._test.update(times[place] - self._back_us, self._summed(standing, frames))
-            yield times[place], held
-            if held is None:
-                ended = None
-            elif self._test.ended_at(times[place] - self._back_us):
-                if ended is not None and ended[1] == held:
-                    place += self._leave_out(times[place:], place - ended[0])
-                ended = place, held
-            after, frames = self._next(times, place, standing)
-            expired = self._expired(times[place + 1 : after])
-            if expired is not None:
-                yield expired, None
-                ended = None
-            place = after
-
-    def _summed(self, standing: Standing, frames: int) -> Standing:
-        """Return the sum of `frames` equal frames."""
-        return standing if frames == 1 else Standing(tuple(frames * lane for lane in standing.lanes), self._scorer)
-
-    def _leave_out(self, left: range, frames: int) -> int:
-        """Skip all whole tests of `frames` frames within `left`; return their total number of frames."""
-        whole = (len(left) - 1) // frames * frames
-        self._back_us += whole * left.step
-        return whole
-
-    def _next(self, times: range, place: int, standing: Standing) -> tuple[int, int]:
-        """Return the position of the next frame to process, past the last if it is in a later stretch, and how many
-        frames it represents: itself, and the counting frames before it that decide nothing.
-        """
-        if self._test.spacing_us <= times.step and place + _WORTHWHILE >= len(times):
-            return place + 1, 1
-        counts = self._place(times, self._test.next_us, up=True)
-        counts = min(max(counts, place + 1), len(times))
-        apart = max(-(-self._test.spacing_us // times.step), 1)
-        last = min(self._place(times, self._test.goes_on_until_us), len(times) - 1)
-        most = (last - counts) // apart + 1
-        frames = self._test.quiet(standing.lanes, most) if most >= _WORTHWHILE else 1
-        return (counts + (frames - 1) * apart, frames) if frames > 1 else (counts, 1)
-
-    def _expired(self, idle: range) -> int | None:
-        """Return the first of some idle frames (not counting, or undecided) at which a decision has expired."""
-        if not idle or self._test.held is None:
-            return None
-        gone = max(self._place(idle, self._test.stands_until_us) + 1, 0)
-        return idle[gone] if gone < len(idle) else None
-
-    def _place(self, times: range, test_us: int, *, up: bool = False) -> int:
-        """Return the position of the last frame up to a time of the test's clock, or with `up` of the first from it on;
-        positions continue beyond the given frames at both ends.
-        """
-        since_us = test_us + self._back_us - times[0]
-        return -(-since_us // times.step) if up else since_us // times.step
+    return decide
 
 
 Times = NDArray[np.int64]
@@ -290,7 +150,7 @@ class Pace(Struct, frozen=True):
     asked: float = 1.0
 
 
-@stored(5)
+@stored(6)
 def latencies(
     samples: Samples,
     rows: Rows,
@@ -337,7 +197,8 @@ class _Held:
 def latency(
     tables: IntegerTables, columns: Sequence[int], stream: Stream, frame_us: float, policy: Deciding
 ) -> Latency:
-    """Return the latency of tables on a stream with one frame every frame_us, in integer microseconds.
+    """Return the latency of tables on a stream with one frame every frame_us, in integer microseconds; one every
+    LEAST_STEP_US if frames are shorter.
 
     columns  the tables' switches as columns of the stream, in the tables' order; of its joints they take all, or none
 
@@ -350,12 +211,13 @@ def latency(
     Raises FrontierError if the tables are not for these inputs, the stream has no grasps, or a frame takes no time.
     """
     _check(tables, columns, stream, frame_us)
-    step_us = max(round(frame_us), 1)
+    takes_us = max(round(frame_us), 1)
+    step_us = max(takes_us, LEAST_STEP_US)
     decided = decided_on(tables, columns, stream, step_us, policy)
     begun_us = stream.at_us - stream.at_us[0]
     held = _Held(begun_us[stream.arrivals], begun_us[stream.ends], stream.types[stream.arrivals])
-    predicted_us = (decided.frames + 1) * step_us
-    return _measured(held, *_waits_and_errors(predicted_us, decided.types, held), step_us)
+    predicted_us = decided.frames * step_us + takes_us
+    return _measured(held, *_waits_and_errors(predicted_us, decided.types, held), takes_us)
 
 
 def latency_on_demand(tables: IntegerTables, columns: Sequence[int], stream: Stream, pace: Pace) -> Latency:

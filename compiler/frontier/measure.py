@@ -1,4 +1,4 @@
-"""Measure the points' times: simulate or time designs on a front, and validate the model against the results."""
+"""Measure the points' times: simulate or time designs on a front."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,18 +6,17 @@ from dataclasses import replace
 from thenar.runtime.tables import tables_from_bytes
 
 from ..firmware.choose import features
+from ..firmware.classifier import LIBRARY_NAME, Library
+from ..firmware.layout import Layout
+from ..firmware.measuring import run_counted, slow_frames
+from ..firmware.targets import Target
+from ..firmware.words import numbered
 from .cache import Cache, stored
 from .designs import Design
 from .equipment import Equipment
-from .points import Check, FrontierError, Time
-from .timing.checks import LEAST, check, unchecked
+from .points import FrontierError, Time
 from .timing.classify_times import ClassifyModel, fitting
 from .timing.python_times import classify_us
-from .timing.simulated import run_layout
-from .timing.wire_check import check_wire
-
-# Expected seconds: of a trial, of timing all designs in Python, of the model's validation.
-TRIAL_S, _TIMES_S, _CHECK_S = 2.0, 1.0, 5.0
 
 
 @stored(1, where="machine")
@@ -29,8 +28,16 @@ def count_steps(content: bytes, layout: str, model: ClassifyModel) -> float:
     assert model.part is not None
     for option in fitting(tables_from_bytes(content), model.part):
         if features(option[0], model.part) == layout:
-            return run_layout((option, model.part)).counted
+            return steps_of(option[0], model.part)
     raise FrontierError(f"there is no layout {layout!r} of these tables: another thenar made the store")
+
+
+def steps_of(layout: Layout, part: Target) -> float:
+    """Compile a layout for a target and run it; return the cycles, or instructions, of the slowest of the frames that
+    should take longest and of extreme ones. Raises FirmwareError.
+    """
+    library = Library(LIBRARY_NAME, numbered(layout.tables), layout, part.avr)
+    return float(run_counted(library, part, slow_frames(layout)).most)
 
 
 @stored(1, where="process")
@@ -39,28 +46,28 @@ def time_here(contents: tuple[bytes, ...], yardstick: float) -> tuple[float, ...
     return tuple(classify_us([tables_from_bytes(content) for content in contents], yardstick))
 
 
-@stored(1, where="process", without=("jobs",))
-def run_checks(contents: tuple[bytes, ...], model: ClassifyModel, jobs: int) -> tuple[Check, ...]:
-    """Validate a model against measurements of these tables, in `jobs` processes. Raises FirmwareError."""
-    return check(model, [tables_from_bytes(content) for content in contents], jobs=jobs)
-
-
-def measured(
-    designs: Sequence[Design], equipment: Equipment, cache: Cache
-) -> tuple[list[Design], tuple[Check, ...], tuple[str, ...]]:
-    """Return the designs with their times, the model's errors on these and more, and sentences on missing measurements.
+def measured(designs: Sequence[Design], equipment: Equipment, cache: Cache) -> tuple[list[Design], tuple[str, ...]]:
+    """Return the designs with their times, and sentences on missing measurements.
 
     Simulators run on this machine even with a cluster, whose workers may have none.
     """
-    model, lack = equipment.model, unchecked(equipment.model)
-    found, checks = list(designs), tuple[Check, ...]()
-    if not lack:
+    model, lack = equipment.model, unmeasured(equipment.model)
+    if lack:
+        found = list(designs)
+    else:
         found = _simulated(designs, model, cache) if model.part else _timed(designs, model, cache)
-        cost = LEAST * TRIAL_S if model.part else _CHECK_S
-        (checks,) = cache.ask("checks", [run_checks.call(cost, _contents(designs), model, cache.jobs)])
-    wire, without = check_wire()
-    said = (lack, model.note, equipment.overhead.what, equipment.records.what, without)
-    return found, (*checks, *wire), tuple(sentence for sentence in said if sentence)
+    said = (lack, model.note, equipment.overhead.what, equipment.records.what)
+    return found, tuple(sentence for sentence in said if sentence)
+
+
+def unmeasured(model: ClassifyModel) -> str | None:
+    """Return, in a sentence, why the classify times are the model's here; None if they are measured."""
+    if model.part is None:
+        other = "classify times on pi were not measured: this machine is no Raspberry Pi"
+        return other if model.guessed else None
+    if lack := model.part.missing():
+        return f"classify times on {model.target} were not counted in a simulator: {lack}"
+    return None
 
 
 def _contents(designs: Sequence[Design]) -> tuple[bytes, ...]:
@@ -70,14 +77,14 @@ def _contents(designs: Sequence[Design]) -> tuple[bytes, ...]:
 def _timed(designs: Sequence[Design], model: ClassifyModel, cache: Cache) -> list[Design]:
     contents = _contents(designs)
     assert model.python is not None
-    (us,) = cache.ask("simulations", [time_here.call(_TIMES_S, contents, model.python.yardstick)])
+    (us,) = cache.ask([time_here.call(contents, model.python.yardstick)])
     times = dict(zip(contents, us, strict=True))
     return [replace(design, measured=Time(times[design.tables.content], "measured")) for design in designs]
 
 
 def _simulated(designs: Sequence[Design], model: ClassifyModel, cache: Cache) -> list[Design]:
-    calls = [count_steps.call(TRIAL_S, design.tables.content, design.classified.layout, model) for design in designs]
-    steps = cache.ask("simulations", calls)
+    calls = [count_steps.call(design.tables.content, design.classified.layout, model) for design in designs]
+    steps = cache.ask(calls)
     return [
         replace(design, measured=Time(model.us(round(each)), "simulated"))
         for design, each in zip(designs, steps, strict=True)

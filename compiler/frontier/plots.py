@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,7 +12,7 @@ from thenar.runtime.manifest import Inputs
 from ..evaluation.rates import Rate
 from ..pictures import on_paper, painting, rendered
 from ..text import counted, duration, percent
-from .labels import FAINT, LINE, Label, Labels
+from .labels import Label, Labels
 from .points import Curve, Frontier, Mark, Point, Tried, front
 from .words import counted_elements, elements_of, featured, inputs_of, of_time, shorten
 
@@ -140,13 +139,13 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     axes.set_xlabel(axis + "; reading the joints is left out" * untimed, color=_INK)
 
     labels, spoken_of = Labels(axes), featured(frontier)
-    _draw_tried(labels, tried)
+    _draw_tried(axes, tried)
     if cost.front == "frame" and len(frontier.trainers) > 1:
-        _draw_trainers(labels, tried)
+        _draw_trainers(axes, tried)
     if cost.is_time:
-        _draw_best(labels, [(x, point.rate.mean) for x, point in points if cost.front in point.fronts], cost.best)
-    _draw_ends(labels, ends)
-    names = list(_draw_curves(labels, curves))
+        _draw_best(axes, [(x, point.rate.mean) for x, point in points if cost.front in point.fronts], cost.best)
+    _draw_ends(axes, ends)
+    names = list(_draw_curves(axes, curves))
     _draw_points(labels, points, cost.front, elements_of(frontier))
     _draw_marks(labels, marks)
     for x, point in points:
@@ -249,44 +248,39 @@ def _draw_key(axes: "Axes") -> None:
         axes.legend(**place, fontsize=FONT, handletextpad=0.35, columnspacing=1.4, handlelength=1.3)
 
 
-def _draw_tried(labels: Labels, tried: Sequence[tuple[float, Tried]]) -> None:
+def _draw_tried(axes: "Axes", tried: Sequence[tuple[float, Tried]]) -> None:
     """Draw the screened placements, faintly."""
     if not tried:
         return
     for inputs, colour in _COLOURS.items():
         xs = [x for x, each in tried if each.inputs == inputs]
         ys = [each.rate.mean for _, each in tried if each.inputs == inputs]
-        labels.axes.scatter(xs, ys, s=_TRIED_SIZE, marker=_SHAPES[inputs], color=colour, alpha=0.22, lw=0, zorder=1.5)
-        labels.avoid(xs, ys, FAINT)
-    labels.axes.scatter([], [], s=_TRIED_SIZE, color=_GREY, alpha=0.6, lw=0, label="tried")
+        axes.scatter(xs, ys, s=_TRIED_SIZE, marker=_SHAPES[inputs], color=colour, alpha=0.22, lw=0, zorder=1.5)
+    axes.scatter([], [], s=_TRIED_SIZE, color=_GREY, alpha=0.6, lw=0, label="tried")
 
 
-def _draw_trainers(labels: Labels, tried: Sequence[tuple[float, Tried]]) -> None:
+def _draw_trainers(axes: "Axes", tried: Sequence[tuple[float, Tried]]) -> None:
     """Draw each trainer's front, not corrected for luck."""
     for number, name in enumerate(dict.fromkeys(each.trainer for _, each in tried)):
         places = [(x, each.rate.mean) for x, each in tried if each.trainer == name]
         best = front(places, lambda place: place[0], lambda place: place[1])
-        xs, ys = [*(x for x, _ in best), labels.axes.get_xlim()[1]], [*(y for _, y in best), best[-1][1]]
+        xs, ys = [*(x for x, _ in best), axes.get_xlim()[1]], [*(y for _, y in best), best[-1][1]]
         colour, dash = _BASELINES[number % len(_BASELINES)], _DASHES[1 + number % (len(_DASHES) - 1)]
-        labels.axes.step(xs, ys, where="post", color=colour, lw=1.1, ls=dash, zorder=2, label=f"{shorten(name)}, tried")
-        for (x, y), (after, higher) in pairwise(zip(xs, ys, strict=True)):
-            labels.avoid_line((x, after, after), (y, y, higher))
+        axes.step(xs, ys, where="post", color=colour, lw=1.1, ls=dash, zorder=2, label=f"{shorten(name)}, tried")
 
 
-def _draw_best(labels: Labels, best: Iterable[tuple[float, float]], name: str) -> None:
+def _draw_best(axes: "Axes", best: Iterable[tuple[float, float]], name: str) -> None:
     """Draw the line of best points, (cost, rate) each: from each point on its rate is reached, until a better one.
 
     A point that is only best among those of its decision may lie below it.
     """
-    axes, corners = labels.axes, front(list(best), lambda place: place[0], lambda place: place[1], step=0.0)
+    corners = front(list(best), lambda place: place[0], lambda place: place[1], step=0.0)
     if not corners:
         return
     xs = [*(x for x, _ in corners), axes.get_xlim()[1]]
     ys = [*(y for _, y in corners), corners[-1][1]]
     axes.step(xs, ys, where="post", color=_INK, lw=1.6, zorder=2.5, label=name)
     axes.fill_between(xs, ys, axes.get_ylim()[0], step="post", color=_INK, alpha=0.04, lw=0, zorder=0.5)
-    for (x, y), (after, higher) in pairwise(zip(xs, ys, strict=True)):
-        labels.avoid_line((x, after, after), (y, y, higher))
 
 
 def _draw_points(labels: Labels, points: Sequence[tuple[float, Point]], best: str, kept: str) -> None:
@@ -296,7 +290,7 @@ def _draw_points(labels: Labels, points: Sequence[tuple[float, Point]], best: st
     hollow = [point for _, point in points if best and best not in point.fronts]
     for inputs, colour in _COLOURS.items():
         some = [(x, point) for x, point in points if point.setting.inputs == inputs]
-        _draw_whiskers(labels, [(x, point.rate) for x, point in some], colour)
+        _draw_whiskers(labels.axes, [(x, point.rate) for x, point in some], colour)
         for face, drawn in (
             (colour, [(x, point) for x, point in some if point not in hollow]),
             (_WHITE, [(x, point) for x, point in some if point in hollow]),
@@ -314,28 +308,25 @@ def _draw_points(labels: Labels, points: Sequence[tuple[float, Point]], best: st
         labels.axes.scatter([], [], s=_SIZE, facecolor=_WHITE, edgecolor=_GREY, lw=1.2, label="not the best here")
 
 
-def _draw_ends(labels: Labels, ends: Iterable[tuple[float, float, Point]]) -> None:
+def _draw_ends(axes: "Axes", ends: Iterable[tuple[float, float, Point]]) -> None:
     """Draw lines from each point's mean to its end."""
     for start, end, point in ends:
         level = (point.rate.mean, point.rate.mean)
         colour = _COLOURS[point.setting.inputs]
-        labels.axes.plot((start, end), level, color=colour, lw=0.9, alpha=0.45, marker="|", ms=5, markevery=[1])
-        labels.avoid_line((start, end), level, LINE / 3)
+        axes.plot((start, end), level, color=colour, lw=0.9, alpha=0.45, marker="|", ms=5, markevery=[1])
 
 
 def _draw_marks(labels: Labels, marks: Sequence[tuple[float, Mark]]) -> None:
     """Draw marks with their intervals."""
-    _draw_whiskers(labels, [(x, mark.rate) for x, mark in marks], _INK)
+    _draw_whiskers(labels.axes, [(x, mark.rate) for x, mark in marks], _INK)
     xs, ys = [x for x, _ in marks], [mark.rate.mean for _, mark in marks]
     labels.axes.scatter(xs, ys, s=_MARK_SIZE, marker="X", color=_INK, edgecolor=_WHITE, lw=0.8, zorder=4.5)
     labels.avoid(xs, ys)
 
 
-def _draw_whiskers(labels: Labels, shown: Sequence[tuple[float, Rate]], colour: str) -> None:
+def _draw_whiskers(axes: "Axes", shown: Sequence[tuple[float, Rate]], colour: str) -> None:
     xs, lows, highs = [x for x, _ in shown], [rate.low for _, rate in shown], [rate.high for _, rate in shown]
-    labels.axes.vlines(xs, lows, highs, color=colour, lw=1.1, alpha=0.8, zorder=3)
-    for x, low, high in zip(xs, lows, highs, strict=True):
-        labels.avoid_line((x, x), (low, high))
+    axes.vlines(xs, lows, highs, color=colour, lw=1.1, alpha=0.8, zorder=3)
 
 
 def _shown(curves: tuple[Curve, ...]) -> list[Rate]:
@@ -343,28 +334,27 @@ def _shown(curves: tuple[Curve, ...]) -> list[Rate]:
     return [rate for size, rate in pairs if size >= _FEW] or [rate for _, rate in pairs]
 
 
-def _draw_curves(labels: Labels, curves: Sequence[Curve]) -> Iterator[Label]:
+def _draw_curves(axes: "Axes", curves: Sequence[Curve]) -> Iterator[Label]:
     """Draw ours and the baselines' curves, and yield their names, ours first."""
     ours, baselines = ([curve for curve in curves if curve.ours == wanted] for wanted in (True, False))
     for number, curve in enumerate(ours):
-        yield from _draw_curve(labels, curve, _COLOURS["switches"], _DASHES[number % len(_DASHES)])
+        yield from _draw_curve(axes, curve, _COLOURS["switches"], _DASHES[number % len(_DASHES)])
     for number, curve in enumerate(baselines):
         turn, colour = divmod(number, len(_BASELINES))
-        yield from _draw_curve(labels, curve, _BASELINES[colour], _DASHES[turn % len(_DASHES)])
+        yield from _draw_curve(axes, curve, _BASELINES[colour], _DASHES[turn % len(_DASHES)])
 
 
-def _draw_curve(labels: Labels, curve: Curve, colour: str, dash: "Dash") -> Iterator[Label]:
+def _draw_curve(axes: "Axes", curve: Curve, colour: str, dash: "Dash") -> Iterator[Label]:
     pairs = [(size, rate) for size, rate in zip(curve.sizes, curve.rates, strict=True) if size >= 1]
     if not pairs:
         return
     xs, means = [size for size, _ in pairs], [rate.mean for _, rate in pairs]
     width, shade, above = (2.4, 0.10, 3) if curve.ours else (1.1, 0.04, 2)
-    labels.axes.plot(xs, means, color=colour, lw=width, ls=dash, zorder=above)
+    axes.plot(xs, means, color=colour, lw=width, ls=dash, zorder=above)
     lows, highs = [rate.low for _, rate in pairs], [rate.high for _, rate in pairs]
-    labels.axes.fill_between(xs, lows, highs, color=colour, alpha=shade, lw=0, zorder=1)
-    labels.avoid_line(xs, means)
+    axes.fill_between(xs, lows, highs, color=colour, alpha=shade, lw=0, zorder=1)
     places = tuple(zip(xs, means, strict=True))
-    seen = tuple(place for place in places if place[1] >= labels.axes.get_ylim()[0])
+    seen = tuple(place for place in places if place[1] >= axes.get_ylim()[0])
     yield Label(seen or places, (shorten(curve.method),), colour, size=9.0 if curve.ours else 8.0, bold=curve.ours)
 
 

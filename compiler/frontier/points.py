@@ -162,16 +162,6 @@ class Curve(Struct, frozen=True, forbid_unknown_fields=True):
     rates: tuple[Rate, ...]
 
 
-class Check(Struct, frozen=True, forbid_unknown_fields=True):
-    """A model's predictions compared with measurements: subject and number of measurements, and relative errors."""
-
-    what: str
-    how: How
-    n: Count
-    mean_error: Amount
-    worst_error: Amount
-
-
 class Mark(Struct, frozen=True, forbid_unknown_fields=True):
     """A reference mark on the pictures: the paper's choices, all switches, the user's build."""
 
@@ -212,7 +202,6 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     tried: tuple[Tried, ...]
     curves: tuple[Curve, ...]
     marks: tuple[Mark, ...]
-    checks: tuple[Check, ...]
     skipped: tuple[str, ...]
     picked: int | None = None
     wanted: str = ""

@@ -12,9 +12,6 @@ from .survey import Judged, Survey
 
 # The frame time hardly depends on the numbers of rounds and rows: tables of few suffice.
 _TABLED = Tabled(12, Shape(16))
-QUICK_PRICE_S = 0.3
-# Suffixes of the stages after the first trainer's.
-OTHER_TRAINERS, FEWER_JOINTS = ", other trainers", ", fewer joints"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,14 +51,14 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
         for name in search.baselines
         for choice in curve_placements(name, sizes[survey.levels[-1]])
     ]
-    survey.choose("placements", choices, (cuts.everything, *cuts.screening))
+    survey.choose(choices, (cuts.everything, *cuts.screening))
     # Drop placements that keep nothing.
     choices = [one for one in choices if one.placement == NO_SWITCHES or survey.columns(one, cuts.everything)]
-    survey.choose("baselines", baselines, cuts.screening)
-    rates = _rates(survey, "", choices, baselines)
+    survey.choose(baselines, cuts.screening)
+    rates = _rates(survey, choices, baselines)
     names = dict.fromkeys([*search.methods, *search.baselines])
     curves = tuple(_curve(survey, name, rates) for name in names if "switches" in inputs)
-    return _screened(survey, "", choices, rates), curves
+    return _screened(survey, choices, rates), curves
 
 
 def screen_fewer(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, ...]:
@@ -69,39 +66,37 @@ def screen_fewer(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, .
     cuts, sizes = survey.cuts, [size for size in JOINTS if size < survey.n_joints]
     mine = [one.choice for one in worth if one.choice.joints] if survey.equipment.records.each_us else []
     choices = [replace(choice, keep_joints=size) for choice in mine for size in sizes]
-    survey.choose_joints(f"joints{FEWER_JOINTS}", choices, (cuts.everything, *cuts.screening))
-    return _screened(survey, FEWER_JOINTS, choices, _rates(survey, FEWER_JOINTS, choices)) if choices else ()
+    survey.choose_joints(choices, (cuts.everything, *cuts.screening))
+    return _screened(survey, choices, _rates(survey, choices))
 
 
 def screen_others(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, ...]:
     """Return those `worth` it, screened with each of the other trainers."""
     choices = [replace(one.choice, trainer=name) for name in survey.search.trainers[1:] for one in worth]
-    return _screened(survey, OTHER_TRAINERS, choices, _rates(survey, OTHER_TRAINERS, choices)) if choices else ()
+    return _screened(survey, choices, _rates(survey, choices))
 
 
 def _rates(
-    survey: Survey, stage: str, choices: Sequence[Candidate], baselines: Sequence[Candidate] = ()
+    survey: Survey, choices: Sequence[Candidate], baselines: Sequence[Candidate] = ()
 ) -> dict[Candidate, Judged]:
     """Return the rates of choices and baselines; baselines choose within the folds only and settle nothing."""
     search, cuts, every = survey.search, survey.cuts, [*choices, *baselines]
-    survey.settle(f"settings{stage}", survey.typical(choices), (cuts.everything, *cuts.screening))
+    survey.settle(survey.typical(choices), (cuts.everything, *cuts.screening))
     rounds = {name: search.alone(name).screened for name in search.trainers}
-    fits = survey.fit(f"screening{stage}", every, cuts.screening, lambda one: ((rounds[one.trainer],), ()))
+    fits = survey.fit(every, cuts.screening, lambda one: ((rounds[one.trainer],), ()))
     return {one: cuts.judged(cuts.by, {fold: fits[one, fold].stages[-1] for fold in cuts.screening}) for one in every}
 
 
-def _screened(
-    survey: Survey, stage: str, choices: Sequence[Candidate], rates: Mapping[Candidate, Judged]
-) -> tuple[Screened, ...]:
+def _screened(survey: Survey, choices: Sequence[Candidate], rates: Mapping[Candidate, Judged]) -> tuple[Screened, ...]:
     """Return the choices that can be built."""
     calls = []
     for choice in choices:
         columns = survey.columns(choice, survey.cuts.everything)
         some, training = survey.read(choice, survey.cuts.everything, few=True), survey.training(choice)
         names, tabled = survey.names(choice), (_TABLED,)
-        calls.append(price.call(QUICK_PRICE_S, some, names, columns, tabled, training, survey.equipment, None))
+        calls.append(price.call(some, names, columns, tabled, training, survey.equipment, None))
     found = []
-    for choice, (priced,) in zip(choices, survey.cache.ask(f"times{stage}", calls), strict=True):
+    for choice, (priced,) in zip(choices, survey.cache.ask(calls), strict=True):
         us = priced.fastest_us(survey.transfer(choice).us)
         if us is not None and (priced.wired or choice.placement == NO_SWITCHES):
             found.append(Screened(choice, survey.columns(choice, survey.cuts.everything), rates[choice], us))

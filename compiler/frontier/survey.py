@@ -28,12 +28,6 @@ from .equipment import Equipment
 from .points import By, Time
 from .search import NO_SWITCHES, SHAPES, TAXEL_LEVELS, Candidate, Choosing, Search, Shape
 
-# Expected seconds of one core for this many rows: only used to estimate the time left.
-_ROWS = 3000
-_ROUND_S, _WHOLE_S, _TABLE_S = 0.004, 0.4, 0.03
-_RANK_S = 3.0
-
-
 # Settings are selected on the placement whose number of switches is nearest to the paper's.
 _TYPICAL = 33
 # Rows for the tables that frame times are measured on.
@@ -255,14 +249,13 @@ class Survey:
         kept = {one: len(self.columns(one, self.cuts.everything)) for mine in alike.values() for one in mine}
         return [min(mine, key=lambda one: abs(kept[one] - _TYPICAL)) for mine in alike.values()]
 
-    def settle(self, stage: str, typical: Sequence[Candidate], folds: Sequence[Fold]) -> None:
+    def settle(self, typical: Sequence[Candidate], folds: Sequence[Fold]) -> None:
         """Select open settings on the training rows of these folds, as `compile` does: by typical choices, once for all
         of the same trainer and inputs.
         """
         places = [(choice, fold) for choice in typical for fold in folds]
         calls = [
             choose_settings.call(
-                settle_s(self.search.alone(choice.trainer), len(fold.train)),
                 self.inputs(choice.joints, choice.levels, fold),
                 fold.train,
                 self.columns(choice, fold),
@@ -272,10 +265,10 @@ class Survey:
             )
             for choice, fold in places
         ]
-        for (choice, fold), fitting in zip(places, self.cache.ask(stage, calls), strict=True):
+        for (choice, fold), fitting in zip(places, self.cache.ask(calls), strict=True):
             self._trainings[choice.trainer, choice.inputs, fold] = Training.chosen(fitting)
 
-    def choose(self, stage: str, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
+    def choose(self, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
         """Choose the switches and levels of all choices from the training rows of these folds."""
         asked: dict[Choosing, dict[float, None]] = {}
         for choice in choices:
@@ -284,7 +277,6 @@ class Survey:
         places = [(key, fold) for key in asked for fold in folds]
         calls = [
             choose_path.call(
-                path_s(method, len(fold.train)),
                 self.inputs(joints, levels, fold),
                 fold.train,
                 method,
@@ -295,21 +287,21 @@ class Survey:
             )
             for (method, joints, levels), fold in places
         ]
-        for (key, fold), path in zip(places, self.cache.ask(stage, calls), strict=True):
+        for (key, fold), path in zip(places, self.cache.ask(calls), strict=True):
             for parameter, columns in zip(asked[key], path.columns, strict=True):
                 self._columns[key, parameter, fold] = columns
             if fold is self.cuts.everything:
                 self._seconds[key] = path.seconds
 
-    def choose_joints(self, stage: str, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
+    def choose_joints(self, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
         """Rank the joints, given the switches, for choices that keep only some, by the training rows of these folds."""
         alike = {(one.chosen_by, one.placement.parameter): one for one in choices if one.keep_joints is not None}
         places = [(key, fold) for key in alike for fold in folds]
         calls = [
-            rank_joints.call(_RANK_S, self.inputs(True, key[0][2], fold), fold.train, self.columns(alike[key], fold))
+            rank_joints.call(self.inputs(True, key[0][2], fold), fold.train, self.columns(alike[key], fold))
             for key, fold in places
         ]
-        for (key, fold), order in zip(places, self.cache.ask(stage, calls), strict=True):
+        for (key, fold), order in zip(places, self.cache.ask(calls), strict=True):
             self._joints[(*key, fold)] = order
 
     def columns(self, choice: Candidate, fold: Fold) -> Columns:
@@ -324,7 +316,6 @@ class Survey:
 
     def fit(
         self,
-        stage: str,
         choices: Sequence[Candidate],
         folds: Sequence[Fold],
         depth: Callable[[Candidate], Depth],
@@ -333,7 +324,6 @@ class Survey:
         places = [(choice, fold) for choice in choices for fold in folds]
         calls = [
             fit_stages.call(
-                fit_s(self.search.alone(choice.trainer), depth(choice), len(fold.train)),
                 self.read(choice, fold),
                 fold,
                 self.columns(choice, fold),
@@ -343,23 +333,7 @@ class Survey:
             )
             for choice, fold in places
         ]
-        return dict(zip(places, self.cache.ask(stage, calls), strict=True))
-
-
-def path_s(method: str, rows: int) -> float:
-    """Return the expected seconds of all placements of a method."""
-    return METHODS[method].seconds * rows / _ROWS
-
-
-def settle_s(search: Search, rows: int) -> float:
-    """Return the expected seconds of choosing among the candidates of a search, in inner folds."""
-    return 2.0 * len(search.candidates) * fit_s(search, ((1,), ()), rows // 2)
-
-
-def fit_s(search: Search, depth: Depth, rows: int) -> float:
-    """Return the expected seconds of a training on `rows` rows with tests, with all tables made and tested."""
-    (*_, last), tabled = depth
-    return (last * (_ROUND_S if search.staged else _WHOLE_S) + len(tabled) * len(SHAPES) * _TABLE_S) * rows / _ROWS
+        return dict(zip(places, self.cache.ask(calls), strict=True))
 
 
 @stored(1)

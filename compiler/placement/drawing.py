@@ -1,4 +1,4 @@
-"""Pictures of placements: the tree of ID3, and the accuracy that a population of subjects reaches."""
+"""The picture of ID3's tree."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,7 +8,7 @@ from thenar.runtime.files import write_atomically
 
 from ..pictures import on_paper, painting, rendered
 from .inputs import PlacementError
-from .placement import Aim, Placement, Standard
+from .placement import Placement
 from .tree import Node, Tree, edge_label, names_for, sizes_of
 
 if TYPE_CHECKING:
@@ -19,25 +19,12 @@ _KEY_LINES = 2
 _LETTER_INCHES = 0.062  # of _FONT_SIZE
 _FONT_SIZE = 7
 
-REFINED: dict[Aim, str] = {
-    "plain": "as chosen",
-    "mean": "refined for the mean",
-    "worst tenth": "refined for the worst tenth",
-}
-
 
 def draw_placement(placement: Placement, path: Path) -> None:
-    """Write a picture to `path`, .svg or .png: the tree of ID3, or the accuracy of a population's subjects.
-
-    The tree shows decisions with switch and gain, and leaves with grasp type and rows. Raises PictureError for another
-    kind of file or without matplotlib, PlacementError if there is neither a tree nor a study.
-    """
-    if placement.tree is not None:
-        draw_tree(placement.tree, path, placement.all_names, placement.grasps)
-    elif placement.study is not None:
-        draw_study(placement.study, path)
-    else:
+    """Draw the tree of a placement by ID3 with `draw_tree`. Raises PlacementError for a placement without a tree."""
+    if placement.tree is None:
         raise PlacementError(f"a placement by {placement.method} has no tree to draw")
+    draw_tree(placement.tree, path, placement.all_names, placement.grasps)
 
 
 def draw_tree(tree: Tree, path: Path, names: Sequence[str] = (), class_names: Sequence[str] = ()) -> None:
@@ -85,33 +72,3 @@ def _draw_box(axes: "Axes", box: tuple[float, float, float, float], label: str, 
     colour = on_paper("leaf" if leaf else "decision")
     axes.add_patch(Rectangle((x, y), width, height, facecolor=colour, edgecolor=on_paper("paper"), linewidth=0.8))
     axes.text(x + _STEP_INCHES / 3, y + 0.5, label, color=on_paper("ink"), va="center_baseline")
-
-
-def draw_study(study: Standard, path: Path) -> None:
-    """Draw the accuracy of held-out subjects against the number of training subjects. Raises PictureError."""
-    with painting(font_size=10):
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(7.5, 5.0), layout="constrained", dpi=120)
-        _draw_study(figure.subplots(), study)
-        figure.legend(frameon=False, loc="outside lower center", ncols=3, fontsize=8)
-        write_atomically(path, rendered(figure, path.suffix.lower().removeprefix(".")))
-
-
-def _draw_study(axes: "Axes", study: Standard) -> None:
-    """Draw two lines for every aim: the mean and the worst tenth."""
-    for (aim, words), colour in zip(REFINED.items(), map(on_paper, ("soft", "switches", "both")), strict=True):
-        points = [point for point in study.curve if point.aim == aim]
-        sizes = [point.subjects for point in points]
-        for what, style in (("mean", "-"), ("worst_tenth", "--")):
-            rates = [100 * getattr(point.served, what) for point in points]
-            label = f"{'mean' if what == 'mean' else 'worst tenth'}, {words}"
-            axes.plot(sizes, rates, style, marker="o", markersize=4, color=colour, label=label)
-    axes.set_xscale("log")
-    sizes = sorted({point.subjects for point in study.curve})
-    axes.set_xticks(sizes, [str(size) for size in sizes])
-    axes.minorticks_off()
-    axes.set_xlabel("training subjects")
-    axes.set_ylabel(f"accuracy on {study.held_out} other subjects, %")
-    axes.set_title(f"{len(study.columns)} switches for everybody")
-    axes.grid(visible=True, alpha=0.3)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import accumulate
 from math import inf
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -18,7 +18,7 @@ from ..samples import Columns, Samples
 from ..sensors import SensorCount
 from .constraints import Bound, Limits
 from .cooccurrence import Cooccurrence
-from .elements import Elements, bits_of, columns_of, elements_of, names_of, ports_of
+from .elements import Elements, bits_of, elements_of, names_of, ports_of
 from .gain import entropy_bits
 from .id3 import grow_id3
 from .inputs import PlacementError
@@ -30,8 +30,6 @@ from .robust import most_robust
 from .tree import Tree
 
 Progress = Callable[[int, int], None]
-# What a placement for many subjects is refined for: nothing, the mean over subjects, or the worst tenth of them.
-Aim = Literal["plain", "mean", "worst tenth"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,55 +120,6 @@ class Exactly(msgspec.Struct, frozen=True):
     proved: bool
 
 
-class Served(msgspec.Struct, frozen=True):
-    """Accuracies, 0..1, of held-out subjects: the mean over them, the mean of the tenth (at least one) with the lowest
-    accuracies, and the lowest.
-    """
-
-    mean: float
-    worst_tenth: float
-    lowest: float
-
-    @property
-    def worth(self) -> float:
-        """The criterion for standard placements: the mean and the worst tenth, in equal parts."""
-        return (self.mean + self.worst_tenth) / 2
-
-
-class CurvePoint(msgspec.Struct, frozen=True):
-    """Accuracy of held-out subjects, with placement and classifier trained on `subjects` others: means over the draws
-    of these, for one aim.
-    """
-
-    subjects: int
-    aim: Aim
-    served: Served
-
-
-class Standard(msgspec.Struct, frozen=True):
-    """How a placement for many subjects was found, and the accuracies that it reaches.
-
-    elements  trained on all subjects with `aim`, in the order of the method
-    aim       the best one among the training subjects, the first of equal ones; `tried` has all
-    held_out  subjects that the curve is measured on; subjects: all in the set
-    rows      training rows of the placement
-    """
-
-    elements: Elements
-    method: str
-    aim: Aim
-    subjects: int
-    held_out: int
-    rows: int
-    tried: tuple[CurvePoint, ...]
-    curve: tuple[CurvePoint, ...]
-
-    @property
-    def columns(self) -> Columns:
-        """The elements' columns in the set, where switches come first."""
-        return columns_of(self.elements)
-
-
 @dataclass(frozen=True, slots=True)
 class Placement:
     """The kept switches of a set, and how they were found.
@@ -180,7 +129,7 @@ class Placement:
     n_switches, n_taxels, n_joints  the numbers of those in the set
     all_names  the names of all elements: switches, and levels of taxels; grasps: the types that occur, which the
                tree's classes index
-    tree       of the paper's ID3; exact: the gap to the optimum, if requested; study: of many subjects
+    tree       of the paper's ID3; exact: the gap to the optimum, if requested
     """
 
     method: str
@@ -193,7 +142,6 @@ class Placement:
     grasps: tuple[str, ...]
     tree: Tree | None = None
     exact: Exactly | None = None
-    study: Standard | None = None
     kept_joints: tuple[str, ...] = ()
     n_switches: int = 0
     n_taxels: int = 0
@@ -248,8 +196,6 @@ class Placement:
             "fingerprint": self.fingerprint,
             "exact": self.exact,
         }
-        if self.study is not None:
-            found["study"] = self.study
         if self.kept_joints:
             found["kept_joints"] = self.kept_joints
         if self.tree is not None:
@@ -317,14 +263,14 @@ def place(
         If the set has no switches, no rows, or more grasp types than a build can hold.
     """
     fingerprint, grasp_set = grasp_set.fingerprint(), grasp_set.without_none()
-    read = samples_of(grasp_set, joints=joints or keep_joints is not None)
+    read = _samples_of(grasp_set, joints=joints or keep_joints is not None)
     elements = elements_of(read, levels)
     read = bits_of(read, elements)
     samples = read if joints else read.with_joints(())
     own = None if ports is None else ports_of(ports, elements)
     bound = None if limits is None else limits.on(elements, own)
     chosen = choose(samples, method, parameter, own, bound, robust=robust)
-    name = partial(kept_of, grasp_set, elements)
+    name = partial(_kept_of, grasp_set, elements)
     return Placement(
         method=method,
         parameter=parameter,
@@ -371,7 +317,7 @@ def place_by_subject(grasp_set: GraspSet, prune: int, on_done: Progress) -> list
     return found
 
 
-def samples_of(grasp_set: GraspSet, *, joints: bool) -> Samples:
+def _samples_of(grasp_set: GraspSet, *, joints: bool) -> Samples:
     """Return the rows of a set to choose switches from, with the joints' codes or without."""
     if not grasp_set.element_names:
         raise PlacementError("the set has no switches to place: it holds joints only")
@@ -381,7 +327,7 @@ def samples_of(grasp_set: GraspSet, *, joints: bool) -> Samples:
     return Samples.of(grasp_set, "both" if joints else "switches")
 
 
-def kept_of(grasp_set: GraspSet, elements: Elements, columns: Columns) -> tuple[Kept, ...]:
+def _kept_of(grasp_set: GraspSet, elements: Elements, columns: Columns) -> tuple[Kept, ...]:
     """Return the elements at `columns`, with their names."""
     kept, n_switches = tuple(elements[column] for column in columns), len(grasp_set.switch_names)
     return tuple(

@@ -304,13 +304,6 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
             of_time(frontier, "Frame, µs"),
         )
         yield PlainTable("Screened placements; settings chosen from the training rows", columns, tried, words=(0, 1, 2))
-    if frontier.checks:
-        checks = tuple(
-            (check.what, check.how, str(check.n), f"{100 * check.mean_error:.1f}", f"{100 * check.worst_error:.1f}")
-            for check in frontier.checks
-        )
-        columns = ("Model of", "Validated by", "Points", "Mean error, %", "Worst error, %")
-        yield PlainTable("Errors of the timing models", columns, checks)
 
 
 def _taxels(frontier: Frontier) -> str:

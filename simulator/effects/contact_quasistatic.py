@@ -107,7 +107,6 @@ MEMBER = Effect(
     place=1,
     reads=CONTACT_READS,
     writes=CONTACT_WRITES,
-    conflicts=("contact.mujoco",),
     parameters=Parameters,
     model=model,
 )

@@ -62,7 +62,6 @@ class Effect:
     place          among the effects of its stage, if nothing else decides
     reads, writes  fields of `Batch`
     after          effects that act before it when they are listed too
-    conflicts      effects that cannot be listed together with it
     timed          True if the effect depends on time, so that whole streams of frames are simulated
     on_wire        True if it acts on bytes, so that frames are sent and received as bytes
     parameters     the parameters of a scene
@@ -76,7 +75,6 @@ class Effect:
     writes: tuple[str, ...]
     place: int = 0
     after: tuple[str, ...] = ()
-    conflicts: tuple[str, ...] = ()
     timed: bool = False
     on_wire: bool = False
     parameters: type[EffectParameters] = EffectParameters
@@ -191,19 +189,10 @@ class Place:
 def in_order(places: Sequence[Place]) -> list[Place]:
     """Return the steps in the order in which they act.
 
-    Raises SceneError if two conflict, if an `after` names a missing effect, or if some wait for each other in a circle.
+    Raises SceneError if an `after` names a missing effect, or if some wait for each other in a circle.
     """
-    _check_conflicts(places)
     _check_after(places)
     return [place for stage in STAGES for place in _sorted([p for p in places if p.effect.stage == stage])]
-
-
-def _check_conflicts(places: Sequence[Place]) -> None:
-    names = {place.effect.name for place in places}
-    for place in places:
-        for other in place.effect.conflicts:
-            if other in names:
-                raise SceneError(f"effects {place.effect.name!r} and {other!r} exclude each other: list one of the two")
 
 
 def _check_after(places: Sequence[Place]) -> None:

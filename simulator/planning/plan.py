@@ -1,12 +1,20 @@
-"""Plans: an object for hands of all lengths, and all objects of a scene."""
+"""Plans: an object for hands of all lengths, and the objects of a scene that have no shipped postures.
 
+A plan is kept in the user's cache folder, in a file whose name is a digest of all that the plan depends on.
+"""
+
+import hashlib
 import math
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib.metadata import version
 from importlib.resources import files
 from itertools import pairwise
+from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from thenar.compiler.elementary import Floats
@@ -31,18 +39,6 @@ _BETTER = 0.99  # a ratio of costs that is not just rounding
 
 
 @dataclass(frozen=True, slots=True)
-class Planned:
-    """One object planned for one grasp type, with the worst values of `Plan` over the hand lengths; gap and depth also
-    halfway between two lengths.
-    """
-
-    entry: Entry
-    gap_mm: float
-    sunk_mm: float
-    imbalance: float
-
-
-@dataclass(frozen=True, slots=True)
 class Work:
     """An object to plan, for hands from `shortest_mm` to `longest_mm` at least."""
 
@@ -62,24 +58,16 @@ def average_hand(length_mm: float) -> Hand:
     return Hand(Size(length_mm, BREADTH * length_mm))
 
 
-def plan_object(work: Work) -> Planned:
+def plan_object(work: Work) -> Entry:
     """Return an object's postures for hands of all lengths.
 
     Raises PlanError if a requested length fails; beyond these, the usual ones are planned until one fails.
     """
     plans = _outwards(work)
     entry = entry_of(work, plans)
-    gap, sunk = _halfway(entry, work.thing)
-    if max(gap, sunk) > TOLERANCE_MM:
-        plans = _evened(work, plans)
-        entry = entry_of(work, plans)
-        gap, sunk = _halfway(entry, work.thing)
-    return Planned(
-        entry,
-        max(gap, *(one.gap_mm for one in plans.values())),
-        max(sunk, *(one.sunk_mm for one in plans.values())),
-        max(one.imbalance for one in plans.values()),
-    )
+    if _worst_halfway(entry, work.thing) > TOLERANCE_MM:
+        entry = entry_of(work, _evened(work, plans))
+    return entry
 
 
 def _outwards(work: Work) -> dict[float, Plan]:
@@ -115,13 +103,13 @@ def _evened(work: Work, plans: dict[float, Plan]) -> dict[float, Plan]:
     return found
 
 
-def _halfway(entry: Entry, thing: Thing) -> tuple[float, float]:
-    """Return the worst gap and depth in mm of hands halfway between two planned lengths."""
+def _worst_halfway(entry: Entry, thing: Thing) -> float:
+    """Return the widest gap or greatest depth in mm of hands halfway between two planned lengths."""
     postures = Postures("", (entry,))
     lengths = [held.length_mm for held in entry.held]
     hands = [average_hand((low + high) / 2) for low, high in pairwise(lengths)]
     measured = [measure(hand, postures.held(hand, entry.grasp, thing), entry.shape) for hand in hands]
-    return max((gap for gap, _ in measured), default=-math.inf), max((sunk for _, sunk in measured), default=-math.inf)
+    return max((max(gap, sunk) for gap, sunk in measured), default=-math.inf)
 
 
 def entry_of(work: Work, plans: dict[float, Plan]) -> Entry:
@@ -158,30 +146,55 @@ def _nearest_turn(vector: Floats, before: Floats) -> Floats:
     return min(others, key=lambda other: float(np.linalg.norm(other - before)))
 
 
-__all__ = ["Planned", "plan_scene", "shipped_prehensions"]
-
 Progress = Callable[[int, int], None]
 
 
-def plan_scene(
-    scene: Scene, jobs: int = -1, progress: Progress | None = None, *, anew: bool = False
-) -> tuple[Postures, list[Planned]]:
-    """Return the postures of a scene, and those planned now: missing ones, or all with `anew`.
+def postures_of(scene: Scene, jobs: int = -1, progress: Progress | None = None) -> Postures:
+    """Return the postures of a scene's objects: shipped ones, those planned in an earlier call, and new plans.
 
-    The scene's objects come in their order, before other known ones, for any `jobs`. Raises SceneError if the taxonomy
-    has no table of prehensions, PlanError if a hand of the scene cannot hold an object.
+    `progress(done, all)` is called after every new plan. Raises SceneError if the taxonomy has no table of prehensions,
+    PlanError if a hand of the scene cannot hold an object.
     """
-    known = _known(scene, anew)
-    works = list(_works(scene, known))
-    results: dict[int, Planned | PlanError] = {}
-    for number, result in in_workers(_result, enumerate(works), jobs):
+    shipped = Postures.shipped(scene.taxonomy)
+    works = list(lacking(scene, shipped))
+    found = {work: _kept(work) for work in works}
+    new = [work for work, entry in found.items() if entry is None]
+    for work, entry in zip(new, planned(new, jobs, progress), strict=True):
+        found[work] = entry
+        # Without a cache folder it is planned again next time.
+        with suppress(OSError, RuntimeError):
+            path = _cached(work)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            Postures(scene.taxonomy, (entry,)).save(path)
+    return Postures(scene.taxonomy, (*shipped.entries, *filter(None, found.values())))
+
+
+def _kept(work: Work) -> Entry | None:
+    """Return the plan in the cache folder, if a valid one is there."""
+    with suppress(OSError, RuntimeError, ValueError):
+        (entry,) = Postures.load(_cached(work)).entries
+        return entry
+    return None
+
+
+def _cached(work: Work) -> Path:
+    """Return the file of a plan in the user's cache folder. Raises RuntimeError if there is no home folder."""
+    folder = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    given = (version("thenar"), work.grasp, work.prehension, work.thing.shape, work.shortest_mm, work.longest_mm)
+    return Path(folder, "thenar", f"postures-{hashlib.sha256(msgspec.json.encode(given)).hexdigest()}.json")
+
+
+def planned(works: Sequence[Work], jobs: int = -1, progress: Progress | None = None) -> list[Entry]:
+    """Return the plans of objects, the same for any `jobs`; `progress(done, all)` is called after each.
+
+    Raises the first PlanError, in the order of the objects, and names the others that cannot be held.
+    """
+    results: dict[int, Entry | PlanError] = {}
+    for number, result in in_workers(_result, enumerate(works), jobs if len(works) > 1 else 1):
         results[number] = result
         if progress is not None:
             progress(len(results), len(works))
-    planned = _successes([results[number] for number in range(len(works))], works)
-    found = Postures(scene.taxonomy, (*known.entries, *(one.entry for one in planned)))
-    own = [found.entry(item.grasp, item.thing()) for item in scene.objects]
-    return Postures(scene.taxonomy, (*filter(None, own), *found.entries)), planned
+    return _successes([results[number] for number in range(len(works))], works)
 
 
 def shipped_prehensions(taxonomy: str) -> dict[str, Prehension]:
@@ -194,26 +207,17 @@ def shipped_prehensions(taxonomy: str) -> dict[str, Prehension]:
     return load_prehensions(table)
 
 
-def _known(scene: Scene, anew: bool) -> Postures:
-    """Return the postures that need no planning. The scene may name the file that is yet to be written."""
-    if anew:
-        return Postures(scene.taxonomy, ())
-    if scene.postures is not None and not scene.postures.exists():
-        return Postures.shipped(scene.taxonomy)
-    return Postures.of(scene)
-
-
-def _works(scene: Scene, known: Postures) -> Iterator[Work]:
-    """Yield the objects without postures for the scene's hands, once each."""
+def lacking(scene: Scene, known: Postures) -> Iterator[Work]:
+    """Yield the objects without known postures for the scene's hands, once each. Raises SceneError."""
     hands = [subject.hand_length_mm for subject in scene.subjects]
     shortest, longest = EVERY_MM * math.floor(min(hands) / EVERY_MM), EVERY_MM * math.ceil(max(hands) / EVERY_MM)
-    lacking: dict[object, SceneObject] = {}
+    items: dict[object, SceneObject] = {}
     for item in scene.objects:
         entry = known.entry(item.grasp, item.thing())
         if entry is None or not (entry.covers(min(hands)) and entry.covers(max(hands))):
-            lacking.setdefault((item.grasp, item.shape), item)
-    prehensions = shipped_prehensions(scene.taxonomy) if lacking else {}
-    for item in lacking.values():
+            items.setdefault((item.grasp, item.shape), item)
+    prehensions = shipped_prehensions(scene.taxonomy) if items else {}
+    for item in items.values():
         if item.grasp not in prehensions:
             raise SceneError(
                 f"{scene.taxonomy} has no prehension for grasp type {item.grasp!r}: {item.name!r} cannot be planned"
@@ -221,16 +225,16 @@ def _works(scene: Scene, known: Postures) -> Iterator[Work]:
         yield Work(item.grasp, prehensions[item.grasp], item.thing(), shortest, longest)
 
 
-def _successes(results: Sequence[Planned | PlanError], works: Sequence[Work]) -> list[Planned]:
+def _successes(results: Sequence[Entry | PlanError], works: Sequence[Work]) -> list[Entry]:
     """Return the results. Raises the first PlanError among them, in the scene's order, and names the other objects."""
     failed = [(result, work) for result, work in zip(results, works, strict=True) if isinstance(result, PlanError)]
     if failed:
         others = ", ".join(f"{work.thing.name!r} ({work.grasp})" for _, work in failed[1:])
         raise PlanError(f"{failed[0][0]}; nor can these be held: {others}" if others else str(failed[0][0]))
-    return [result for result in results if isinstance(result, Planned)]
+    return [result for result in results if isinstance(result, Entry)]
 
 
-def _result(task: tuple[int, Work]) -> tuple[int, Planned | PlanError]:
+def _result(task: tuple[int, Work]) -> tuple[int, Entry | PlanError]:
     # Failures are results, too, so that an error does not depend on which worker is first.
     number, work = task
     try:

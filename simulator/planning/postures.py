@@ -3,7 +3,7 @@
 Postures are interpolated between two lengths; each length is planned from the next, so neighbours differ little. An
 entry is found by its grasp type and the object's shape, so a changed object never gets an old posture.
 
-The file is JSON: {"format": 1, "taxonomy": NAME, "entries": [{grasp, object, shape, grip_n, down, spheres, held:
+A file is JSON: {"format": 1, "taxonomy": NAME, "entries": [{grasp, object, shape, grip_n, down, spheres, held:
 [{length_mm, posture_deg, pose, shares}, ...]}, ...]}.
 """
 
@@ -11,13 +11,12 @@ from collections.abc import Iterable
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 import msgspec
 import numpy as np
 
 from thenar.runtime.files import read_file, write_atomically
-from thenar.runtime.names import shortened
 from thenar.runtime.nesting import check_json
 
 from ..body.condition import Held, Pad, Thing
@@ -25,9 +24,7 @@ from ..body.hand import Hand, Size
 from ..body.shapes import Shape
 from ..contact.model import GRAVITY
 from ..errors import SceneError
-from ..scenes.scene import Scene
 
-FORMAT = 1
 LARGEST = 10_000_000  # bytes; the shipped files have a two-hundredth of it
 _SPHERES = len(Hand(Size(1.0, 1.0)).sphere_capsules)
 
@@ -37,8 +34,6 @@ _Sphere = Annotated[int, msgspec.Meta(ge=0, lt=_SPHERES)]
 # A hand presses an object like a weightless one, plus a force at which pads with this friction on its two sides would
 # bear twice its weight.
 FRICTION = 0.8
-
-_ADVICE = 'plan it with `thenar plan SCENE -o FILE`, and write postures = "FILE" in the scene'
 
 
 class HeldAt(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -73,12 +68,8 @@ class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return self.held[0].length_mm <= length_mm <= self.held[-1].length_mm
 
 
-class _Head(msgspec.Struct, frozen=True):
-    format: int
-
-
 class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    format: int
+    format: Literal[1]
     taxonomy: str
     entries: tuple[Entry, ...]
 
@@ -95,55 +86,23 @@ class Postures:
     def shipped(cls, taxonomy: str) -> Self:
         """Return the shipped postures for a taxonomy, which may be none."""
         resource = files(__package__) / "data" / f"{taxonomy}.postures.json"
-        return cls.decode(resource.read_bytes(), resource.name) if resource.is_file() else cls(taxonomy, ())
+        return cls.decode(resource.read_bytes()) if resource.is_file() else cls(taxonomy, ())
 
     @classmethod
     def load(cls, path: Path) -> Self:
-        """Return the postures that `save` wrote. Raises SceneError if the file is missing or invalid."""
-        try:
-            content = read_file(path, LARGEST, SceneError)
-        except FileNotFoundError:
-            raise SceneError(f"{path}: there is no such file of planned postures: `thenar plan` makes it") from None
-        except OSError as reason:
-            raise SceneError(f"{path}: cannot be read: {reason.strerror}") from reason
-        return cls.decode(content, str(path))
+        """Return the postures that `save` wrote. Raises OSError or ValueError if the file is missing or invalid."""
+        return cls.decode(read_file(path, LARGEST, SceneError))
 
     @classmethod
-    def decode(cls, content: bytes, name: str) -> Self:
-        """Return the postures in the content of file `name`."""
-        try:
-            check_json(content)
-            head = msgspec.json.decode(content, type=_Head)
-            if head.format != FORMAT:
-                raise SceneError(f"{name} holds postures of format {head.format}, not {FORMAT}: plan them anew")
-            known = msgspec.json.decode(content, type=_File)
-        except SceneError:
-            raise
-        except ValueError as wrong:
-            why = shortened(str(wrong), 300)
-            raise SceneError(f"{name} holds no planned postures: {why}: `thenar plan` makes such a file") from wrong
+    def decode(cls, content: bytes) -> Self:
+        """Return the postures in the content of a file. Raises ValueError if it is invalid."""
+        check_json(content)
+        known = msgspec.json.decode(content, type=_File)
         return cls(known.taxonomy, known.entries)
-
-    @classmethod
-    def of(cls, scene: Scene) -> Self:
-        """Return the postures for a scene: the shipped ones, and those of the scene's file, which come first.
-
-        Raises SceneError if that file is missing, invalid, or of another taxonomy.
-        """
-        shipped = cls.shipped(scene.taxonomy)
-        if scene.postures is None:
-            return shipped
-        own = cls.load(scene.postures)
-        if own.taxonomy != scene.taxonomy:
-            raise SceneError(
-                f"{scene.postures} was planned for {own.taxonomy}, the scene is of {scene.taxonomy}: "
-                "name another file of `postures`"
-            )
-        return cls(scene.taxonomy, (*shipped.entries, *own.entries))
 
     def save(self, path: Path) -> None:
         """Write the file whole or not at all."""
-        write_atomically(path, msgspec.json.encode(_File(FORMAT, self.taxonomy, self.entries)) + b"\n")
+        write_atomically(path, msgspec.json.encode(_File(1, self.taxonomy, self.entries)) + b"\n")
 
     def entry(self, grasp: str, thing: Thing) -> Entry | None:
         """Return the planned entry of this grasp type and object shape, if any."""
@@ -154,16 +113,12 @@ class Postures:
 
         Raises SceneError naming grasp and object if nothing was planned, or not for this size of hand.
         """
-        entry = self.entry(grasp, thing)
-        what = f"grasp type {grasp!r} with object {thing.name!r}"
-        if entry is None:
-            raise SceneError(f"no planned posture of {what}: {_ADVICE}")
-        length = hand.size.length_mm
-        lengths = [held.length_mm for held in entry.held]
-        if not entry.covers(length):
+        entry, length = self.entry(grasp, thing), hand.size.length_mm
+        if entry is None or not entry.covers(length):
             raise SceneError(
-                f"{what} is planned for hands of {lengths[0]:g} to {lengths[-1]:g} mm, not of {length:g} mm: {_ADVICE}"
+                f"no planned posture of grasp type {grasp!r} with object {thing.name!r} for a hand of {length:g} mm"
             )
+        lengths = [held.length_mm for held in entry.held]
         above = min(max(sum(known < length for known in lengths), 1), len(lengths) - 1)
         low, high = entry.held[max(above - 1, 0)], entry.held[above]
         return _between(entry, low, high, length, entry.grip_n + thing.mass_kg * GRAVITY / FRICTION)

@@ -10,7 +10,7 @@ from thenar.compiler.workers import workers_of
 
 from ..pipeline.batch import Batch
 from ..pipeline.effect import at_a_time
-from ..planning.postures import Postures
+from ..planning.plan import postures_of
 from ..scenes.scene import Scene
 from .pipeline import Cost, Ledger, Pipeline, Stop, compile_pipeline
 from .simulation import Session, conditions_of, session_of
@@ -21,9 +21,9 @@ _ROUNDS = 3
 def middle_session(scene: Scene) -> Session:
     """Return the session of the middle subject; the order of trials of all subjects alone can take minutes.
 
-    Raises SceneError if any subject's hand has no planned posture of an object.
+    Raises SceneError or PlanError if any subject's hand cannot hold an object.
     """
-    postures = Postures.of(scene)
+    postures = postures_of(scene)
     conditions = [conditions_of(scene, subject, postures) for subject in scene.subjects]
     return session_of(scene, conditions[len(conditions) // 2])
 

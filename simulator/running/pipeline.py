@@ -136,7 +136,7 @@ def _closing(model: ContactModel) -> Together:
 def compile_pipeline(scene: Scene, without: str | None = None) -> Pipeline:
     """Return the steps of `scene`, except for the listed effect `without`.
 
-    Raises SceneError if effects conflict, wait for each other in a circle, or have impossible parameters;
+    Raises SceneError if effects wait for each other in a circle, or have impossible parameters;
     MissingPackageError if one needs a package that is not installed.
     """
     listed = list(_listed(scene, without))

@@ -19,6 +19,7 @@ from ..errors import SceneError
 from ..pipeline.batch import Batch, Integers
 from ..pipeline.effect import at_a_time
 from ..pipeline.taxels import IDEAL, Converter, taxel_places
+from ..planning.plan import postures_of
 from ..planning.postures import Postures
 from ..scenes.scene import Scene, Subject
 from ..streams import Draw, Draws
@@ -136,17 +137,18 @@ def simulate(
     """Return the set of grasps of `scene`, and the report. The set is the same for any `jobs` and `block`.
 
     jobs      worker processes, as in joblib: -1 for all cores, 1 for none in addition to this one
-    progress  called with repetitions (done, all)
+    progress  called with repetitions (done, all); before, with the objects whose postures are planned
     block     approximate number of repetitions simulated at a time, fewer if each has many frames
     keep_unsettled  keep repetitions that did not settle; the report names them in any case
     without   a listed effect to omit
 
-    Raises SceneError if the scene cannot be simulated, or if none of it settles.
+    Raises SceneError if the scene cannot be simulated, or if none of it settles; PlanError if a hand cannot hold an
+    object.
     """
     start = perf_counter()
     # Errors of the scene are raised here and not in a worker.
     setting = compile_pipeline(scene, without).setting
-    plan = sessions(scene, Postures.of(scene))
+    plan = sessions(scene, postures_of(scene, jobs, progress))
     run = partial(_run, scene, without, keep_unsettled)
     total = sum(len(session.before) for session in plan)
     made = _gathered(in_workers(run, _groups(plan, at_a_time(setting, block)), jobs), total, progress)

@@ -132,7 +132,6 @@ class _SceneFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     subjects: object = None
     population: object = None
     effects: object = {}
-    postures: str | None = None
 
 
 class Shipped(msgspec.Struct, frozen=True):
@@ -156,7 +155,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
     source = read_source(_file(path), SceneError)
     tables = source.tables()
     check_finite(source, (), tables)
-    return _Decoder(source, convert(source, (), tables, _SceneFile), path.parent).scene(path.stem)
+    return _Decoder(source, convert(source, (), tables, _SceneFile)).scene(path.stem)
 
 
 def located(name_or_path: str | Path, fault: SceneError) -> ThenarError:
@@ -190,11 +189,10 @@ def _file(path: Path) -> Traversable:
 
 @dataclass(frozen=True, slots=True)
 class _Decoder:
-    """A scene being decoded; `folder` is that of its file."""
+    """A scene being decoded."""
 
     source: TomlText
     file: _SceneFile
-    folder: Path
 
     def scene(self, default_name: str) -> Scene:
         """Return the whole scene."""
@@ -202,8 +200,6 @@ class _Decoder:
         name = default_name if file.name is None else file.name
         if reason := fault(name):
             raise source.error(("name",), f"{name!r} {reason}")
-        if file.postures is not None and (not file.postures or "\0" in file.postures):
-            raise source.error(("postures",), f"no file is called {file.postures!r}")
         taxonomy = find_taxonomy(source, file.taxonomy)
         return Scene(
             name=name,
@@ -215,7 +211,6 @@ class _Decoder:
             recording=convert(source, ("recording",), file.recording, Recording),
             glove=convert(source, ("glove",), file.glove, Glove),
             effects=self._effects(),
-            postures=None if file.postures is None else self.folder / file.postures,
         )
 
     def _objects(self, taxonomy: Taxonomy) -> tuple[SceneObject, ...]:

@@ -8,7 +8,6 @@ Every subject has separate draws, so that a larger count leaves the first subjec
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import floor, sqrt
-from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
 import msgspec
@@ -109,7 +108,6 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     repetitions  of every grasp type by every subject, shared evenly by the type's objects
     done         earlier repetitions: the numbers and trials of these follow
     effects      by their rank, at most one contact model among them
-    postures     a file of planned postures for your own objects
     """
 
     name: str
@@ -121,7 +119,6 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     recording: Recording = Recording()
     glove: Glove = Glove()
     effects: tuple[Listed, ...]
-    postures: Path | None = None
     done: int = 0
 
     def varied(

@@ -1,8 +1,6 @@
 """Hands and objects that are hard to bring to rest: singular, coincident, weightless, huge; and halved steps.
 
-Zero mass: in contact.quasistatic mass is only a weight, so a massless object is one without weight, held by skin and
-its soft spring. contact.mujoco integrates over time, which needs inertia: every object has at least that of 0.1 kg
-there, with its true weight.
+Mass is only a weight: a massless object is one without weight, held by skin and its soft spring.
 """
 
 from collections.abc import Iterator

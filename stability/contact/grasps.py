@@ -103,7 +103,7 @@ def _of_hands() -> Iterator[tuple[str, Grasp]]:
 def planned(every: int) -> Iterator[Grasp]:
     """Yield shipped grasps (each of `every`-th object) by the hands of 1 % and 99 % of ANSUR II."""
     scene = load_scene("kamakura")
-    postures = Postures.of(scene)
+    postures = Postures.shipped(scene.taxonomy)
     men, women = SURVEYS["ansur2"]
     for share, hands, normal in ((1, women, -_ONE_IN_A_HUNDRED), (99, men, _ONE_IN_A_HUNDRED)):
         size = Size(hands.length.at(normal, (0.0, 300.0)), hands.breadth.at(normal, (0.0, 300.0)))

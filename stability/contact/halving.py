@@ -1,4 +1,4 @@
-"""Halved steps: Newton's, the limits of rest, MuJoCo's time step, and the levels of a growing grip.
+"""Halved steps: Newton's, the limits of rest, and the levels of a growing grip.
 
 A force matters only if it changes a switch. The shipped scenes spread the thresholds of switches around 1 N with a
 standard deviation of 0.15 N (switch.threshold), because those of a real glove are no better known. So if halved steps
@@ -7,7 +7,6 @@ differs, they may change no more switches than newly drawn thresholds would.
 """
 
 from collections.abc import Iterator, Sequence
-from importlib.util import find_spec
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from thenar.compiler.elementary import Floats
 from thenar.simulator.body.layout import murakami160
 from thenar.simulator.contact.balance import USUAL, Pace
 from thenar.simulator.contact.model import Contact, Load
-from thenar.simulator.effects import contact_mujoco, switch_threshold
+from thenar.simulator.effects import switch_threshold
 from thenar.simulator.effects.contact_quasistatic import Parameters, Quasistatic
 from thenar.simulator.pipeline.batch import SLID_OUT_MM
 from thenar.simulator.pipeline.ramp import crossings
@@ -25,7 +24,6 @@ from thenar.simulator.running.simulation import conditions_of
 from thenar.simulator.scenes.decode import load_scene
 
 from ..finding import Finding, Worst
-from .rest import models
 
 Bits = NDArray[np.bool_]
 
@@ -47,15 +45,13 @@ def findings(full: bool) -> Iterator[Finding]:
     if full:
         again = Quasistatic(Parameters(), Pace(parts=4)).solve(loads)
         yield _turned("quasistatic: Newton steps halved again", loads, halved, again)
-    if find_spec("mujoco") is not None:
-        yield _finer_time(loads)
     yield _finer_grip(loads[:: 1 if full else 14])
 
 
 def shipped(repetitions: int) -> Iterator[Load]:
     """Yield the grasps of the shipped scene's first subject, varied by its effects."""
     scene, rng = load_scene("kamakura"), np.random.default_rng(14)
-    for condition in conditions_of(scene, scene.subjects[0], Postures.of(scene)):
+    for condition in conditions_of(scene, scene.subjects[0], Postures.shipped(scene.taxonomy)):
         target, n = condition.held, repetitions
         pose = target.pose + rng.normal(size=(n, 6)) * ([1.5] * 3 + [np.radians(2.5)] * 3)
         posture_deg = target.posture_deg + 1.5 * rng.normal(size=(n, 20))
@@ -95,13 +91,6 @@ def _turned(check: str, loads: Sequence[Load], one: Sequence[Contact], other: Se
     most = f"{np.array(_names(loads))[good][change.argmax()]}: {change.max():.2g} N, median {np.median(change):.2g} N"
     error, bound, tried = float(turned), float(by_thresholds), int(np.count_nonzero(closed))
     return Finding(check, "the spread of thresholds", error, bound, "switches", tried, most)
-
-
-def _finer_time(loads: Sequence[Load]) -> Finding:
-    usual = contact_mujoco.Parameters()
-    finer = contact_mujoco.Parameters(dt_ms=usual.dt_ms / 2, steps=usual.steps * 2)
-    make = models()["mujoco"]
-    return _turned("mujoco: time steps halved", loads, make(usual).solve(loads), make(finer).solve(loads))
 
 
 def _finer_grip(loads: Sequence[Load]) -> Finding:

@@ -23,7 +23,6 @@ from thenar.compiler import GraspSet
 # Arguments and options of a small run of each command. Its devices are not there.
 LINES: dict[str, tuple[str, str]] = {
     "simulate": ("quick", "-o new.grasps --repetitions 1 --subject S1 --jobs 1"),
-    "plan": ("quick", "-o new.json --jobs 1"),
     "import": ("table.csv", "-o new.grasps --columns columns.toml"),
     "export": ("set.grasps", "-o new.csv"),
     "merge": ("set.grasps other.grasps", "-o new.grasps"),

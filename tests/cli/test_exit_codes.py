@@ -183,7 +183,6 @@ def test_the_extras_in_hints_are_those_of_the_project() -> None:
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
     called = {
         "scikit-learn": "sklearn",
-        "mujoco-core": "mujoco",
         "python-calamine": "python_calamine",
         "foxglove-sdk": "foxglove",
     }

@@ -41,7 +41,7 @@ def found(found_folder: Path) -> Frontier:
 
 def test_the_folder_holds_tables_pictures_and_the_store(found_folder: Path) -> None:
     names = {path.name for path in found_folder.iterdir()}
-    assert names == {"frontier.json", "frontier.csv", "frontier.svg", "switches.svg", "latency.svg", "store.jsonl"}
+    assert names == {"frontier.json", "frontier.csv", "frontier.svg", "switches.svg", "latency.svg", "store.sqlite"}
 
 
 def test_every_point_stands_in_the_csv(found_folder: Path, found: Frontier) -> None:
@@ -97,7 +97,7 @@ def test_running_again_asks_nothing_twice_and_json_is_the_frontier(
     done = thenar("frontier", set_file, "-o", again, *QUICK, "--rate", 0.5, "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == json.loads((again / "frontier.json").read_bytes())
-    assert (again / "store.jsonl").read_bytes() == (found_folder / "store.jsonl").read_bytes()
+    assert (again / "store.sqlite").read_bytes() == (found_folder / "store.sqlite").read_bytes()
     second = frontier_from_bytes((again / "frontier.json").read_bytes())
     assert second.points == found.points
 

@@ -85,7 +85,7 @@ def completed(*words: str) -> list[str]:
         (("",), [*COMMANDS]),
         (("ev",), ["evaluate"]),
         (("simulate", ""), [*shipped()]),
-        (("plan", "kam"), ["kamakura", "kamakura-analog", "kamakura-def"]),
+        (("simulate", "kam"), ["kamakura", "kamakura-analog", "kamakura-def"]),
         (("emulate", "qu"), ["quick"]),
         (("place", "set.grasps", "--method", ""), [*METHODS]),
         (("frontier", "--methods", "id3,cm"), ["id3,cmim"]),

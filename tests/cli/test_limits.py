@@ -51,7 +51,6 @@ def test_what_contradicts_or_is_not_known_is_refused(thenar: Thenar, set_file: P
         (("--apart-mm", 6), "the position of s0, s1, s2, s3, s4 and 1 more is unknown"),
         (("--budget-us", 0), "--never and --budget-us leave nothing"),
         (("--at-most", 3, "pads"), "'pads' is not"),
-        (("--population", "--keep", 2, "--robust"), "--population looks for the placement of many subjects"),
         (where, "--layout gives positions for --apart-mm: add that"),
     ):
         done = thenar("place", set_file, *asked)

@@ -183,7 +183,7 @@ def test_a_frontier_leaves_the_unknown_time_of_joints_out_and_says_so_or_takes_w
     for name, more in (("left out", ()), ("given", ("--joint-us", 5000))):
         if found:  # all else has been asked already
             (tmp_path / name).mkdir()
-            copy(tmp_path / "left out" / "store.jsonl", tmp_path / name)
+            copy(tmp_path / "left out" / "store.sqlite", tmp_path / name)
         said = worked(thenar("frontier", grasps, "-o", tmp_path / name, *few, *settled, "--target", "avr328p", *more))
         assert ("the time of reading the joints (flex_thumb, flex_index) is unknown" in said) == (name == "left out")
         points = json.loads((tmp_path / name / "frontier.json").read_text())["points"]

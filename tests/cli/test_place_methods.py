@@ -1,5 +1,4 @@
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +12,6 @@ from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.propose import propose_harness
 
 Captured = pytest.CaptureFixture[str]
-
-
-@pytest.fixture(scope="module")
-def crowd_file(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    rows = small_set.rows(np.tile(np.arange(60), 4))
-    path = tmp_path_factory.mktemp("crowd") / "crowd.grasps"
-    replace(rows, subjects=np.repeat([f"p{number:02}" for number in range(12)], 20)).save(path)
-    return path
 
 
 @pytest.mark.parametrize("method", ["elimination", "cmim", "id3-ccp"])
@@ -107,29 +98,6 @@ def test_people_read_how_far_a_placement_is_from_the_best(set_file: Path, capsys
         assert words in said
 
 
-@pytest.mark.slow
-def test_a_standard_placement_is_printed_stored_and_drawn(
-    crowd_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    stored, drawn = tmp_path / "crowd.json", tmp_path / "crowd.svg"
-    ask = ["place", str(crowd_file), "--population", "--keep", "3", "--method", "cmim", "--jobs", "1"]
-    assert run([*ask, "-o", str(stored), "--draw", str(drawn)]) == 0
-    said = capsys.readouterr().out
-    for words in (
-        "Standard placement",
-        "Accuracy on trials of 2 held-out subjects (new subject)",
-        "worst tenth, %",
-        "of all 12 subjects",
-    ):
-        assert words in said
-    placement = json.loads(stored.read_text())
-    assert len(kept_names(stored)) == 3
-    assert [point["subjects"] for point in placement["study"]["curve"]] == [2, 2, 2, 5, 5, 5, 10, 10, 10]
-    assert drawn.read_text().startswith("<?xml")
-    assert run([*ask, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == placement
-
-
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
@@ -138,14 +106,10 @@ def test_a_standard_placement_is_printed_stored_and_drawn(
         (["--method", "cmim", "--keep", "3", "--prune", "4"], "method 'cmim' takes --keep M and no --prune"),
         (["--method", "elimintion"], "there is no method 'elimintion' (did you mean 'elimination'"),
         (["--method", "cmim", "--keep", "3", "--tree"], "--tree prints the tree of the paper's ID3"),
-        (["--method", "cmim", "--keep", "3", "--draw", "a.svg"], "--draw draws ID3's tree, or a --population"),
-        (["--population", "--keep", "3", "--exact"], "--exact judges one placement"),
-        (["--population", "--method", "id3", "--keep", "3"], "--population takes a method that keeps M switches"),
-        (["--population", "--keep", "3"], "the set has 1 subject(s)"),
+        (["--method", "cmim", "--keep", "3", "--draw", "a.svg"], "--draw draws the tree of the paper's ID3"),
         (["--joints"], "--joints is for methods other"),
         (["--glove", "GLOVE"], "--glove gives the scan costs"),
         (["--method", "elimination", "--keep", "3", "--glove", "GLOVE"], "weighs them: elimination-cost, id3-cost"),
-        (["--population", "--method", "id3-cost", "--keep", "3", "--glove", "GLOVE"], "--glove gives the scan costs"),
     ],
 )
 def test_what_does_not_go_together_is_one_sentence_and_code_two(

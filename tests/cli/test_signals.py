@@ -36,8 +36,6 @@ main()
 PF_EXITING = 4
 COMMANDS = {
     "simulate": "simulate crowd -o new.grasps --jobs 2",
-    "plan": "plan quick --anew -o new.json --jobs 2",
-    "place": "place crowd.grasps --population --keep 4 --method elimination --jobs 2",
     "evaluate": "evaluate set.grasps --repeats 50 -o new.json --jobs 2",
     "compile": "compile set.grasps -o new --rounds 100000 --folds 10",
     "verify": "verify build set.grasps --firmware host",
@@ -51,7 +49,6 @@ def material(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         assert run(["simulate", "quick", "-o", "set.grasps", "--repetitions", "3", "--jobs", "1"]) == 0
-        assert run(["simulate", "crowd", "-o", "crowd.grasps", "--repetitions", "1", "--jobs", "2"]) == 0
         assert run(["compile", "set.grasps", "-o", "build", "--rounds", "3", "--folds", "0", "--no-report"]) == 0
     return folder
 

@@ -268,7 +268,7 @@ def test_an_interrupt_ends_with_130_and_leaves_the_old_set_alone(tmp_path: Path)
 
 WITH_THE_BASE_ALONE = """
 import sys
-for name in ("scipy", "sklearn", "matplotlib", "joblib", "mujoco"):
+for name in ("scipy", "sklearn", "matplotlib", "joblib"):
     sys.modules[name] = None
 from thenar.cli import main
 sys.argv = ["thenar", "simulate", "quick", "-o", sys.argv[1], "--jobs", "1", "--repetitions", "2"]

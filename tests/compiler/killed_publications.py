@@ -14,13 +14,14 @@ import signal
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import FrameType
 from typing import Any, NamedTuple
 
 from thenar.compiler import publication
 from thenar.compiler.artifact import compile as artifact
 from thenar.compiler.firmware import generate as firmware
-from thenar.compiler.frontier.cache import HEADER, Store
+from thenar.compiler.frontier.cache import Store
 from thenar.compiler.frontier.find import kept_entries
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.glove import files as spec
@@ -59,8 +60,15 @@ def _encoded(files: Content) -> dict[str, bytes]:
 def _publish_frontier(files: Content, folder: Path) -> None:
     publication.check_folder(folder, kept_entries, FrontierError)
     folder.mkdir(exist_ok=True)
-    with Store(folder / "store.jsonl", "scope"):
+    with Store(folder / "store.sqlite", "scope") as store:
+        store.finish()
         publication.publish_folder(_encoded(files), folder, kept_entries, FrontierError)
+
+
+def _empty_store() -> str:
+    with TemporaryDirectory() as folder:
+        Store(Path(folder) / "store.sqlite", "scope").close()
+        return (Path(folder) / "store.sqlite").read_text("latin-1")
 
 
 BUILD = {"build.json": "new", "ensemble.bin": "new", "spec/spec.json": "new"}
@@ -89,7 +97,7 @@ KINDS = {
     ),
     "frontier": Kind(
         {"frontier.json": "old", "frontier.csv": "old", "latency.svg": "old"},
-        *(FRONTIER, FRONTIER, {"store.jsonl": HEADER.decode(), "sub/set.grasps": "mine"}),
+        *(FRONTIER, FRONTIER, {"store.sqlite": _empty_store(), "sub/set.grasps": "mine"}),
         _publish_frontier,
     ),
 }
@@ -99,11 +107,11 @@ def _before(kind: Kind, folder: Path) -> None:
     shutil.rmtree(folder.parent, ignore_errors=True)
     for path, text in {**kind.old, **kind.kept}.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text)
+        (folder / path).write_text(text, "latin-1")
 
 
 def _content(folder: Path) -> Content:
-    return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
+    return {str(path.relative_to(folder)): path.read_text("latin-1") for path in folder.rglob("*") if path.is_file()}
 
 
 def _found(kind: Kind, folder: Path) -> str:

@@ -20,7 +20,7 @@ from thenar.compiler.artifact.verify import verify
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.firmware.generate import Firmware, sums, write_folder
 from thenar.compiler.frontier import points
-from thenar.compiler.frontier.cache import HEADER, Store
+from thenar.compiler.frontier.cache import Store
 from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.words import csv_bytes
 from thenar.compiler.glove.files import spec_files
@@ -255,34 +255,15 @@ def _store() -> bytes:
     from tempfile import TemporaryDirectory
 
     with TemporaryDirectory() as folder:
-        path = Path(folder) / "store.jsonl"
+        path = Path(folder) / "store.sqlite"
         with Store(path, "scope") as store:
             for number in range(4):
                 store.put(b"%d" % number, _Answer(number / 4, GRASPS))
         return path.read_bytes()
 
 
-def _changed_store(data: bytes, random: Random) -> bytes:
-    """Change a result and work out its checksum; or lines, or bytes."""
-    lines = data.removeprefix(HEADER).splitlines(keepends=True)
-    if not lines or random.random() < 0.3:
-        return altered(data, random)
-    at = random.randrange(len(lines))
-    try:
-        line = json.loads(lines[at])
-        result = json_file(json.dumps(line["result"]).encode(), random)
-        from zlib import crc32
-
-        key = str(line["key"])
-        crc = crc32(result, crc32(key.encode()))
-        lines[at] = b'{"key":"%s","crc":%d,"result":%s}\n' % (key.encode(), crc, result.replace(b"\n", b" "))
-    except (ValueError, RecursionError, KeyError, TypeError):
-        lines[at] = json_file(lines[at], random) + b"\n"
-    return HEADER + b"".join(lines)
-
-
 def _resume(data: bytes, folder: Path) -> None:
-    path = folder / "store.jsonl"
+    path = folder / "store.sqlite"
     path.write_bytes(data)
     with Store(path, "scope") as store:
         for number in range(4):
@@ -322,7 +303,7 @@ FORMATS = (
     _member(HAND_NAME, json_file, bytes),
     Format("build", lambda: [_packed_build()], _mixed, _folder),
     Format("frontier.json", _frontier, json_file, _compile_from),
-    Format("store.jsonl", lambda: [_store()], _changed_store, _resume),
+    Format("store.sqlite", lambda: [_store()], altered, _resume),
     Format("placement.json", _placements, json_file, _kept),
     Format("SHA256SUMS", lambda: [sums(_FIRMWARE).encode()], altered, _sums),
 )

@@ -4,9 +4,8 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import msgspec
 from material import GLOVE_TOML, GRASPS, SENSORS, Format, build_files, harness, make_folder
-from mutating import json_file, toml_file
+from mutating import toml_file
 
 from thenar.compiler.firmware.board import load_board
 from thenar.compiler.firmware.generate import Firmware
@@ -27,8 +26,6 @@ from thenar.runtime.recording.session import Collection
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import scan_us
-from thenar.simulator.body.condition import Thing
-from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.planning.postures import Postures
 from thenar.simulator.running.pipeline import compile_pipeline
 from thenar.simulator.running.simulation import conditions_of
@@ -123,7 +120,7 @@ def _scenes() -> list[bytes]:
         for number, grasp in enumerate(_kamakura(), 1)
     )
     subjects = '[[subjects]]\nname = "A"\nhand_length_mm = 188\nhand_breadth_mm = 84\n'
-    own = f'seed = 1\ntaxonomy = "kamakura14"\nrepetitions = 2\npostures = "own.json"\n{subjects}{objects}'
+    own = f'seed = 1\ntaxonomy = "kamakura14"\nrepetitions = 2\n{subjects}{objects}'
     return [own.encode(), *(file.read_bytes() for file in shipped().values())]
 
 
@@ -137,24 +134,9 @@ def _scene(data: bytes, folder: Path) -> None:
     """Read a scene as far as the first grasp."""
     path = folder / "scene.toml"
     path.write_bytes(data)
-    (folder / "own.json").write_bytes(_postures()[0])
     scene = load_scene(path)
     compile_pipeline(scene)
-    conditions_of(scene, scene.subjects[0], Postures.of(scene))
-
-
-@cache
-def _postures() -> list[bytes]:
-    known = Postures.shipped("kamakura14").entries[:3]
-    return [msgspec.json.encode({"format": 1, "taxonomy": "kamakura14", "entries": known})]
-
-
-def _held(data: bytes, folder: Path) -> None:
-    path = folder / "postures.json"
-    path.write_bytes(data)
-    postures = Postures.load(path)
-    for entry in postures.entries:
-        postures.held(Hand(Size(180.0, 80.0)), entry.grasp, Thing(entry.object, entry.shape, 0.2))
+    conditions_of(scene, scene.subjects[0], Postures.shipped(scene.taxonomy))
 
 
 def _catalogues() -> list[bytes]:
@@ -188,5 +170,4 @@ FORMATS = (
     Format("scene.toml", _scenes, toml_file, _scene),
     Format("objects.toml", lambda: [_OBJECTS.encode()], toml_file, _objects),
     Format("catalogue.toml", _catalogues, toml_file, _catalogue),
-    Format("postures.json", _postures, json_file, _held),
 )

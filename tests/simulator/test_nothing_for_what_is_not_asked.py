@@ -19,12 +19,12 @@ from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.running.pipeline import Ledger, compile_pipeline
 from thenar.simulator.scenes.scene import Scene
 
-NAMES = tuple(EFFECTS)
+# Every scene has a contact model.
+NAMES = tuple(name for name in EFFECTS if name != "contact.quasistatic")
 
 ONE = (
     "hand.style",
     "hand.object_pose",
-    "contact.quasistatic",
     "switch.threshold",
     "frame.jitter",
     "hand.transition",
@@ -34,14 +34,14 @@ ONE = (
     "wire.lost_bytes",
 )
 OTHER = tuple(name for name in NAMES if name not in ONE)
-OWN = {f"glove.{step}" for step in ("recall", "threshold", "close", "frames", "sense", "encode", "sample")}
+OWN = {f"glove.{step}" for step in ("recall", "threshold", "close", "frames", "sense", "encode", "sample")} | {
+    "contact.quasistatic"
+}
 WIRED = {"glove.send", "glove.receive"}
 # Of a scene with taxels, such as OTHER.
 FELT = {"glove.feel", "glove.count"}
 # These draw no random numbers: what they do follows from what there is.
 DRAWS_NOTHING = {
-    "contact.quasistatic",
-    "contact.mujoco",
     "contact.ramp",
     "bus.latency",
     "hand.transition",
@@ -55,7 +55,6 @@ DRAWS_NOTHING = {
 # What these count beside; the others count nothing.
 COUNTS = {
     "contact.quasistatic": ["solver steps"],
-    "contact.mujoco": ["solver steps"],
     "contact.ramp": ["grips solved", "solver steps"],
     "glove.send": ["bytes sent"],
 }
@@ -168,11 +167,6 @@ def test_solver_steps_and_bytes_are_counted_by_those_that_make_them(
 def test_what_only_some_effects_need_is_imported_for_these_alone(audits: dict[tuple[str, ...], Audit]) -> None:
     bare = audited(())
     needed = {
-        "mujoco": (OTHER,),
-        "thenar.simulator.contact.mujoco": (OTHER,),
-        "thenar.simulator.contact.balance": (ONE, ()),
-        "thenar.simulator.contact.settle": (ONE, ()),
-        "thenar.simulator.effects.contact_quasistatic": (ONE, ()),
         "thenar.simulator.pipeline.wire": (ONE, OTHER),
         "thenar.simulator.pipeline.parts": (ONE, OTHER),
         "thenar.drivers.scanner_protocol": (ONE, OTHER),
@@ -196,6 +190,6 @@ def test_a_bare_scene_has_no_arrays_for_what_it_does_not_simulate(
     assert not hasattr(batch, "taxels_n")
     assert not hasattr(batch, "traffic")
     assert batch.bits.shape == (3, 1, 160)
-    assert set(ledger.entries) == OWN | {"contact.quasistatic"}
+    assert set(ledger.entries) == OWN
     assert all(entry.own and entry.draws == 0 for entry in ledger.entries.values())
     assert np.array_equal(batch.posture_deg[0], batch.posture_deg[1])

@@ -66,7 +66,7 @@ def test_a_shipped_scene_says_that_it_is_simulated_and_can_be_compiled(name: str
 @pytest.mark.parametrize("name", shipped())
 def test_every_hand_of_a_shipped_scene_has_a_planned_posture_for_every_object(name: str) -> None:
     scene = load_scene(name)
-    postures = Postures.of(scene)
+    postures = Postures.shipped(scene.taxonomy)
     for subject in (min(scene.subjects, key=length), max(scene.subjects, key=length)):
         for item in scene.objects:
             assert postures.held(subject.hand(), item.grasp, item.thing()).pads

@@ -61,8 +61,6 @@ class Method:
         When a frontier tries it by default: "wired" if the glove's actual wiring is known.
     imports, install : str
         The package that it requires, and its name for pip; "" if scikit-learn suffices.
-    seconds : float
-        Expected core time for all sizes, with 160 switches and 3000 rows; only used to predict the time left.
     label : str
         Its name in the tables of `evaluate`; "" for `name`.
     rank : int
@@ -87,7 +85,6 @@ class Method:
     tried: Literal["always", "wired", "unwired", "never"] = "never"
     imports: str = ""
     install: str = ""
-    seconds: float = 0.5
     label: str = ""
     rank: int = 0
 

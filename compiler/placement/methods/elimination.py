@@ -209,7 +209,6 @@ MEMBER = (
         sizes=FINE,
         all_too=True,
         tried="always",
-        seconds=5.0,
         rank=1,
     ),
     Method(
@@ -223,7 +222,6 @@ MEMBER = (
         sizes=FINE,
         all_too=True,
         tried="wired",
-        seconds=5.0,
         rank=2,
     ),
     Method(
@@ -235,7 +233,6 @@ MEMBER = (
         uses_joints=True,
         sizes=FINE,
         all_too=True,
-        seconds=9.0,
         rank=3,
     ),
 )

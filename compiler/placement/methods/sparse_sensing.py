@@ -55,7 +55,6 @@ MEMBER = (
         tried="always",
         imports="pysensors",
         install="python-sensors",
-        seconds=4.0,
         rank=26,
     ),
     Method(

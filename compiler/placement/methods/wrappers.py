@@ -39,7 +39,6 @@ MEMBER = (
         learn=ranked(_elimination_by_regression),
         nested=True,
         tried="always",
-        seconds=6.0,
         rank=20,
     ),
     Method(

@@ -85,6 +85,11 @@ def test_without_folds_the_report_says_what_it_lacks(gloved: GraspSet, tmp_path:
     assert "the accuracy on new grasps was not measured" in words
 
 
+def test_the_report_of_very_many_subjects_has_no_column_for_each(make_set: Make, tmp_path: Path) -> None:
+    words = _compile(make_set(rows=640, subjects=32), tmp_path / "build", folds=2)
+    assert "have a column for each subject: 32 are too many for a page. thenar evaluate SET.grasps" in words
+
+
 @pytest.mark.parametrize(("types", "switches", "joints"), [(2, 1, 0), (2, 0, 1), (33, 12, 2), (33, 6, 0)])
 def test_sets_at_the_edges_have_a_report(
     make_set: Make, tmp_path: Path, types: int, switches: int, joints: int

@@ -12,7 +12,6 @@ import msgspec
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.points import (
     SCHEMA,
-    Check,
     Curve,
     DecisionKind,
     Frontier,
@@ -129,7 +128,6 @@ def example_frontier(**changes: object) -> Frontier:
         tried=_tried(),
         curves=tuple(Curve(name, what, ours, _SIZES, tuple(map(rate, means))) for name, what, ours, means in _CURVES),
         marks=_marks(),
-        checks=_checks(),
         skipped=("qemu-system-arm is missing: no Cortex-M was measured.",),
         picked=5,
         wanted="--budget-us 500",
@@ -232,11 +230,4 @@ def _marks() -> tuple[Mark, ...]:
         Mark("paper, S = 13", 66, rate(0.932), 1420.0, 6600.0),
         Mark("paper, S = 62", 35, rate(0.915), 905.0, 5200.0),
         Mark("your build", 49, rate(0.927), 1105.0, 6000.0),
-    )
-
-
-def _checks() -> tuple[Check, ...]:
-    return (
-        Check("classify on the AVR", "simulated", 36, 0.011, 0.034),
-        Check("reading the chips", "wire", 12, 0.0, 0.0),
     )

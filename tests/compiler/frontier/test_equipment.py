@@ -27,7 +27,7 @@ def test_whatever_times_depend_on_is_part_of_the_question(grasp_set: GraspSet) -
     ]
     names, rows = tuple(NAMES), Samples.of(grasp_set)
     training = Search().training
-    asked = {price.call(1.0, rows, names, (0, 1, 2), (), training, each, None).question({}) for each in equipments}
+    asked = {price.call(rows, names, (0, 1, 2), (), training, each, None).question({}) for each in equipments}
     assert len(asked) == len(equipments)
 
 

@@ -213,6 +213,13 @@ def test_latencies_that_can_be_said_ahead(policy: Policy | None, first: int, sec
     assert (found.missed, found.wrong) == (0, 0)
 
 
+def test_shorter_frames_are_played_once_a_millisecond_and_take_their_own_time() -> None:
+    tables, stream = two_grasps()
+    found = latency(tables, (0,), stream, 200, POLICIES["single"])
+    # The frame at 1001 ms is the first that sees the second grasp.
+    assert (found.mean_us, found.p99_us) == ((200 + 900) / 2, 900)
+
+
 def test_another_answer_while_a_grasp_is_held_is_counted_as_wrong() -> None:
     tables, stream = two_grasps(flicker=True)
     found = latency(tables, (0,), stream, 1_000, POLICIES["single"])

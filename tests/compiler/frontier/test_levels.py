@@ -102,12 +102,12 @@ def test_words_name_levels_and_taxels(found: tuple[Path, Frontier]) -> None:
 def test_levels_of_a_fold_come_from_its_training_rows_alone(pressed: GraspSet, tmp_path: Path) -> None:
     samples = Samples.of(pressed)
     cuts, ports = Cuts.of(samples, SEARCH), ports_of_whole_glove(None, pressed.element_names, 4)
-    with Store(tmp_path / "store.jsonl", "test") as store:
+    with Store(tmp_path / "store.sqlite", "test") as store:
         equipment = Equipment(ClassifyModel("avr328p"), (), WIRE_ONLY)
         cache = Cache(store, lambda _done, _all: None, jobs=1)
         survey = Survey(pressed, "set", samples, ports, SEARCH, cuts, equipment, cache)
         choice, fold = Candidate(PlacementChoice("elimination-cost", 5.0), "switches", levels=3), cuts.screening[0]
-        survey.choose("placements", [choice], [fold])
+        survey.choose([choice], [fold])
         alone = samples.rows(fold.train).with_joints(())
         elements = elements_of(alone, 3)
         assert survey.elements(3, fold) == elements

@@ -16,7 +16,7 @@ from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 
 TABLED = Tabled(1, Shape(16))
-QUICK, SLOW = 300, 4000
+QUICK, SLOW = 1000, 4000
 
 
 def tables_of(seed: int, joint_steps: int) -> IntegerTables:

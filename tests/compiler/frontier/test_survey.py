@@ -94,8 +94,8 @@ def test_folds_and_costs_of_ports_are_told_apart(samples: Samples, cuts: Cuts) -
     several = (((0,) * 14, (1.0,)), ((0,) * 14, (2.0,)), (one, (1.0, 1.0)), (two, (1.0, 1.0)))
     costs = [None, *(PortCosts(*each) for each in several)]
     folds = [*cuts.screening, *cuts.others, cuts.everything]
-    asked = {choose_path.call(1.0, samples, folds[0].train, "id3", (0.0,), ports).question({}) for ports in costs}
-    asked |= {fit_stages.call(1.0, samples, fold, (0,), (1,), (), (), SEARCH.training).question({}) for fold in folds}
+    asked = {choose_path.call(samples, folds[0].train, "id3", (0.0,), ports).question({}) for ports in costs}
+    asked |= {fit_stages.call(samples, fold, (0,), (1,), (), (), SEARCH.training).question({}) for fold in folds}
     assert len(asked) == len(costs) + len(folds)
 
 

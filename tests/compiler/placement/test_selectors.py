@@ -17,7 +17,6 @@ from thenar.compiler import GraspSet, grow_id3
 from thenar.compiler.placement import selectors
 from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.placement.placement import place
-from thenar.compiler.placement.population import place_for_population
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.placement.selectors import ID3Selector, SwitchSelector
 from thenar.drivers.members import MemberError
@@ -57,12 +56,9 @@ def test_rows_in_which_nothing_is_held_place_no_switch(
 ) -> None:
     grasps = make_set(subjects=8, types=2)
     more = with_none(grasps)
-    for found, other in (
-        (place(grasps, 4.0, exact=True, keep_joints=1), place(more, 4.0, exact=True, keep_joints=1)),
-        (place_for_population(grasps, 2, jobs=1), place_for_population(more, 2, jobs=1)),
-    ):
-        assert other.fingerprint == more.fingerprint()
-        assert replace(other, fingerprint=found.fingerprint) == found
+    found, other = place(grasps, 4.0, exact=True, keep_joints=1), place(more, 4.0, exact=True, keep_joints=1)
+    assert other.fingerprint == more.fingerprint()
+    assert replace(other, fingerprint=found.fingerprint) == found
 
 
 def test_id3_keeps_its_tree_and_what_each_switch_brought(data: tuple[Any, Any]) -> None:

@@ -193,7 +193,7 @@ def test_what_was_not_asked_for_is_said_with_the_command_that_makes_it(bare: Rep
 
 
 def test_a_frontier_without_points_is_shown_as_such(whole: ReportContent, frontier: Frontier) -> None:
-    empty = msgspec.structs.replace(frontier, points=(), picked=None, tried=(), curves=(), marks=(), checks=())
+    empty = msgspec.structs.replace(frontier, points=(), picked=None, tried=(), curves=(), marks=())
     assert "This frontier has no points." in Page(report_html(replace(whole, frontier=empty))).text
 
 

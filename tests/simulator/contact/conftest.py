@@ -16,7 +16,7 @@ SCENES = ("kamakura", "cutkosky")
 
 def _planned(scene_name: str) -> tuple[Condition, ...]:
     scene = load_scene(scene_name)
-    return sessions(scene, Postures.of(scene))[0].conditions
+    return sessions(scene, Postures.shipped(scene.taxonomy))[0].conditions
 
 
 def _case(condition: Condition, n: int = 3, seed: int = 1, share: float = 1.0) -> Case:

@@ -27,7 +27,7 @@ def conditions() -> list[Condition]:
     scene = load_scene("kamakura")
     return [
         condition
-        for session in sessions(scene, Postures.of(scene))
+        for session in sessions(scene, Postures.shipped(scene.taxonomy))
         for condition in session.conditions
         if condition.grasp in ("PoS", "CMF") or condition.thing.name == "pin"
     ]
@@ -170,8 +170,7 @@ def test_skins_at_the_ends_of_what_may_be_asked_for_come_to_numbers(
         assert all(np.isfinite(getattr(contact, field)).all() for field in FIELDS)
 
 
-def test_it_conflicts_with_the_other_model_and_declares_what_it_writes() -> None:
-    assert MEMBER.conflicts == ("contact.mujoco",)
+def test_it_declares_what_it_writes() -> None:
     assert MEMBER.stage == "contact"
     assert set(MEMBER.writes) <= set(Batch.__dataclass_fields__)
 

@@ -1,4 +1,4 @@
-"""A scene's postures: what is planned and what is not, in which order, and what is said of what cannot be."""
+"""A scene's postures: what is planned, what is kept for later, and what is said of what cannot be held."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +12,15 @@ from thenar.simulator.body.condition import Thing
 from thenar.simulator.body.hand import LIMITS_DEG
 from thenar.simulator.body.shapes import Shape, Sphere, rotation
 from thenar.simulator.errors import PlanError, SceneError
-from thenar.simulator.planning.plan import Work, average_hand, plan_object, plan_scene, shipped_prehensions
+from thenar.simulator.planning.plan import (
+    Work,
+    average_hand,
+    lacking,
+    plan_object,
+    planned,
+    postures_of,
+    shipped_prehensions,
+)
 from thenar.simulator.planning.planner import Misfit, _start_near
 from thenar.simulator.planning.postures import Entry, Postures
 from thenar.simulator.scenes.decode import load_scene
@@ -45,14 +53,19 @@ BALL, MELON, MOON = (thing(name, "CMF", Sphere(size)) for name, size in (("ball"
 BEAD = next(item for item in load_scene("kamakura").objects if item.name == "bead")
 
 
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "thenar"
+
+
 @pytest.mark.parametrize("name", ["kamakura", "cutkosky"])
-def test_every_object_of_a_shipped_catalogue_is_planned_in_its_order_and_nothing_else_is(name: str) -> None:
+def test_every_object_of_a_shipped_catalogue_has_shipped_postures_in_its_order(name: str, cache: Path) -> None:
     scene = load_scene(name)
     shipped = Postures.shipped(scene.taxonomy)
     assert [(entry.grasp, entry.shape) for entry in shipped.entries] == [(o.grasp, o.shape) for o in scene.objects]
-    postures, planned = plan_scene(scene, jobs=1)
-    assert planned == []
-    assert postures.entries == shipped.entries
+    assert postures_of(scene, 1).entries == shipped.entries
+    assert not cache.exists()
 
 
 # Other processors round otherwise: what follows is the same grasp, and nearly the same numbers.
@@ -115,72 +128,75 @@ def test_the_shipped_posture_of_a_bead_is_what_is_planned_today() -> None:
     work = Work("Tip", shipped_prehensions("kamakura14")["Tip"], BEAD.thing(), 180.0, 210.0)
     known = SHIPPED.entry("Tip", BEAD.thing())
     assert known is not None
-    assert np.abs(figures(plan_object(work).entry) - figures(known)).max() < ROUNDING
+    assert np.abs(figures(plan_object(work)) - figures(known)).max() < ROUNDING
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["kamakura", "cutkosky"])
 def test_the_shipped_postures_are_what_is_planned_today(name: str) -> None:
     scene = load_scene(name)
-    postures, planned = plan_scene(scene, anew=True)
-    assert len(planned) == len(scene.objects)
-    for entry, known in zip(postures.entries, Postures.shipped(scene.taxonomy).entries, strict=True):
+    works = list(lacking(scene, Postures(scene.taxonomy, ())))
+    assert len(works) == len(scene.objects)
+    for entry, known in zip(planned(works), Postures.shipped(scene.taxonomy).entries, strict=True):
         assert (entry.grasp, entry.object, entry.spheres) == (known.grasp, known.object, known.spheres)
         off = np.abs(figures(entry) - figures(known)).max(axis=1)
         for held in (held for held, most in zip(entry.held, off, strict=True) if most >= ROUNDING):
             check_on_the_same_way_down(entry, known, scene.taxonomy, held.length_mm)
 
 
-def test_only_what_has_no_posture_is_planned(make_scene: MakeScene) -> None:
+def test_only_what_has_no_posture_is_planned_and_once(make_scene: MakeScene, cache: Path) -> None:
     reports: list[tuple[int, int]] = []
-    postures, planned = plan_scene(make_scene(objects=(PEA, BEAD)), 1, lambda *report: reports.append(report))
-    assert [one.entry.object for one in planned] == ["pea"]
+    scene = make_scene(objects=(PEA, BEAD))
+    postures = postures_of(scene, 1, lambda *report: reports.append(report))
     assert reports == [(1, 1)]
-    assert [entry.object for entry in postures.entries[:2]] == ["pea", "bead"]
-    assert set(postures.entries) == {*SHIPPED.entries, planned[0].entry}
+    pea = postures.entry("Tip", PEA.thing())
+    assert set(postures.entries) == {*SHIPPED.entries, pea}
+    (path,) = cache.iterdir()
+    assert Postures.load(path).entries == (pea,)
+    assert postures_of(scene, 1, lambda *_: pytest.fail("it is planned again")).entries == postures.entries
+    path.write_bytes(path.read_bytes()[:-100])
+    assert postures_of(scene, 1).entries == postures.entries
+    assert Postures.load(path).entries == (pea,)
 
 
-def test_anew_all_of_the_scene_is_planned_and_nothing_else_kept(make_scene: MakeScene) -> None:
-    postures, planned = plan_scene(make_scene(objects=(BEAD,)), 1, anew=True)
-    assert postures.entries == tuple(one.entry for one in planned)
-    assert [entry.object for entry in postures.entries] == ["bead"]
+def test_without_a_cache_folder_it_is_planned_every_time(make_scene: MakeScene, cache: Path) -> None:
+    cache.write_text("a file is in its place")
+    assert postures_of(make_scene(objects=(PEA,)), 1).entry("Tip", PEA.thing()) is not None
 
 
 def test_a_changed_shape_is_planned_though_its_name_is_known(make_scene: MakeScene) -> None:
     larger = thing("bead", "Tip", msgspec.structs.replace(BEAD.shape, diameter_mm=13.0))
-    assert [one.entry.shape for one in plan_scene(make_scene(objects=(larger,)), 1)[1]] == [larger.shape]
+    (work,) = lacking(make_scene(objects=(larger,)), SHIPPED)
+    assert work.thing.shape == larger.shape
 
 
 def test_two_objects_of_one_shape_and_type_are_planned_once(make_scene: MakeScene) -> None:
     twin = msgspec.structs.replace(PEA, name="twin", mass_g=3.0)
-    assert len(plan_scene(make_scene(objects=(PEA, twin)), 1)[1]) == 1
+    assert len(list(lacking(make_scene(objects=(PEA, twin)), SHIPPED))) == 1
 
 
 @pytest.mark.slow
-def test_the_result_does_not_depend_on_the_number_of_jobs(make_scene: MakeScene, tmp_path: Path) -> None:
-    scene = make_scene(objects=(PEA, BALL, BEAN))  # the ball is done first
-    saved = []
-    for jobs in (1, 2, 3):
-        postures, planned = plan_scene(scene, jobs, anew=True)
-        assert [one.entry.object for one in planned] == ["pea", "ball", "bean"]
-        postures.save(tmp_path / "postures.json")
-        saved.append((tmp_path / "postures.json").read_bytes())
-    assert len(set(saved)) == 1
+def test_the_result_does_not_depend_on_the_number_of_jobs(make_scene: MakeScene) -> None:
+    works = list(lacking(make_scene(objects=(PEA, BALL, BEAN)), SHIPPED))  # the ball is done first
+    found = [planned(works, jobs) for jobs in (1, 2, 3)]
+    assert [entry.object for entry in found[0]] == ["pea", "ball", "bean"]
+    assert found[0] == found[1] == found[2]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_the_first_object_that_cannot_be_held_is_told_and_the_others_named(make_scene: MakeScene, jobs: int) -> None:
     with pytest.raises(PlanError) as refusal:
-        plan_scene(make_scene(objects=(PEA, MELON, BALL, MOON), subjects=(hand(160.0),)), jobs)
+        postures_of(make_scene(objects=(PEA, MELON, BALL, MOON), subjects=(hand(160.0),)), jobs)
     assert str(refusal.value).startswith("a hand of 165 mm cannot hold 'melon' with grasp type 'CMF': ")
     assert str(refusal.value).endswith("; nor can these be held: 'moon' (CMF)")
 
 
 def test_what_a_hand_of_the_scene_need_not_hold_is_no_error(make_scene: MakeScene) -> None:
-    (planned,) = plan_scene(make_scene(objects=(MELON,), subjects=(hand(222.0),)), 1)[1]
-    assert planned.entry.covers(222.0)
-    assert not planned.entry.covers(160.0)
+    entry = postures_of(make_scene(objects=(MELON,), subjects=(hand(222.0),)), 1).entry("CMF", MELON.thing())
+    assert entry is not None
+    assert entry.covers(222.0)
+    assert not entry.covers(160.0)
 
 
 @pytest.mark.slow
@@ -198,66 +214,32 @@ def test_lengths_go_as_far_as_the_hands_of_the_scene(
     make_scene: MakeScene, lengths: list[float], first: float, last: float
 ) -> None:
     hands = tuple(map(hand, lengths))
-    postures, (planned,) = plan_scene(make_scene(objects=(PEA,), subjects=hands), 1)
-    assert [held.length_mm for held in planned.entry.held] == np.arange(first, last + 1.0, 15.0).tolist()
+    postures = postures_of(make_scene(objects=(PEA,), subjects=hands), 1)
+    entry = postures.entry("Tip", PEA.thing())
+    assert entry is not None
+    assert [held.length_mm for held in entry.held] == np.arange(first, last + 1.0, 15.0).tolist()
     for subject in hands:
         assert postures.held(subject.hand(), "Tip", PEA.thing()).pads
 
 
 def test_a_known_object_is_planned_again_for_a_hand_beyond_its_lengths_and_not_within(make_scene: MakeScene) -> None:
     far = make_scene(objects=(BEAD,), subjects=(hand(188.0), hand(238.0)))
-    postures, (planned,) = plan_scene(far, 1)
-    assert planned.entry.held[-1].length_mm == 240.0
-    assert postures.entry("Tip", BEAD.thing()) == planned.entry
-    known = SHIPPED.entry("Tip", BEAD.thing())
+    entry, known = (postures.entry("Tip", BEAD.thing()) for postures in (postures_of(far, 1), SHIPPED))
+    assert entry is not None
     assert known is not None
-    assert np.abs(figures(planned.entry)[:-1] - figures(known)).max() < ROUNDING
-
-
-def test_postures_of_ones_own_are_kept_where_they_cover_the_scenes_hands(make_scene: MakeScene, tmp_path: Path) -> None:
-    known = SHIPPED.entry("Tip", BEAD.thing())
-    assert known is not None
-    short = msgspec.structs.replace(known, grip_n=9.0, held=known.held[2:4])
-    Postures("kamakura14", (short,)).save(tmp_path / "own.json")
-    own = {"objects": (BEAD,), "postures": tmp_path / "own.json"}
-    postures, planned = plan_scene(make_scene(subjects=(hand(188.0),), **own), 1)
-    assert (postures.entries[0], planned) == (short, [])
-    assert len(plan_scene(make_scene(subjects=(hand(196.0),), **own), 1)[1]) == 1
-
-
-def test_a_scene_may_name_the_file_that_is_only_to_be_written(make_scene: MakeScene, tmp_path: Path) -> None:
-    path = tmp_path / "postures.json"
-    scene = make_scene(objects=(PEA, BEAD), postures=path)
-    postures, planned = plan_scene(scene, 1)
-    assert len(planned) == 1
-    postures.save(path)
-    assert plan_scene(scene, 1)[1] == []
-    path.write_text("{")
-    with pytest.raises(SceneError, match="holds no planned postures"):
-        plan_scene(scene, 1)
+    assert entry.held[-1].length_mm == 240.0
+    assert np.abs(figures(entry)[:-1] - figures(known)).max() < ROUNDING
 
 
 def test_a_taxonomy_without_a_table_cannot_be_planned(make_scene: MakeScene) -> None:
     item = thing("bead", "Tip Pinch", BEAD.shape)
     with pytest.raises(SceneError, match="no table of prehensions for the grasp types of 'feix33': nothing can be pla"):
-        plan_scene(make_scene(taxonomy="feix33", objects=(item,)), 1)
-
-
-def test_a_taxonomy_without_a_table_needs_none_where_everything_is_planned(
-    make_scene: MakeScene, tmp_path: Path
-) -> None:
-    known = SHIPPED.entry("Tip", BEAD.thing())
-    assert known is not None
-    own = Postures("feix33", (msgspec.structs.replace(known, grasp="Tip Pinch"),))
-    own.save(tmp_path / "own.json")
-    item = thing("bead", "Tip Pinch", BEAD.shape)
-    scene = make_scene(taxonomy="feix33", objects=(item,), postures=tmp_path / "own.json")
-    assert plan_scene(scene, 1)[0].entries == own.entries
+        postures_of(make_scene(taxonomy="feix33", objects=(item,)), 1)
 
 
 def test_a_type_that_its_taxonomys_table_lacks_is_named_with_its_object(make_scene: MakeScene) -> None:
     with pytest.raises(SceneError, match="kamakura14 has no prehension for grasp type 'Hold': 'pea' cannot"):
-        plan_scene(make_scene(objects=(thing("pea", "Hold", PEA.shape),)), 1)
+        postures_of(make_scene(objects=(thing("pea", "Hold", PEA.shape),)), 1)
 
 
 def test_an_interrupt_passes_through(make_scene: MakeScene) -> None:
@@ -265,4 +247,4 @@ def test_an_interrupt_passes_through(make_scene: MakeScene) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        plan_scene(make_scene(objects=(PEA, BEAN)), 1, interrupt)
+        postures_of(make_scene(objects=(PEA, BEAN)), 1, interrupt)

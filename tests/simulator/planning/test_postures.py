@@ -1,7 +1,7 @@
 """Planned postures as data: what lies between two lengths, and what is said where there is none."""
 
 import json
-from collections.abc import Callable
+import re
 from pathlib import Path
 
 import msgspec
@@ -17,9 +17,7 @@ from thenar.simulator.body.shapes import rotation
 from thenar.simulator.contact.model import GRAVITY
 from thenar.simulator.errors import SceneError
 from thenar.simulator.planning.postures import FRICTION, Entry, Postures
-from thenar.simulator.scenes.scene import Scene
 
-MakeScene = Callable[..., Scene]
 SHIPPED = {name: Postures.shipped(name) for name in ("kamakura14", "cutkosky16")}
 ENTRIES = [entry for postures in SHIPPED.values() for entry in postures.entries]
 PIN = next(entry for entry in SHIPPED["kamakura14"].entries if entry.object == "pin")
@@ -95,18 +93,16 @@ def test_what_comes_with_a_posture_is_its_entrys() -> None:
     assert one.grip_n == PIN.grip_n + 0.2 * GRAVITY / FRICTION
 
 
-def test_a_hand_beyond_the_planned_ones_is_told_from_where_to_where_they_go() -> None:
+def test_a_hand_beyond_the_planned_ones_has_no_posture() -> None:
     for length in (149.9, 225.1):
-        with pytest.raises(SceneError) as refusal:
+        with pytest.raises(SceneError, match=f"grasp type 'Tip' with object 'pin' for a hand of {length} mm"):
             held(PIN, length)
-        what = "grasp type 'Tip' with object 'pin' is planned for hands of 150 to 225 mm, not of"
-        assert str(refusal.value).startswith(f"{what} {length} mm: plan it with `thenar plan SCENE")
 
 
 def test_postures_of_one_length_hold_for_that_length_alone() -> None:
     one = msgspec.structs.replace(PIN, held=PIN.held[2:3])
     assert numbers(held(one, 180.0)).tolist() == numbers(held(PIN, 180.0)).tolist()
-    with pytest.raises(SceneError, match="hands of 180 to 180 mm, not of 181 mm"):
+    with pytest.raises(SceneError, match="for a hand of 181 mm"):
         held(one, 181.0)
 
 
@@ -118,9 +114,7 @@ def test_postures_of_one_length_hold_for_that_length_alone() -> None:
 def test_another_type_or_a_changed_shape_finds_no_old_posture(grasp: str, shape: object) -> None:
     thing = Thing("pin", shape, 0.001)  # type: ignore[arg-type]
     assert SHIPPED["kamakura14"].entry(grasp, thing) is None
-    with pytest.raises(
-        SceneError, match=f"^no planned posture of grasp type '{grasp}' with object 'pin': .*thenar plan"
-    ):
+    with pytest.raises(SceneError, match=f"^no planned posture of grasp type '{grasp}' with object 'pin' for a hand"):
         SHIPPED["kamakura14"].held(Hand(Size(188.0, 84.0)), grasp, thing)
 
 
@@ -150,30 +144,6 @@ def test_a_taxonomy_without_shipped_postures_has_none() -> None:
     assert Postures.shipped("feix33").entries == ()
 
 
-def test_a_scenes_own_postures_come_before_the_shipped_ones(make_scene: MakeScene, tmp_path: Path) -> None:
-    path = tmp_path / "mine.json"
-    stronger = msgspec.structs.replace(PIN, grip_n=99.0)
-    Postures("kamakura14", (stronger,)).save(path)
-    found = Postures.of(make_scene(postures=path))
-    assert found.entry("Tip", Thing("pin", PIN.shape, 0.001)) == stronger
-    assert len(found.entries) == len(SHIPPED["kamakura14"].entries)
-    assert Postures.of(make_scene()).entries == SHIPPED["kamakura14"].entries
-
-
-def test_postures_of_another_taxonomy_are_refused(make_scene: MakeScene, tmp_path: Path) -> None:
-    path = tmp_path / "mine.json"
-    SHIPPED["cutkosky16"].save(path)
-    with pytest.raises(SceneError, match=r"mine\.json was planned for cutkosky16, the scene is of kamakura14: name"):
-        Postures.of(make_scene(postures=path))
-
-
-def test_a_missing_file_and_a_folder_are_refused_with_the_reason(make_scene: MakeScene, tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match=r"mine\.json: there is no such file of planned postures: `thenar plan` makes"):
-        Postures.of(make_scene(postures=tmp_path / "mine.json"))
-    with pytest.raises(SceneError, match="cannot be read: Is a directory"):
-        Postures.of(make_scene(postures=tmp_path))
-
-
 def broken(**changes: object) -> bytes:
     """Return a file of one entry whose first posture, or which itself, is changed."""
     entry = json.loads(msgspec.json.encode(PIN))
@@ -184,10 +154,10 @@ def broken(**changes: object) -> bytes:
 
 BROKEN = {
     "no JSON": (b"{", "truncated"),
-    "no text": (b'{"format":1,"taxonomy":"\xff"}', "holds no planned postures"),
+    "no text": (b'{"format":1,"taxonomy":"\xff"}', "utf-8"),
     "another thing": (b"[]", "Expected `object`"),
     "no format": (b"{}", "`format`"),
-    "a foreign format": (b'{"format":2,"hands":[]}', "holds postures of format 2, not 1: plan them anew"),
+    "a foreign format": (b'{"format":2,"hands":[]}', "Invalid enum value 2 - at `$.format`"),
     "a key too many": (b'{"format":1,"taxonomy":"a","entries":[],"more":1}', "`more`"),
     "19 angles": (broken(posture_deg=[0.0] * 19), "length >= 20 - at `$.entries[0].held[0].posture_deg`"),
     "7 numbers of a pose": (broken(pose=[0.0] * 7), "length <= 6 - at `$.entries[0].held[0].pose`"),
@@ -203,19 +173,14 @@ BROKEN = {
 
 
 @pytest.mark.parametrize(("content", "told"), BROKEN.values(), ids=BROKEN)
-def test_a_file_that_holds_no_postures_is_refused_in_one_sentence(content: bytes, told: str, tmp_path: Path) -> None:
-    path = tmp_path / "mine.json"
-    path.write_bytes(content)
-    with pytest.raises(SceneError) as refusal:
-        Postures.load(path)
-    assert str(refusal.value).startswith(f"{path} holds ")
-    assert told in str(refusal.value)
-    assert "\n" not in str(refusal.value)
+def test_a_file_that_holds_no_postures_is_refused(content: bytes, told: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(told)):
+        Postures.decode(content)
 
 
 @given(st.data())
 def test_a_file_cut_short_is_refused_wherever_it_is_cut(data: st.DataObject) -> None:
     content = broken()
     end = data.draw(st.integers(0, len(content) - 1))
-    with pytest.raises(SceneError, match=r"^mine\.json holds no planned postures: "):
-        Postures.decode(content[:end], "mine.json")
+    with pytest.raises(ValueError):
+        Postures.decode(content[:end])

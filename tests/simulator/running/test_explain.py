@@ -1,7 +1,7 @@
 import msgspec
 import pytest
 
-from thenar.simulator.errors import SceneError
+from thenar.simulator.errors import PlanError
 from thenar.simulator.running.explain import explain
 from thenar.simulator.running.pipeline import compile_pipeline
 from thenar.simulator.scenes.decode import load_scene
@@ -45,8 +45,8 @@ def test_draws_are_counted_a_grasp() -> None:
     assert (drawn["hand.grip"], drawn["hand.posture"], drawn["glove.sample"]) == (1.0, 20.0, 0.0)
 
 
-def test_a_scene_without_planned_postures_cannot_be_explained() -> None:
-    (first, *others) = QUICK.objects
-    odd = msgspec.structs.replace(first, shape=msgspec.structs.replace(first.shape, diameter_mm=61.25))
-    with pytest.raises(SceneError, match="no planned posture"):
-        explain(msgspec.structs.replace(QUICK, objects=(odd, *others)))
+def test_a_scene_with_an_object_that_no_hand_can_hold_cannot_be_explained() -> None:
+    (bead,) = (item for item in QUICK.objects if item.name == "bead")
+    large = msgspec.structs.replace(bead, shape=msgspec.structs.replace(bead.shape, diameter_mm=190.0))
+    with pytest.raises(PlanError, match="cannot hold 'bead' with grasp type 'Tip'"):
+        explain(msgspec.structs.replace(QUICK, objects=(large,)))

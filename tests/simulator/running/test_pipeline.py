@@ -16,7 +16,6 @@ from thenar.simulator.running.pipeline import Ledger, compile_pipeline
 from thenar.simulator.scenes.scene import Scene
 
 NAMES = tuple(EFFECTS)
-CONTACTS = tuple(name for name, effect in EFFECTS.items() if effect.model)
 
 SceneMaker = Callable[..., Scene]
 BatchMaker = Callable[..., Batch]
@@ -32,11 +31,9 @@ OWN = {
 }
 WIRED = {"glove.send", "glove.receive"}
 FELT = {"glove.feel", "glove.count"}
-OTHERS = [name for name in NAMES if name not in CONTACTS]
+OTHERS = [name for name in NAMES if name != "contact.quasistatic"]
 EVERYTHING = ["contact.quasistatic", *OTHERS]
-SUBSETS = st.sets(st.sampled_from(OTHERS)).flatmap(
-    lambda others: st.sampled_from(CONTACTS).map(lambda contact: [contact, *sorted(others)])
-)
+SUBSETS = st.sets(st.sampled_from(OTHERS)).map(lambda others: ["contact.quasistatic", *sorted(others)])
 
 
 def listed_with(name: str, **parameters: Any) -> tuple:
@@ -44,7 +41,7 @@ def listed_with(name: str, **parameters: Any) -> tuple:
 
 
 def light() -> list[tuple]:
-    """Return all effects but the contact models: the ramp in two levels, the bus as it reads all that it can."""
+    """Return all effects but the contact model: the ramp in two levels, the bus as it reads all that it can."""
     special: dict[str, dict[str, Any]] = {"contact.ramp": {"levels": 2}, "bus.latency": {"jitter_us": 20.0}}
     return [listed_with(name, **special.get(name, {})) for name in OTHERS]
 
@@ -123,8 +120,7 @@ class Watched(Batch):
 FIELDS = set(Batch.__dataclass_fields__) - {"condition", "repetitions"}
 
 
-@pytest.mark.parametrize("contact", CONTACTS)
-def test_every_step_reads_and_writes_what_it_says(make_scene: SceneMaker, make_batch: BatchMaker, contact: str) -> None:
+def test_every_step_reads_and_writes_what_it_says(make_scene: SceneMaker, make_batch: BatchMaker) -> None:
     plain = make_batch(range(2))
     batch = Watched.__new__(Watched)
     object.__setattr__(batch, "seen", [])
@@ -132,7 +128,7 @@ def test_every_step_reads_and_writes_what_it_says(make_scene: SceneMaker, make_b
     batch.taken()
     for name in OTHERS:
         assert {*EFFECTS[name].reads, *EFFECTS[name].writes} <= FIELDS
-    pipeline = compile_pipeline(make_scene([contact, *light()]))
+    pipeline = compile_pipeline(make_scene(["contact.quasistatic", *light()]))
     written = {"trials", "previous_deg", "rest_deg", "delay_us", "lost", "ramp", "taxels"}
     for stop in pipeline.stops:
         single = type(pipeline)(pipeline.setting, (stop,))
@@ -154,12 +150,10 @@ def test_a_scene_without_a_contact_model_gets_the_default_as_the_gloves_own(make
     ]
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name != "contact.quasistatic"])
+@pytest.mark.parametrize("name", OTHERS)
 def test_leaving_an_effect_out_is_the_scene_without_it(make_scene: SceneMaker, name: str) -> None:
-    contact = "contact.mujoco" if name == "contact.mujoco" else "contact.quasistatic"
-    names = [contact, *OTHERS]
-    rest = [other for other in names if other != name]
-    left, never = compile_pipeline(make_scene(names), without=name), compile_pipeline(make_scene(rest))
+    rest = [other for other in EVERYTHING if other != name]
+    left, never = compile_pipeline(make_scene(EVERYTHING), without=name), compile_pipeline(make_scene(rest))
     assert [(stop.effect, stop.own) for stop in left.stops] == [(stop.effect, stop.own) for stop in never.stops]
     assert left.setting == never.setting
 
@@ -184,11 +178,6 @@ def test_what_cannot_be_left_out_is_refused_with_the_reason(
     with pytest.raises(SceneError) as caught:
         compile_pipeline(make_scene(["contact.quasistatic", "joint.drift"]), without)
     assert all(word in str(caught.value) for word in words)
-
-
-def test_two_contact_models_are_refused(make_scene: SceneMaker) -> None:
-    with pytest.raises(SceneError, match=r"'contact\.quasistatic' and 'contact\.mujoco' exclude each other"):
-        compile_pipeline(make_scene([*CONTACTS]))
 
 
 def test_after_puts_an_effect_behind_one_that_follows_it_in_the_registry(make_scene: SceneMaker) -> None:
@@ -253,17 +242,13 @@ def outcome(batch: Batch, row: int) -> dict[str, bytes]:
 
 @settings(max_examples=4, deadline=None)
 @given(company=st.lists(st.integers(0, 50), min_size=2, max_size=5, unique=True))
-@pytest.mark.parametrize(
-    "contact", [listed_with("contact.quasistatic", most_steps=12), listed_with("contact.mujoco", steps=20)]
-)
 def test_a_repetition_comes_out_the_same_in_any_batch_and_beside_any_other(
     make_scene: SceneMaker,
     make_batch: BatchMaker,
     make_condition: Callable[..., Condition],
-    contact: tuple,
     company: list[int],
 ) -> None:
-    pipeline = compile_pipeline(make_scene([contact, *light()]))
+    pipeline = compile_pipeline(make_scene([listed_with("contact.quasistatic", most_steps=12), *light()]))
     row = len(company) // 2
     alone, together = make_batch([company[row]]), make_batch(company)
     beside = make_batch(company[1:], make_condition(grasp="Tip", grip_n=4.0))

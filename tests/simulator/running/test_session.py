@@ -15,7 +15,7 @@ from thenar.simulator.scenes.scene import Scene
 from thenar.simulator.streams import Draw, Draws, Site
 
 QUICK = load_scene("quick")
-POSTURES = Postures.of(QUICK)
+POSTURES = Postures.shipped(QUICK.taxonomy)
 
 
 def quick(**changes: object) -> Scene:
@@ -110,7 +110,7 @@ def test_one_repetition_alone_is_as_in_a_batch_of_many() -> None:
 
 
 def test_an_object_without_a_planned_posture_is_named_with_its_grasp_type(make_scene: Callable[..., Scene]) -> None:
-    with pytest.raises(SceneError, match=r"no planned posture of grasp type 'PoS' with object 'bar'.*thenar plan"):
+    with pytest.raises(SceneError, match=r"no planned posture of grasp type 'PoS' with object 'bar' for a hand of"):
         sessions(make_scene(), Postures("kamakura14", ()))
 
 

@@ -72,7 +72,7 @@ def test_scenes_in_time_and_on_the_wire_do_not_depend_on_blocks_either(name: str
 
 def test_one_repetition_alone_is_as_in_the_whole_scene(quick: Simulated) -> None:
     pipeline, made = compile_pipeline(QUICK), quick.grasp_set
-    for session in sessions(QUICK, Postures.of(QUICK)):
+    for session in sessions(QUICK, Postures.shipped(QUICK.taxonomy)):
         for place, condition in enumerate(session.conditions):
             batch = session.batch(place, np.array([2]))
             pipeline.run([batch], Ledger())
@@ -226,6 +226,18 @@ def test_what_did_not_settle_is_left_out_and_named_unless_it_is_to_be_kept() -> 
     assert sum(one.unsettled for one in left_out.report.grasps) == len(unsettled)
     assert not left_out.report.kept_unsettled
     assert kept.report.kept_unsettled
+
+
+def test_an_object_of_ones_own_is_planned_and_simulated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    (bead,) = (item for item in QUICK.objects if item.name == "bead")
+    pea = msgspec.structs.replace(bead, name="pea", shape=msgspec.structs.replace(bead.shape, diameter_mm=7.5))
+    scene = msgspec.structs.replace(QUICK, objects=(*QUICK.objects, pea))
+    seen: list[tuple[int, int]] = []
+    found = simulate(scene, jobs=1, progress=lambda *done: seen.append(done), keep_unsettled=True).grasp_set
+    assert "pea" in found.objects
+    assert seen[0] == (1, 1)  # the plan
+    assert simulate(scene, jobs=1, keep_unsettled=True).grasp_set.fingerprint() == found.fingerprint()
 
 
 def test_a_scene_in_which_nothing_settles_is_an_error() -> None:

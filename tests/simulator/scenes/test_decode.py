@@ -63,18 +63,17 @@ def test_the_least_scene_has_defaults_for_everything_else(scene: Load) -> None:
         recording=Recording(rate_hz=100.0, lead_ms=0.0, hold_ms=500.0, release_ms=0.0, rows="last"),
         glove=Glove(layout="murakami160", threshold_n=1.0, codes="common"),
         effects=(),
-        postures=None,
     )
 
 
 def test_everything_that_is_said_is_kept(scene: Load, tmp_path: Path) -> None:
     found = scene(
-        'name = "other"\npostures = "own/mine.json"\n'
+        'name = "other"\n'
         + LEAST
         + '[recording]\nrate_hz = 50\nlead_ms = 10\nhold_ms = 20\nrelease_ms = 30\nrows = "all"\n'
         + '[glove]\nthreshold_n = 0.8\ncodes = "raw"\n'
     )
-    assert (found.name, found.postures) == ("other", tmp_path / "own" / "mine.json")
+    assert found.name == "other"
     assert found.recording == Recording(rate_hz=50.0, lead_ms=10.0, hold_ms=20.0, release_ms=30.0, rows="all")
     assert found.glove == Glove(threshold_n=0.8, codes="raw")
 
@@ -99,9 +98,8 @@ def test_an_effect_may_be_spelled_in_every_way_of_toml(scene: Load, text: str) -
 
 
 def test_every_effect_may_be_listed_without_parameters(scene: Load) -> None:
-    names = [name for name in NAMES if name != "contact.mujoco"]
-    found = scene(LEAST + "".join(f"[effects.{name}]\n" for name in names))
-    assert [name for name, _ in found.effects] == sorted(names, key=lambda name: EFFECTS[name].rank)
+    found = scene(LEAST + "".join(f"[effects.{name}]\n" for name in NAMES))
+    assert [name for name, _ in found.effects] == sorted(NAMES, key=lambda name: EFFECTS[name].rank)
 
 
 def test_only_the_effects_that_are_listed_are_imported(tmp_path: Path) -> None:
@@ -190,12 +188,6 @@ def test_nobody_to_simulate_is_an_error(complaint: Callable[[str], str]) -> None
     assert "subjects: must be a list of tables, not an empty list" in complaint(
         LEAST[: LEAST.index("[[")] + "subjects = []"
     )
-
-
-def test_two_contact_models_exclude_each_other_and_the_line_is_that_of_one(complaint: Callable[[str], str]) -> None:
-    text = LEAST + "[effects.hand.grip]\n[effects.contact.quasistatic]\n[effects.contact.mujoco]\n"
-    assert "mine.toml, line 10: effects.contact.quasistatic: " in complaint(text)
-    assert "'contact.mujoco' exclude each other" in complaint(text)
 
 
 def test_a_circle_is_named_with_the_line_of_one_of_its_effects(complaint: Callable[[str], str]) -> None:

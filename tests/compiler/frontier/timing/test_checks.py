@@ -1,14 +1,15 @@
+"""The model of classify times, held beside layouts that are compiled and simulated."""
+
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from statistics import fmean
 
 import pytest
 
 from thenar.compiler.firmware.simavr import missing
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.frontier.timing.checks import LEAST, check, unchecked
+from thenar.compiler.frontier.measure import steps_of, unmeasured
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel, fitting
 from thenar.compiler.frontier.timing.python_times import PythonCost, random_tables
-from thenar.compiler.frontier.timing.simulated import Outcome, run_layout, scan_trials
 
 PYTHON = PythonCost(2.0, 0.03, 0.15, 0.03, 0.0002, 0.0009, 10.0)
 TABLES = [random_tables(33, 16, 14), random_tables(20, 0, 14), random_tables(8, 0, 5)]
@@ -32,74 +33,44 @@ def qemu(tool: Callable[[str], str]) -> None:
 def test_cycles_of_an_avr_are_foretold_within_three_percent_and_never_too_few() -> None:
     part = TARGETS["avr328p"]
     for tables in TABLES[1:]:
-        for option in fitting(tables, part)[:2]:
-            outcome = run_layout((option, part))
-            assert outcome.counted <= outcome.predicted <= 1.03 * outcome.counted
+        for layout, cost in fitting(tables, part)[:2]:
+            counted = steps_of(layout, part)
+            assert counted <= cost.cycles <= 1.03 * counted
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("simavr")
-@pytest.mark.parametrize("target", ["avr328p", "avr2560"])
-def test_at_least_thirty_layouts_are_run_on_a_simulated_avr(target: str) -> None:
-    found, scans = check(ClassifyModel(target), TABLES, jobs=1)
-    assert (found.n, found.how) == (LEAST, "simulated")
-    assert 0 < found.mean_error < 0.01
-    assert found.worst_error < 0.03
-    assert (scans.n, scans.how) == (len(scan_trials(target)), "simulated")
-    assert "scan" in scans.what
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("qemu")
-@pytest.mark.parametrize("target", ["cortex-m0plus", "cortex-m4"])
-def test_at_least_thirty_layouts_are_run_on_an_emulated_cortex_m(target: str) -> None:
-    (found,) = check(ClassifyModel(target), TABLES, jobs=1)
-    assert (found.n, found.how) == (LEAST, "simulated")
-    assert found.mean_error < 0.25
-    assert found.worst_error < 0.5
-
-
-def test_python_is_timed_on_thirty_tables_even_where_one_is_given() -> None:
-    (found,) = check(ClassifyModel("host", python=PYTHON), TABLES[:1])
-    assert (found.n, found.how) == (LEAST, "measured")
-    assert found.worst_error >= found.mean_error > 0
-
-
-def test_a_model_that_is_off_is_found_out() -> None:
-    tenfold = replace(PYTHON, **{name: 10 * weight for name, weight in asdict(PYTHON).items() if name != "yardstick"})
-    (found,) = check(ClassifyModel("host", python=tenfold), TABLES)
-    assert found.mean_error > 1.0
-
-
-def test_tables_too_small_for_thirty_points_give_as_many_as_there_are() -> None:
-    (found,) = check(ClassifyModel("host", python=PYTHON), [random_tables(3, 0, 4)])
-    assert found.n == 3
-
-
-def test_without_tables_nothing_is_checked() -> None:
-    assert check(ClassifyModel("avr328p"), []) == check(ClassifyModel("host", python=PYTHON), []) == ()
+@pytest.mark.parametrize(
+    ("target", "tools", "mean", "worst"),
+    [
+        ("avr328p", "simavr", 0.01, 0.03),
+        ("avr2560", "simavr", 0.01, 0.03),
+        ("cortex-m0plus", "qemu", 0.25, 0.5),
+        ("cortex-m4", "qemu", 0.25, 0.5),
+    ],
+)
+def test_layouts_take_what_the_model_says(
+    target: str, tools: str, mean: float, worst: float, request: pytest.FixtureRequest
+) -> None:
+    request.getfixturevalue(tools)
+    part = TARGETS[target]
+    several = [random_tables(switches, joints, 14) for switches in (5, 20, 33) for joints in (0, 4, 16)]
+    options = [option for tables in several for option in fitting(tables, part)][::3]
+    errors = [abs(cost.cycles / steps_of(layout, part) - 1) for layout, cost in options]
+    assert fmean(errors) < mean
+    assert max(errors) < worst
 
 
 @pytest.mark.parametrize(("target", "gone"), [("avr328p", "avr-gcc"), ("cortex-m4", "arm-none-eabi-gcc")])
-def test_without_its_tools_a_target_is_not_checked_and_it_is_said_what_is_missing(
+def test_without_its_tools_a_target_is_not_simulated_and_it_is_said_what_is_missing(
     monkeypatch: pytest.MonkeyPatch, target: str, gone: str
 ) -> None:
     monkeypatch.setenv("PATH", "/nowhere")
-    model = ClassifyModel(target)
-    assert check(model, TABLES) == ()
-    reason = unchecked(model)
+    reason = unmeasured(ClassifyModel(target))
     assert reason is not None
     assert gone in reason
     assert "apt-get install" in reason
 
 
-def test_a_raspberry_pi_is_not_checked_elsewhere() -> None:
-    model = ClassifyModel("pi", python=PYTHON, factor=4.0)
-    assert check(model, TABLES) == ()
-    assert "no Raspberry Pi" in str(unchecked(model))
-    assert unchecked(ClassifyModel("host", python=PYTHON)) is None
-
-
-def test_an_error_is_a_share_of_what_was_counted() -> None:
-    assert Outcome(110.0, 100.0).error == pytest.approx(0.1)
-    assert Outcome(90.0, 100.0).error == pytest.approx(0.1)
+def test_a_raspberry_pi_is_not_timed_elsewhere() -> None:
+    assert "no Raspberry Pi" in str(unmeasured(ClassifyModel("pi", python=PYTHON, factor=4.0)))
+    assert unmeasured(ClassifyModel("host", python=PYTHON)) is None

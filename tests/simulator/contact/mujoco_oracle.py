@@ -1,4 +1,5 @@
-"""Grasps in MuJoCo: the hand takes a posture and a grip, time runs until it rests, and the contacts are read.
+"""An oracle of contact: grasps in MuJoCo, with friction and in time. The hand takes a posture and a grip, time runs
+until it rests, and the contacts are read.
 
 The model has the same capsules on the same joints as hand.py, in metres and kilograms. Every capsule of a digit is a
 body with the axes of `Skeleton.frames`; the palm's are fixed. The object slides and rotates on springs about its
@@ -6,23 +7,15 @@ commanded pose, a soft weld. Gravity is off: the true weight is applied as a for
 enough inertia for a stable step.
 """
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
-
+import mujoco
 import numpy as np
 
 from thenar.compiler.elementary import Floats
-from thenar.drivers.extras import optional
-
-from ..body.condition import Thing
-from ..body.hand import CAPSULES, DOF, LIMITS_DEG, Hand, Skeleton
-from ..body.layout import Patch, Switches
-from ..body.shapes import Box, Cylinder, Pose, Shape, Sphere
-from .model import GRAVITY, STIFFNESS, Contact, Load, split, torques
-
-with optional():
-    import mujoco
+from thenar.simulator.body.condition import Thing
+from thenar.simulator.body.hand import CAPSULES, DOF, LIMITS_DEG, Hand, Skeleton
+from thenar.simulator.body.layout import Switches, murakami160
+from thenar.simulator.body.shapes import Box, Cylinder, Pose, Shape, Sphere
+from thenar.simulator.contact.model import GRAVITY, STIFFNESS, Contact, Load, split, torques
 
 JOINTS = len(DOF)
 OBJECT = "object"
@@ -40,40 +33,34 @@ _GRIPS = 20.0
 _HAND, _OBJECT = 1, 2
 
 
-@dataclass(frozen=True, slots=True)
-class Dynamics:
-    """The time step, and the parameters of skin, friction and the hold on the object (effects/contact_mujoco.py)."""
-
-    dt_ms: float
-    steps: int
-    friction: float
-    skin_n_per_mm: float
-    reach_mm: float
-    weld_n_per_m: float
-    weld_nm_per_rad: float
+# 60 steps of 5 ms come closer to rest than 100 of 2 ms. Friction and stiffness of the skin are of the order measured on
+# dry fingertips; a switch shares the force as far from the object as in contact.quasistatic; a stiff weld holds the
+# object at its commanded pose.
+_DT_MS, _STEPS, _FRICTION, _SKIN_N_PER_MM, _REACH_MM = 5.0, 60, 0.8, 2.0, 1.0
+_WELD_N_PER_M, _WELD_NM_PER_RAD = 3000.0, 5.0
 
 
-def build(hand: Hand, thing: Thing, dynamics: Dynamics) -> mujoco.MjModel:
+def build(hand: Hand, thing: Thing) -> mujoco.MjModel:
     """Return the model of `hand` and `thing`: joints 0 to 19 in the order of DOF, then the object's three slides and
     its ball joint; the object is the last body; geoms have the names of CAPSULES and `OBJECT`.
     """
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.compiler.boundmass = spec.compiler.boundinertia = _LEAST_PART
-    spec.option.timestep = dynamics.dt_ms / 1e3
+    spec.option.timestep = _DT_MS / 1e3
     spec.option.gravity = [0.0, 0.0, 0.0]
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
     spec.option.impratio = _GRIPS
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    _add_hand(spec, hand, dynamics.friction)
-    _add_object(spec, thing, dynamics)
+    _add_hand(spec, hand)
+    _add_object(spec, thing)
     model = spec.compile()
-    _soften(model, dynamics.skin_n_per_mm / MM)
+    _soften(model)
     return model
 
 
-def _add_hand(spec: mujoco.MjSpec, hand: Hand, friction: float) -> None:
+def _add_hand(spec: mujoco.MjSpec, hand: Hand) -> None:
     skeleton = hand.skeleton(np.zeros((JOINTS, 1)))
     for digit in range(5):
         body = spec.worldbody
@@ -81,10 +68,10 @@ def _add_hand(spec: mujoco.MjSpec, hand: Hand, friction: float) -> None:
             body = _add_segment(body, skeleton, 3 * digit + segment)
             for joint in (0, 1) if segment == 0 else (segment + 1,):
                 _add_joint(body, skeleton, digit, joint, segment)
-            _add_capsule(body, hand, 3 * digit + segment, np.zeros(3), np.eye(3), friction)
+            _add_capsule(body, hand, 3 * digit + segment, np.zeros(3), np.eye(3))
     for capsule in range(15, len(CAPSULES)):
         origin, frame = skeleton.origins[capsule, :, 0] * MM, skeleton.frames[capsule, :, :, 0]
-        _add_capsule(spec.worldbody, hand, capsule, origin, frame, friction)
+        _add_capsule(spec.worldbody, hand, capsule, origin, frame)
 
 
 def _add_segment(parent: mujoco.MjsBody, skeleton: Skeleton, capsule: int) -> mujoco.MjsBody:
@@ -110,9 +97,7 @@ def _add_joint(body: mujoco.MjsBody, skeleton: Skeleton, digit: int, joint: int,
     )
 
 
-def _add_capsule(
-    body: mujoco.MjsBody, hand: Hand, capsule: int, origin: Floats, frame: Floats, friction: float
-) -> None:
+def _add_capsule(body: mujoco.MjsBody, hand: Hand, capsule: int, origin: Floats, frame: Floats) -> None:
     begin, end = (origin + frame[:, 0] * along * MM for along in _span_mm(hand, capsule))
     body.add_geom(
         name=CAPSULES[capsule],
@@ -123,7 +108,7 @@ def _add_capsule(
         contype=_HAND,
         conaffinity=_OBJECT,
         priority=1,
-        friction=[friction, 0.0, 0.0],
+        friction=[_FRICTION, 0.0, 0.0],
         solimp=[_IMPEDANCE, _IMPEDANCE, 1.0, 0.5, 1.0],
     )
 
@@ -137,13 +122,13 @@ def _span_mm(hand: Hand, capsule: int) -> tuple[float, float]:
     return 0.0 if begins_at_joint else float(skin.min()), float(hand.lengths[capsule] if ends_at_joint else skin.max())
 
 
-def _add_object(spec: mujoco.MjSpec, thing: Thing, dynamics: Dynamics) -> None:
+def _add_object(spec: mujoco.MjSpec, thing: Thing) -> None:
     kind, size, quaternion = _geom(thing.shape)
     mass, inertia = _inertia(thing)
     body = spec.worldbody.add_body(
         name=OBJECT, mass=mass, inertia=inertia, ipos=[0.0] * 3, iquat=[1.0, 0.0, 0.0, 0.0], explicitinertial=True
     )
-    slide, turn = dynamics.weld_n_per_m, dynamics.weld_nm_per_rad
+    slide, turn = _WELD_N_PER_M, _WELD_NM_PER_RAD
     for axis in np.eye(3):
         _add_spring(body, mujoco.mjtJoint.mjJNT_SLIDE, axis, slide, _critical(slide, mass))
     _add_spring(body, mujoco.mjtJoint.mjJNT_BALL, np.eye(3)[2], turn, _critical(turn, float(np.max(inertia))))
@@ -190,14 +175,14 @@ def _quaternion(frame: Floats) -> Floats:
     return quaternion
 
 
-def _soften(model: mujoco.MjModel, skin_n_per_m: float) -> None:
+def _soften(model: mujoco.MjModel) -> None:
     """Set skin of one stiffness on every capsule, critically damped.
 
     A contact that rests at depth r bears aref / R = (solref / d^2) d r * d / ((1 - d) A), with impedance d and A the
     sum of both bodies' inverse masses (MuJoCo's documentation, Computation, Dynamics): solved for solref.
     """
     inverse_mass = model.body_invweight0[model.geom_bodyid, 0]
-    stiffness = skin_n_per_m * (1.0 - _IMPEDANCE) * (inverse_mass + model.body(OBJECT).invweight0[0])
+    stiffness = _SKIN_N_PER_MM / MM * (1.0 - _IMPEDANCE) * (inverse_mass + model.body(OBJECT).invweight0[0])
     model.geom_solref[:, 0], model.geom_solref[:, 1] = -stiffness, -2.0 * np.sqrt(stiffness)
 
 
@@ -215,48 +200,36 @@ _SPEED, _LEVER, _UNBALANCED_N, _UNBALANCED_SHARE = 0.1, 0.03, 0.1, 0.02
 Settled = tuple[Floats, Floats, Floats, float, float, bool]
 
 
-@dataclass(frozen=True, slots=True)
-class MujocoContact:
-    """The contact model of rigid-body dynamics with friction."""
-
-    dynamics: Dynamics
-    layout: tuple[Patch, ...]
-
-    def solve(self, loads: Sequence[Load]) -> list[Contact]:
-        """Return the rest of the hands (contact.ContactModel), one repetition after another."""
-        with _warnings_counted_only():
-            return [self._solve(load) for load in loads]
-
-    def _solve(self, load: Load) -> Contact:
-        condition = load.condition
-        hand, shape = condition.hand, condition.thing.shape
-        angles = np.radians(load.posture_deg.T)
-        moments = load.grip_n * torques(condition, hand.skeleton(angles), Pose.of(load.pose.T))
-        pair = Pair(hand, condition.thing, condition.held.down, self.dynamics)
-        rests = [pair.rest(*commands) for commands in zip(angles.T, load.pose, moments.T, strict=True)]
-        angles, pose, capsules_n, residual_n, residual_nmm, at_rest = map(np.array, zip(*rests, strict=True))
-        switches = Switches(hand, self.layout)
-        gaps = Pose.of(pose.T).distance(shape, switches.tops(hand.skeleton(angles.T)))[0]
-        forces_n, between_n = split(switches, self.dynamics.reach_mm - gaps, capsules_n.T)
-        return Contact(
-            posture_deg=np.degrees(angles),
-            pose=pose,
-            forces_n=forces_n.T,
-            capsules_n=capsules_n,
-            between_n=between_n,
-            settled=at_rest,
-            residual_n=residual_n,
-            residual_nmm=residual_nmm,
-            steps=len(rests) * self.dynamics.steps,
-        )
+def solve(load: Load) -> Contact:
+    """Return the rest of the hands of a load, one repetition after another."""
+    condition = load.condition
+    hand, shape = condition.hand, condition.thing.shape
+    angles = np.radians(load.posture_deg.T)
+    moments = load.grip_n * torques(condition, hand.skeleton(angles), Pose.of(load.pose.T))
+    pair = Pair(hand, condition.thing, condition.held.down)
+    rests = [pair.rest(*commands) for commands in zip(angles.T, load.pose, moments.T, strict=True)]
+    angles, pose, capsules_n, residual_n, residual_nmm, at_rest = map(np.array, zip(*rests, strict=True))
+    switches = Switches(hand, murakami160())
+    gaps = Pose.of(pose.T).distance(shape, switches.tops(hand.skeleton(angles.T)))[0]
+    forces_n, between_n = split(switches, _REACH_MM - gaps, capsules_n.T)
+    return Contact(
+        posture_deg=np.degrees(angles),
+        pose=pose,
+        forces_n=forces_n.T,
+        capsules_n=capsules_n,
+        between_n=between_n,
+        settled=at_rest,
+        residual_n=residual_n,
+        residual_nmm=residual_nmm,
+        steps=len(rests) * _STEPS,
+    )
 
 
 class Pair:
     """A hand and an object in MuJoCo, reused for every repetition."""
 
-    def __init__(self, hand: Hand, thing: Thing, down: Floats, dynamics: Dynamics) -> None:
-        self._dynamics = dynamics
-        self._model = build(hand, thing, dynamics)
+    def __init__(self, hand: Hand, thing: Thing, down: Floats) -> None:
+        self._model = build(hand, thing)
         self._data = mujoco.MjData(self._model)
         self._weight = thing.mass_kg * GRAVITY * down
         self._object = self._model.geom(OBJECT).id
@@ -273,7 +246,7 @@ class Pair:
         model.qpos_spring[:] = data.qpos
         data.qfrc_applied[:JOINTS] = moments * N_MM
         data.xfrc_applied[-1, :3] = self._weight
-        mujoco.mj_step(model, data, self._dynamics.steps)
+        mujoco.mj_step(model, data, _STEPS)
         mujoco.mj_forward(model, data)
         if data.warning.number.any() or not np.isfinite(data.qacc).all():
             return angles, pose, np.zeros(len(CAPSULES)), np.inf, np.inf, False
@@ -307,17 +280,6 @@ class Pair:
         normal = np.zeros(len(CAPSULES))
         np.add.at(normal, capsules, loads[:, 0])
         return normal, np.add.reduce(forces, axis=0), np.add.reduce(np.cross(arms, forces), axis=0)
-
-
-@contextmanager
-def _warnings_counted_only() -> Iterator[None]:
-    """Suppress MuJoCo's warnings on the console and in a file of the working folder: `MjData` counts them."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 def _places(angles: Floats, pose: Floats) -> Floats:

@@ -1,30 +1,26 @@
-"""Measure classifying and scanning in a simulator: compile a layout and run its slowest frames; on an AVR, run thenar's
-scanning firmware on a simulated board that scans without pause.
-"""
+"""Scan times of an AVR: thenar's scanning firmware on a simulated board that scans without pause."""
 
 import json
 import subprocess
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from thenar.compiler.firmware import FirmwareError
+from thenar.compiler.firmware.board import Board, BoardBus
+from thenar.compiler.firmware.generate import Firmware
+from thenar.compiler.firmware.simavr import harness, missing
+from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.firmware.tools import call, workshop
+from thenar.compiler.firmware.words import numbered
+from thenar.compiler.frontier.timing.python_times import random_tables
+from thenar.compiler.frontier.timing.scan_times import overhead_of, scan_times
+from thenar.compiler.frontier.timing.wirings import Wiring, names_of
 from thenar.runtime.harness.wiring import BusWiring
 from thenar.runtime.scanning.ports import ports_of
-
-from ...firmware import FirmwareError
-from ...firmware.board import Board, BoardBus
-from ...firmware.choose import Option
-from ...firmware.classifier import LIBRARY_NAME, Library
-from ...firmware.generate import Firmware
-from ...firmware.measuring import run_counted, slow_frames
-from ...firmware.simavr import harness
-from ...firmware.targets import TARGETS, Target
-from ...firmware.tools import call, workshop
-from ...firmware.words import numbered
-from .python_times import random_tables
-from .scan_times import overhead_of, scan_times
-from .wirings import Wiring, names_of
 
 _TRIALS = (
     ("mcp23017", 5, 400_000),
@@ -42,29 +38,6 @@ _TRIALS = (
 _WATCHED = 1_600_000
 # A START, and a repeated one before reading: chips with registers, the only ones that an AVR's firmware reads.
 _STARTS = 2
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """Predicted and counted cycles, or instructions, of the slowest frame; microseconds on host."""
-
-    predicted: float
-    counted: float
-
-    @property
-    def error(self) -> float:
-        """The relative error of the prediction."""
-        return abs(self.predicted - self.counted) / self.counted
-
-
-def run_layout(trial: tuple[Option, Target]) -> Outcome:
-    """Compile a layout for a target, and run the frame that should take longest, and extreme ones.
-
-    Raises FirmwareError.
-    """
-    (layout, cost), part = trial
-    library = Library(LIBRARY_NAME, numbered(layout.tables), layout, part.avr)
-    return Outcome(cost.cycles, float(run_counted(library, part, slow_frames(layout)).most))
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,12 +60,11 @@ def scan_trials(target: str) -> tuple[ScanTrial, ...]:
     return tuple(ScanTrial(target, *trial) for trial in _TRIALS)
 
 
-def run_scan(trial: ScanTrial) -> Outcome:
-    """Return the predicted and the simulated time of a whole scan, in microseconds. Raises FirmwareError."""
+def predicted_scan_us(trial: ScanTrial) -> float:
+    """Return the time of a whole scan by the model."""
     nothing = np.zeros((1, trial.switches), bool), np.zeros((1, 0), np.uint16)
     tables = random_tables(trial.switches, 0, 2)
-    times = scan_times(names_of(trial.switches), tables, trial.wiring, *nothing, overhead_of(trial.target))
-    return Outcome(times.full_us, simulated_scan_us(trial))
+    return scan_times(names_of(trial.switches), tables, trial.wiring, *nothing, overhead_of(trial.target)).full_us
 
 
 def simulated_scan_us(trial: ScanTrial) -> float:
@@ -154,3 +126,30 @@ def _now(board: "subprocess.Popen[bytes]") -> tuple[int, int]:
         raise FirmwareError("the simulated board ended by itself")
     reported = json.loads(reply)
     return int(reported["cycle"]), int(reported["starts"])
+
+
+@pytest.fixture(autouse=True)
+def simavr(tool: Callable[[str], str]) -> None:
+    for name in ("avr-gcc", "make"):
+        tool(name)
+    if missing() is not None:
+        tool("libsimavr-dev")
+
+
+def test_a_scan_by_the_firmware_of_a_simulated_board_takes_what_is_predicted() -> None:
+    trial = ScanTrial("avr328p", "mcp23017", 33, 400_000)
+    counted = simulated_scan_us(trial)
+    assert predicted_scan_us(trial) == pytest.approx(counted, rel=0.05)
+    # More than the wire alone, by far: three chips at 400 kHz.
+    assert counted > 2 * 341.4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("platform", ["avr328p", "avr2560"])
+def test_scans_of_all_sizes_take_what_is_predicted(platform: str) -> None:
+    trials = scan_trials(platform)
+    errors = {trial: abs(predicted_scan_us(trial) / simulated_scan_us(trial) - 1) for trial in trials}
+    print(errors)
+    assert {trial.clock_hz for trial in trials} == {100_000, 400_000}
+    assert max(errors.values()) < 0.08
+    assert sum(errors.values()) / len(errors) < 0.03
