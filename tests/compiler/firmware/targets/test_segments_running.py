@@ -1,4 +1,4 @@
-"""The decoder of segments beside the classifier, in every language: Python's state at every frame of whole streams."""
+"""The decoder of segments beside the classifier, in C and MicroPython: Python's state at every frame of streams."""
 
 from collections.abc import Callable
 
@@ -20,7 +20,7 @@ from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
-KINDS = ("cortex-m0plus", "host", "micropython", "rust", "rv32imac", "wasm")
+KINDS = ("cortex-m0plus", "host", "micropython", "rv32imac")
 TICKS = 3 * STREAM_TICKS + 77  # several streams, the last without its end
 
 

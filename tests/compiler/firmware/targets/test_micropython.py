@@ -1,4 +1,4 @@
-"""The classifier in other languages than C: every score, margin and probability is Python's, whatever the tables."""
+"""The classifier as a module of MicroPython: every score, margin and probability is Python's, whatever the tables."""
 
 import re
 import subprocess
@@ -18,7 +18,6 @@ from thenar.compiler.firmware.probes import Predictions, Probes, lost_inputs
 from thenar.compiler.firmware.segments import LAG_US
 from thenar.compiler.firmware.sensors import Sensor, sensors_of
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.firmware.tools import call, find
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Manifest, Rejection, Threshold
@@ -32,7 +31,7 @@ Describe = Callable[[IntegerTables], Manifest]
 Probed = Callable[[IntegerTables, int], Probes]
 SameAsPython = Callable[..., None]
 
-LANGUAGES = ("micropython", "rust", "wasm")
+TARGET = TARGETS["micropython"]
 SHAPES: dict[str, dict[str, int]] = {
     "small": {"classes": 7, "switches": 12, "joints": 4},
     "switches_only": {"joints": 0},
@@ -43,17 +42,15 @@ SHAPES: dict[str, dict[str, int]] = {
 }
 
 
-@pytest.fixture(params=LANGUAGES)
-def language(request: pytest.FixtureRequest, tool: Callable[[str], str]) -> str:
-    if missing := TARGETS[request.param].missing():
+@pytest.fixture(autouse=True)
+def interpreter(tool: Callable[[str], str]) -> None:
+    if missing := TARGET.missing():
         tool(missing.split()[0])
-    return str(request.param)
 
 
-def answers(language: str, layout: Layout, manifest: Manifest, frames: Probes, **how: Any) -> Predictions:
-    target = TARGETS[language]
+def answers(layout: Layout, manifest: Manifest, frames: Probes, **how: Any) -> Predictions:
     sent = layout.frame_bytes(frames.bits, frames.codes)
-    return target.run(target.sources(Library("hand", manifest, layout, avr=False)), "hand", layout, sent, **how)
+    return TARGET.run(TARGET.sources(Library("hand", manifest, layout, avr=False)), "hand", layout, sent, **how)
 
 
 @pytest.mark.parametrize("incremental", [False, True], ids=["classify", "update"])
@@ -62,13 +59,12 @@ def test_every_score_is_python_s_with_inputs_missing_too(
     describe: Describe,
     probed: Probed,
     same_as_python: SameAsPython,
-    language: str,
     incremental: bool,
 ) -> None:
     tables = make_tables(**SHAPES["small"])
     frames = probed(tables, 500)
     lost = lost_inputs(tables, len(frames), 3) if incremental else None
-    found = answers(language, arrange(tables), describe(tables), frames, incremental=incremental, lost=lost)
+    found = answers(arrange(tables), describe(tables), frames, incremental=incremental, lost=lost)
     same_as_python(found, tables, frames, lost)
     assert found.names == describe(tables).grasps
 
@@ -93,7 +89,6 @@ def test_so_it_is_for_tables_of_any_shape(
     describe: Describe,
     probed: Probed,
     same_as_python: SameAsPython,
-    language: str,
     shape: str,
     lost: bool,
 ) -> None:
@@ -103,12 +98,11 @@ def test_so_it_is_for_tables_of_any_shape(
     gone = lost_inputs(tables, len(frames), 3) if lost else None
     for entry_bits, bins in ((16, "search"), (8, "trimmed")) if "wide" not in shape else ((16, "search"),):
         layout = arrange(tables, entry_bits=entry_bits, bins=bins)  # type: ignore[arg-type]
-        found = answers(language, layout, describe(tables), frames, incremental=lost, lost=gone)
+        found = answers(layout, describe(tables), frames, incremental=lost, lost=gone)
         same_as_python(found, tables, frames, gone)
 
 
-MORE = {
-    "micropython": """
+MORE = """
 import thenar_hand as library
 glove = library.Glove()
 for number in range(0, {switches}, 3):
@@ -118,65 +112,21 @@ for joint in range({joints}):
 grasp = glove.classify()
 print(glove.margin(), *[glove.probability(k) for k in range({classes})], glove.held(grasp), glove.held(grasp, 1))
 print(library.NONE, library.NAMES[library.NONE])
-""",
-    "rust": """
-use thenar_hand::*;
-fn main() {{
-    let mut glove = Glove::new();
-    for number in (0..{switches}).step_by(3) {{
-        glove.set_switch(Switch::ALL[number], true);
-    }}
-    for joint in 0..{joints} {{
-        glove.input.codes[joint] = 40 * joint as Code;
-    }}
-    let grasp = glove.classify();
-    println!("{{}} {{}} {{}} {{}}", glove.margin(),
-        Grasp::ALL.map(|each| glove.probability(each).to_string()).join(" "),
-        glove.held(grasp, 0).map_or(CLASSES, |held| held as usize),
-        glove.held(grasp, 1).map_or(CLASSES, |held| held as usize));
-}}
-""",
-    "wasm": """
-import {{ readFileSync }} from "node:fs";
-import {{ load }} from "./thenar_hand.js";
-const {{ Glove, NONE, names }} = await load(readFileSync("thenar_hand.wasm"));
-const other = Array.from({{ length: 1000 }}, () => new Glove()); // more than one page of memory
-const glove = new Glove();
-for (let number = 0; number < {switches}; number += 3) {{
-    glove.setSwitch(number, true);
-}}
-for (let joint = 0; joint < {joints}; joint++) {{
-    glove.setCode(joint, 40 * joint);
-}}
-other.forEach((each) => each.classify());
-const grasp = glove.classify();
-const shares = Array.from({{ length: {classes} }}, (_, k) => Math.round(glove.probability(k) * 65535));
-console.log(glove.margin(), ...shares, glove.held(grasp), glove.held(grasp, 1));
-console.log(NONE, names[NONE]);
-""",
-}
+"""
 
 
-def printed(language: str, files: Mapping[str, str], program: str, folder: Path) -> str:
+def printed(files: Mapping[str, str], program: str, folder: Path) -> str:
     """Return what a program around the classifier prints."""
-    place = {"micropython": "main.py", "rust": "examples/more.rs", "wasm": "main.mjs"}[language]
-    for path, text in {**files, place: program}.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+    for path, text in {**files, "main.py": program}.items():
         (folder / path).write_text(text)
-    if language == "wasm":
-        call([find((("make",), "make"))], folder)
-    command = {
-        "micropython": [sys.executable, "-m", "micropython_unix", place],
-        "rust": ["cargo", "run", "--quiet", "--offline", "--example", "more"],
-        "wasm": ["node", place],
-    }
-    done = subprocess.run(command[language], cwd=folder, capture_output=True, text=True, check=False, timeout=120)
+    command = [sys.executable, "-m", "micropython_unix", "main.py"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 def test_margin_probability_and_refusal_are_python_s(
-    make_tables: MakeTables, describe: Describe, language: str, tmp_path: Path
+    make_tables: MakeTables, describe: Describe, tmp_path: Path
 ) -> None:
     tables = make_tables(**SHAPES["small"])
     bits = np.arange(tables.n_switches)[np.newaxis] % 3 == 0
@@ -188,18 +138,17 @@ def test_margin_probability_and_refusal_are_python_s(
     least = [32767 if each == best else -32768 for each in range(k)]  # refused for its score alone
     rejection = Rejection(0.05, tuple(least), ((0, 12),) * k, (((0, 65535),) * j,) * k, 0)
     manifest = structs.replace(describe(tables), rejection=rejection)
-    files = TARGETS[language].sources(Library("hand", manifest, layout, avr=False))
-    program = MORE[language].format(switches=tables.n_switches, joints=j, classes=k)
-    said, *of_none = printed(language, files, program, tmp_path).splitlines()
+    files = TARGET.sources(Library("hand", manifest, layout, avr=False))
+    program = MORE.format(switches=tables.n_switches, joints=j, classes=k)
+    said, of_none = printed(files, program, tmp_path).splitlines()
     margin, *shares = map(int, said.split())
     assert margin == scores.max() - np.sort(scores)[-2]
     assert shares == [*Softmax(tables.scale).probabilities(scores.tolist()), k, best]
-    assert of_none == ([] if language == "rust" else [f"{k} none"])
+    assert of_none == f"{k} none"
 
 
 # At every tick the state, the newest state, whether they are of one segment; each third of the stream begins afresh.
-FOLLOWING = {
-    "micropython": """
+FOLLOWING = """
 import thenar_hand as library
 glove, segmenter = library.Glove(), library.Segmenter()
 print(library.TICK_US, library.LAG_TICKS, library.NAMES[library.SEGMENT_NONE])
@@ -210,57 +159,19 @@ for tick in range({ticks}):
         glove.set_switch(number, number % 5 == tick // {still} % 5)
     state = segmenter.push(glove, glove.classify())
     print(state, segmenter.newest(), segmenter.same() + 0)
-""",
-    "rust": """
-use thenar_hand::*;
-fn main() {{
-    let (mut glove, mut segmenter) = (Glove::new(), Segmenter::default());
-    println!("{{}} {{}} none", TICK_US, LAG_TICKS);
-    let number_of = |state: Option<Grasp>| state.map_or(CLASSES, |held| held as usize);
-    for tick in 0..{ticks} {{
-        if tick % {stream} == 0 {{
-            segmenter.start();
-        }}
-        for switch in Switch::ALL {{
-            glove.set_switch(switch, switch as usize % 5 == tick / {still} % 5);
-        }}
-        let grasp = glove.classify();
-        let state = segmenter.push(&glove, grasp, false);
-        println!("{{}} {{}} {{}}", number_of(state), number_of(segmenter.newest()), segmenter.same() as u8);
-    }}
-}}
-""",
-    "wasm": """
-import {{ readFileSync }} from "node:fs";
-import {{ load }} from "./thenar_hand.js";
-const {{ Glove, Segmenter, names, TICK_US, LAG_TICKS, SEGMENT_NONE }} = await load(readFileSync("thenar_hand.wasm"));
-const glove = new Glove();
-const segmenter = new Segmenter();
-console.log(TICK_US, LAG_TICKS, names[SEGMENT_NONE]);
-for (let tick = 0; tick < {ticks}; tick++) {{
-    if (tick % {stream} === 0) {{
-        segmenter.start();
-    }}
-    for (let number = 0; number < {switches}; number++) {{
-        glove.setSwitch(number, number % 5 === Math.floor(tick / {still}) % 5);
-    }}
-    const state = segmenter.push(glove, glove.classify());
-    console.log(state, segmenter.newest(), Number(segmenter.same()));
-}}
-""",
-}
+"""
 
 
 def test_a_segmenter_says_its_newest_state_and_whether_it_is_of_the_segment_that_is_known(
-    make_tables: MakeTables, describe: Describe, language: str, tmp_path: Path
+    make_tables: MakeTables, describe: Describe, tmp_path: Path
 ) -> None:
     tables = make_tables(**SHAPES["small"])
     model = structs.replace(SegmentModel.usual(tables.n_classes, False, tables.scale / 8), enter=(40,) * 7)
     manifest = structs.replace(describe(tables), segments=model)
     ticks, stream, still = 480, 160, 17
-    files = TARGETS[language].sources(Library("hand", manifest, arrange(tables), avr=False))
-    program = FOLLOWING[language].format(ticks=ticks, stream=stream, still=still, switches=tables.n_switches)
-    first, *lines = printed(language, files, program, tmp_path).splitlines()
+    files = TARGET.sources(Library("hand", manifest, arrange(tables), avr=False))
+    program = FOLLOWING.format(ticks=ticks, stream=stream, still=still, switches=tables.n_switches)
+    first, *lines = printed(files, program, tmp_path).splitlines()
     assert first == f"{model.tick_us} {LAG_US // model.tick_us} none"
     build, expected = Build(manifest, tables), []
     for tick in range(ticks):
@@ -274,8 +185,7 @@ def test_a_segmenter_says_its_newest_state_and_whether_it_is_of_the_segment_that
     assert len(set(expected)) > 5
 
 
-CONVERTING = {
-    "micropython": """
+CONVERTING = """
 import thenar_hand as library
 glove = library.Glove()
 print(*[glove.calibrated(sensor) + 0 for sensor in range({sensors})])
@@ -288,56 +198,7 @@ for sensor in range({sensors}):
     glove.set_reading(sensor, 300 + 60 * sensor)
 glove.classify()
 print(*[glove.score(k) for k in range({classes})])
-""",
-    "rust": """
-use thenar_hand::*;
-fn main() {{
-    let mut glove = Glove::new();
-    println!("{{}}", Sensor::ALL.map(|each| (glove.calibrated(each) as u8).to_string()).join(" "));
-    for _ in 0..2 {{
-        for sensor in Sensor::ALL {{
-            for reading in {first}..{last} {{
-                print!("{{}} ", glove.code_of(sensor, reading));
-            }}
-            println!();
-        }}
-        for (number, sensor) in Sensor::ALL.into_iter().enumerate() {{
-            let line = glove.calibrate(sensor, 900, 100 + number as i32);
-            println!("{{}} {{}}", line as u8, glove.calibrate(sensor, 7, 7) as u8);
-        }}
-    }}
-    for (number, sensor) in Sensor::ALL.into_iter().enumerate() {{
-        glove.set_reading(sensor, 300 + 60 * number as i32);
-    }}
-    glove.classify();
-    println!("{{}}", Grasp::ALL.map(|each| glove.score(each).to_string()).join(" "));
-}}
-""",
-    "wasm": """
-import {{ readFileSync }} from "node:fs";
-import {{ load }} from "./thenar_hand.js";
-const {{ Glove, sensors }} = await load(readFileSync("thenar_hand.wasm"));
-const glove = new Glove();
-const other = new Glove();
-console.log(...sensors.map((_, sensor) => Number(glove.calibrated(sensor))));
-for (let again = 0; again < 2; again++) {{
-    sensors.forEach((_, sensor) => {{
-        const codes = [];
-        for (let reading = {first}; reading < {last}; reading++) {{
-            codes.push(glove.codeOf(sensor, reading));
-        }}
-        console.log(codes.join(" "));
-    }});
-    sensors.forEach((_, sensor) => {{
-        console.log(Number(glove.calibrate(sensor, 900, 100 + sensor)), Number(glove.calibrate(sensor, 7, 7)));
-    }});
-}}
-other.calibrate(0, 1, 2); // a glove of its own
-sensors.forEach((_, sensor) => glove.setReading(sensor, 300 + 60 * sensor));
-glove.classify();
-console.log(...glove.scores);
-""",
-}
+"""
 STREAM = """
 name = "glove"
 [[stream]]
@@ -349,7 +210,7 @@ taxels = { pad = [0, 1023] }
 
 @pytest.mark.parametrize("known", [True, False], ids=["of a glove", "not known"])
 def test_readings_become_python_s_codes(
-    make_tables: MakeTables, describe: Describe, language: str, tmp_path: Path, known: bool
+    make_tables: MakeTables, describe: Describe, tmp_path: Path, known: bool
 ) -> None:
     tables = make_tables(**SHAPES["small"])
     manifest = describe(tables)
@@ -364,7 +225,7 @@ def test_readings_become_python_s_codes(
     readings = range(-90, 1100)
     count = len(sensors.every)
     given = {"sensors": count, "classes": tables.n_classes, "first": readings.start, "last": readings.stop}
-    text = printed(language, TARGETS[language].sources(library), CONVERTING[language].format(**given), tmp_path)
+    text = printed(TARGET.sources(library), CONVERTING.format(**given), tmp_path)
     lines = [[int(word) for word in line.split()] for line in text.splitlines()]
 
     def codes(every: Sequence[Sensor]) -> list[list[int]]:
@@ -386,34 +247,6 @@ def test_readings_become_python_s_codes(
 
 def with_segments(manifest: Manifest, tables: IntegerTables) -> Manifest:
     return structs.replace(manifest, segments=SegmentModel.usual(tables.n_classes, False, tables.scale))
-
-
-@pytest.mark.parametrize("segments", [False, True], ids=["frames", "segments"])
-def test_a_crate_is_free_of_warnings_and_tests_itself(
-    tool: Callable[[str], str],
-    make_tables: MakeTables,
-    describe: Describe,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    segments: bool,
-) -> None:
-    monkeypatch.setenv("RUSTFLAGS", "-D warnings")
-    tables = make_tables(**SHAPES["small"])
-    manifest = with_segments(describe(tables), tables) if segments else describe(tables)
-    for path, text in TARGETS["rust"].files(Library("hand", manifest, arrange(tables), avr=False)).items():
-        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / path).write_text(text)
-    done = subprocess.run(
-        [tool("cargo"), "test", "--offline"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "test every_frame_is_answered_as_by_python ... ok" in done.stdout
-    assert ("test every_state_of_a_stream_is_python_s ... ok" in done.stdout) == segments
 
 
 # What the module in C uses of MicroPython, as its documentation and headers declare it: no registry has its sources.
