@@ -1,6 +1,5 @@
 """The classifier as a module of MicroPython: every score, margin and probability is Python's, whatever the tables."""
 
-import re
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -243,86 +242,3 @@ def test_readings_become_python_s_codes(
     bits[:2] = found[-1] > 90, found[-1] > 400
     held = np.array(found[:-1], np.uint16)
     assert lines[-1] == Build(manifest, tables).scores(bits, held).tolist()
-
-
-def with_segments(manifest: Manifest, tables: IntegerTables) -> Manifest:
-    return structs.replace(manifest, segments=SegmentModel.usual(tables.n_classes, False, tables.scale))
-
-
-# What the module in C uses of MicroPython, as its documentation and headers declare it: no registry has its sources.
-PY = """
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-typedef void *mp_obj_t;
-typedef const void *mp_const_obj_t, *mp_rom_obj_t;
-typedef intptr_t mp_int_t;
-typedef uintptr_t mp_uint_t;
-typedef unsigned char byte;
-typedef struct { int flags; const void *slots[4]; } mp_obj_type_t;
-typedef struct { const mp_obj_type_t *type; } mp_obj_base_t;
-typedef struct { mp_obj_base_t base; size_t len; mp_rom_obj_t items[]; } mp_rom_obj_tuple_t;
-typedef struct { mp_obj_base_t base; size_t hash, len; const byte *data; } mp_obj_str_t;
-typedef struct { mp_rom_obj_t key, value; } mp_rom_map_elem_t;
-typedef struct { mp_obj_base_t base; size_t used; const mp_rom_map_elem_t *table; } mp_obj_dict_t;
-typedef struct { mp_obj_base_t base; mp_obj_dict_t *globals; } mp_obj_module_t;
-typedef struct {
-    mp_obj_base_t base;
-    mp_obj_t (*one)(mp_obj_t);
-    mp_obj_t (*two)(mp_obj_t, mp_obj_t);
-    mp_obj_t (*three)(mp_obj_t, mp_obj_t, mp_obj_t);
-    mp_obj_t (*more)(size_t, const mp_obj_t *);
-} mp_obj_fun_t;
-extern const mp_obj_type_t mp_type_tuple, mp_type_str, mp_type_module, mp_type_fun, mp_type_dict;
-extern const mp_obj_type_t mp_type_IndexError, mp_type_TypeError;
-#define MP_OBJ_TO_PTR(o) ((void *)o)
-#define MP_OBJ_FROM_PTR(p) ((mp_obj_t)p)
-#define MP_OBJ_NEW_SMALL_INT(n) ((mp_obj_t)((((mp_uint_t)(n)) << 1) | 1))
-#define MP_ROM_QSTR(q) ((mp_rom_obj_t)(uintptr_t)((((mp_uint_t)(q)) << 3) | 2))
-#define MP_ROM_PTR(p) (p)
-#define MP_ROM_INT(n) ((mp_rom_obj_t)((((mp_uint_t)(n)) << 1) | 1))
-#define MP_ERROR_TEXT(text) (text)
-#define MP_TYPE_FLAG_NONE 0
-#define MP_DEFINE_CONST_FUN_OBJ_1(o, f) const mp_obj_fun_t o = {.base = {&mp_type_fun}, .one = f}
-#define MP_DEFINE_CONST_FUN_OBJ_2(o, f) const mp_obj_fun_t o = {.base = {&mp_type_fun}, .two = f}
-#define MP_DEFINE_CONST_FUN_OBJ_3(o, f) const mp_obj_fun_t o = {.base = {&mp_type_fun}, .three = f}
-#define MP_DEFINE_CONST_FUN_OBJ_VAR_BETWEEN(o, least, most, f) \\
-    const mp_obj_fun_t o = {.base = {&mp_type_fun}, .more = f}
-#define MP_DEFINE_CONST_DICT(d, t) const mp_obj_dict_t d = {{&mp_type_dict}, sizeof(t) / sizeof(t[0]), t}
-#define MP_DEFINE_STR_OBJ(o, str) mp_obj_str_t o = {{&mp_type_str}, 0, sizeof(str) - 1, (const byte *)str}
-#define MP_DEFINE_CONST_OBJ_TYPE(t, q, flags, slot, new, other, dict) \\
-    const mp_obj_type_t t = {flags, {(const void *)new, dict}}
-#define MP_REGISTER_MODULE(q, m)
-#define mp_const_none ((mp_obj_t)&mp_type_tuple)
-mp_int_t mp_obj_get_int(mp_const_obj_t o);
-const mp_obj_type_t *mp_obj_get_type(mp_const_obj_t o);
-bool mp_obj_is_true(mp_obj_t o);
-mp_obj_t mp_obj_new_bool(mp_int_t x);
-void mp_raise_msg(const mp_obj_type_t *type, const char *text) __attribute__((noreturn));
-void mp_arg_check_num(size_t n_args, size_t n_kw, size_t least, size_t most, bool keywords);
-void *mp_obj_malloc_helper(size_t bytes, const mp_obj_type_t *type);
-#define mp_obj_malloc(s, t) ((s *)mp_obj_malloc_helper(sizeof(s), t))
-"""
-
-
-@pytest.mark.parametrize("segments", [False, True], ids=["frames", "segments"])
-@pytest.mark.parametrize("shape", ["small", "switches_only", "joints_only_wide_codes"])
-def test_the_user_module_in_c_compiles_without_a_warning_against_what_it_uses_of_micropython(
-    c_compiler: str, make_tables: MakeTables, describe: Describe, tmp_path: Path, shape: str, segments: bool
-) -> None:
-    tables = make_tables(**SHAPES[shape])
-    manifest = with_segments(describe(tables), tables) if segments else describe(tables)
-    files = TARGETS["micropython"].files(Library("hand", manifest, arrange(tables, bins="search"), avr=True))
-    folder = tmp_path / "modules" / "thenar_hand"
-    (folder / "py").mkdir(parents=True)
-    for path, text in files.items():
-        (tmp_path / path).write_text(text)
-    words = sorted(set(re.findall(r"MP_QSTR_\w+", (folder / "mod_hand.c").read_text())))
-    (folder / "py/obj.h").write_text(PY + f"enum {{ {', '.join(words)} }};\n")
-    for header in ("objstr", "objtuple", "runtime"):
-        (folder / f"py/{header}.h").write_text("")
-    strict = ["-std=gnu99", "-Wall", "-Wextra", "-Werror", "-Wno-unused-const-variable", "-c"]
-    named = re.findall(r"/(\w+\.c)$", (folder / "micropython.mk").read_text(), re.MULTILINE)
-    assert sorted(named) == sorted(path.name for path in folder.glob("*.c"))
-    done = subprocess.run([c_compiler, *strict, "-I.", *named], cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
