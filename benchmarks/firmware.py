@@ -18,7 +18,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from firmwarecosts import Cost, instructions, of_ours, of_peer
+from firmwarecosts import Cost, of_ours, of_peer
 from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Fold, Predictor, folds, rates, raw, split, two_changed
 from firmwarepeers import peers
 from numpy.typing import NDArray
@@ -37,7 +37,6 @@ from thenar.compiler.tables.quantise import quantise
 from thenar.runtime.tables import IntegerTables
 
 AVR, LARGER = TARGETS["avr328p"], TARGETS["avr2560"]
-CORES = (TARGETS["cortex-m0plus"], TARGETS["cortex-m4"])
 CHANGES, SLOW_ROWS = 500, 20  # rows in which two switches change; rows for a peer on the larger part
 CONSOLE = Console(width=170)
 COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + stack", "differing", "front")
@@ -171,18 +170,13 @@ def _on_front(line: Line, lines: Sequence[Line]) -> bool:
 
 
 def print_changes(cuts: Mapping[str, list[Fold]], what: Ours) -> None:
-    """Print the cost of update() after changes of two switches, and that of the tables on 32-bit cores."""
+    """Print the cost of update() after changes of two switches."""
     fold = cuts[CUTS[0]][0]
     integers = what.integers(fold)
     layout = choose(integers, AVR, entry_bits=what.bits).layout
     changed = split(two_changed(fold, CHANGES, joints=what.joints), joints=what.joints)
     cost = of_ours(layout, AVR, layout.frame_bytes(*changed), layout.scores(*changed), changes=True)
     CONSOLE.print(f"{what.name}, two switches changed: {' | '.join(cost.cells)}")
-    frames = split(fold.asked, joints=what.joints)
-    for core in CORES:
-        chosen = choose(integers, core).layout
-        most = instructions(chosen, core, chosen.frame_bytes(*frames), chosen.scores(*frames))
-        CONSOLE.print(f"{what.name}, {core.title}: at most {most:,} instructions")
 
 
 def main() -> None:

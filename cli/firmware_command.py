@@ -207,8 +207,7 @@ def _print(fit: "Fit", measured: "Measured | None", *, frontier: bool, updates: 
         console.print(f"expected: {_expected(fit, updates)}", soft_wrap=True)
     if measured is not None:
         console.print(measured.note, soft_wrap=True)
-        if not measured.rough:
-            console.print("within the bounds" if measured.holds else "BEYOND THE BOUNDS")
+        console.print("within the bounds" if measured.holds else "BEYOND THE BOUNDS")
 
 
 def _print_firmware(firmware: "Firmware", target: str, output: Path | None) -> None:

@@ -337,18 +337,17 @@ def verify_firmware(
 ) -> FirmwareVerification:
     """Compile the classifier for `kinds` and compare it with Python: every row, extreme frames, 10,000 random frames.
 
-    "host" runs with the address and undefined behaviour sanitizers, "avr" is the smallest AVR that fits the classifier,
-    "cortex-m" means both cores, "riscv" and "xtensa" one each. Each classifies every frame from scratch, then once more
-    from the changes between frames, then both again with inputs missing, one at a time and several at once. Except on
-    "avr", set_switch() also sets every switch and every name is read. If no AVR fits the build, host runs the layout of
-    the larger core.
+    "host" runs with the address and undefined behaviour sanitizers, "avr" is the smallest AVR that fits the classifier.
+    Each classifies every frame from scratch, then once more from the changes between frames, then both again with
+    inputs missing, one at a time and several at once. Except on "avr", set_switch() also sets every switch and every
+    name is read. If no AVR fits the build, host runs the layout of the larger core.
     Raises FirmwareError where a tool is missing, a kind is not in `firmware.targets.kinds()`, or the build does not fit
     a part; otherwise raises as `verify` does.
     """
     if unknown := [kind for kind in kinds if kind not in every_kind()]:
         raise FirmwareError(f"no simulator runs firmware for {unknown[0]!r}: choose from {', '.join(every_kind())}")
     build = Build.load(folder)
-    fits = [fit for kind in every_kind() if kind in kinds for fit in _fits(build, kind)]
+    fits = [_fit(build, kind) for kind in every_kind() if kind in kinds]
     for fit in fits:
         if lack := fit.target.missing():
             raise FirmwareError(f"firmware for {fit.target.part} cannot be run here: {lack}")
@@ -370,10 +369,8 @@ def verify_firmware(
     )
 
 
-def _fits(build: Build, kind: str) -> list[Fit]:
-    """Return the parts of a kind to try, each with its layout: of similar parts, the smallest that fits."""
+def _fit(build: Build, kind: str) -> Fit:
+    """Return the smallest part of a kind that fits, with its layout."""
     tables, ports = build.tables, ports_of_scan(build.scan)
-    targets = [target for target in TARGETS.values() if target.kind == kind]
-    if all(target.alike for target in targets):
-        return [smallest_fit(tables, kind=kind, ports=ports)]
-    return [fit_for(target, tables, ports=ports) for target in targets]
+    first, *more = (target for target in TARGETS.values() if target.kind == kind)
+    return smallest_fit(tables, kind=kind, ports=ports) if more else fit_for(first, tables, ports=ports)

@@ -24,8 +24,7 @@ class Measured:
     (None where not measured), flash and RAM.
 
     flash is the total, flash_classify the part of it in a program that never calls update() and never marks an input as
-    missing. The numbers that begin with most_ are those of the cost model: bounds on an AVR, where RAM includes the
-    stack, and elsewhere `rough`.
+    missing. The numbers that begin with most_ are the bounds of the cost model, whose RAM includes the stack.
     """
 
     part: str
@@ -41,7 +40,6 @@ class Measured:
     most_flash: int
     most_flash_classify: int
     most_ram: int
-    rough: bool
 
     @property
     def holds(self) -> bool:
@@ -49,19 +47,18 @@ class Measured:
         used = self.ram + (self.stack or 0)
         small = self.flash <= self.most_flash and self.flash_classify <= self.most_flash_classify
         quick = self.time <= self.most_time and self.update_time <= self.most_update_time
-        return self.rough or (quick and small and used <= self.most_ram)
+        return quick and small and used <= self.most_ram
 
     @property
     def note(self) -> str:
         """The measurements, as a sentence."""
-        bound = "expected about" if self.rough else "bound"
         stack = "" if self.stack is None else f" and {self.stack} of stack"
         return (
-            f"Measured on {self.part}: at most {self.time} {self.unit} a frame ({bound} {self.most_time}), "
-            f"{self.update_time} by update() ({bound} {self.most_update_time}); "
-            f"{self.flash} bytes of flash ({bound} {self.most_flash}), "
-            f"{self.flash_classify} where only classify() is called ({bound} {self.most_flash_classify}); "
-            f"{self.ram} bytes of RAM{stack} ({bound} {self.most_ram})."
+            f"Measured on {self.part}: at most {self.time} {self.unit} a frame (bound {self.most_time}), "
+            f"{self.update_time} by update() (bound {self.most_update_time}); "
+            f"{self.flash} bytes of flash (bound {self.most_flash}), "
+            f"{self.flash_classify} where only classify() is called (bound {self.most_flash_classify}); "
+            f"{self.ram} bytes of RAM{stack} (bound {self.most_ram})."
         )
 
 
@@ -81,7 +78,7 @@ def measure(library: Library, fit: Fit) -> Measured:
     flash, flash_classify, ram = _size(library, target)
     long_names = _more_for_names(library.names.grasps)
     return Measured(
-        part=target.counted_on,
+        part=target.part,
         time=predictions.most,
         update_time=updated.most,
         unit=predictions.unit,
@@ -94,7 +91,6 @@ def measure(library: Library, fit: Fit) -> Measured:
         most_flash=cost.flash + long_names,
         most_flash_classify=cost.flash_classify + long_names,
         most_ram=cost.ram,
-        rough=not target.avr,
     )
 
 

@@ -36,9 +36,9 @@ def content(folder: Path) -> dict[str, bytes]:
 NEXT_STEP = {
     "avr328p": "`make -C {made}` compiles it",
     "avr2560": "`make -C {made}` compiles it",
-    "cortex-m0plus": "`make -C {made} check` compiles and tests it",
-    "cortex-m4": "`make -C {made} check` compiles and tests it",
-    "rv32imac": "`make -C {made} check` compiles and tests it",
+    "cortex-m0plus": "{made} holds the sources to compile",
+    "cortex-m4": "{made} holds the sources to compile",
+    "rv32imac": "{made} holds the sources to compile",
     "arduino": "copy it into `libraries` of your sketchbook; {made}/README.md lists other build systems",
     "esp32": "{made}/README.md explains how to use it in each ecosystem",
 }
@@ -131,22 +131,19 @@ def test_a_flash_limit_is_kept(thenar: Thenar, build: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("target", ["avr328p", "cortex-m0plus"])
 def test_what_was_measured_stands_in_the_header_beside_its_bounds(
-    thenar: Thenar, build: Path, tmp_path: Path, tool: Tool, target: str
+    thenar: Thenar, build: Path, tmp_path: Path, tool: Tool
 ) -> None:
-    for name in ("avr-gcc", "make") if target == "avr328p" else ("arm-none-eabi-gcc", "qemu-system-arm"):
+    for name in ("avr-gcc", "make"):
         tool(name)
-    done = thenar("firmware", build, "--target", target, "-o", tmp_path / "made", "--measure", "--json")
+    done = thenar("firmware", build, "--target", "avr328p", "-o", tmp_path / "made", "--measure", "--json")
     assert done.returncode == 0, done.stderr
     measured = json.loads(done.stdout)["measured"]
-    assert measured["rough"] == (target != "avr328p")
     for what in ("time", "flash", "flash_classify", "ram"):
-        assert 0 < measured[what] <= (2 if measured["rough"] else 1) * measured[f"most_{what}"]
+        assert 0 < measured[what] <= measured[f"most_{what}"]
     opening = " ".join((tmp_path / "made" / "thenar_glove.h").read_text().split("*/")[0].replace("\n *", "\n").split())
-    beside = f"{'expected about' if measured['rough'] else 'bound'} {measured['most_time']}"
-    assert f"at most {measured['time']} {measured['unit']} a frame ({beside})" in opening
-    assert f"{measured['flash']} bytes of flash ({beside.rsplit(' ', 1)[0]} {measured['most_flash']}), " in opening
+    assert f"at most {measured['time']} {measured['unit']} a frame (bound {measured['most_time']})" in opening
+    assert f"{measured['flash']} bytes of flash (bound {measured['most_flash']}), " in opening
 
 
 @pytest.mark.parametrize("flag", ["--measure", "--frontier"])

@@ -122,7 +122,6 @@ _avr = partial(
     help="a library with a Makefile, or the complete firmware of a board",
     next_step="`make -C {folder}` compiles it",
     carried=True,
-    alike=True,
     most_flash=48 << 10,
     clock_hz=16_000_000,
     kind="avr",

@@ -44,8 +44,6 @@ class Target:
         Whether it is a package for the smallest part that holds the build, and not for one part.
     carried : bool, optional
         Whether the firmware that a build carries may be laid out for it.
-    alike : bool, optional
-        Whether targets of its kind differ in memory alone, so that verifying one of them is enough.
     flash, ram : int, optional
         Memory in bytes.
     most_flash : int, optional
@@ -55,7 +53,8 @@ class Target:
     core : Core, optional
         The costs of portable C on it, for `cost`.
     kind : str, optional
-        The name in `thenar verify --firmware` of targets that run alike; "" where `run` cannot run anything.
+        The name in `thenar verify --firmware` of targets that differ in memory alone: the smallest that fits is
+        verified. "" where `run` cannot run anything.
     compiler, size : Tool, optional
         The C compiler, called with `flags`, and its program `size`: `--measure` needs both.
     """
@@ -73,7 +72,6 @@ class Target:
     own_layout: bool = True
     any_part: bool = False
     carried: bool = False
-    alike: bool = False
     flash: int = 1 << 30
     ram: int = 1 << 30
     most_flash: int = 1 << 30
@@ -98,11 +96,6 @@ class Target:
     def named(self) -> str:
         """The part with its article: "an atmega328p", "an stm32"."""
         return f"{'an' if self.part[0] in 'aefilmnorsx' else 'a'} {self.part}"
-
-    @property
-    def counted_on(self) -> str:
-        """The part on which `run` counts, for a sentence: "Measured on atmega328p"."""
-        return self.part
 
     def cost(self, layout: "Layout") -> Cost:
         """Return a bound on the cost of the classifier of that layout, or an estimate that is not too low."""

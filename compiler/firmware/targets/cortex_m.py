@@ -1,26 +1,14 @@
-"""Cortex-M cores with small memories, which match the qemu machines that test such firmware.
-
-qemu 7 has no Cortex-M0+, but a Cortex-M0, on the micro:bit, with the same instructions (ARMv6-M); it rejects those of a
-larger core. Code for a Cortex-M4 runs on Arm's MPS2 board with image AN386, which has that core. SysTick counts
-instructions; its 24 bits are enough for a million.
-"""
+"""Cortex-M cores with small memories."""
 
 from functools import partial
 
 from ..costs import Core, Updating
-from ..tools import ARM_COMPILER, ARM_EMULATOR
-from .bare import Bare, Machine
-
-_SHIFT = 9
+from ..tools import ARM_COMPILER
+from .base import Target
 
 _core = partial(
-    Bare,
-    architecture="arm",
-    prefix="arm-none-eabi-",
-    emulator=ARM_EMULATOR,
-    help="a library for this core, with start-up, Makefile and a self test in qemu",
-    next_step="`make -C {folder} check` compiles and tests it",
-    kind="cortex-m",
+    Target,
+    help="a library for this core, to link with the vendor's start-up code",
     compiler=ARM_COMPILER,
     size=(("arm-none-eabi-size",), "binutils-arm-none-eabi"),
 )
@@ -62,8 +50,6 @@ MEMBER = (
             compared=3,
         ),
         flags=("-mcpu=cortex-m0plus", "-mthumb", "-O2", "-ffreestanding"),
-        board="st_nucleo_g0",
-        machine=Machine("microbit", 256 << 10, 16 << 10, 16_000_000, _SHIFT),
     ),
     _core(
         name="cortex-m4",
@@ -75,7 +61,5 @@ MEMBER = (
         ram=64 << 10,
         clock_hz=64_000_000,
         flags=("-mcpu=cortex-m4", "-mthumb", "-O2", "-ffreestanding"),
-        board="st_nucleo_f4",
-        machine=Machine("mps2-an386", 4 << 20, 4 << 20, 25_000_000, _SHIFT),
     ),
 )

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -202,7 +203,7 @@ def _stack(folder: Path) -> int:
 @pytest.mark.parametrize("entry_bits", [16, 8])
 @pytest.mark.parametrize("part", ["cortex-m0plus", "cortex-m4"])
 def test_a_cortex_takes_no_more_than_the_model_and_not_much_less(
-    tool: Tool,
+    cores: Any,
     size: Size,
     make_tables: MakeTables,
     describe: Describe,
@@ -212,18 +213,16 @@ def test_a_cortex_takes_no_more_than_the_model_and_not_much_less(
     bins: Bins,
     lowest: int,
 ) -> None:
-    for name in ("arm-none-eabi-gcc", "qemu-system-arm"):
-        tool(name)
     tables = make_tables(1, classes=14, switches=33, joints=16, bins=25, reach=5, highest=200)
     tables = replace(tables, thresholds=tuple(steps + np.uint16(lowest) for steps in tables.thresholds))
     target = TARGETS[part]
     layout = arrange(tables, bins=bins, entry_bits=entry_bits)
     files, cost = classifier_files("hand", describe(tables), layout, avr=False), target.cost(layout)
-    answers = target.run(files, "hand", layout, layout.frame_bytes(*_frames(layout, 50)))
+    answers = cores[part].run(files, "hand", layout, layout.frame_bytes(*_frames(layout, 50)))
     assert answers.cost is not None
     assert answers.cost.max() <= cost.cycles <= 1.2 * answers.cost.max()
     changing = layout.frame_bytes(*_all_changing(layout, *_frames(layout, 50)))
-    changed = target.run(files, "hand", layout, changing, incremental=True)
+    changed = cores[part].run(files, "hand", layout, changing, incremental=True)
     assert changed.cost is not None
     assert changed.cost.max() <= cost.update_cycles <= 1.3 * changed.cost.max()
     files["glove.c"] = '#include "thenar_hand.h"\nextern thenar_hand glove;\nthenar_hand glove;\n'

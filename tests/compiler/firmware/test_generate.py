@@ -44,7 +44,7 @@ BOARDS = {
     ),
 }
 PLATFORM = {target.part: name for name, target in TARGETS.items()}
-COMPILERS = {"avr": "avr-gcc", "cortex": "arm-none-eabi-gcc", "rv32": "riscv64-unknown-elf-gcc", "host": "gcc"}
+COMPILERS = {"avr": "avr-gcc", "host": "gcc"}
 
 
 @pytest.fixture(scope="session")
@@ -77,7 +77,7 @@ def make(folder: Path, *arguments: str) -> str:
     done = subprocess.run(["make", "-C", str(folder), strict, *arguments], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "warning" not in done.stderr, done.stderr
-    return done.stdout + done.stderr  # qemu's semihosting prints on the latter
+    return done.stdout
 
 
 @pytest.mark.parametrize("platform", [name for name in TARGETS if name.startswith(tuple(COMPILERS))])
@@ -88,8 +88,6 @@ def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
     folder = write_folder(classifier(build, platform), tmp_path / "firmware")
     make(folder)
     assert "text" in make(folder, "size")
-    if platform.startswith(("cortex", "rv32")):
-        tool("qemu-system-arm" if platform.startswith("cortex") else "qemu-system-riscv32")
     if not platform.startswith("avr"):
         assert "\n18 frames, predicted as by Python\n" in make(folder, "check")
     make(folder, "clean")

@@ -36,7 +36,7 @@ def test_on_an_avr_nothing_is_beyond_its_bound_and_all_that_is_static_is_counted
 ) -> None:
     tool("avr-gcc")
     found = measured(build, platform)
-    assert (found.holds, found.rough, found.unit) == (True, False, "cycles")
+    assert (found.holds, found.unit) == (True, "cycles")
     assert found.most_time * 0.9 < found.time <= found.most_time
     # Scores, and the input at least: groups and codes.
     assert found.ram >= 2 * 5 + 3 + 2
@@ -48,11 +48,9 @@ def test_on_an_avr_nothing_is_beyond_its_bound_and_all_that_is_static_is_counted
     assert f"{found.ram} bytes of RAM and {found.stack} of stack (bound {found.most_ram})." in found.note
 
 
-@pytest.mark.parametrize("platform", ["avr328p", "cortex-m4"])
-def test_a_program_that_only_classifies_has_no_update(build: Build, platform: str, tool: Tool) -> None:
-    for name in ("avr-gcc",) if platform == "avr328p" else ("arm-none-eabi-gcc", "qemu-system-arm"):
-        tool(name)
-    found = measured(build, platform)
+def test_a_program_that_only_classifies_has_no_update(build: Build, tool: Tool) -> None:
+    tool("avr-gcc")
+    found = measured(build, "avr328p")
     assert found.flash - found.flash_classify > 80
     assert found.flash_classify <= found.most_flash_classify < found.most_flash
 
@@ -67,14 +65,6 @@ def test_a_bound_that_is_broken_does_not_hold(build: Build, tool: Tool) -> None:
     assert not replace(found, most_flash_classify=found.flash_classify - 1).holds
     assert not replace(found, most_ram=found.ram + found.stack - 1).holds
     assert replace(found, most_time=found.time, most_flash=found.flash, most_ram=found.ram + found.stack).holds
-
-
-def test_on_a_cortex_m_instructions_are_counted_and_the_model_is_rough(build: Build, tool: Tool) -> None:
-    for name in ("arm-none-eabi-gcc", "qemu-system-arm"):
-        tool(name)
-    found = measured(build, "cortex-m4")
-    assert (found.holds, found.rough, found.unit) == (True, True, "instructions")
-    assert f"at most {found.time} instructions a frame (expected about {found.most_time})" in found.note
 
 
 def test_the_bound_of_flash_grows_with_long_names(make_tables: MakeTables, describe: Describe, tool: Tool) -> None:

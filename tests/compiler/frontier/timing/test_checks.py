@@ -22,12 +22,6 @@ def simavr(tool: Callable[[str], str]) -> None:
         tool("libsimavr-dev")
 
 
-@pytest.fixture
-def qemu(tool: Callable[[str], str]) -> None:
-    for name in ("arm-none-eabi-gcc", "qemu-system-arm"):
-        tool(name)
-
-
 @pytest.mark.usefixtures("simavr")
 def test_cycles_of_an_avr_are_foretold_within_three_percent_and_never_too_few() -> None:
     part = TARGETS["avr328p"]
@@ -47,16 +41,6 @@ def test_at_least_thirty_layouts_are_run_on_a_simulated_avr(target: str) -> None
     assert found.worst_error < 0.03
     assert (scans.n, scans.how) == (len(scan_trials(target)), "simulated")
     assert "scan" in scans.what
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("qemu")
-@pytest.mark.parametrize("target", ["cortex-m0plus", "cortex-m4"])
-def test_at_least_thirty_layouts_are_run_on_an_emulated_cortex_m(target: str) -> None:
-    (found,) = check(ClassifyModel(target), TABLES, jobs=1)
-    assert (found.n, found.how) == (LEAST, "simulated")
-    assert found.mean_error < 0.25
-    assert found.worst_error < 0.5
 
 
 def test_python_is_timed_on_thirty_tables_even_where_one_is_given() -> None:
@@ -80,16 +64,15 @@ def test_without_tables_nothing_is_checked() -> None:
     assert check(ClassifyModel("avr328p"), []) == check(ClassifyModel("host", python=PYTHON), []) == ()
 
 
-@pytest.mark.parametrize(("target", "gone"), [("avr328p", "avr-gcc"), ("cortex-m4", "arm-none-eabi-gcc")])
 def test_without_its_tools_a_target_is_not_checked_and_it_is_said_what_is_missing(
-    monkeypatch: pytest.MonkeyPatch, target: str, gone: str
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("PATH", "/nowhere")
-    model = ClassifyModel(target)
+    model = ClassifyModel("avr328p")
     assert check(model, TABLES) == ()
     reason = unchecked(model)
     assert reason is not None
-    assert gone in reason
+    assert "avr-gcc" in reason
     assert "apt-get install" in reason
 
 

@@ -4,9 +4,14 @@
 #include "semihosting.h"
 #include "ticks.h"
 
-typedef thenar_{{ name }}_class predict_function(thenar_{{ name }} *);
+/* The compiler is given NAME, a classifier's, and FUNCTION, _classify or _update. */
+#define JOINED_AGAIN(name, part) thenar_##name##part
+#define JOINED(name, part) JOINED_AGAIN(name, part)
+#define NAMED(part) JOINED(NAME, part)
 
-static thenar_{{ name }}_class grasp;
+typedef NAMED(_class) predict_function(NAMED() *);
+
+static NAMED(_class) grasp;
 
 void thenar_fault(void);
 void thenar_fault(void)
@@ -18,12 +23,7 @@ void thenar_fault(void)
 }
 
 /* One instruction. */
-#ifdef __XTENSA__
-thenar_{{ name }}_class nothing(thenar_{{ name }} *glove);
-__asm(".text\n.align 4\nnothing: ret");
-#else
-__attribute__((naked)) static thenar_{{ name }}_class nothing(
-    __attribute__((unused)) thenar_{{ name }} *unused)
+__attribute__((naked)) static NAMED(_class) nothing(__attribute__((unused)) NAMED() *unused)
 {
 #ifdef __riscv
     __asm volatile("ret");
@@ -31,7 +31,6 @@ __attribute__((naked)) static thenar_{{ name }}_class nothing(
     __asm volatile("bx lr");
 #endif
 }
-#endif
 
 __attribute__((noinline, noclone)) static uint32_t ticks_of(predict_function *function)
 {
@@ -40,27 +39,6 @@ __attribute__((noinline, noclone)) static uint32_t ticks_of(predict_function *fu
     grasp = function(&glove);
     return (before - ticks_left()) & TICKS_MOST;
 }
-
-#ifdef __XTENSA__
-/* An ESP8266 has it in its ROM; libgcc does not have it. */
-unsigned __udivsi3(unsigned dividend, unsigned divisor);
-unsigned __udivsi3(unsigned dividend, unsigned divisor)
-{
-    unsigned quotient = 0u;
-    unsigned rest = 0u;
-
-    for (unsigned bit = 0u; bit < 32u; ++bit) {
-        rest = (rest << 1) | (dividend >> 31);
-        dividend <<= 1;
-        quotient <<= 1;
-        if (rest >= divisor) {
-            rest -= divisor;
-            quotient |= 1u;
-        }
-    }
-    return quotient;
-}
-#endif
 
 static void put32(uint8_t *to, uint32_t word)
 {
@@ -78,9 +56,9 @@ int main(void)
     put32(prediction, ticks_of(nothing));
     bool whole = true;
 
-    thenar_{{ name }}_init(&glove);
+    NAMED(_init)(&glove);
     for (unsigned k = 0; k < CLASSES; ++k) {
-        const char *const type = thenar_{{ name }}_grasp((thenar_{{ name }}_class)k);
+        const char *const type = NAMED(_grasp)((NAMED(_class))k);
 
         whole = semihosting_write(predictions, type, name_bytes(type)) && whole;
     }
@@ -88,7 +66,7 @@ int main(void)
 
     while (semihosting_read(frames, frame, sizeof frame)) {
         take_frame(frame);
-        put32(prediction + PREDICTION_BYTES, ticks_of(thenar_{{ name }}_{{ function }}));
+        put32(prediction + PREDICTION_BYTES, ticks_of(NAMED(FUNCTION)));
         give_prediction(grasp, prediction);
         whole = semihosting_write(predictions, prediction, sizeof prediction) && whole;
     }

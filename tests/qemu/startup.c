@@ -1,13 +1,4 @@
-{% if architecture == "xtensa" %}
-/* Start-up of an Xtensa core: stack and exceptions, .data and .bss, then main(). No C library is needed. */
-{% elif architecture == "riscv" %}
-/* Start-up of a RISC-V core with one hart: stack and traps, .data and .bss, then main(). No C library is needed. */
-{% else %}
-/* Start-up of a Cortex-M: the vector table, .data and .bss, then main(). No C library is needed. */
-{% endif %}
-{% if architecture == "xtensa" %}
-#include <stdbool.h>
-{% endif %}
+/* Start-up of a Cortex-M or of a RISC-V core with one hart: stack, .data and .bss, then main(). No C library is needed. */
 #include <stddef.h>
 #include <stdint.h>
 
@@ -37,26 +28,6 @@ void thenar_reset(void)
     thenar_fault(); /* firmware cannot return */
 }
 
-{% if architecture != "arm" %}
-/* An exception, or an unhandled interrupt: a debugger stops here, and without one the core stays here. A program may
-   define another thenar_fault(). */
-__attribute__((weak)) void thenar_fault(void)
-{
-    for (;;) {
-        __asm volatile("{{ "ebreak" if architecture == "riscv" else "break 1, 15" }}");
-    }
-}
-{% else %}
-/* HardFault, or an unhandled exception: a debugger stops here, and without one the core locks up instead of running on.
-   A program may define another thenar_fault(). */
-__attribute__((weak)) void thenar_fault(void)
-{
-    for (;;) {
-        __asm volatile("bkpt #0");
-    }
-}
-{% endif %}
-
 /* The compiler may call these two in any program (GCC manual, "Standards"). */
 __attribute__((weak)) void *memcpy(void *to, const void *from, size_t size)
 {
@@ -79,43 +50,7 @@ __attribute__((weak)) void *memset(void *to, int byte, size_t size)
     return to;
 }
 
-{% if architecture == "xtensa" %}
-/* The core has no division, and the compiler's library relies on the ESP8266's ROM for it. */
-uint32_t __udivsi3(uint32_t dividend, uint32_t divisor);
-
-__attribute__((weak)) uint32_t __udivsi3(uint32_t dividend, uint32_t divisor)
-{
-    uint32_t quotient = 0u;
-    uint32_t rest = 0u;
-
-    for (unsigned bit = 32u; bit-- != 0u;) {
-        const bool carried = (rest >> 31) != 0u;
-
-        rest = (rest << 1) | ((dividend >> bit) & 1u);
-        if (carried || (rest >= divisor)) {
-            rest -= divisor;
-            quotient |= 1u << bit;
-        }
-    }
-    return quotient;
-}
-
-/* The reset entry, and the vectors of the core: debugger, NMI, exceptions, nested exceptions. */
-__asm(".section .vectors, \"ax\"\n"
-      "thenar_vectors: j thenar_first\n"
-      ".org 0x10\nj thenar_fault\n"
-      ".org 0x20\nj thenar_fault\n"
-      ".org 0x30\nj thenar_fault\n"
-      ".org 0x50\nj thenar_fault\n"
-      ".org 0x70\nj thenar_fault\n"
-      ".text\n"
-      ".align 4\n"
-      "thenar_first:\n"
-      "movi a2, thenar_vectors\n"
-      "wsr a2, vecbase\n"
-      "movi a1, thenar_stack_top\n"
-      "call0 thenar_reset\n");
-{% elif architecture == "riscv" %}
+#ifdef __riscv
 /* The first instructions in flash: the reset entry. */
 __attribute__((naked, section(".vectors"), used)) static void first(void)
 {
@@ -130,7 +65,7 @@ __attribute__((naked, section(".vectors"), used)) static void first(void)
                    ".balign 4\n" /* as mtvec requires */
                    "1: j thenar_fault");
 }
-{% else %}
+#else
 /* The 16 vectors of the core (ARMv6-M and ARMv7-M Architecture Reference Manuals, B1.5.3). Interrupts of peripherals
    follow them in the order of the part's data sheet: nothing here enables any. */
 __attribute__((section(".vectors"), used)) static const struct {
@@ -153,4 +88,4 @@ __attribute__((section(".vectors"), used)) static const struct {
         thenar_fault, /* SysTick */
     },
 };
-{% endif %}
+#endif

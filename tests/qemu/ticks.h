@@ -19,18 +19,6 @@ static inline uint32_t ticks_left(void)
     __asm volatile("csrr %0, minstret" : "=r"(retired));
     return 0u - retired;
 }
-#elif defined(__XTENSA__)
-static inline void start_ticking(void)
-{
-}
-
-static inline uint32_t ticks_left(void)
-{
-    uint32_t ticks;
-
-    __asm volatile("rsr %0, ccount" : "=r"(ticks));
-    return 0u - ticks;
-}
 #else
 #define SYSTICK_CONTROL (*(volatile uint32_t *)0xe000e010u)
 #define SYSTICK_RELOAD (*(volatile uint32_t *)0xe000e014u)

@@ -1,5 +1,4 @@
-/* Files, messages and program end through the debugger or qemu (ARM, "Semihosting for AArch32 and AArch64", 2.0).
-   On a part without a debugger every call ends in thenar_fault(). */
+/* Files, messages and program end through the debugger or qemu (ARM, "Semihosting for AArch32 and AArch64", 2.0). */
 #ifndef THENAR_SEMIHOSTING_H
 #define THENAR_SEMIHOSTING_H
 
@@ -16,6 +15,23 @@ enum {
 };
 enum { SEMIHOSTING_RB = 1, SEMIHOSTING_WB = 5 }; /* open modes: fopen()'s "rb" and "wb" */
 
+#ifdef __riscv
+/* The three instructions form one signal: they must be uncompressed and on one page. */
+static inline uint32_t semihosting(uint32_t operation, uint32_t argument)
+{
+    register uint32_t a0 __asm("a0") = operation;
+    register uint32_t a1 __asm("a1") = argument;
+
+    __asm volatile(".balign 16\n"
+                   ".option push\n"
+                   ".option norvc\n"
+                   "slli x0, x0, 0x1f\n"
+                   "ebreak\n"
+                   "srai x0, x0, 7\n"
+                   ".option pop" : "+r"(a0) : "r"(a1) : "memory");
+    return a0;
+}
+#else
 static inline uint32_t semihosting(uint32_t operation, uint32_t argument)
 {
     register uint32_t r0 __asm("r0") = operation;
@@ -24,6 +40,7 @@ static inline uint32_t semihosting(uint32_t operation, uint32_t argument)
     __asm volatile("bkpt #0xab" : "+r"(r0) : "r"(r1) : "memory");
     return r0;
 }
+#endif
 
 static inline uint32_t semihosting_open(const char *name, size_t length, uint32_t mode)
 {
