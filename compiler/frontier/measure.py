@@ -5,11 +5,10 @@ from dataclasses import replace
 
 from thenar.runtime.tables import tables_from_bytes
 
-from ..firmware.choose import features
 from .cache import Cache, stored
 from .designs import Design
 from .equipment import Equipment
-from .points import Check, FrontierError, Time
+from .points import Check, Time
 from .timing.checks import LEAST, check, unchecked
 from .timing.classify_times import ClassifyModel, fitting
 from .timing.python_times import classify_us
@@ -21,16 +20,15 @@ TRIAL_S, _TIMES_S, _CHECK_S = 2.0, 1.0, 5.0
 
 
 @stored(1, where="machine")
-def count_steps(content: bytes, layout: str, model: ClassifyModel) -> float:
-    """Compile a layout of tables and run it; return the cycles, or instructions, of the slowest frame.
+def count_steps(content: bytes, model: ClassifyModel) -> float:
+    """Compile the classifier of tables and run it; return the cycles of the slowest frame.
 
     Raises FirmwareError.
     """
     assert model.part is not None
-    for option in fitting(tables_from_bytes(content), model.part):
-        if features(option[0], model.part) == layout:
-            return run_layout((option, model.part)).counted
-    raise FrontierError(f"there is no layout {layout!r} of these tables: another thenar made the store")
+    fit = fitting(tables_from_bytes(content), model.part)
+    assert fit is not None
+    return run_layout(fit).counted
 
 
 @stored(1, where="process")
@@ -76,7 +74,7 @@ def _timed(designs: Sequence[Design], model: ClassifyModel, cache: Cache) -> lis
 
 
 def _simulated(designs: Sequence[Design], model: ClassifyModel, cache: Cache) -> list[Design]:
-    calls = [count_steps.call(TRIAL_S, design.tables.content, design.classified.layout, model) for design in designs]
+    calls = [count_steps.call(TRIAL_S, design.tables.content, model) for design in designs]
     steps = cache.ask("simulations", calls)
     return [
         replace(design, measured=Time(model.us(round(each)), "simulated"))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
-from ..costs import Cost
+from ..costs import Formula
 from ..tools import AVR_COMPILER
 from .wired import Wired
 
@@ -35,12 +35,6 @@ class Avr(Wired):
     avrdude: str
     programmer: str
     brown_out: str = "4.3 V, extended fuse 0xFC; at 8 MHz or less 2.7 V, 0xFD"
-
-    def cost(self, layout: "Layout") -> Cost:
-        """Return the worst-case cost over all possible frames, counted instruction by instruction."""
-        from ..avr_costs import AvrCosts
-
-        return AvrCosts(layout, self.flash).cost
 
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text: the library, a Makefile (program, size, flash) and an initial main()."""
@@ -133,6 +127,51 @@ _avr = partial(
 # separate pins, which only the packages with 32 leads have.
 _ATMEGA328P = _avr(
     name="avr328p",
+    formula=Formula(
+        cycles={
+            "one": 43.11,
+            "word classes": 12.94,
+            "byte classes": 14.4,
+            "passes": 127.1,
+            "class passes": 7.079,
+            "lookups": 3.027,
+            "kept lookups": 2.149,
+            "words": 1.58,
+            "entries": 3.921,
+            "offsets": 1.735,
+            "fields": 8.422,
+            "bins": 19.17,
+            "thresholds": 4.871,
+            "lines": 40.76,
+            "line sums": 1.454,
+        },
+        flash={
+            "one": 659.6,
+            "word classes": 51.51,
+            "byte classes": 49.21,
+            "lookups": 19.1,
+            "kept lookups": 27.0,
+            "split words": 12.24,
+            "found": 25.83,
+            "found words": 2.623,
+            "bins": 115.8,
+            "thresholds": 13.96,
+            "lines": 40.71,
+            "line sums": 10.07,
+            "rows": 1.104,
+            "tables": 0.5987,
+        },
+        ram={
+            "one": 2.27,
+            "word classes": 4.757,
+            "byte classes": 4.244,
+            "class passes": 0.1282,
+            "found": 1.476,
+            "compared codes": 1.138,
+            "ports": 0.366,
+            "input": 1.028,
+        },
+    ),
     part="atmega328p",
     rank=10,
     flags=("-mmcu=atmega328p", "-Os"),
@@ -151,6 +190,51 @@ _ATMEGA328P = _avr(
 # ATmega640/1280/1281/2560/2561, DS40002211: crystal and RESET have separate pins.
 _ATMEGA2560 = _avr(
     name="avr2560",
+    formula=Formula(
+        cycles={
+            "one": 48.5,
+            "word classes": 12.86,
+            "byte classes": 14.39,
+            "passes": 128.1,
+            "class passes": 6.904,
+            "lookups": 5.202,
+            "kept lookups": 2.339,
+            "words": 1.652,
+            "entries": 3.89,
+            "offsets": 1.721,
+            "fields": 8.179,
+            "bins": 19.49,
+            "thresholds": 4.88,
+            "lines": 42.23,
+            "line sums": 1.573,
+        },
+        flash={
+            "one": 667.8,
+            "word classes": 51.28,
+            "byte classes": 49.02,
+            "lookups": 19.24,
+            "kept lookups": 26.97,
+            "split words": 12.17,
+            "found": 25.66,
+            "found words": 2.659,
+            "bins": 116.0,
+            "thresholds": 13.97,
+            "lines": 40.65,
+            "line sums": 10.09,
+            "rows": 1.104,
+            "tables": 0.6014,
+        },
+        ram={
+            "one": 2.27,
+            "word classes": 4.757,
+            "byte classes": 4.244,
+            "class passes": 0.1282,
+            "found": 1.476,
+            "compared codes": 1.138,
+            "ports": 0.366,
+            "input": 1.028,
+        },
+    ),
     part="atmega2560",
     rank=11,
     flags=("-mmcu=atmega2560", "-Os"),

@@ -196,6 +196,5 @@ MEMBER = MicroPython(
     help="a Python module for any board with MicroPython",
     next_step="`mpremote cp {folder}/*.py :` copies it to a board",
     rank=40,
-    own_layout=False,
     kind="micropython",
 )

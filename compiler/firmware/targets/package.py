@@ -1,5 +1,5 @@
 """The classifier as a package for every microcontroller ecosystem: Arduino, PlatformIO, ESP-IDF, Zephyr, pico-sdk and
-plain CMake. Targets differ in the core for which the layout is chosen, not in the files.
+plain CMake. Targets differ in the core whose cost is estimated, not in the files.
 
 Layout and fields of the Arduino library are those of its specification, revision 1.5.
 """
@@ -7,7 +7,7 @@ Layout and fields of the Arduino library are those of its specification, revisio
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..costs import Core, Updating
+from ..costs import Formula
 from .base import Target
 from .cortex_m import MEMBER as _CORTEX_M
 
@@ -102,42 +102,15 @@ def _keywords(name: str, segments: bool, codes: bool) -> list[tuple[str, str]]:
     return [*words, *((f"THENAR_{name.upper()}_{word}", "LITERAL1") for word in _CONSTANTS)]
 
 
-M0PLUS, _M4 = (target.core for target in _CORTEX_M)
-# Numbers are fitted to qemu's counts of an ESP8266's core, without an ESP32's register windows, for 3 to 30 classes and
-# 3 to 27 lookups: 1 to 38 % above.
-XTENSA = Core(
-    fixed=12,
-    a_class=7,
-    in_parts=4,
-    lookup=2,
-    found=4,
-    part=4,
-    pair=2,
-    quad=5,
-    updating=Updating(
-        fixed=23,
-        a_class=5,
-        in_parts=5,
-        noted=0,
-        added=16,
-        pair=3,
-        quad=4,
-        split=2,
-        moved=10,
-        moved_part=0,
-        product=6,
-        halves=5,
-    ),
-    product=5,
-)
+M0PLUS, M4 = (target.formula for target in _CORTEX_M)
 _NEXT = "{folder}/README.md explains how to use it in each ecosystem"
 # More only on request: on most parts, flash is read through a cache of 1 to 32 KiB, and larger tables miss it.
 _MOST = 64 << 10
 
 
-def family(shape: type[P], name: str, core: Core, what: str, **given: Any) -> P:
-    """Return a package for parts with such a core."""
-    values = {"name": name, "part": name, "help": what, "most_flash": _MOST, "core": core, "next_step": _NEXT}
+def family(shape: type[P], name: str, formula: Formula | None, what: str, **given: Any) -> P:
+    """Return a package for parts whose cost is that of a similar core."""
+    values = {"name": name, "part": name, "help": what, "most_flash": _MOST, "formula": formula, "next_step": _NEXT}
     return shape(**{**values, **given})
 
 
@@ -149,13 +122,12 @@ MEMBER = (
         help="a package for Arduino's boards, AVR or other; for the smallest part that holds the build",
         next_step="copy it into `libraries` of your sketchbook; {folder}/README.md lists other build systems",
         rank=30,
-        own_layout=False,
         any_part=True,
     ),
     family(
         Package,
         "rp2350",
-        _M4,
+        M4,
         "a package as for rp2040: Raspberry Pi Pico 2, Cortex-M33 or RISC-V",
         rank=33,
         flash=16 << 20,
@@ -164,7 +136,7 @@ MEMBER = (
     family(
         Package,
         "nrf52",
-        _M4,
+        M4,
         "a package for Zephyr (nRF Connect), Arduino, PlatformIO: nRF52832, nRF52840, Cortex-M4F",
         rank=34,
         flash=1 << 20,
@@ -173,13 +145,13 @@ MEMBER = (
     family(
         Package,
         "stm32",
-        _M4,
+        M4,
         "a package for STM32CubeIDE and any CMSIS project, Zephyr, Arduino, PlatformIO; counted as Cortex-M4",
         rank=35,
         flash=2 << 20,
         ram=20 << 10,
     ),
     family(
-        Package, "generic", _M4, "a package for any other part that has a C99 compiler; counted as Cortex-M4", rank=36
+        Package, "generic", M4, "a package for any other part that has a C99 compiler; counted as Cortex-M4", rank=36
     ),
 )

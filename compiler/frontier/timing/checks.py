@@ -11,7 +11,7 @@ import numpy as np
 
 from thenar.runtime.tables import IntegerTables
 
-from ...firmware.choose import Option
+from ...firmware.choose import Fit
 from ...firmware.targets import Target
 from ...workers import in_workers
 from ..points import Check, How
@@ -70,13 +70,14 @@ def _on_python(model: ClassifyModel, several: Sequence[IntegerTables], least: in
     return _judged("time of a frame in runtime.scores on this machine", "measured", outcomes)
 
 
-def _trials(several: Sequence[IntegerTables], part: Target, least: int) -> list[tuple[Option, Target]]:
-    """Return `least` layouts, evenly spread over those of the tables, or as many as there are."""
-    chosen, found = _spread(several, _TABLES), list[tuple[Option, Target]]()
+def _trials(several: Sequence[IntegerTables], part: Target, least: int) -> list[Fit]:
+    """Return `least` classifiers, evenly spread over the tables, or as many as there are."""
+    chosen, found = _spread(several, _TABLES), list[Fit]()
     for number, tables in enumerate(chain(chosen, _smaller(chosen))):
         if number >= len(chosen) and len(found) >= least:
             break
-        found += [(option, part) for option in fitting(tables, part)]
+        fit = fitting(tables, part)
+        found += [] if fit is None else [fit]
     return _spread(found, least)
 
 

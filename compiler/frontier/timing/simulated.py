@@ -14,12 +14,12 @@ from thenar.runtime.scanning.ports import ports_of
 
 from ...firmware import FirmwareError
 from ...firmware.board import Board, BoardBus
-from ...firmware.choose import Option
+from ...firmware.choose import Fit
 from ...firmware.classifier import LIBRARY_NAME, Library
 from ...firmware.generate import Firmware
 from ...firmware.measuring import run_counted, slow_frames
 from ...firmware.simavr import harness
-from ...firmware.targets import TARGETS, Target
+from ...firmware.targets import TARGETS
 from ...firmware.tools import call, workshop
 from ...firmware.words import numbered
 from .python_times import random_tables
@@ -57,14 +57,11 @@ class Outcome:
         return abs(self.predicted - self.counted) / self.counted
 
 
-def run_layout(trial: tuple[Option, Target]) -> Outcome:
-    """Compile a layout for a target, and run the frame that should take longest, and extreme ones.
-
-    Raises FirmwareError.
-    """
-    (layout, cost), part = trial
-    library = Library(LIBRARY_NAME, numbered(layout.tables), layout, part.avr)
-    return Outcome(cost.cycles, float(run_counted(library, part, slow_frames(layout)).most))
+def run_layout(fit: Fit) -> Outcome:
+    """Compile a classifier for its part, and run slow frames. Raises FirmwareError."""
+    assert fit.cost is not None
+    library = Library(LIBRARY_NAME, numbered(fit.layout.tables), fit.layout, fit.target.avr)
+    return Outcome(fit.cost.cycles, float(run_counted(library, fit.target, slow_frames(library)).most))
 
 
 @dataclass(frozen=True, slots=True)

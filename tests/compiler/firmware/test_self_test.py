@@ -57,7 +57,7 @@ def test_a_folder_checks_itself_without_a_warning(
     make: Make, make_tables: MakeTables, describe: Describe, shape: str
 ) -> None:
     tables = make_tables(**SHAPES[shape])
-    files = files_for(arrange(tables, bins="search"), describe(tables))
+    files = files_for(arrange(tables), describe(tables))
     assert [line for text in files.values() for line in text.splitlines() if len(line) > 120] == []
     done = make(files, "CFLAGS=-O2 -Werror", "check")
     assert (done.returncode, done.stdout + done.stderr) == (0, AGREED)

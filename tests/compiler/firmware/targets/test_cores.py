@@ -46,8 +46,8 @@ def test_every_score_and_class_is_python_s_in_few_instructions(
     entry_bits: int,
     incremental: bool,
 ) -> None:
-    tables = make_tables(classes=14, switches=33, joints=16)
-    layout, frames = arrange(tables, entry_bits=entry_bits), probed(tables, 10_000)
+    tables = make_tables(classes=14, switches=33, joints=16, reach=20 if entry_bits == 8 else 300)
+    layout, frames = arrange(tables), probed(tables, 10_000)
     files = classifier_files("hand", describe(tables), layout, avr=False)
     sent = layout.frame_bytes(frames.bits, frames.codes)
     answers = cores[part].run(files, "hand", layout, sent, incremental=incremental)
@@ -78,7 +78,7 @@ def test_so_it_is_for_builds_of_any_shape(
     shape: str,
 ) -> None:
     tables = make_tables(**SHAPES[shape])
-    layout, frames = arrange(tables, bins="search"), probed(tables, 100)
+    layout, frames = arrange(tables), probed(tables, 100)
     files = classifier_files("hand", describe(tables), layout, avr=False)
     sent = layout.frame_bytes(frames.bits, frames.codes)
     same_as_python(cores[part].run(files, "hand", layout, sent), tables, frames)

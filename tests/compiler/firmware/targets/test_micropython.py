@@ -95,10 +95,8 @@ def test_so_it_is_for_tables_of_any_shape(
     tables = {"slopes": with_slopes, "pairs": with_pairs}.get(shape, lambda same: same)(tables)
     frames = probed(tables, 60)
     gone = lost_inputs(tables, len(frames), 3) if lost else None
-    for entry_bits, bins in ((16, "search"), (8, "trimmed")) if "wide" not in shape else ((16, "search"),):
-        layout = arrange(tables, entry_bits=entry_bits, bins=bins)  # type: ignore[arg-type]
-        found = answers(layout, describe(tables), frames, incremental=lost, lost=gone)
-        same_as_python(found, tables, frames, gone)
+    found = answers(arrange(tables), describe(tables), frames, incremental=lost, lost=gone)
+    same_as_python(found, tables, frames, gone)
 
 
 MORE = """
