@@ -1,6 +1,6 @@
 """Fit the formula of a target's costs: cycles or instructions, flash and RAM, of random builds.
 
-    python benchmarks/firmwarefit.py [--builds 80] [TARGET ...]
+    python benchmarks/firmwarefit.py [TARGET ...]
 
 Every build is compiled and run in simavr or qemu, on extreme and random frames. The coefficients, none negative, have
 the least largest relative error; they are printed as they stand in the target's file.
@@ -32,6 +32,7 @@ from thenar.runtime.tables import COARSE, IntegerTables, Slope
 
 FITTED = ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "rv32imac")
 FRAMES = 200
+DRAWS = (*range(80), *range(1000, 1050))
 TIME_TERMS = (
     *("one", "word classes", "byte classes", "passes", "class passes", "lookups", "kept lookups", "words", "entries"),
     *("offsets", "split words", "fields", "bins", "thresholds", "searches", "lines", "line sums"),
@@ -137,11 +138,10 @@ def main() -> None:
     """Print the formulas."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("targets", nargs="*", default=FITTED, metavar="TARGET")
-    parser.add_argument("--builds", type=int, default=80)
     asked = parser.parse_args()
     for name in asked.targets:
         with ProcessPoolExecutor(2) as pool:
-            points = [point for point in pool.map(partial(measured, name), map(drawn, range(asked.builds))) if point]
+            points = [point for point in pool.map(partial(measured, name), map(drawn, DRAWS)) if point]
         print(f"{name}: {len(points)} builds\nformula=Formula(")
         for part, names in (("time", TIME_TERMS), ("flash", FLASH_TERMS), ("ram", RAM_TERMS)):
             values = [getattr(point, part) for point in points]

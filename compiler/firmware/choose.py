@@ -86,11 +86,15 @@ def fit_for(target: Target, tables: IntegerTables, flash: int | None = None, por
 
 def smallest_fit(tables: IntegerTables, *, kind: str = "", flash: int | None = None, ports: Ports | None = None) -> Fit:
     """Return the smallest part that holds the tables, of those that builds carry firmware for, or those of `kind`;
-    in `flash` bytes where given, or in all of the part's flash if that is less.
+    in `flash` bytes where given, or in all of the part's flash if that is less: then of parts whose flash is estimated.
 
     Raises FirmwareError, with the reason for the largest part, if there is none.
     """
-    candidates = [target for target in TARGETS.values() if (target.kind == kind if kind else target.carried)]
+    candidates = [
+        target
+        for target in TARGETS.values()
+        if (target.kind == kind if kind else target.carried) and (flash is None or target.formula)
+    ]
     *smaller, largest = sorted(candidates, key=lambda target: target.flash)
     for target in smaller:
         with suppress(FirmwareError):
