@@ -42,7 +42,10 @@ FLASH_TERMS = (
     *("split words", "found", "found words", "split code", "fields", "bins", "thresholds", "lines", "line sums"),
     *("rows", "padded rows", "tables"),
 )
-RAM_TERMS = ("one", "word classes", "byte classes", "class passes", "found", "compared codes", "ports", "input")
+RAM_TERMS = (
+    *("one", "word classes", "byte classes", "class passes", "found", "kept found", "sum words", "compared codes"),
+    *("ports", "input"),
+)
 
 
 @dataclass(frozen=True, slots=True)

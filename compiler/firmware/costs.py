@@ -58,7 +58,9 @@ def terms(layout: "Layout") -> dict[str, float]:
     fields                       of switches that are cut out of the bytes of ports
     bins, thresholds, searches   joints that are looked up; thresholds that are compared; steps of binary searches
     lines, line sums             joints that are multiplied in all passes, and the sums that each is added to
-    found, compared codes, ports what update() keeps of a frame: rows and distances, codes; and the bytes of switches
+    found, kept found            rows and distances of a frame, which update() keeps; those that an AVR finds first
+    sum words, compared codes    words of sums; codes that update() keeps
+    ports                        bytes of switches
     found words, split code      words of rows, and words that are taken apart, in one pass
     rows, padded rows, tables    bytes of rows, on an AVR and in words; bytes of bins and means
     input                        bytes of a frame
@@ -92,6 +94,8 @@ def terms(layout: "Layout") -> dict[str, float]:
         "lines": passes * lines,
         "line sums": passes * lines * parts.width,
         "found": len(layout.lookups) + lines,
+        "kept found": (len(layout.lookups) + lines) * finds_first(layout),
+        "sum words": passes * -(-parts.width * layout.sum_bits // 32),
         "compared codes": len(layout.joints) * (layout.code_bits == 8),
         "ports": len(layout.ports),
         "found words": len(layout.lookups) * words,
