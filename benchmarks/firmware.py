@@ -4,10 +4,9 @@
 
 33 switches and 16 joints (a byte each) of the simulated scene kamakura, 14 grasp types. Switches are placed and models
 trained on the training rows of each fold; accuracy is that of the deployed integers, in four folds and with each
-subject left out. libsimavr counts cycles over the test rows of the first fold, median and maximum, including the worst
-frame for thenar. Flash and RAM are those of the whole program. A row is on the Pareto front of both accuracies, maximum
-cycles and flash. Peers that are not installed are left out (`make bench` installs them), and those that do not fit an
-ATmega328P are not on the front.
+subject left out. libsimavr counts cycles over the test rows of the first fold, median and maximum. Flash and RAM are
+those of the whole program. A row is on the Pareto front of both accuracies, maximum cycles and flash. Peers that are
+not installed are left out (`make bench` installs them), and those that do not fit an ATmega328P are not on the front.
 """
 
 import argparse
@@ -17,27 +16,22 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
-import numpy as np
-from firmwarecosts import Cost, instructions, of_ours, of_peer
+from firmwarecosts import Cost, of_ours, of_peer
 from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Fold, Predictor, folds, rates, raw, split, two_changed
 from firmwarepeers import peers
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
 from thenar.compiler import TRAINERS
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.avr_costs import worst_frame
-from thenar.compiler.firmware.choose import choose, flash_shares
-from thenar.compiler.firmware.layout import Layout
+from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.tables.collapse import Model, collapse
 from thenar.compiler.tables.quantise import quantise
 from thenar.runtime.tables import IntegerTables
 
 AVR, LARGER = TARGETS["avr328p"], TARGETS["avr2560"]
-CORES = (TARGETS["cortex-m0plus"], TARGETS["cortex-m4"])
 CHANGES, SLOW_ROWS = 500, 20  # rows in which two switches change; rows for a peer on the larger part
 CONSOLE = Console(width=170)
 COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + stack", "differing", "front")
@@ -69,7 +63,7 @@ class Ours:
 
     def predictor(self, fold: Fold) -> Predictor:
         """Return the predictor of rows that matches the firmware of a fold."""
-        layout = choose(self.integers(fold), AVR, entry_bits=self.bits).frontier[-1][0]
+        layout = arrange(self.integers(fold))
         return lambda rows: layout.scores(*split(rows, joints=self.joints)).argmax(axis=1)
 
 
@@ -114,23 +108,12 @@ class Line:
         return all(one <= two for one, two in zip(mine, theirs, strict=True)) and mine != theirs
 
 
-def _asked(layout: Layout, fold: Fold, *, joints: bool) -> tuple[NDArray[np.bool_], NDArray[np.uint16]]:
-    """Return the test rows, and the worst frame."""
-    (bits, codes), worst = split(fold.asked, joints=joints), worst_frame(layout)
-    return np.vstack([bits, worst[0]]), np.vstack([codes, worst[1]])
-
-
-def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Iterator[Line]:
-    """Yield the Pareto front of layouts, by cycles and flash, on the first fold."""
+def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Line:
+    """Return the line of a trainer, on the first fold."""
     fold = cuts[CUTS[0]][0]
-    found = rates(cuts, what.predictor)
-    for layout, expected in choose(what.integers(fold), AVR, entry_bits=what.bits).frontier:
-        if expected.flash > flash_shares(AVR)[1]:
-            continue
-        size = max(map(len, layout.groups), default=0)
-        name = f"{what.name}: {layout.adding}, {layout.bins if what.joints else 'no codes'}, up to {size} switches"
-        frames = _asked(layout, fold, joints=what.joints)
-        yield Line(name, found, of_ours(layout, AVR, layout.frame_bytes(*frames), layout.scores(*frames)))
+    layout, frames = arrange(what.integers(fold)), split(fold.asked, joints=what.joints)
+    cost = of_ours(layout, AVR, layout.frame_bytes(*frames), layout.scores(*frames))
+    return Line(what.name, rates(cuts, what.predictor), cost)
 
 
 def theirs(cuts: Mapping[str, list[Fold]]) -> Iterator[Line]:
@@ -171,18 +154,13 @@ def _on_front(line: Line, lines: Sequence[Line]) -> bool:
 
 
 def print_changes(cuts: Mapping[str, list[Fold]], what: Ours) -> None:
-    """Print the cost of update() after changes of two switches, and that of the tables on 32-bit cores."""
+    """Print the cost of update() after changes of two switches."""
     fold = cuts[CUTS[0]][0]
     integers = what.integers(fold)
-    layout = choose(integers, AVR, entry_bits=what.bits).layout
+    layout = arrange(integers)
     changed = split(two_changed(fold, CHANGES, joints=what.joints), joints=what.joints)
     cost = of_ours(layout, AVR, layout.frame_bytes(*changed), layout.scores(*changed), changes=True)
     CONSOLE.print(f"{what.name}, two switches changed: {' | '.join(cost.cells)}")
-    frames = split(fold.asked, joints=what.joints)
-    for core in CORES:
-        chosen = choose(integers, core).layout
-        most = instructions(chosen, core, chosen.frame_bytes(*frames), chosen.scores(*frames))
-        CONSOLE.print(f"{what.name}, {core.title}: at most {most:,} instructions")
 
 
 def main() -> None:
@@ -192,7 +170,7 @@ def main() -> None:
     asked = parser.parse_args()
     try:
         cuts = folds(CONSOLE)
-        lines = [line for what in track(OURS, "thenar", console=CONSOLE) for line in ours(cuts, what)]
+        lines = [ours(cuts, what) for what in track(OURS, "thenar", console=CONSOLE)]
         lines += [] if asked.quick else theirs(cuts)
     except FirmwareError as lack:
         sys.exit(f"benchmarks/firmware.py: {lack}")

@@ -109,12 +109,3 @@ def of_peer(
     differing = int(np.count_nonzero(found["grasp"] != expected))
     middle, most, stack = int(np.median(found["cycles"])), int(found["cycles"].max()), int(found["stack"].max())
     return Cost(target.part, middle, most, flash, ram, stack, differing, len(found))
-
-
-def instructions(layout: Layout, core: Target, frames: Frames, expected: NDArray[np.int64]) -> int:
-    """Return the maximum number of instructions per frame on a Cortex-M. Raises FirmwareError for any wrong score."""
-    files = classifier_files("glove", numbered(layout.tables), layout, avr=False)
-    results = core.run(files, "glove", layout, frames)
-    if results.cost is None or (results.scores != expected).any():
-        raise FirmwareError(f"{core.part} gives different scores from Python")
-    return int(results.cost.max())

@@ -13,7 +13,7 @@ little, and over these the median and the mean.
 
 import argparse
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 
 from thenar.compiler.firmware.segments import segment_files
 from thenar.compiler.firmware.simavr import harness
-from thenar.compiler.firmware.targets.bare import Bare
 from thenar.compiler.firmware.tools import (
     AVR_COMPILER,
     HOST_COMPILER,
@@ -189,10 +188,10 @@ def run_avr(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> Run:
     return Run(timed["state"], cycles, flash, ram, int(timed["stack"].max()))
 
 
-def run_cortex(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int, core: Bare) -> Run:
-    """Run the decoder on a core in qemu."""
+def run_cortex(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int, emulate: Callable[..., bytes]) -> Run:
+    """Run the decoder on a core of tests/qemu."""
     given: dict[str, str | bytes] = {**sources(model, "cortex-m"), "frames": records(lanes, refused)}
-    printed = core.emulate(given, flags=(*STRICT, _lag(lag)))
+    printed = emulate(given, flags=(*STRICT, _lag(lag)))
     return Run(np.frombuffer(printed, np.uint8), np.zeros(0, np.int64))
 
 

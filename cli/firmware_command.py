@@ -3,10 +3,9 @@
 import shlex
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
-from rich.table import Table
 
 from .common import (
     OneOf,
@@ -17,7 +16,6 @@ from .common import (
     out,
     print_json,
     progress,
-    table,
     wants_json,
 )
 
@@ -92,14 +90,12 @@ class _Command(click.Command):
     "--flash-limit",
     type=click.IntRange(1),
     metavar="BYTES",
-    help="Flash available to the classifier.  [default: half of the part's, three quarters if half is too little; "
-    "on an AVR at most 48 KiB]",
+    help="Flash available to the classifier.  [default: three quarters of the part's; on an AVR at most 48 KiB]",
 )
-@click.option("--frontier", is_flag=True, help="List the possible layouts: cycles against flash against width.")
 @click.option(
     "--measure",
     is_flag=True,
-    help="Compile, run the worst frame in a simulator, and record the cycles in the header.",
+    help="Compile, run slow frames in a simulator, and record the cycles in the header: for AVRs.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace firmware that thenar wrote there; other files stay.")
 @json_flag
@@ -113,22 +109,20 @@ def command(
     glove: Path | None,
     name: str,
     flash_limit: int | None,
-    frontier: bool,
     measure: bool,
     overwrite: bool,
 ) -> int:
     """Write C99 that predicts exactly as BUILD does, bit for bit, with a Makefile, or as a package for Arduino,
     PlatformIO, ESP-IDF, Zephyr, pico-sdk and CMake.
 
-    A cost model chooses the layout of the tables: the fastest that fits. Exits with 1 if --measure exceeds the model's
-    bounds. The same build and options give the same bytes.
+    What it costs is estimated, and a build that does not fit is refused. The same build and options give the same
+    bytes.
 
     \b
     Example:
         thenar firmware build/ --target avr328p -o firmware/ --measure
         thenar firmware build/ --target avr2560 --mode glove --board board.toml -o firmware/
         thenar firmware build/ --target esp32 -o components/thenar_glove
-        thenar firmware build/ --target avr328p --frontier
     """
     from thenar.compiler.firmware.board import load_board
     from thenar.compiler.firmware.generate import Firmware, write_folder
@@ -136,13 +130,12 @@ def command(
     from thenar.compiler.firmware.targets import TARGETS
     from thenar.runtime.build import Build
 
-    _check(TARGETS[target], mode, writes=output is not None, counts=measure or frontier)
+    _check(TARGETS[target], mode, writes=output is not None, measures=measure)
     _check_calibrated(mode, calibration, glove)
     loaded, sensors = _converting(Build.load(build), mode, calibration, glove)
     wiring = None if board is None else load_board(board)
     firmware = Firmware(loaded.tables, loaded.manifest, target, mode, name, wiring, flash_limit, loaded.scan, sensors)
-    with progress("choosing a layout"):
-        fit = firmware.fit
+    fit = firmware.fit
     measured = None
     if measure:
         with progress(f"measuring on {fit.target.part}"):
@@ -154,9 +147,9 @@ def command(
         print_json(_document(fit, measured, sorted(files)))
     else:
         if mode != "scan":
-            _print(fit, measured, frontier=frontier, updates=mode == "glove")
+            _print(fit, measured)
         _print_firmware(firmware, target, output)
-    return 0 if measured is None or measured.holds else 1
+    return 0
 
 
 def _converting(
@@ -188,27 +181,21 @@ def _check_calibrated(mode: "Mode", calibration: Path | None, glove: Path | None
         raise click.UsageError("glove.toml names its calibration: leave out --calibration, or --glove.")
 
 
-def _check(target: "Target", mode: "Mode", *, writes: bool, counts: bool) -> None:
-    """Raise UsageError for options that conflict; `counts` is --measure or --frontier."""
-    if mode == "scan" and counts:
-        raise click.UsageError("A board that only scans has no classifier: leave out --measure and --frontier.")
-    if not target.own_layout and not target.any_part and counts:
-        raise click.UsageError("The host has no cycle counts: --measure and --frontier are for microcontrollers.")
-    if not writes and not counts:
-        raise click.UsageError("Nothing to do: name a folder to write with -o, or add --frontier or --measure.")
+def _check(target: "Target", mode: "Mode", *, writes: bool, measures: bool) -> None:
+    """Raise UsageError for options that conflict."""
+    if mode == "scan" and measures:
+        raise click.UsageError("A board that only scans has no classifier: leave out --measure.")
+    if target.formula is None and not target.any_part and measures:
+        raise click.UsageError("The host has no cycle counts: --measure is for microcontrollers.")
+    if not writes and not measures:
+        raise click.UsageError("Nothing to do: name a folder to write with -o, or add --measure.")
 
 
-def _print(fit: "Fit", measured: "Measured | None", *, frontier: bool, updates: bool) -> None:
+def _print(fit: "Fit", measured: "Measured | None") -> None:
     console = out()
-    if frontier:
-        console.print(_frontier_table(fit))
     console.print(f"layout {fit.words}", soft_wrap=True)
-    if fit.target.own_layout:
-        console.print(f"expected: {_expected(fit, updates)}", soft_wrap=True)
     if measured is not None:
         console.print(measured.note, soft_wrap=True)
-        if not measured.rough:
-            console.print("within the bounds" if measured.holds else "BEYOND THE BOUNDS")
 
 
 def _print_firmware(firmware: "Firmware", target: str, output: Path | None) -> None:
@@ -225,61 +212,8 @@ def _print_firmware(firmware: "Firmware", target: str, output: Path | None) -> N
     out().print(f"{output}: firmware for {target}; {next_step}", soft_wrap=True)
 
 
-def _expected(fit: "Fit", updates: bool) -> str:
-    cost = fit.choice.cost
-    less = "" if updates else f" ({cost.flash_classify} if only classify() is called)"
-    times = f"{cost.cycles} {fit.target.unit} a frame ({cost.update_cycles} by update())"
-    return f"{fit.target.bound} {times}, {cost.flash} bytes of flash{less}, {cost.ram} of RAM"
-
-
-def _layouts(fit: "Fit") -> list[dict[str, Any]]:
-    """Return the frontier that the layout was chosen from, fastest first: `time` of a frame, bytes, and how many
-    switches, and joints, share a `lookup` at most.
-    """
-    return [
-        {
-            "entry_bits": layout.entry_bits,
-            "lookup": max(map(len, layout.groups), default=0),
-            "joints": max((len(lookup.joints) for lookup in layout.lookups), default=0),
-            "bins": layout.bins if layout.joints else "",
-            "adding": layout.adding if fit.target.avr else "",
-            "time": cost.cycles,
-            "flash": cost.flash,
-            "ram": cost.ram,
-            "chosen": layout is fit.choice.layout,
-        }
-        for layout, cost in fit.choice.frontier
-    ]
-
-
-def _frontier_table(fit: "Fit") -> Table:
-    """Return the frontier as a table, with the chosen layout marked."""
-    numbers = ("bits", "switches per lookup", "joints", fit.target.unit, "flash", "RAM")
-    columns = ("", *numbers[:3], "codes", "rows added", *numbers[3:])
-    layouts = table(columns, numbers, f"Layouts for {fit.target.part}, {fit.target.bound}")
-    for row in _layouts(fit):
-        mark, shared = "*" if row["chosen"] else "", [str(row[key] or "") for key in ("lookup", "joints")]
-        costs = (str(row[key]) for key in ("time", "flash", "ram"))
-        layouts.add_row(mark, str(row["entry_bits"]), *shared, row["bins"], row["adding"], *costs)
-    return layouts
-
-
 def _document(fit: "Fit", measured: "Measured | None", files: list[str]) -> dict[str, object]:
     """Return the document of --json; the host target has no cycle counts and so no cost."""
-    counted, cost = fit.target.own_layout, fit.choice.cost
-    costs = {
-        "time": cost.cycles,
-        "unit": fit.target.unit,
-        "flash": cost.flash,
-        "flash_classify": cost.flash_classify,
-        "ram": cost.ram,
-        "bound": fit.target.avr,
-    }
-    return {
-        "part": fit.target.part,
-        "layout": fit.words,
-        "cost": costs if counted else None,
-        "frontier": _layouts(fit) if counted else [],
-        "measured": measured,
-        "files": files,
-    }
+    cost = fit.cost
+    costs = cost and {"time": cost.cycles, "unit": fit.target.unit, "flash": cost.flash, "ram": cost.ram}
+    return {"part": fit.target.part, "layout": fit.words, "cost": costs, "measured": measured, "files": files}

@@ -47,8 +47,7 @@ def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bo
 
     With --firmware, every score, grasp type, margin and probability of the compiled classifiers, and every state of
     segments that were learnt, is compared with Python's: on every row, on 10,000 random frames and on all extreme ones.
-    host runs with sanitizers; avr runs in simavr on an ATmega328P, or on an ATmega2560 if the build does not fit;
-    cortex-m on an M0+ and an M4, riscv on an RV32IMAC and xtensa on an LX106 run in qemu.
+    host runs with sanitizers; avr runs in simavr on an ATmega328P, or on an ATmega2560 if the build does not fit.
 
     With --faults, every fault is applied to every row: each input lost, with and without its substitute row; each input
     stuck at each of its values; each port, chip and board of the build's scan map dead; and any two inputs lost.
@@ -59,7 +58,7 @@ def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bo
     \b
     Example:
         thenar verify build/ set.grasps
-        thenar verify build/ set.grasps --firmware host,avr,cortex-m
+        thenar verify build/ set.grasps --firmware host,avr
         thenar verify build/ others.grasps --faults
     """
     from thenar.compiler.artifact.verify import verify, verify_faults

@@ -109,7 +109,7 @@ def verify(
         The build.
     grasp_set : GraspSet
         Any recordings with the inputs of the build. Columns are found by name.
-    firmware : sequence of {"host", "avr", "cortex-m", "riscv", "xtensa"}
+    firmware : sequence of {"host", "avr", "micropython"}
         Targets to compile the classifier for, to compare its scores with those of Python.
     progress : callable, optional
         Called with (done, total) after blocks of rows and compiled classifiers.

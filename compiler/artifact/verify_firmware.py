@@ -22,7 +22,7 @@ from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables
 
 from ..firmware import FirmwareError
-from ..firmware.choose import Fit, fit_for, smallest_fit
+from ..firmware.choose import Fit, features, fit_for, smallest_fit
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Library
 from ..firmware.generate import LARGEST
 from ..firmware.layout import ports_of_scan
@@ -105,7 +105,7 @@ def made_firmware(manifest: Manifest, tables: IntegerTables, scan: ScanMap | Non
     """Return path in the build -> text of its firmware, and a sentence on its target, or on why there is none."""
     try:
         fit = smallest_fit(tables, ports=ports_of_scan(scan))
-        made = Library(LIBRARY_NAME, manifest, fit.choice.layout, fit.target.avr, fit.notes()).whole
+        made = Library(LIBRARY_NAME, manifest, fit.layout, fit.target.avr, fit.notes()).whole
     except FirmwareError as reason:
         return {}, f"no firmware: {reason}"
     return {f"{FIRMWARE_NAME}/{name}": text for name, text in made.items()}, f"firmware {fit.words}"
@@ -150,7 +150,7 @@ class Difference(Struct, frozen=True):
 class TargetCheck(Struct, frozen=True, kw_only=True):
     """The result for one part.
 
-    layout     which layout was compiled, and why
+    layout     how wide its entries are
     missing    whether inputs are missing in every frame; in every second frame it is a single one
     frames     how many were classified; `differing` of them differ from Python in a score, grasp type, margin,
                probability or state of a segment
@@ -209,7 +209,7 @@ class FirmwareTrial:
             wrong |= (said != expected).any(axis=1)
         return TargetCheck(
             part=fit.target.part,
-            layout=fit.choice.why,
+            layout=features(fit.layout),
             function=function,
             missing=missing,
             shares=said is not None,
@@ -260,7 +260,7 @@ class FirmwareTrial:
         return sum(name != grasp for name, grasp in zip(found.names, self._build.grasps, strict=True))
 
     def _run(self, fit: Fit, *, incremental: bool, lost: Lost | None) -> Predictions:
-        layout, target = fit.choice.layout, fit.target
+        layout, target = fit.layout, fit.target
         files = target.sources(Library(LIBRARY_NAME, self._build.manifest, layout, target.avr))
         frames = layout.frame_bytes(self._frames.bits, self._frames.codes)
         return target.run(files, LIBRARY_NAME, layout, frames, incremental=incremental, lost=lost)
@@ -337,18 +337,17 @@ def verify_firmware(
 ) -> FirmwareVerification:
     """Compile the classifier for `kinds` and compare it with Python: every row, extreme frames, 10,000 random frames.
 
-    "host" runs with the address and undefined behaviour sanitizers, "avr" is the smallest AVR that fits the classifier,
-    "cortex-m" means both cores, "riscv" and "xtensa" one each. Each classifies every frame from scratch, then once more
-    from the changes between frames, then both again with inputs missing, one at a time and several at once. Except on
-    "avr", set_switch() also sets every switch and every name is read. If no AVR fits the build, host runs the layout of
-    the larger core.
+    "host" runs with the address and undefined behaviour sanitizers, "avr" is the smallest AVR that fits the classifier.
+    Each classifies every frame from scratch, then once more from the changes between frames, then both again with
+    inputs missing, one at a time and several at once. Except on "avr", set_switch() also sets every switch and every
+    name is read.
     Raises FirmwareError where a tool is missing, a kind is not in `firmware.targets.kinds()`, or the build does not fit
     a part; otherwise raises as `verify` does.
     """
     if unknown := [kind for kind in kinds if kind not in every_kind()]:
         raise FirmwareError(f"no simulator runs firmware for {unknown[0]!r}: choose from {', '.join(every_kind())}")
     build = Build.load(folder)
-    fits = [fit for kind in every_kind() if kind in kinds for fit in _fits(build, kind)]
+    fits = [_fit(build, kind) for kind in every_kind() if kind in kinds]
     for fit in fits:
         if lack := fit.target.missing():
             raise FirmwareError(f"firmware for {fit.target.part} cannot be run here: {lack}")
@@ -370,10 +369,8 @@ def verify_firmware(
     )
 
 
-def _fits(build: Build, kind: str) -> list[Fit]:
-    """Return the parts of a kind to try, each with its layout: of similar parts, the smallest that fits."""
+def _fit(build: Build, kind: str) -> Fit:
+    """Return the smallest part of a kind that fits, with its layout."""
     tables, ports = build.tables, ports_of_scan(build.scan)
-    targets = [target for target in TARGETS.values() if target.kind == kind]
-    if all(target.alike for target in targets):
-        return [smallest_fit(tables, kind=kind, ports=ports)]
-    return [fit_for(target, tables, ports=ports) for target in targets]
+    first, *more = (target for target in TARGETS.values() if target.kind == kind)
+    return smallest_fit(tables, kind=kind, ports=ports) if more else fit_for(first, tables, ports=ports)

@@ -11,9 +11,8 @@ from .words import Names, comment, switches_in_words
 
 # Call-clobbered and call-saved register pairs, each named by its lower register.
 _FREE, _KEPT = (22, 24, 26, 18, 20), (16, 14, 12, 10, 8, 6, 4, 2, 28)
-# Finding a row needs r0, r1, Z, and Y, which points at the glove. With 16-bit codes it also needs r19:r18 as zero, or
-# r20 for comparisons.
-_POINTER, _ZERO, _COMPARED = 28, 18, 20
+# Finding a row needs r0, r1, Z, and Y, which points at the glove. With 16-bit codes it also needs r20 for comparisons.
+_POINTER, _COMPARED = 28, 20
 _IMMEDIATE = 16  # registers from here on can be loaded with a constant
 _LPM_REACH = 65536
 _TEMPLATES = "classifier/avr/"
@@ -35,15 +34,11 @@ def check_size(layout: Layout) -> None:
         raise FirmwareError(f"the tables need {needed} bytes, an AVR reads constants from the first {_LPM_REACH} bytes")
 
 
-def assembly_values(
-    name: str, names: Names, layout: Layout, *, near: bool, whole: Layout | None = None
-) -> dict[str, object]:
-    """Return the values for the assembly template; if `near`, calls are relative. `whole` is the layout whose state
-    update() keeps, where `layout` has but a part of its lookups.
-    """
-    parts, seen = layout.parts, seen_inputs(whole or layout)
-    stride, call = parts.width * layout.entry_bits // 8, "rcall" if near else "call"
-    passes = [_pass(names, layout, number, seen, near=near) for number in range(len(parts.firsts))]
+def assembly_values(name: str, names: Names, layout: Layout) -> dict[str, object]:
+    """Return the values for the assembly template."""
+    parts, seen = layout.parts, seen_inputs(layout)
+    stride = parts.width * layout.entry_bits // 8
+    passes = [_pass(names, layout, number, seen) for number in range(len(parts.firsts))]
     bins = sum(len(joint.bins) for joint in layout.joints)
     return {
         "byte_sums": layout.sum_bits == 8,
@@ -51,14 +46,8 @@ def assembly_values(
         "entries": _entries(layout),
         "sum_macros": f"{_TEMPLATES}sums_{_SIZES[layout.sum_bits]}.j2",
         "code_macros": f"{_TEMPLATES}codes_{_SIZES[layout.code_bits]}.j2",
-        "zeros": _ZERO in _spare(layout),
-        "unrolled": layout.adding == "unrolled",
         "finds_first": finds_first(layout),
         "compares": compares_input(layout),
-        "add_row": "add_row" if layout.adding == "unrolled" else f"{call} add_row_at_z",
-        "add_changed_row": f"{call if layout.adding == 'unrolled' else 'call '} add_row_at_z",
-        "call": call,
-        "jump": "rjmp" if near else "jmp",
         "passes": passes,
         "sums": passes[0]["sums"],
         "stride": stride,
@@ -90,11 +79,9 @@ def finds_first(layout: Layout) -> bool:
 
 def compares_input(layout: Layout) -> bool:
     """Return whether update() compares the input before it finds rows. Otherwise it finds all rows and compares those,
-    which needs less flash but more time if few codes change.
-
-    Sensor noise changes most 16-bit codes in every frame, so they are only compared if rows are added in line.
+    since sensor noise changes most 16-bit codes in every frame.
     """
-    return layout.adding == "unrolled" or layout.code_bits == 8
+    return layout.code_bits == 8
 
 
 class Seen(NamedTuple):
@@ -124,10 +111,7 @@ def seen_inputs(layout: Layout) -> dict[int, list[Seen]]:
 
 
 def _lookup_places(layout: Layout, lookup: Lookup) -> list[int]:
-    if not lookup.joints:
-        return []
-    ports = [] if lookup.group is None else [field.port for field in layout.fields[lookup.group]]
-    return [*dict.fromkeys(ports), *(_code_place(layout, joint.number) for joint in lookup.joints)]
+    return [_code_place(layout, joint.number) for joint in lookup.joints]
 
 
 def found_size(layout: Layout) -> int:
@@ -242,7 +226,7 @@ def _spare(layout: Layout) -> set[int]:
     """Return the register pairs that are needed to find rows, each by its lower register."""
     if layout.code_bits == 8 or not looked_up(layout.tables):
         return {_POINTER}
-    return {_POINTER, _COMPARED if layout.bins == "search" else _ZERO}
+    return {_POINTER, _COMPARED}
 
 
 def _registers(layout: Layout) -> list[int]:
@@ -278,7 +262,7 @@ def kept_registers(layout: Layout) -> list[int]:
     return sorted(sums | {_POINTER, _POINTER + 1})
 
 
-def _pass(names: Names, layout: Layout, number: int, seen: Mapping[int, Sequence[Seen]], *, near: bool) -> Row:
+def _pass(names: Names, layout: Layout, number: int, seen: Mapping[int, Sequence[Seen]]) -> Row:
     """Return a pass over all lookups for some classes.
 
     Each sum is in a register, or in a pair from `low` on; those in `spilled`, the last, stay in memory while Y points
@@ -302,7 +286,7 @@ def _pass(names: Names, layout: Layout, number: int, seen: Mapping[int, Sequence
         "sums": sums,
         "held": sums[: len(held)],
         "spilled": sums[len(held) :],
-        "back": f"{'rjmp' if near else 'jmp'}  back_{number}" if sums[len(held) :] else "ret",
+        "back": f"jmp   back_{number}" if sums[len(held) :] else "ret",
         "last_bytes": [(_POINTER + at, 2 * len(held) + at * (2 - high)) for at in range(last_size(layout))],
         "scores": 2 * first,
         "again": parts.firsts[number - 1] + parts.width - first if number else 0,
@@ -393,22 +377,19 @@ def _step(names: Names, layout: Layout, lookup: Lookup, part: int, seen: Sequenc
     """Return a lookup in the pass of a part: its inputs, how its row number is computed and in which register, what
     update() compares, and the offset of its rows.
     """
-    grouped = lookup.group is not None
     compared = [joint for joint in reversed(lookup.joints) if joint.compared]
     trimmed = [joint for joint in lookup.joints if not joint.compared]
     weights = [joint.weight for joint in compared]
     factors = [before // weight for before, weight in pairwise(weights)]
-    groups = [] if lookup.group is None else [switches_in_words(layout.groups[lookup.group])]
+    joints = [comment(names.joints[joint.number].name) for joint in lookup.joints]
     group = [] if lookup.group is None else group_lines(layout.fields[lookup.group])
-    ports = [each for each in seen if each.now < len(layout.ports)]
     return {
         "index": lookup.index,
-        "what": ", ".join([*groups, *(comment(names.joints[joint.number].name) for joint in lookup.joints)]),
+        "what": ", ".join(joints) if lookup.group is None else switches_in_words(layout.groups[lookup.group]),
         "rows": (part * layout.n_rows + lookup.first_row) * layout.parts.width * layout.entry_bits // 8,
         **_compared(seen),
         **_exchange(layout, len(layout.tables.slopes) + lookup.index),
         **({} if lookup.joints or layout.biased else {"kind": "switches"}),
-        "noted": [*chain(*([*taken(each.now, 30), *_noted(each)] for each in ports))],
         "compared": [
             {
                 **_taken(layout, joint.number, seen),
@@ -420,11 +401,11 @@ def _step(names: Names, layout: Layout, lookup: Lookup, part: int, seen: Sequenc
         "times": weights[-1] if weights else 1,
         "trimmed": [
             {**_taken(layout, joint.number, seen), **_bins(layout, joint), "how": how}
-            for joint, how in zip(trimmed, _adding(len(trimmed), bool(compared), grouped), strict=True)
+            for joint, how in zip(trimmed, _adding(len(trimmed), bool(compared)), strict=True)
         ],
         "group": group,
         "borrows": borrows(layout, lookup),
-        "register": 30 if trimmed or grouped else 0,
+        "register": 30 if trimmed or group else 0,
     }
 
 
@@ -436,16 +417,14 @@ def _bins(layout: Layout, joint: JointLayout) -> Row:
         "last": last,
         "lower": first > 0,
         "upper": first + last < (1 << layout.code_bits) - 1,
-        "paged": layout.bins == "direct",
     }
 
 
-def _adding(count: int, before: bool, after: bool) -> list[str]:
-    """Return the instruction that adds each of `count` numbers in r30 to a sum in r0; the last leaves the sum in r30.
-    `before`: r0 already holds a number; `after`: another number follows.
+def _adding(count: int, before: bool) -> list[str]:
+    """Return the instruction that adds each of `count` numbers in r30 to a sum in r0, which may hold a number `before`;
+    the last leaves the sum in r30.
     """
-    last = [] if after else ["add   r30, r0" if count > 1 or before else ""]
-    rest = ["add   r0, r30"] * (count - len(last) if count else 0)
-    if rest and not before:
-        rest[0] = "mov   r0, r30"
-    return [*rest, *last][:count]
+    found = ["add   r0, r30"] * (count - 1) + ["add   r30, r0" if count > 1 or before else ""]
+    if count > 1 and not before:
+        found[0] = "mov   r0, r30"
+    return found if count else []

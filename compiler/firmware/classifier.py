@@ -14,7 +14,6 @@ from thenar.runtime.manifest import Rejection
 from thenar.runtime.softmax import POWERS, Softmax
 
 from .assembly import assembly_values, check_size
-from .avr_costs import calls_are_near
 from .layout import MOST_INLINE, Field, JointLayout, Layout, Lookup, Parts
 from .segments import segment_files
 from .sensors import Sensors, codes_files, sensors_of
@@ -51,8 +50,7 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
     entries = 32 // layout.entry_bits
     return {
         "slopes": _slope_lines(slopes, parts, lanes),
-        "tabled": _tabled(layout),
-        "distances": [_distance(name, layout, at) for at in range(len(slopes))],
+        "distances": [_distance(layout, at) for at in range(len(slopes))],
         "words": -(-parts.width // entries),
         "lanes": n_lanes,
         "in_words": {2: "two", 4: "four"}[entries],
@@ -142,7 +140,7 @@ def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
     found = [f"{lookup.first_row}u"] if lookup.first_row else []
     if lookup.group is not None:
         fields = " | ".join(map(_field, layout.fields[lookup.group]))
-        found.append(f"({fields})" if lookup.joints or found else fields)
+        found.append(f"({fields})" if found else fields)
     for joint in lookup.joints:
         code = f"input->codes[{joint.number}]"
         if joint.compared:
@@ -153,8 +151,7 @@ def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
                 counted = " + ".join(f"(({code} <= {step}u) ? 1u : 0u)" if step < _HIGHEST else "1u" for step in steps)
             found.append(f"({joint.weight}u * ({counted}))" if joint.weight > 1 else counted)
         else:
-            whole = len(joint.bins) == 1 << layout.code_bits
-            place = code if whole else f"clamped({code}, {joint.first}u, {len(joint.bins) - 1}u)"
+            place = f"clamped({code}, {joint.first}u, {len(joint.bins) - 1}u)"
             found.append(f"thenar_{name}_bins[{_after(joint.first_bin, place)}]")
     width = COLUMNS - 8 - len(f"found->rows[999] = thenar_{name}_rows[];")
     kept = " + ".join(found).replace(" ", "\xa0").replace("\xa0+\xa0", " +\xa0")
@@ -187,26 +184,13 @@ def _lane_words(row: list[int], lanes: Sequence[tuple[int, int]]) -> str:
     return ", ".join(f"SLOPE({words[lane][0]}, {(words[lane] + [0])[1]})" for lane in sorted(words))
 
 
-def _distance(name: str, layout: Layout, at: int) -> str:
+def _distance(layout: Layout, at: int) -> str:
     """Return the expression for the distance of a slope's code."""
     slope = layout.tables.slopes[at]
     code = f"input->codes[{slope.joint}]"
-    if layout.stores_distances:
-        beyond = 256 * (at - len(layout.tables.slopes) // 2)  # from the middle, cores reach twice as many
-        return f"distances[(int32_t){code} {'-' if beyond < 0 else '+'} {abs(beyond)}]"
     above = f"clamped({code}, {slope.low}u, {slope.high - slope.low}u)"
     shift = f" {'<<' if slope.gain > 0 else '>>'} {abs(slope.gain)}" if slope.gain else ""
     return f"(int16_t)(({above}{shift}) - {slope.zero})"
-
-
-def _tabled(layout: Layout) -> list[str]:
-    """Return the distances of all codes as lines, for each slope, with an empty line between, where they are stored."""
-    if not layout.stores_distances:
-        return []
-    lines: list[str] = []
-    for slope in layout.tables.slopes:
-        lines += [""] * bool(lines) + number_lines(slope.distances(np.arange(256)).tolist())
-    return lines
 
 
 def _after(first: int, place: str) -> str:
@@ -361,7 +345,7 @@ def classifier_files(
     portable, found = portable_values(name, layout), _source_values(names, layout)
     values = _common_values(name, names, layout, avr) | portable | found | _header_values(name, names, layout)
     if avr:
-        values |= {"assembly": assembly_values(name, names, layout, near=calls_are_near(layout))}
+        values |= {"assembly": assembly_values(name, names, layout)}
     endings = (".h", ".c", "_tables.h", "_tables.c", "_avr.S")[: 4 + avr]
     return {
         f"thenar_{name}{ending}": render(
@@ -432,9 +416,7 @@ def _source_values(names: Names, layout: Layout) -> dict[str, object]:
         "table": table_lines(layout, names),
         "bins": [line for joint in trimmed for line in _bin_lines(names, joint)],
         "n_bins": sum(len(joint.bins) for joint in trimmed),
-        "paged": layout.bins == "direct" and bool(trimmed),
-        "clamped": (layout.bins == "trimmed" and bool(trimmed))
-        or (bool(layout.tables.slopes) and not layout.stores_distances),
+        "clamped": bool(trimmed) or bool(layout.tables.slopes),
         "thresholds": number_lines(steps),
         "n_thresholds": len(steps),
         "means": _mean_lines(means),

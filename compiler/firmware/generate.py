@@ -45,8 +45,7 @@ class Firmware:
     board        how the microcontroller is wired; the modes scan and glove need it, the mode classify rejects it
     scan         how the build's harness is read, if it has one: a library takes its switches from these readings
     sensors      the known sensors of the glove whose readings a library converts; None: only the names are known
-    flash        how many bytes of flash the classifier may take; None: half of the part's, three quarters where half
-                 is too little
+    flash        how many bytes of flash the classifier may take; None: three quarters of the part's
 
     Raises FirmwareError where these are inconsistent, or the name cannot be used in C; MemberError if there is no such
     target.
@@ -88,7 +87,7 @@ class Firmware:
 
     @cached_property
     def fit(self) -> Fit:
-        """The part of the target, and the layout chosen for it. Raises FirmwareError if no layout fits."""
+        """The part of the target, and the layout of the build. Raises FirmwareError if it does not fit."""
         if self.mode == "scan":  # a board that only scans contains no classifier
             return smallest_fit(self.tables, flash=self.flash)
         return fit_for(self._target, self.tables, self.flash, self._ports)
@@ -112,13 +111,13 @@ class Firmware:
 
     def library(self, notes: Sequence[str] = ()) -> Library:
         """Return the classifier alone, with lines for its opening comments."""
-        return Library(self.name, self.names, self.fit.choice.layout, self.fit.target.avr, tuple(notes), self.sensors)
+        return Library(self.name, self.names, self.fit.layout, self.fit.target.avr, tuple(notes), self.sensors)
 
     def files(self, notes: Sequence[str] | None = None) -> dict[str, str]:
         """Return path -> text of the firmware; the result is deterministic.
 
         notes are lines for the opening comment of the classifier's header, by default those of the fit. Raises
-        FirmwareError where no layout fits, or the board cannot do what the mode needs.
+        FirmwareError where the build does not fit, or the board cannot do what the mode needs.
         """
         library = self.library(self.fit.notes() if notes is None else notes)
         return self._target.files(library) if self.board is None else self._of_board(self.board, library)

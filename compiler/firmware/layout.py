@@ -3,25 +3,26 @@ is, and how a joint's code selects a row.
 
     score_k = start_k + sum over lookups l of rows_l[n_l, k] + sum over slopes of distance * row[k]
 
-where n_l is the byte of a group of switches, one bit per switch, or a sum over the codes of one or a few joints, or
-both. A pair of joints is a lookup of both, in addition to those of each joint alone. A frame holds the switches as they
-are read, a byte for each port: eight wires of an expander, eight keys of a matrix, or eight kept switches in their
-order; a group is assembled from fields of such bytes. Every row is the exact sum of its switches' and joints' rows, so
-the scores are those of `IntegerTables`, bit for bit. There are three kinds of entries:
+where n_l is the byte of a group of at most four switches, one bit per switch, or the place of a joint's code among its
+thresholds. A pair of joints is a lookup of both, in addition to those of each joint alone. A frame holds the switches
+as they are read, a byte for each port: eight wires of an expander, eight keys of a matrix, or eight kept switches in
+their order; a group is assembled from fields of such bytes. Every row is the exact sum of its switches' and joints'
+rows, so the scores are those of `IntegerTables`, bit for bit. Entries are the narrowest that hold a build's rows:
 
-    16 bits, added up in 16. Sums may wrap around, since all scores fit; row 0 of a group of switches is zero, so that
-             one switch's change is plus or minus row 2^bit.
-    8 bits,  added up in 8 in the same way, where the proved bound of all scores is at most 127.
-    8 bits,  added up in 16, elsewhere: entries are offsets from the minimum of their lookup and class, 0 to 255; the
-             minima are part of `start`. Where tables have slopes and all offsets are multiples of 256 (`grid`), entries
-             are their upper halves.
+    8 bits,  added up in 8, where the proved bound of all scores is at most 127.
+    8 bits,  added up in 16, where no lookup spans more than 255 steps: entries are offsets from the minimum of their
+             lookup and class; the minima are part of `start`. Where tables have slopes and all offsets are multiples of
+             256 (`grid`), entries are their upper halves.
+    16 bits, added up in 16, elsewhere.
+
+Sums may wrap around, since all scores fit. Row 0 of a group of switches is zero except of offsets, so that one switch's
+change is plus or minus row 2^bit.
 """
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import chain
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +36,8 @@ MOST_INLINE = 8  # up to this number, thresholds are compared one by one; more a
 MOST_ROWS = 256  # a bin is one byte
 MOST_ENTRY = 255  # the largest unsigned byte
 MOST_BYTE = 127  # the largest bound of scores that are added up in a byte
-MOST_BINS = 256  # a code less the first code of a joint's bins is also one byte
+GROUP_SIZE = 4  # switches that share a lookup: half of a port's byte
 
-Bins = Literal["direct", "trimmed", "search"]
 Rows = NDArray[np.integer]
 
 
@@ -46,10 +46,9 @@ class JointLayout:
     """Joint `number`, and its contribution to the number of a lookup's row: `weight` times the number of thresholds
     that are not below the code, so that the highest codes add nothing.
 
-    "direct": bins[code] for all 256 codes. "trimmed": bins[clamped code - first] from the first threshold to one beyond
-    the last. Both hold uint8 (n,), already multiplied by the weight. "search": no bins, the thresholds are compared;
-    "trimmed" also compares if there are few, where that is faster. Bins begin at byte `first_bin` of all bins,
-    thresholds at `first_step` of all compared thresholds.
+    Codes of 8 bits with many thresholds have bins[clamped code - first], from the first threshold to one beyond the
+    last: uint8 (n,), already multiplied by the weight. Otherwise there are no bins, and the thresholds are compared.
+    Bins begin at byte `first_bin` of all bins, thresholds at `first_step` of all that are searched.
     """
 
     number: int
@@ -82,16 +81,13 @@ class JointLayout:
 _COMPARED = 6
 
 
-def _bins(thresholds: NDArray[np.uint16], weight: int, bins: Bins, code_bits: int) -> tuple[int, NDArray[np.uint8]]:
-    """Return the first code of a joint's bins, and the bins."""
-    first, last = 0, 255
-    if bins == "trimmed":
-        first, last = int(thresholds[0]), int(thresholds[-1]) + 1
-        if code_bits == 8 and len(thresholds) <= _COMPARED:
-            bins = "search"
-    codes = np.arange(first, last + 1) if bins != "search" else np.arange(0)
+def _bins(thresholds: NDArray[np.uint16], weight: int, code_bits: int) -> tuple[int, NDArray[np.uint8]]:
+    """Return the first code of a joint's bins, and the bins, none where thresholds are compared."""
+    if code_bits == 16 or len(thresholds) <= _COMPARED:
+        return 0, np.zeros(0, np.uint8)
+    codes = np.arange(int(thresholds[0]), int(thresholds[-1]) + 2)
     places = weight * (len(thresholds) - np.searchsorted(thresholds, codes))
-    return first, places.astype(np.uint8)
+    return int(codes[0]), places.astype(np.uint8)
 
 
 def code_bits(tables: IntegerTables) -> int:
@@ -101,10 +97,8 @@ def code_bits(tables: IntegerTables) -> int:
     return 16 if any(code > 255 for code in last) else 8
 
 
-def check_joints(tables: IntegerTables, bins: Bins) -> None:
-    """Raise FirmwareError if a joint has more rows than a byte can number, or `bins` cannot find them."""
-    if bins == "direct" and code_bits(tables) == 16:
-        raise FirmwareError('codes have 16 bits: find their rows by "trimmed" or "search", not by "direct"')
+def check_joints(tables: IntegerTables) -> None:
+    """Raise FirmwareError if a joint has more rows than a byte can number."""
     own = list(enumerate(tables.thresholds))
     own += [each for pair in tables.pairs for each in zip(pair.joints, pair.thresholds, strict=True)]
     for number, steps in own:
@@ -112,11 +106,6 @@ def check_joints(tables: IntegerTables, bins: Bins) -> None:
             raise FirmwareError(
                 f"joint {number} has {len(steps) + 1} rows, but firmware has at most {MOST_ROWS} a joint: "
                 "compile the build with fewer rounds or coarser codes"
-            )
-        if bins == "trimmed" and len(steps) and int(steps[-1]) - int(steps[0]) + 2 > MOST_BINS:
-            raise FirmwareError(
-                f"the thresholds of joint {number}, {steps[0]} to {steps[-1]}, are more than {MOST_BINS - 2} codes "
-                'apart: find their rows by "search"'
             )
 
 
@@ -162,10 +151,7 @@ class Field:
     to: int
 
 
-SMALLEST_GROUP, LARGEST_GROUP = 2, 8
 MOST_TABLE_ROWS = 65535  # row numbers are 16 bits wide
-
-Adding = Literal["called", "unrolled"]
 
 _REGISTERS = 28  # registers that an AVR has for sums
 
@@ -190,7 +176,7 @@ def parts_of(n_classes: int, sum_bits: int = 16) -> Parts:
 class Lookup:
     """One row added per frame, of `rows` (m, K), which begin at row `first_row` of the table.
 
-    Its number is the byte of the group of switches `group`, if there is one, plus the contributions of `joints`.
+    Its number is the byte of the group of switches `group`, or the sum of the contributions of `joints`.
     """
 
     index: int
@@ -219,8 +205,6 @@ class Layout:
     entry_bits: int
     sum_bits: int
     code_bits: int
-    bins: Bins
-    adding: Adding
     start: NDArray[np.int64]
     lookups: tuple[Lookup, ...]
 
@@ -233,11 +217,6 @@ class Layout:
     def entry_shift(self) -> int:
         """The left shift of entries before they are added: 8 where they are upper halves, else 0."""
         return 8 if self.entry_bits == 8 and self.tables.grid == COARSE else 0
-
-    @property
-    def stores_distances(self) -> bool:
-        """Whether portable C looks up the distances of slopes' codes, like bins."""
-        return self.bins == "direct" and self.code_bits == 8
 
     @property
     def padding(self) -> int:
@@ -366,13 +345,9 @@ def _means(tables: IntegerTables) -> NDArray[np.int64]:
     return np.vstack([tables.switch_means.astype(np.int64), *joints])
 
 
-Shared = tuple[int | None, tuple[int, ...]]
-"""A lookup: the number of a group of switches or None, and those of joints; pairs are numbered after all joints."""
-
-
 def seen_by(tables: IntegerTables, number: int) -> tuple[tuple[int, NDArray[np.uint16]], ...]:
-    """Return the joints that a number in `Shared` refers to, and their thresholds: one joint, or the two of a pair;
-    empty without thresholds.
+    """Return the joints that the number of a joint, or of a pair (they follow the joints), refers to, and their
+    thresholds; empty without thresholds.
     """
     if number < tables.n_joints:
         joints: Iterable[tuple[int, NDArray[np.uint16]]] = ((number, tables.thresholds[number]),)
@@ -383,74 +358,55 @@ def seen_by(tables: IntegerTables, number: int) -> tuple[tuple[int, NDArray[np.u
 
 
 def looked_up(tables: IntegerTables) -> list[int]:
-    """Return the numbers, as in `Shared`, of joints and pairs that have more than one row."""
+    """Return the numbers of joints, and of pairs after them, that have more than one row."""
     return [number for number in range(tables.n_joints + len(tables.pairs)) if seen_by(tables, number)]
 
 
-def arrange(
-    tables: IntegerTables,
-    *,
-    ports: Ports | None = None,
-    group_size: int = 5,
-    n_groups: int | None = None,
-    entry_bits: int = 16,
-    bins: Bins = "direct",
-    adding: Adding = "called",
-    shared: Sequence[Shared] = (),
-) -> Layout:
-    """Return `tables` with the switches in groups of at most `group_size` (2 to 8), in the order of `ports`.
+def arrange(tables: IntegerTables, ports: Ports | None = None) -> Layout:
+    """Return `tables` with the switches in groups of at most four, in the order of `ports`, and the narrowest entries.
 
-    There are as few groups as that size allows, or `n_groups` where given: more lookups and less flash. Groups are as
-    even as possible, and none spans two ports if the same number of groups can avoid that. Without known wiring,
-    `ports` are left out, and switches are taken by number. The groups and joints in `shared` share lookups, none of
-    which uses a joint twice; every other group, every pair and every other joint with thresholds has a separate lookup.
-    Raises FirmwareError if the tables cannot be laid out like this: 8-bit entries for lookups that span more than 255
-    steps, more than 256 rows in a lookup, "direct" for codes of 16 bits, "trimmed" for thresholds further apart than
-    254 codes, no inputs at all.
+    There are as few groups as that size allows, as even as possible, and none spans two ports if the same number of
+    groups can avoid that. Without known wiring, `ports` are left out, and switches are taken by number. Every joint
+    with thresholds, and every pair, has a lookup. Raises FirmwareError if the tables cannot be laid out like this: more
+    than 256 rows in a lookup, no inputs at all.
     """
     if tables.n_switches + tables.n_joints == 0:
         raise FirmwareError("the build uses no switch and no joint: compile it with at least one input")
-    if entry_bits not in (8, 16):
-        raise FirmwareError(f"entries of {entry_bits} bits: choose 8 or 16")
-    check_joints(tables, bins)
-    coarse = tables.grid if entry_bits == 8 else 1
+    check_joints(tables)
     ports = consecutive(tables.n_switches) if ports is None else ports
-    groups = _grouped(ports, group_size, n_groups)
-    sum_bits = 8 if entry_bits == 8 and tables.bound <= MOST_BYTE and not tables.slopes else 16
-    varying = set(looked_up(tables))
+    groups, varying, wide = _grouped(ports), looked_up(tables), code_bits(tables)
     constant = (number for number in range(tables.n_joints + len(tables.pairs)) if number not in varying)
     start = sum((_falling(tables, number)[0] for number in constant), tables.bias.astype(np.int64))
-    wide = code_bits(tables)
+    whole = [*(_group_sums(tables, numbers) for numbers in groups), *(_falling(tables, number) for number in varying)]
+    if most := max((len(rows) for rows in whole if len(rows) > MOST_ROWS), default=0):
+        raise FirmwareError(f"a pair of joints has {most} rows, but firmware has at most {MOST_ROWS} in a lookup")
+    entry_bits, sum_bits = _widths(tables, whole)
     made: list[Lookup] = []
     first_row = first_bin = first_step = 0
-    for group, numbers in _all_shared(tables, len(groups), shared):
-        rows = np.zeros((1, tables.n_classes), np.int64) if group is None else _group_sums(tables, groups[group])
-        weight, joints = len(rows), []
-        for number, steps in chain(*(seen_by(tables, each) for each in numbers)):
-            first, held = _bins(steps, weight, bins, wide)
+    for index, rows in enumerate(whole):
+        weight, joints = 1, []
+        for number, steps in seen_by(tables, varying[index - len(groups)]) if index >= len(groups) else ():
+            first, held = _bins(steps, weight, wide)
             joints.append(JointLayout(number, weight, steps, first, held, first_bin, first_step))
             first_bin, weight = first_bin + len(held), weight * (len(steps) + 1)
             first_step += len(steps) if len(held) == 0 and len(steps) > MOST_INLINE else 0
-        for number in numbers:
-            rows = (_falling(tables, number)[:, np.newaxis] + rows).reshape(-1, tables.n_classes)
-        if len(rows) > MOST_ROWS:
-            raise FirmwareError(f"a lookup of {len(rows)} rows: firmware has at most {MOST_ROWS}; share fewer inputs")
-        what = f"the lookup of switch group {group}" if group is not None else "the lookup of joints"
-        what += f" {', '.join(str(joint.number) for joint in joints)}" if joints else ""
         least = rows.min(axis=0) if entry_bits < sum_bits else 0 * rows[0]
-        made.append(
-            Lookup(
-                len(made),
-                first_row,
-                _entries((rows - least) // coarse, entry_bits, sum_bits, what),
-                group,
-                tuple(joints),
-            )
-        )
+        entries = (rows - least) // (tables.grid if entry_bits == 8 else 1)
+        kind = np.int16 if entry_bits == 16 else np.int8 if sum_bits == 8 else np.uint8
+        group = index if index < len(groups) else None
+        made.append(Lookup(index, first_row, entries.astype(kind), group, tuple(joints)))
         start, first_row = start + least, first_row + len(rows)
     if first_row > MOST_TABLE_ROWS:
         raise FirmwareError(f"{first_row} rows: firmware has at most {MOST_TABLE_ROWS}; keep fewer inputs")
-    return Layout(tables, ports, groups, entry_bits, sum_bits, wide, bins, adding, start, tuple(made))
+    return Layout(tables, ports, groups, entry_bits, sum_bits, wide, start, tuple(made))
+
+
+def _widths(tables: IntegerTables, whole: Iterable[NDArray[np.int64]]) -> tuple[int, int]:
+    """Return the bits of an entry and of a sum, for the rows of all lookups."""
+    if tables.bound <= MOST_BYTE and not tables.slopes:
+        return 8, 8
+    spans = (np.ptp(rows, axis=0).max() // tables.grid for rows in whole)
+    return (8 if all(span <= MOST_ENTRY for span in spans) else 16), 16
 
 
 def _falling(tables: IntegerTables, number: int) -> NDArray[np.int64]:
@@ -461,27 +417,11 @@ def _falling(tables: IntegerTables, number: int) -> NDArray[np.int64]:
     return rows.swapaxes(0, 1).reshape(-1, tables.n_classes)[::-1]
 
 
-def _all_shared(tables: IntegerTables, n_groups: int, shared: Sequence[Shared]) -> list[Shared]:
-    """Return all lookups: `shared`, every other group and every other joint with thresholds, groups first."""
-    taken = {group for group, _ in shared}
-    placed = {number for _, numbers in shared for number in numbers}
-    alone: list[Shared] = [(group, ()) for group in range(n_groups) if group not in taken]
-    alone += [(None, (number,)) for number in looked_up(tables) if number not in placed]
-    return sorted([*alone, *shared], key=lambda lookup: (lookup[0] is None, lookup[0] or 0, lookup[1]))
-
-
-def _grouped(ports: Ports, group_size: int, n_groups: int | None) -> tuple[tuple[int, ...], ...]:
-    if not SMALLEST_GROUP <= group_size <= LARGEST_GROUP:
-        raise FirmwareError(f"groups of {group_size} switches: use {SMALLEST_GROUP} to {LARGEST_GROUP} in a lookup")
+def _grouped(ports: Ports) -> tuple[tuple[int, ...], ...]:
     shown = [[number for number in port if number != NO_SWITCH] for port in ports]
     switches = [*chain(*shown)]
-    fewest = -(-len(switches) // group_size)
-    count = fewest if n_groups is None else n_groups
-    if not fewest <= count <= len(switches):
-        raise FirmwareError(
-            f"{count} groups of at most {group_size} for {len(switches)} switches: use {fewest} groups or more"
-        )
-    within = [part for port in shown for part in _even(port, -(-len(port) // group_size))]
+    count = -(-len(switches) // GROUP_SIZE)
+    within = [part for port in shown for part in _even(port, -(-len(port) // GROUP_SIZE))]
     return tuple(within if len(within) == count else _even(switches, count))
 
 
@@ -495,15 +435,3 @@ def _group_sums(tables: IntegerTables, numbers: Sequence[int]) -> NDArray[np.int
     for number in numbers:
         sums = np.vstack([sums, sums + tables.switch_rows[number]])
     return sums
-
-
-def _entries(rows: NDArray[np.int64], entry_bits: int, sum_bits: int, what: str) -> Rows:
-    if entry_bits == 16:
-        return rows.astype(np.int16)
-    if sum_bits == 8:
-        return rows.astype(np.int8)
-    if rows.max() > MOST_ENTRY:
-        raise FirmwareError(
-            f"{what} spans {rows.max()} steps, but an 8-bit entry holds {MOST_ENTRY}: compile with --table-bits 8"
-        )
-    return rows.astype(np.uint8)

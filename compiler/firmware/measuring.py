@@ -1,14 +1,11 @@
-"""The measured cost of a classifier on its part, compiled and run in a simulator, next to the cost model's bounds."""
+"""The measured cost of a classifier on its part, compiled and run in a simulator."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from . import FirmwareError
-from .avr_costs import worst_frame
 from .choose import Fit
 from .classifier import Library
-from .costs import NAME_BYTES, Unit
-from .layout import Layout
+from .costs import Unit
 from .probes import Predictions, Probes, changing_frames, extreme_frames, joined, random_frames
 from .targets import Target
 from .tools import STRICT, call, find, workshop
@@ -24,8 +21,7 @@ class Measured:
     (None where not measured), flash and RAM.
 
     flash is the total, flash_classify the part of it in a program that never calls update() and never marks an input as
-    missing. The numbers that begin with most_ are those of the cost model: bounds on an AVR, where RAM includes the
-    stack, and elsewhere `rough`.
+    missing.
     """
 
     part: str
@@ -36,52 +32,32 @@ class Measured:
     flash: int
     flash_classify: int
     ram: int
-    most_time: int
-    most_update_time: int
-    most_flash: int
-    most_flash_classify: int
-    most_ram: int
-    rough: bool
-
-    @property
-    def holds(self) -> bool:
-        """Whether everything is within its bound, where there is one."""
-        used = self.ram + (self.stack or 0)
-        small = self.flash <= self.most_flash and self.flash_classify <= self.most_flash_classify
-        quick = self.time <= self.most_time and self.update_time <= self.most_update_time
-        return self.rough or (quick and small and used <= self.most_ram)
 
     @property
     def note(self) -> str:
         """The measurements, as a sentence."""
-        bound = "expected about" if self.rough else "bound"
         stack = "" if self.stack is None else f" and {self.stack} of stack"
         return (
-            f"Measured on {self.part}: at most {self.time} {self.unit} a frame ({bound} {self.most_time}), "
-            f"{self.update_time} by update() ({bound} {self.most_update_time}); "
-            f"{self.flash} bytes of flash ({bound} {self.most_flash}), "
-            f"{self.flash_classify} where only classify() is called ({bound} {self.most_flash_classify}); "
-            f"{self.ram} bytes of RAM{stack} ({bound} {self.most_ram})."
+            f"Measured on {self.part}: at most {self.time} {self.unit} a frame, {self.update_time} by update(); "
+            f"{self.flash} bytes of flash, {self.flash_classify} where only classify() is called; "
+            f"{self.ram} bytes of RAM{stack}."
         )
 
 
 def measure(library: Library, fit: Fit) -> Measured:
-    """Compile a classifier, run the frames that should take longest, and return the measured maxima.
+    """Compile a classifier, run extreme and random frames, and return the measured maxima.
 
     Raises FirmwareError where a tool is missing, or for a part whose simulator does not count.
     """
-    target, layout, cost = fit.target, fit.choice.layout, fit.choice.cost
-    if not target.own_layout:
-        raise FirmwareError("the classifier fits none of the simulated microcontrollers: nothing can be measured")
+    target = fit.target
     if lack := target.missing():
         raise FirmwareError(f"firmware for {target.part} cannot be measured here: {lack}")
-    tried = joined(slow_frames(layout), random_frames(layout.tables, _RANDOM, seed=1))
+    tried = slow_frames(library)
     predictions = run_counted(library, target, tried)
-    updated = run_counted(library, target, joined(changing_frames(layout.tables), tried), incremental=True)
-    flash, flash_classify, ram = _size(library, target)
-    long_names = _more_for_names(library.names.grasps)
+    updated = run_counted(library, target, joined(changing_frames(library.layout.tables), tried), incremental=True)
+    flash, flash_classify, ram = sizes(library, target)
     return Measured(
-        part=target.counted_on,
+        part=target.part,
         time=predictions.most,
         update_time=updated.most,
         unit=predictions.unit,
@@ -89,19 +65,13 @@ def measure(library: Library, fit: Fit) -> Measured:
         flash=flash,
         flash_classify=flash_classify,
         ram=ram,
-        most_time=cost.cycles,
-        most_update_time=cost.update_cycles,
-        most_flash=cost.flash + long_names,
-        most_flash_classify=cost.flash_classify + long_names,
-        most_ram=cost.ram,
-        rough=not target.avr,
     )
 
 
-def slow_frames(layout: Layout) -> Probes:
-    """Return the frame that takes longest by the model, and extreme ones in case the model is wrong."""
-    bits, codes = worst_frame(layout)
-    return joined(Probes(bits.reshape(1, -1), codes.reshape(1, -1)), extreme_frames(layout.tables))
+def slow_frames(library: Library) -> Probes:
+    """Return frames of which one is among the slowest: extreme and random ones."""
+    tables = library.layout.tables
+    return joined(extreme_frames(tables), random_frames(tables, _RANDOM, seed=1))
 
 
 def run_counted(library: Library, target: Target, frames: Probes, *, incremental: bool = False) -> Predictions:
@@ -113,13 +83,7 @@ def run_counted(library: Library, target: Target, frames: Probes, *, incremental
     return predictions
 
 
-def _more_for_names(grasps: Sequence[str]) -> int:
-    """Return the bytes by which long names exceed the size assumed by the cost model."""
-    longest = 1 + max(len(grasp.encode()) for grasp in grasps)
-    return max(0, longest - NAME_BYTES) * (len(grasps) + 1)
-
-
-def _size(library: Library, target: Target) -> tuple[int, int, int]:
+def sizes(library: Library, target: Target) -> tuple[int, int, int]:
     """Return the bytes of flash of the compiled files, of flash where only classify() is called, and of RAM."""
     if target.compiler is None or target.size is None:
         raise FirmwareError(

@@ -108,7 +108,7 @@ def states_of(model: SegmentModel, scores: NDArray[np.integer], refused: NDArray
 def record_files(
     name: str,
     layout: Layout,
-    machine: Literal["host", "bare", "avr"],
+    machine: Literal["host", "avr"],
     function: Literal["classify", "update"],
     *,
     lost: bool = False,

@@ -19,15 +19,7 @@ Tool = tuple[tuple[str, ...], str]
 HOST_COMPILER: Tool = (("gcc", "clang"), "gcc")
 AVR_COMPILER: Tool = (("avr-gcc",), "gcc-avr avr-libc")
 ARM_COMPILER: Tool = (("arm-none-eabi-gcc",), "gcc-arm-none-eabi")
-ARM_EMULATOR: Tool = (("qemu-system-arm",), "qemu-system-arm")
-RUST: Tool = (("cargo",), "cargo rustc")
-WASM_COMPILER: Tool = (("clang",), "clang")
-WASM_LINKER: Tool = (("wasm-ld",), "lld")
-WASM_RUNTIME: Tool = (("node",), "nodejs")
 RISCV_COMPILER: Tool = (("riscv64-unknown-elf-gcc",), "gcc-riscv64-unknown-elf")
-RISCV_EMULATOR: Tool = (("qemu-system-riscv32",), "qemu-system-misc")
-XTENSA_COMPILER: Tool = (("xtensa-lx106-elf-gcc",), "gcc-xtensa-lx106")
-XTENSA_EMULATOR: Tool = (("qemu-system-xtensa",), "qemu-system-misc")
 
 
 def lacking(*tools: Tool) -> str | None:

@@ -5,39 +5,36 @@ from dataclasses import replace
 
 from thenar.runtime.tables import tables_from_bytes
 
-from ..firmware.choose import features
+from ..firmware.choose import Fit
 from ..firmware.classifier import LIBRARY_NAME, Library
-from ..firmware.layout import Layout
 from ..firmware.measuring import run_counted, slow_frames
-from ..firmware.targets import Target
 from ..firmware.words import numbered
 from .cache import Cache, stored
 from .designs import Design
 from .equipment import Equipment
-from .points import FrontierError, Time
+from .points import Time
 from .timing.classify_times import ClassifyModel, fitting
 from .timing.python_times import classify_us
 
 
 @stored(1, where="machine")
-def count_steps(content: bytes, layout: str, model: ClassifyModel) -> float:
-    """Compile a layout of tables and run it; return the cycles, or instructions, of the slowest frame.
+def count_steps(content: bytes, model: ClassifyModel) -> float:
+    """Compile the classifier of tables and run it; return the cycles of the slowest frame.
 
     Raises FirmwareError.
     """
     assert model.part is not None
-    for option in fitting(tables_from_bytes(content), model.part):
-        if features(option[0], model.part) == layout:
-            return steps_of(option[0], model.part)
-    raise FrontierError(f"there is no layout {layout!r} of these tables: another thenar made the store")
+    fit = fitting(tables_from_bytes(content), model.part)
+    assert fit is not None
+    return steps_of(fit)
 
 
-def steps_of(layout: Layout, part: Target) -> float:
-    """Compile a layout for a target and run it; return the cycles, or instructions, of the slowest of the frames that
-    should take longest and of extreme ones. Raises FirmwareError.
+def steps_of(fit: Fit) -> float:
+    """Compile a classifier for its part and run it; return the cycles of the slowest of the frames that should take
+    longest and of extreme ones. Raises FirmwareError.
     """
-    library = Library(LIBRARY_NAME, numbered(layout.tables), layout, part.avr)
-    return float(run_counted(library, part, slow_frames(layout)).most)
+    library = Library(LIBRARY_NAME, numbered(fit.layout.tables), fit.layout, fit.target.avr)
+    return float(run_counted(library, fit.target, slow_frames(library)).most)
 
 
 @stored(1, where="process")
@@ -83,7 +80,7 @@ def _timed(designs: Sequence[Design], model: ClassifyModel, cache: Cache) -> lis
 
 
 def _simulated(designs: Sequence[Design], model: ClassifyModel, cache: Cache) -> list[Design]:
-    calls = [count_steps.call(design.tables.content, design.classified.layout, model) for design in designs]
+    calls = [count_steps.call(design.tables.content, model) for design in designs]
     steps = cache.ask(calls)
     return [
         replace(design, measured=Time(model.us(round(each)), "simulated"))

@@ -32,7 +32,6 @@ def place(small_set: GraspSet, build_folder: Path, tmp_path: Path, monkeypatch: 
         "evaluate set.grasps --repeats 1 --folds 2 --rounds 3 --jobs 1 --confusion",
         "compile set.grasps -o new --rounds 3 --folds 2 --no-report --glove glove.toml",
         "spec build",
-        "firmware build --target avr328p --frontier",
         "doctor glove.toml",
         pytest.param("simulate quick --explain --jobs 1", marks=pytest.mark.slow),
         "stability --list",

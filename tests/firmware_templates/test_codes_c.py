@@ -74,7 +74,7 @@ def compiled(shared_library: SharedLibrary) -> Callable[..., Codes]:
     def compiled(
         names: Numbered, sensors: Sensors | None = None, take: str = "return 0u;", highest: int = 900
     ) -> Codes:
-        layout = arrange(tables_of(names, highest), bins="search")
+        layout = arrange(tables_of(names, highest))
         files = Library("hand", names, layout, avr=False, glove=sensors).whole
         library = shared_library({**files, "sweep.c": SWEEP, "take.c": TAKE % take}, "-Wall", "-Wextra", "-Wconversion")
         return Codes(library, len((sensors or sensors_of(names)).every))
@@ -273,7 +273,7 @@ def test_what_a_glove_does_not_know_is_said() -> None:
 
 def test_a_build_of_switches_alone_has_no_codes() -> None:
     names = names_of([])
-    whole = Library("hand", names, arrange(tables_of(names, 9), bins="search"), avr=False).whole
+    whole = Library("hand", names, arrange(tables_of(names, 9)), avr=False).whole
     assert not [path for path in whole if "codes" in path]
 
 

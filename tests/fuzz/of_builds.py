@@ -223,7 +223,6 @@ def _frontier() -> list[bytes]:
         tried=(points.Tried(ways[0], "both", 4, 4, rate, 25.0),),
         curves=(points.Curve("elimination", "by tables", True, (1.0, 2.0), (rate, rate)),),
         marks=(points.Mark("all switches", 6, rate, 40.0, 80.0),),
-        checks=(points.Check("scans", "wire", 4, 0.01, 0.02),),
         skipped=("no AVR was simulated",),
         picked=1,
         wanted="a frame within 20 us",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
-from ..costs import Cost
+from ..costs import Formula
 from ..tools import AVR_COMPILER
 from .wired import Wired
 
@@ -35,12 +35,6 @@ class Avr(Wired):
     avrdude: str
     programmer: str
     brown_out: str = "4.3 V, extended fuse 0xFC; at 8 MHz or less 2.7 V, 0xFD"
-
-    def cost(self, layout: "Layout") -> Cost:
-        """Return the worst-case cost over all possible frames, counted instruction by instruction."""
-        from ..avr_costs import AvrCosts
-
-        return AvrCosts(layout, self.flash).cost
 
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text: the library, a Makefile (program, size, flash) and an initial main()."""
@@ -122,7 +116,6 @@ _avr = partial(
     help="a library with a Makefile, or the complete firmware of a board",
     next_step="`make -C {folder}` compiles it",
     carried=True,
-    alike=True,
     most_flash=48 << 10,
     clock_hz=16_000_000,
     kind="avr",
@@ -134,6 +127,48 @@ _avr = partial(
 # separate pins, which only the packages with 32 leads have.
 _ATMEGA328P = _avr(
     name="avr328p",
+    formula=Formula(
+        cycles={
+            "word classes": 17.48,
+            "byte classes": 16.57,
+            "class passes": 9.246,
+            "lookups": 10.44,
+            "kept lookups": 2.412,
+            "entries": 4.089,
+            "offsets": 1.199,
+            "split words": 5.197,
+            "fields": 5.606,
+            "bins": 16.96,
+            "thresholds": 3.973,
+            "lines": 36.91,
+            "line sums": 1.24,
+        },
+        flash={
+            "one": 595.0,
+            "word classes": 52.52,
+            "byte classes": 50.54,
+            "lookups": 43.34,
+            "kept lookups": 14.88,
+            "words": 0.8615,
+            "found words": 2.705,
+            "split code": 13.71,
+            "bins": 183.9,
+            "thresholds": 15.21,
+            "lines": 91.7,
+            "line sums": 7.286,
+            "rows": 1.16,
+            "tables": 0.312,
+        },
+        ram={
+            "one": 9.043,
+            "word classes": 4.158,
+            "byte classes": 3.825,
+            "found": 1.993,
+            "kept found": 0.8861,
+            "compared codes": 0.3211,
+            "input": 0.5797,
+        },
+    ),
     part="atmega328p",
     rank=10,
     flags=("-mmcu=atmega328p", "-Os"),
@@ -152,6 +187,50 @@ _ATMEGA328P = _avr(
 # ATmega640/1280/1281/2560/2561, DS40002211: crystal and RESET have separate pins.
 _ATMEGA2560 = _avr(
     name="avr2560",
+    formula=Formula(
+        cycles={
+            "one": 48.5,
+            "word classes": 12.86,
+            "byte classes": 14.39,
+            "passes": 128.1,
+            "class passes": 6.904,
+            "lookups": 5.202,
+            "kept lookups": 2.339,
+            "words": 1.652,
+            "entries": 3.89,
+            "offsets": 1.721,
+            "fields": 8.179,
+            "bins": 19.49,
+            "thresholds": 4.88,
+            "lines": 42.23,
+            "line sums": 1.573,
+        },
+        flash={
+            "one": 667.8,
+            "word classes": 51.28,
+            "byte classes": 49.02,
+            "lookups": 19.24,
+            "kept lookups": 26.97,
+            "split words": 12.17,
+            "found": 25.66,
+            "found words": 2.659,
+            "bins": 116.0,
+            "thresholds": 13.97,
+            "lines": 40.65,
+            "line sums": 10.09,
+            "rows": 1.104,
+            "tables": 0.6014,
+        },
+        ram={
+            "one": 7.37,
+            "word classes": 4.224,
+            "byte classes": 3.928,
+            "found": 2.239,
+            "kept found": 0.8611,
+            "compared codes": 0.2158,
+            "input": 0.4392,
+        },
+    ),
     part="atmega2560",
     rank=11,
     flags=("-mmcu=atmega2560", "-Os"),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from .. import FirmwareError
-from ..costs import CORTEX_M4, Core, Cost, word_cost
+from ..costs import Formula
 from ..tools import Tool
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ Mode = Literal["classify", "scan", "glove"]
 class Target:
     """A firmware target: a core with a compiler and perhaps a simulator, or a package for a build system.
 
-    A target is an object of this class, or of a derived class that overrides `files`, `cost`, `run` or `missing`.
+    A target is an object of this class, or of a derived class that overrides `files`, `run` or `missing`.
     Importing it imports neither numpy nor jinja2, so that `--help` is fast: its methods import what they need.
 
     Parameters
@@ -37,31 +37,27 @@ class Target:
         How to use the folder that was written, whose path replaces `{folder}`.
     rank : int, optional
         Targets are listed, and tried, in the order of their ranks.
-    own_layout : bool, optional
-        Whether layouts are chosen for its flash, RAM and costs. If not, it uses the layout for the smallest of our
-        parts that holds the build, and its costs are not counted.
     any_part : bool, optional
         Whether it is a package for the smallest part that holds the build, and not for one part.
     carried : bool, optional
-        Whether the firmware that a build carries may be laid out for it.
-    alike : bool, optional
-        Whether targets of its kind differ in memory alone, so that verifying one of them is enough.
+        Whether the firmware that a build carries may be for it.
     flash, ram : int, optional
         Memory in bytes.
     most_flash : int, optional
         The default limit of flash for a classifier.
     clock_hz : int, optional
         Usual clock, which converts counts to times on a Pareto front; `thenar frontier` requires it.
-    core : Core, optional
-        The costs of portable C on it, for `cost`.
+    formula : Formula, optional
+        The cost of the classifier on it; None where nothing is estimated, and everything fits.
     kind : str, optional
-        The name in `thenar verify --firmware` of targets that run alike; "" where `run` cannot run anything.
+        The name in `thenar verify --firmware` of targets that differ in memory alone: the smallest that fits is
+        verified. "" where `run` cannot run anything.
     compiler, size : Tool, optional
         The C compiler, called with `flags`, and its program `size`: `--measure` needs both.
     """
 
     avr: ClassVar[bool] = False
-    """Whether an AVR's assembly adds up the rows: costs are then bounds, in cycles."""
+    """Whether an AVR's assembly adds up the rows: costs are then in cycles."""
     modes: ClassVar[tuple[Mode, ...]] = ("classify",)
 
     name: str
@@ -70,15 +66,13 @@ class Target:
     title: str = ""
     next_step: str = "{folder} holds the sources to compile"
     rank: int = 100
-    own_layout: bool = True
     any_part: bool = False
     carried: bool = False
-    alike: bool = False
     flash: int = 1 << 30
     ram: int = 1 << 30
     most_flash: int = 1 << 30
     clock_hz: int | None = None
-    core: Core = CORTEX_M4
+    formula: Formula | None = None
     kind: str = ""
     compiler: Tool | None = None
     size: Tool | None = None
@@ -90,23 +84,9 @@ class Target:
         return "cycles" if self.avr else "instructions"
 
     @property
-    def bound(self) -> str:
-        """The words before a cost, which is either a bound or an estimate."""
-        return "at most" if self.avr else "about"
-
-    @property
     def named(self) -> str:
         """The part with its article: "an atmega328p", "an stm32"."""
         return f"{'an' if self.part[0] in 'aefilmnorsx' else 'a'} {self.part}"
-
-    @property
-    def counted_on(self) -> str:
-        """The part on which `run` counts, for a sentence: "Measured on atmega328p"."""
-        return self.part
-
-    def cost(self, layout: "Layout") -> Cost:
-        """Return a bound on the cost of the classifier of that layout, or an estimate that is not too low."""
-        return word_cost(layout, self.core)
 
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text of all files for the target; by default only the C99 of the library."""

@@ -7,7 +7,7 @@ Pins and channels are those of the GPIO tables of the ESP-IDF Programming Guide,
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from .package import XTENSA, family
+from .package import M4, family
 from .riscv import MEMBER as _RISCV
 from .sketch import SketchPart, gpio
 
@@ -36,7 +36,7 @@ def _esp(name: str, what: str, **given: Any) -> SketchPart:
         "fqbn": f"esp32:esp32:{name}",
         "platform": "espressif32",
     }
-    return family(SketchPart, name, given.pop("like", XTENSA), what, **{**shared, **given})
+    return family(SketchPart, name, given.pop("formula", M4), what, **{**shared, **given})
 
 
 # GPIO16 and 17 are a WROVER's PSRAM. Pins of bus and UARTs are the core's defaults except those of UART 1, which share
@@ -45,7 +45,6 @@ _ESP32_ADC = {"ADC1_CH0": 36, "ADC1_CH3": 39, "ADC1_CH4": 32, "ADC1_CH5": 33, "A
 _ESP32 = _esp(
     "esp32",
     "a package for ESP-IDF, Arduino, PlatformIO, Zephyr: ESP32 (Xtensa); or a sketch",
-    kind="xtensa",
     pins=gpio(4, 5, 13, 14, 16, 17, 18, 19, 21, 22, 23, 25, 26, 27, 32, 33),
     uarts=(gpio(3, 1), gpio(26, 27), gpio(16, 17)),
     twi=gpio(21, 22),
@@ -104,7 +103,7 @@ _C3_ADC = {f"ADC1_CH{channel}": channel for channel in range(5)}
 _ESP32C3 = _esp(
     "esp32c3",
     "a package as for esp32: ESP32-C3 (RISC-V); or a sketch",
-    like=_RISCV,
+    formula=_RISCV.formula,
     pins=gpio(0, 1, 3, 4, 5, 6, 7, 10),
     uarts=(gpio(20, 21), gpio(10, 5)),
     twi=gpio(6, 7),
@@ -125,7 +124,7 @@ _C6_ADC = {f"ADC1_CH{channel}": channel for channel in range(7)}
 _ESP32C6 = _esp(
     "esp32c6",
     "a package as for esp32: ESP32-C6, H2 (RISC-V); or a sketch for ESP32-C6",
-    like=_RISCV,
+    formula=_RISCV.formula,
     pins=gpio(0, 1, 2, 3, 6, 7, *range(18, 24)),
     uarts=(gpio(17, 16), gpio(18, 19)),
     twi=gpio(23, 22),

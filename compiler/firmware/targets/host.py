@@ -86,7 +86,6 @@ MEMBER = Host(
     help="a library for this machine, with a Makefile and a self test",
     next_step="`make -C {folder} check` compiles and tests it",
     rank=0,
-    own_layout=False,
     carried=True,
     kind="host",
 )

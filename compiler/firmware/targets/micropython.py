@@ -1,6 +1,4 @@
-"""MicroPython: the classifier as a Python module, which runs on any board, and as a user module in C, to be built into
-the board's firmware. Both have the same classes and functions.
-"""
+"""MicroPython: the classifier as a Python module, which runs on any board."""
 
 import sys
 from base64 import b64encode
@@ -30,44 +28,21 @@ class MicroPython(Target):
     """Any board that runs MicroPython."""
 
     def files(self, library: "Library") -> dict[str, str]:
-        """Return path -> text of the Python module, and in modules/ of the user module in C."""
+        """Return path -> text of the Python module and of its README."""
         from thenar.firmware_templates.rendering import render
 
         from ..segments import times_of
-        from ..words import answers_of, none_of, string
 
-        segments = library.names.segments
-        name, folder = library.name, f"modules/thenar_{library.name}"
-        c_files = library.whole
+        names = library.names
         values = {
-            "name": name,
-            "upper": name.upper(),
-            "opening": _opening(library),
-            "sources": [path for path in c_files if path.endswith(".c")],
-            "sensor_names": [string(sensor.name) for sensor in library.sensors.every],
-            "sensors": len(library.sensors.every),
-            "grasps": [string(grasp) for grasp in library.names.grasps],
-            "names": [string(each) for each in answers_of(library.names)],
-            "switch_names": [string(switch.name) for switch in library.names.switches],
-            "joint_names": [string(joint.name) for joint in library.names.joints],
-            "switches": len(library.names.switches),
-            "joints": len(library.names.joints),
-            "rejection": library.names.rejection,
-            "nothing_held": none_of(library.names),
-            "segments": segments is not None,
-            **({} if segments is None else times_of(segments)),
+            "name": library.name,
+            "switches": len(names.switches),
+            "joints": len(names.joints),
+            "rejection": names.rejection,
+            "segments": names.segments is not None,
+            **({} if names.segments is None else times_of(names.segments)),
         }
-        made = {
-            "micropython.mk": "micropython.mk",
-            "micropython.cmake": "micropython.cmake",
-            "mod_NAME.c": f"mod_{name}.c",
-        }
-        return {
-            **self.sources(library),
-            **{f"{folder}/{path}": text for path, text in c_files.items()},
-            **{f"{folder}/{path}": render(f"micropython/{of}.j2", **values) for of, path in made.items()},
-            "README.md": render("micropython/README.md.j2", **values),
-        }
+        return {**self.sources(library), "README.md": render("micropython/README.md.j2", **values)}
 
     def sources(self, library: "Library") -> dict[str, str]:
         """Return the Python module."""
@@ -218,9 +193,8 @@ MEMBER = MicroPython(
     name="micropython",
     part="micropython",
     title="MicroPython",
-    help="a Python module for any board with MicroPython, and one in C to build into its firmware",
+    help="a Python module for any board with MicroPython",
     next_step="`mpremote cp {folder}/*.py :` copies it to a board",
     rank=40,
-    own_layout=False,
     kind="micropython",
 )

@@ -1,24 +1,19 @@
 """The classifier as a package for every microcontroller ecosystem: Arduino, PlatformIO, ESP-IDF, Zephyr, pico-sdk and
-plain CMake. Targets differ in the core for which the layout is chosen, not in the files.
+plain CMake. Targets differ in the core whose cost is estimated, not in the files.
 
 Layout and fields of the Arduino library are those of its specification, revision 1.5.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..costs import Core, Updating
-from ..tools import XTENSA_COMPILER, XTENSA_EMULATOR
-from .bare import Bare, Machine
+from ..costs import Formula
 from .base import Target
 from .cortex_m import MEMBER as _CORTEX_M
 
 if TYPE_CHECKING:
     from ..classifier import Library
     from ..example import Pins
-    from ..layout import Layout
-    from ..probes import Frames, Lost, Predictions
 
 _VERSION = "1.0.0"
 
@@ -29,17 +24,7 @@ _CONSTANTS = ("CLASSES", "SWITCHES", "PORTS", "JOINTS")
 
 @dataclass(frozen=True, kw_only=True)
 class Package(Target):
-    """A package for a part of a family, or for any part.
-
-    like   the target on whose core the classifier's costs are counted, if there is one
-    """
-
-    like: Target | None = None
-
-    @property
-    def counted_on(self) -> str:
-        """The core that is counted on, and the part that it represents."""
-        return self.part if self.like is None else f"{self.like.part}, for {self.part}"
+    """A package for a part of a family, or for any part."""
 
     @property
     def example_pins(self) -> "Pins | None":
@@ -89,24 +74,6 @@ class Package(Target):
 
         return str(Wiring.of(library, self.example_pins))
 
-    def missing(self) -> str | None:
-        """Return which of compiler and emulator is missing, and how to install it; None if neither is."""
-        return super().missing() if self.like is None else self.like.missing()
-
-    def run(
-        self,
-        files: Mapping[str, str],
-        name: str,
-        layout: "Layout",
-        frames: "Frames",
-        *,
-        incremental: bool = False,
-        lost: "Lost | None" = None,
-    ) -> "Predictions":
-        """Return the predictions for frames (n, F) on a similar core, as in the base class."""
-        run = super().run if self.like is None else self.like.run
-        return run(files, name, layout, frames, incremental=incremental, lost=lost)
-
 
 P = TypeVar("P", bound=Package)
 
@@ -135,66 +102,16 @@ def _keywords(name: str, segments: bool, codes: bool) -> list[tuple[str, str]]:
     return [*words, *((f"THENAR_{name.upper()}_{word}", "LITERAL1") for word in _CONSTANTS)]
 
 
-M0PLUS, _M4 = _CORTEX_M
-# Its costs are within 3 % of a Cortex-M4's.
-_M33 = replace(
-    _M4,
-    part="cortex-m33",
-    title="Cortex-M33",
-    flags=("-mcpu=cortex-m33", *_M4.flags[1:]),
-    machine=Machine("mps2-an505", 4 << 20, 4 << 20, 20_000_000, 9, flash_at=0x10000000, ram_at=0x38000000),
-)
-# The Xtensa core whose compiler and emulator Debian has: an ESP8266's, without an ESP32's register windows. Numbers are
-# fitted to qemu's counts, as in `costs`, for 3 to 30 classes and 3 to 27 lookups: 1 to 38 % above.
-XTENSA = Bare(
-    architecture="xtensa",
-    prefix="xtensa-lx106-elf-",
-    emulator=XTENSA_EMULATOR,
-    board="",
-    name="xtensa",
-    part="lx106",
-    title="Xtensa LX106",
-    help="",
-    compiler=XTENSA_COMPILER,
-    size=(("xtensa-lx106-elf-size",), "binutils-xtensa-lx106"),
-    flags=("-mlongcalls", "-O2", "-ffreestanding"),
-    machine=Machine("sim", 1 << 20, 256 << 10, 40_000_000, 9, flash_at=0x50000000, ram_at=0x3FFC0000, cpu="lx106"),
-    core=Core(
-        fixed=12,
-        a_class=7,
-        in_parts=4,
-        lookup=2,
-        found=4,
-        part=4,
-        pair=2,
-        quad=5,
-        updating=Updating(
-            fixed=23,
-            a_class=5,
-            in_parts=5,
-            noted=0,
-            added=16,
-            pair=3,
-            quad=4,
-            split=2,
-            moved=10,
-            moved_part=0,
-            product=6,
-            halves=5,
-        ),
-        product=5,
-    ),
-)
+M0PLUS, M4 = (target.formula for target in _CORTEX_M)
 _NEXT = "{folder}/README.md explains how to use it in each ecosystem"
 # More only on request: on most parts, flash is read through a cache of 1 to 32 KiB, and larger tables miss it.
 _MOST = 64 << 10
 
 
-def family(shape: type[P], name: str, like: Target, what: str, **given: Any) -> P:
-    """Return a package for parts whose core matches that of another target, which is simulated."""
-    tools = {"compiler": like.compiler, "size": like.size, "flags": like.flags, "next_step": _NEXT}
-    values = {"name": name, "part": name, "help": what, "like": like, "most_flash": _MOST, "core": like.core}
-    return shape(**{**values, **tools, **given})
+def family(shape: type[P], name: str, formula: Formula | None, what: str, **given: Any) -> P:
+    """Return a package for parts whose cost is that of a similar core."""
+    values = {"name": name, "part": name, "help": what, "most_flash": _MOST, "formula": formula, "next_step": _NEXT}
+    return shape(**{**values, **given})
 
 
 # Flash is that of a family's largest usual part, RAM that of its smallest.
@@ -205,13 +122,12 @@ MEMBER = (
         help="a package for Arduino's boards, AVR or other; for the smallest part that holds the build",
         next_step="copy it into `libraries` of your sketchbook; {folder}/README.md lists other build systems",
         rank=30,
-        own_layout=False,
         any_part=True,
     ),
     family(
         Package,
         "rp2350",
-        _M33,
+        M4,
         "a package as for rp2040: Raspberry Pi Pico 2, Cortex-M33 or RISC-V",
         rank=33,
         flash=16 << 20,
@@ -220,7 +136,7 @@ MEMBER = (
     family(
         Package,
         "nrf52",
-        _M4,
+        M4,
         "a package for Zephyr (nRF Connect), Arduino, PlatformIO: nRF52832, nRF52840, Cortex-M4F",
         rank=34,
         flash=1 << 20,
@@ -229,13 +145,13 @@ MEMBER = (
     family(
         Package,
         "stm32",
-        _M4,
+        M4,
         "a package for STM32CubeIDE and any CMSIS project, Zephyr, Arduino, PlatformIO; counted as Cortex-M4",
         rank=35,
         flash=2 << 20,
         ram=20 << 10,
     ),
     family(
-        Package, "generic", _M4, "a package for any other part that has a C99 compiler; counted as Cortex-M4", rank=36
+        Package, "generic", M4, "a package for any other part that has a C99 compiler; counted as Cortex-M4", rank=36
     ),
 )

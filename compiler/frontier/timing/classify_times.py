@@ -1,11 +1,11 @@
-"""Predict the time of classifying a frame on a target, for each layout, without compiling."""
+"""Predict the time of classifying a frame on a target, without compiling."""
 
 from dataclasses import dataclass
 
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ...firmware import FirmwareError
-from ...firmware.choose import Option, choose, features, flash_shares
+from ...firmware.choose import Fit, features, fit_for
 from ...firmware.targets import TARGETS, Target, timed
 from ..points import FrontierError, How
 from .machine import machine_name, on_a_pi
@@ -17,7 +17,7 @@ PI_FACTOR = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Classified:
-    """A layout's costs: microseconds a frame, bytes of flash and RAM; of the tables alone on host and pi.
+    """The costs of tables: microseconds a frame, bytes of flash and RAM; of the tables alone on host and pi.
 
     layout  in words; "" on host and pi, which have none
     """
@@ -32,9 +32,9 @@ class Classified:
 class ClassifyModel:
     """Predicts the time of classifying on `target`, one of `timed()`.
 
-    AVR       the most cycles of classify(), counted instruction by instruction, at `clock_hz`
-    Cortex-M  typical and most instructions of classify(), at `clock_hz` and one cycle each: hardly any such core is
-              faster, and loads, taken branches and slow flash take more cycles, so times are lower bounds
+    AVR       cycles of classify() for the slowest frame, by the target's formula, at `clock_hz`
+    Cortex-M  instructions of classify(), likewise, at `clock_hz` and one cycle each: hardly any such core is faster,
+              and loads, taken branches and slow flash take more cycles, so times are lower bounds
     host      wall time of the runtime's Scorer here, by a linear fit to tables that are timed on construction
     pi        that times `factor`; the same time if this machine is a Raspberry Pi
 
@@ -60,19 +60,16 @@ class ClassifyModel:
         return self.target, self.clock_hz, self.python, self.factor
 
     def options(self, tables: IntegerTables) -> tuple[Classified, ...]:
-        """Return the Pareto front of (time, flash) of the layouts that fit the part, the fastest first.
-
-        It is empty if none fits. On host and pi it has one layout, the runtime's.
-        """
+        """Return what tables cost; empty where they do not fit."""
         if self.part is None:
             assert self.python is not None
             size = len(tables_to_bytes(tables))
             how: How = "guess" if self.guessed else "model"
             return (Classified("", self.python.us(tables) * self.factor, how, size, size),)
-        return tuple(
-            Classified(features(layout, self.part), self.us(cost.cycles), "model", cost.flash, cost.ram)
-            for layout, cost in fitting(tables, self.part)
-        )
+        fit = fitting(tables, self.part)
+        if fit is None or fit.cost is None:
+            return ()
+        return (Classified(features(fit.layout), self.us(fit.cost.cycles), "model", fit.cost.flash, fit.cost.ram),)
 
     def us(self, steps: int) -> float:
         """Return the microseconds of `steps` cycles or instructions of the part."""
@@ -97,7 +94,7 @@ class ClassifyModel:
         """The caveat on its times, in a sentence; "" if there is none."""
         if self.part is not None and not self.part.avr and self.clock_hz is not None:
             return (
-                f"on {self.target} times are instructions, counted by qemu, at {self.clock_hz / 1e6:g} MHz and one "
+                f"on {self.target} times are instructions, estimated, at {self.clock_hz / 1e6:g} MHz and one "
                 "cycle each: a lower bound, for many instructions take more cycles"
             )
         if self.python is not None and not self.guessed:
@@ -110,11 +107,9 @@ class ClassifyModel:
         return ""
 
 
-def fitting(tables: IntegerTables, part: Target) -> tuple[Option, ...]:
-    """Return the layouts of `tables` worth choosing from that fit three quarters of the part's flash, and its RAM."""
+def fitting(tables: IntegerTables, part: Target) -> Fit | None:
+    """Return the fit of `tables` on a part, with its cost; None where they do not fit."""
     try:
-        best = choose(tables, part).frontier
+        return fit_for(part, tables)
     except FirmwareError:
-        return ()
-    most = flash_shares(part)[1]
-    return tuple((layout, cost) for layout, cost in best if cost.flash <= most and cost.ram <= part.ram)
+        return None

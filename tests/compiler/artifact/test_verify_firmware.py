@@ -28,9 +28,8 @@ Tool = Callable[[str], str]
 TOOLS: dict[str, tuple[str, ...]] = {
     "host": ("gcc",),
     "avr": ("avr-gcc", "make", "gcc"),
-    "cortex-m": ("arm-none-eabi-gcc", "qemu-system-arm"),
 }
-PARTS = {"host": ["host"], "avr": ["atmega328p"], "cortex-m": ["cortex-m0plus", "cortex-m4"]}
+PARTS = {"host": ["host"], "avr": ["atmega328p"]}
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +37,7 @@ def build(grasp_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path
     return compile_build(grasp_set, tmp_path_factory.mktemp("builds") / "build", rounds=10, folds=0).folder
 
 
-@pytest.mark.parametrize("kind", ["host", "avr", "cortex-m"])
+@pytest.mark.parametrize("kind", ["host", "avr"])
 def test_every_score_and_type_of_every_frame_is_pythons(
     build: Path, grasp_set: GraspSet, tool: Tool, kind: str
 ) -> None:
@@ -70,7 +69,7 @@ def few_frames(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("few_frames")
 @pytest.mark.parametrize("table_bits", [8, 16])
-@pytest.mark.parametrize("kind", ["host", "avr", pytest.param("cortex-m", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", ["host", "avr"])
 def test_builds_with_linear_joints_are_pythons_too(
     grasp_set: GraspSet, tool: Tool, tmp_path: Path, table_bits: int, kind: str
 ) -> None:
@@ -224,31 +223,27 @@ def test_a_state_of_a_segment_that_is_off_is_found(
 
 
 @pytest.mark.usefixtures("few_frames")
-@pytest.mark.parametrize("kind", ["host", "cortex-m"])
 def test_a_switch_put_into_the_wrong_bit_is_found(
-    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch, kind: str
+    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in TOOLS[kind]:
-        tool(name)
+    tool("gcc")
 
     def turned(layout: Layout) -> list[str]:
         other, one, *rest = layout.places
         return [f"    {{{port}, {1 << bit}}}," for port, bit in (one, other, *rest)]
 
     monkeypatch.setattr(classifier, "_place_lines", turned)
-    found = verify_firmware(build, grasp_set.rows(np.arange(2)), (kind,))
+    found = verify_firmware(build, grasp_set.rows(np.arange(2)), ("host",))
     assert not found.holds
     assert [check.differing > 0 for check in found.checks[:2]] == [False, True]
     assert {check.misnamed for check in found.checks} == {0}
 
 
 @pytest.mark.usefixtures("few_frames")
-@pytest.mark.parametrize("kind", ["host", "cortex-m"])
 def test_names_that_are_mixed_up_are_found(
-    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch, kind: str
+    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in TOOLS[kind]:
-        tool(name)
+    tool("gcc")
     made = classifier_files
 
     def mixed_up(name: str, manifest: Manifest, *arguments: object, **options: object) -> dict[str, str]:
@@ -256,7 +251,7 @@ def test_names_that_are_mixed_up_are_found(
         return made(name, structs.replace(manifest, grasps=grasps), *arguments, **options)  # type: ignore[arg-type]
 
     monkeypatch.setattr(classifier, "classifier_files", mixed_up)
-    found = verify_firmware(build, grasp_set.rows(np.arange(2)), (kind,))
+    found = verify_firmware(build, grasp_set.rows(np.arange(2)), ("host",))
     assert not found.holds
     assert [(check.differing, check.misnamed) for check in found.checks[:2]] == [(0, 2), (0, 2)]
 
@@ -290,7 +285,7 @@ def test_a_build_of_before_carries_no_firmware_and_holds(grasp_set: GraspSet, to
     assert (found.carried.present, found.holds) == (False, True)
 
 
-@pytest.mark.parametrize("kind", ["host", "avr", "cortex-m"])
+@pytest.mark.parametrize("kind", ["host", "avr"])
 def test_without_the_tools_it_says_what_to_install(
     build: Path, grasp_set: GraspSet, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:

@@ -1,7 +1,11 @@
 """Integer tables and manifests of any size, without training anything, and what Python answers by them."""
 
 import hashlib
+import sys
 from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -61,6 +65,15 @@ def _describe(tables: IntegerTables) -> Manifest:
         proof=Proof(16, tables.scale, tables.bound, 6.5, 13.0, 10, 0),
         rates=(Recognised("training", 0, 1, 10, 10),),
     )
+
+
+@pytest.fixture(scope="session")
+def cores(tool: Callable[[str], str]) -> Any:
+    """Return the emulated cores of tests/qemu by the names of their targets."""
+    for name in ("arm-none-eabi-gcc", "qemu-system-arm", "riscv64-unknown-elf-gcc", "qemu-system-riscv32"):
+        tool(name)
+    sys.path.append(str(Path(__file__).parents[2] / "qemu"))
+    return import_module("qemu").CORES
 
 
 @pytest.fixture(scope="session")

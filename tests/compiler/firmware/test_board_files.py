@@ -56,7 +56,7 @@ def generate(make_tables: MakeTables, describe: Describe) -> Generate:
         named = tuple(
             replace(joint, name=name, **(RAW | coded)) for joint, name in zip(manifest.joints, joints, strict=True)
         )
-        layout = arrange(tables, bins="search" if highest > 254 else "direct")
+        layout = arrange(tables)
         board = parse_board(text)
         files = board_files("my_hand", replace(manifest, joints=named), layout, board, mode)
         return whole_folder("my_hand", board, mode, files)

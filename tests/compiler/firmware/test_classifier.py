@@ -69,7 +69,7 @@ def texts(request: pytest.FixtureRequest, make_tables: MakeTables, describe: Des
     tables = make_tables(classes=14, switches=33, joints=2)
     odd = replace(describe(tables), grasps=("*/ #error", *(f"grasp {k} of many words" for k in range(13))))
     notes = ("3260 cycles */", "Grünes Licht")
-    return classifier_files("hand", odd, arrange(tables, bins="trimmed"), avr=request.param, notes=notes)
+    return classifier_files("hand", odd, arrange(tables), avr=request.param, notes=notes)
 
 
 def test_lines_are_ascii_of_120_columns_without_trailing_blanks_or_runs_of_empty_lines(texts: dict[str, str]) -> None:
@@ -119,7 +119,7 @@ def test_the_same_layout_gives_the_same_texts(make_tables: MakeTables, describe:
 
 def test_tables_beyond_what_an_avr_reads_are_refused_for_it_alone(make_tables: MakeTables, describe: Describe) -> None:
     tables = make_tables(classes=300, switches=30)
-    layout = arrange(tables, group_size=6)
+    layout = arrange(tables)
     assert classifier_files("a", describe(tables), layout, avr=False)
     with pytest.raises(FirmwareError, match="an AVR reads constants from the first 65536 bytes"):
         classifier_files("a", describe(tables), layout, avr=True)

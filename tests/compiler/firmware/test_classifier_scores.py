@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from thenar.compiler.firmware import simavr
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.layout import Layout, arrange
+from thenar.compiler.firmware.layout import Layout, Ports, arrange
 from thenar.compiler.firmware.probes import Lost, Probes, joined, lost_inputs, random_frames
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.host import MEMBER as HOST
@@ -23,16 +23,14 @@ Probed = Callable[[IntegerTables, int], Probes]
 SameAsPython = Callable[..., None]
 Tool = Callable[[str], str]
 
-_arrange: Callable[..., Layout] = arrange
-
 
 @dataclass(frozen=True)
 class Case:
-    """Sizes of tables and how these are laid out; all codes of joint `constant` take the same row."""
+    """Sizes of tables, and the ports of their switches; all codes of joint `constant` take the same row."""
 
     tables: dict[str, int]
-    how: dict[str, object]
     constant: int | None = None
+    ports: Ports | None = None
 
 
 def _without_thresholds(tables: IntegerTables, joint: int) -> IntegerTables:
@@ -42,44 +40,42 @@ def _without_thresholds(tables: IntegerTables, joint: int) -> IntegerTables:
     return IntegerTables(*kept, tables.switch_means, tables.joint_means, tables.scale)
 
 
-def _case(bins: str = "direct", entry_bits: int = 16, constant: int | None = None, **sizes: int) -> Case:
-    return Case(sizes, {"bins": bins, "entry_bits": entry_bits}, constant)
+def _case(constant: int | None = None, ports: Ports | None = None, **sizes: int) -> Case:
+    return Case(sizes, constant, ports)
 
 
 WIRED = ((-1, 8, 0, -1, 1), (2, -1, -1, -1, -1, -1, 3, 4), (5, 7, -1, 6))
-MATRIX = ((8, 7, -1, 6, 5, 4, 3, -1), (-1,) * 8, (2, 0, 1))
+# Entries have 16 bits where `reach` is 300 or more, else 8; more than 7 bins of codes of a byte are looked up.
 CASES = {
-    "2 classes": _case(classes=2),
-    "2 classes, bytes": _case(classes=2, entry_bits=8, bins="trimmed"),
-    "3 classes": _case(classes=3, bins="trimmed"),
-    "5 classes, bytes": _case(classes=5, entry_bits=8),
-    "7 classes, bytes, search": _case(classes=7, entry_bits=8, bins="search"),
+    "2 classes": _case(classes=2, reach=300),
+    "2 classes, bytes": _case(classes=2, bins_=9),
+    "3 classes": _case(classes=3, reach=300, bins_=9),
+    "5 classes, bytes": _case(classes=5),
+    "5 classes, sums of bytes": _case(classes=5, reach=3, bins_=9),
     "14 classes, 33 switches, 16 joints": _case(classes=14, switches=33, joints=16, bins_=20, reach=300),
-    "14 classes, bytes, trimmed": _case("trimmed", 8, classes=14, switches=33, joints=16, bins_=20),
-    "codes beyond both ends of the bins": _case("trimmed", joints=3, lowest=40, highest=150),
-    "codes beyond both ends of the bins, bytes": _case("trimmed", 8, joints=3, lowest=40, highest=150),
+    "14 classes, bytes": _case(classes=14, switches=33, joints=16, bins_=20),
+    "codes beyond both ends of the bins": _case(joints=3, lowest=40, highest=150, bins_=9, reach=300),
+    "codes beyond both ends of the bins, bytes": _case(joints=3, lowest=40, highest=150, bins_=9),
     "16 classes": _case(classes=16, reach=1000),
     "17 classes, one of them in two parts": _case(classes=17, reach=1000),
-    "31 classes, two of them in two parts, bytes, search": _case("search", 8, classes=31),
-    "33 classes, bytes, trimmed": _case("trimmed", 8, classes=33),
-    "33 classes, search": _case("search", classes=33),
-    "no joints": _case(joints=0),
-    "no joints, bytes": _case(joints=0, entry_bits=8),
-    "no switches": _case(switches=0, bins="trimmed"),
+    "31 classes, two of them in two parts, bytes": _case(classes=31),
+    "33 classes, bytes": _case(classes=33, bins_=9),
+    "40 classes, sums of bytes": _case(classes=40, reach=3),
+    "33 classes": _case(classes=33, reach=300),
+    "no joints": _case(joints=0, reach=300),
+    "no joints, bytes": _case(joints=0),
+    "no switches": _case(switches=0, bins_=9, reach=300),
     "one switch": _case(switches=1, joints=0),
-    "codes of 16 bits, search": _case("search", joints=4, switches=13, highest=65535),
-    "codes of 16 bits, trimmed": _case("trimmed", joints=4, switches=3, lowest=600, highest=854),
-    "codes of 16 bits, trimmed, bytes": _case("trimmed", 8, joints=4, lowest=900, highest=1154),
+    "codes of 16 bits": _case(joints=4, switches=13, highest=65535, reach=300),
+    "codes of 16 bits, searched, bytes": _case(joints=4, switches=3, lowest=600, highest=854, bins_=20),
     "a constant joint": _case(constant=1),
-    "a constant joint, search": _case("search", constant=0),
-    "a constant joint alone with switches": _case("search", joints=1, constant=0),
-    "ports of a harness": Case({}, {"ports": WIRED, "group_size": 3}),
-    "ports of a harness, groups of three of them, bytes": Case({}, {"ports": WIRED, "group_size": 6, "entry_bits": 8}),
-    "keys of a matrix, a byte without a switch": Case(
-        {}, {"ports": ((8, 7, -1, 6, 5, 4, 3, -1), (-1,) * 8, (2, 0, 1))}
-    ),
-    "254 thresholds": _case("direct", joints=1, bins_=255),
-    "48 look-ups, more than near calls reach": _case("trimmed", switches=160, joints=16, classes=4, reach=150),
+    "a constant joint, bins": _case(constant=0, bins_=9, reach=300),
+    "a constant joint alone with switches": _case(joints=1, constant=0),
+    "ports of a harness": _case(ports=WIRED, reach=300),
+    "ports of a harness, bytes": _case(ports=WIRED),
+    "keys of a matrix, a byte without a switch": _case(ports=((8, 7, -1, 6, 5, 4, 3, -1), (-1,) * 8, (2, 0, 1))),
+    "254 thresholds": _case(joints=1, bins_=255),
+    "56 look-ups": _case(switches=160, joints=16, classes=4, reach=150, bins_=9),
 }
 NAMED = pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 
@@ -98,7 +94,7 @@ def arranged(make_tables: MakeTables) -> Callable[[Case], Layout]:
         tables = IntegerTables(*kept, tables.switch_means, tables.joint_means, tables.scale)
         if case.constant is not None:
             tables = _without_thresholds(tables, case.constant)
-        return _arrange(tables, **case.how)
+        return arrange(tables, case.ports)
 
     return make
 
@@ -122,7 +118,7 @@ def test_portable_c_by_clang_scores_as_python_does(
 
 
 @NAMED
-@pytest.mark.parametrize(("part", "adding"), [("avr328p", "called"), ("avr2560", "unrolled")])
+@pytest.mark.parametrize("part", ["avr328p", "avr2560"])
 def test_assembly_scores_as_python_does(
     avr: None,
     arranged: Callable[[Case], Layout],
@@ -131,9 +127,8 @@ def test_assembly_scores_as_python_does(
     same_as_python: SameAsPython,
     case: Case,
     part: str,
-    adding: str,
 ) -> None:
-    layout = arranged(Case(case.tables, case.how | {"adding": adding}, case.constant))
+    layout = arranged(case)
     files = classifier_files("hand", describe(layout.tables), layout, avr=True)
     frames = probed(layout.tables, 40)
     held = layout.frame_bytes(frames.bits, frames.codes)
@@ -231,12 +226,11 @@ def test_tables_at_the_limit_of_16_bits_borrow_and_carry_as_they_should(
     st.integers(2, 40),
     st.integers(0, 40),
     st.integers(0, 6),
-    st.integers(2, 6),
-    st.sampled_from([8, 16]),
-    st.sampled_from(["direct", "trimmed", "search"]),
+    st.sampled_from([3, 20, 300]),
+    st.sampled_from([6, 9]),
     st.booleans(),
 )
-def test_any_tables_in_any_layout_score_as_python_does(
+def test_any_tables_score_as_python_does(
     tool: Tool,
     make_tables: MakeTables,
     describe: Describe,
@@ -245,39 +239,37 @@ def test_any_tables_in_any_layout_score_as_python_does(
     classes: int,
     switches: int,
     joints: int,
-    group_size: int,
-    entry_bits: int,
-    bins: str,
+    reach: int,
+    bins: int,
     incremental: bool,
 ) -> None:
     tool("gcc")
-    tables = make_tables(seed, classes=classes, switches=switches, joints=max(joints, int(switches == 0)))
-    layout = _arrange(tables, group_size=group_size, entry_bits=entry_bits, bins=bins)
+    sizes = {"classes": classes, "switches": switches, "joints": max(joints, int(switches == 0))}
+    tables = make_tables(seed, **sizes, reach=reach, bins=bins)
+    layout = arrange(tables)
     frames = random_frames(tables, 60, seed=seed)
     files = classifier_files("hand", describe(tables), layout, avr=False)
     held = layout.frame_bytes(frames.bits, frames.codes)
     same_as_python(HOST.run(files, "hand", layout, held, incremental=incremental), tables, frames)
 
 
-@pytest.mark.parametrize("entry_bits", [8, 16])
-@pytest.mark.parametrize(
-    ("bins", "shift", "codes"), [("direct", 40, 256), ("trimmed", 40, 256), ("trimmed", 600, 1024), ("search", 40, 256)]
-)
+@pytest.mark.parametrize("reach", [20, 300])
+@pytest.mark.parametrize(("bins", "shift", "codes"), [(9, 40, 256), (6, 40, 256), (6, 600, 1024), (20, 600, 1024)])
 def test_every_code_finds_its_row_on_both(
     avr: None,
     make_tables: MakeTables,
     describe: Describe,
     same_as_python: SameAsPython,
-    bins: str,
+    bins: int,
     shift: int,
     codes: int,
-    entry_bits: int,
+    reach: int,
 ) -> None:
-    drawn = make_tables(seed=3, switches=2, joints=2, bins=9, highest=100)
+    drawn = make_tables(seed=3, switches=2, joints=2, bins=bins, highest=100, reach=reach)
     shifted = tuple((steps + shift).astype(np.uint16) for steps in drawn.thresholds)
     kept = drawn.bias, drawn.switch_rows, shifted, drawn.joint_rows
     tables = IntegerTables(*kept, drawn.switch_means, drawn.joint_means, drawn.scale)
-    layout = _arrange(tables, bins=bins, entry_bits=entry_bits)
+    layout = arrange(tables)
     every = np.arange(codes, dtype=np.uint16)
     frames = Probes(np.zeros((codes, 2), bool), np.stack([every, every[::-1]], axis=1))
     held = layout.frame_bytes(frames.bits, frames.codes)
@@ -302,18 +294,18 @@ def _watched(call: str) -> str:
 
 @pytest.mark.parametrize("incremental", [False, True], ids=["classify", "update"])
 @pytest.mark.parametrize("classes", [2, 6, 14, 20])
-@pytest.mark.parametrize("entry_bits", [8, 16])
+@pytest.mark.parametrize("reach", [3, 20, 1500])
 def test_assembly_keeps_the_registers_that_c_keeps(
     avr: None,
     make_tables: MakeTables,
     describe: Describe,
     same_as_python: SameAsPython,
-    entry_bits: int,
+    reach: int,
     classes: int,
     incremental: bool,
 ) -> None:
     # Scores beyond a byte, where entries have room for them: the best is in r1:r0 in the end.
-    layout = arrange(make_tables(classes=classes, reach=20 if entry_bits == 8 else 1500), entry_bits=entry_bits)
+    layout = arrange(make_tables(classes=classes, reach=reach))
     files = classifier_files("hand", describe(layout.tables), layout, avr=True)
     call_name = "thenar_hand_update" if incremental else "thenar_hand_classify"
     # Only as a whole word: its section keeps its name.

@@ -30,7 +30,7 @@ BOARDS = {
     "glove chip": ("glove", "atmega2560", '[[chip]]\nkind = "mcp23017"\naddress = 0x20\n' + CHIP + CYBERGLOVE),
 }
 PLATFORM = {target.part: name for name, target in TARGETS.items()}
-COMPILERS = {"avr": "avr-gcc", "cortex": "arm-none-eabi-gcc", "rv32": "riscv64-unknown-elf-gcc", "host": "gcc"}
+COMPILERS = {"avr": "avr-gcc", "host": "gcc"}
 
 
 @pytest.fixture(scope="session")
@@ -63,7 +63,7 @@ def make(folder: Path, *arguments: str) -> str:
     done = subprocess.run(["make", "-C", str(folder), strict, *arguments], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "warning" not in done.stderr, done.stderr
-    return done.stdout + done.stderr  # qemu's semihosting prints on the latter
+    return done.stdout
 
 
 @pytest.mark.parametrize("platform", [name for name in TARGETS if name.startswith(tuple(COMPILERS))])
@@ -74,8 +74,6 @@ def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
     folder = write_folder(classifier(build, platform), tmp_path / "firmware")
     make(folder)
     assert "text" in make(folder, "size")
-    if platform.startswith(("cortex", "rv32")):
-        tool("qemu-system-arm" if platform.startswith("cortex") else "qemu-system-riscv32")
     if not platform.startswith("avr"):
         assert "\n18 frames, predicted as by Python\n" in make(folder, "check")
     make(folder, "clean")
@@ -127,17 +125,17 @@ def test_on_this_machine_the_layout_is_told_without_a_microcontrollers_cycles(bu
     assert not re.search("atmega|cycles|instructions", fit.words)
 
 
-@pytest.mark.parametrize("platform", [name for name, target in TARGETS.items() if target.own_layout])
+@pytest.mark.parametrize("platform", [name for name, target in TARGETS.items() if target.formula])
 def test_more_flash_than_the_part_has_is_refused(build: Build, platform: str) -> None:
     part = TARGETS[platform]
-    assert Firmware(build.tables, build.manifest, platform, flash=part.flash).fit.choice.cost.flash <= part.flash
+    assert Firmware(build.tables, build.manifest, platform, flash=part.flash).fit.target is part
     with pytest.raises(FirmwareError, match=f"{part.part} has {part.flash} bytes$"):
         Firmware(build.tables, build.manifest, platform, flash=part.flash + 1).files()
 
 
 def test_where_any_part_will_do_none_is_chosen_for_flash_that_it_has_not(build: Build) -> None:
     fit = Firmware(build.tables, build.manifest, "arduino", flash=1 << 20).fit
-    assert (fit.target.part, fit.choice.cost.flash <= fit.target.flash) == ("atmega328p", True)
+    assert fit.target.part == "atmega328p"
 
 
 def test_notes_stand_in_the_opening_of_the_header(build: Build) -> None:
@@ -146,16 +144,10 @@ def test_notes_stand_in_the_opening_of_the_header(build: Build) -> None:
     assert "measured on a rainy day" in files["thenar_glove.h"].split("*/")[0]
 
 
-@pytest.mark.parametrize("platform", ["avr328p", "cortex-m4", "host", "arduino"])
-def test_less_flash_is_a_smaller_layout_and_too_little_is_refused(build: Build, platform: str) -> None:
-    whole = Firmware(build.tables, build.manifest, platform).fit.choice
-    smallest = whole.frontier[-1][1].flash
-    assert whole.cost.flash > smallest
-    assert Firmware(build.tables, build.manifest, platform, flash=smallest).fit.choice.cost.flash == smallest
-    # Where any part will do, the largest is the last to refuse: its smallest layout is another.
-    own = TARGETS[platform].own_layout
-    with pytest.raises(FirmwareError, match=f"takes {smallest} bytes of flash" if own else "bytes of flash"):
-        Firmware(build.tables, build.manifest, platform, flash=smallest - 1 if own else smallest // 2).files()
+@pytest.mark.parametrize("platform", ["avr328p", "cortex-m4", "arduino"])
+def test_too_little_flash_is_refused(build: Build, platform: str) -> None:
+    with pytest.raises(FirmwareError, match=r"takes about \d+ bytes of flash"):
+        Firmware(build.tables, build.manifest, platform, flash=500).files()
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,10 @@
-"""The firmware of a small build, byte by byte, as it stands in tests/golden/firmware.
+"""The firmware of a small build, byte by byte: three folders stand in tests/golden/firmware, of the others digests.
 
 After a change that is meant: pytest tests/compiler/firmware/test_golden.py --update-golden, and read the difference.
 """
 
+import hashlib
+import json
 import shutil
 from pathlib import Path
 
@@ -17,6 +19,8 @@ from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Orig
 from thenar.runtime.tables import IntegerTables
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "firmware"
+WHOLE = ("host", "avr328p", "glove-avr2560")
+DIGESTS = GOLDEN / "digests.json"
 
 SWITCHES = ("thumb tip", "index tip", "index middle", "middle tip", "palm radial", "palm ulnar")
 JOINTS = ("thumb_rotation", "index_pij")
@@ -126,7 +130,11 @@ def write(folder: Path, files: dict[str, str]) -> None:
         (folder / name).write_bytes(text.encode())
 
 
-@pytest.mark.parametrize("case", CASES)
+def digests(files: dict[str, str]) -> dict[str, str]:
+    return {path: hashlib.sha256(text.encode()).hexdigest()[:16] for path, text in sorted(files.items())}
+
+
+@pytest.mark.parametrize("case", WHOLE)
 def test_firmware_is_what_it_was(case: str, update_golden: bool) -> None:
     files = made(case)
     if update_golden:
@@ -134,13 +142,20 @@ def test_firmware_is_what_it_was(case: str, update_golden: bool) -> None:
     assert files == content(GOLDEN / case)
 
 
+def test_the_other_firmware_is_what_it_was(update_golden: bool) -> None:
+    found = {case: digests(made(case)) for case in CASES if case not in WHOLE}
+    if update_golden:
+        DIGESTS.write_text(json.dumps(found, indent=1) + "\n")
+    assert found == json.loads(DIGESTS.read_text())
+
+
 def test_there_are_no_other_golden_files() -> None:
-    assert {path.name for path in GOLDEN.iterdir()} == set(CASES)
+    assert {path.name for path in GOLDEN.iterdir()} == {*WHOLE, DIGESTS.name}
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_every_file_ends_with_one_newline_and_is_at_most_120_wide_without_trailing_blanks(case: str) -> None:
-    for name, text in content(GOLDEN / case).items():
+    for name, text in made(case).items():
         assert text.endswith("\n"), name
         assert not text.endswith("\n\n"), name
         for number, line in enumerate(text.splitlines(), 1):

@@ -6,22 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.layout import NO_SWITCH, Bins, Field, Layout, arrange, parts_of, ports_of_scan
+from thenar.compiler.firmware.layout import NO_SWITCH, Field, arrange, parts_of, ports_of_scan
 from thenar.compiler.firmware.probes import Probes
 from thenar.runtime.scanning.scanmap import Port, ScanMap
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
-SHARED = [(), ((None, (0, 1)),), ((0, (2,)), (None, (1, 0))), ((0, (1,)),), ((None, (2, 0, 1)),)]
-ANY_LAYOUT = st.fixed_dictionaries(
-    {"group_size": st.integers(2, 6), "entry_bits": st.sampled_from([8, 16])}
-    | {"bins": st.sampled_from(["direct", "trimmed", "search"])}
-    | {
-        "shared": st.sampled_from(
-            [(), ((None, (0, 1)),), ((0, (2,)), (None, (1, 0))), ((0, (1,)),), ((None, (2, 0, 1)),)]
-        )
-    }
-)
 
 
 def plain_scores(tables: IntegerTables, frames: Probes) -> np.ndarray:
@@ -47,39 +37,39 @@ def without_thresholds(tables: IntegerTables, joint: int) -> IntegerTables:
     )
 
 
-@given(st.integers(0, 99), st.integers(0, 12), st.integers(0, 3), st.sampled_from([3, 12]), ANY_LAYOUT)
+@given(
+    st.integers(0, 99), st.integers(0, 12), st.integers(0, 3), st.sampled_from([3, 12, 300]), st.sampled_from([4, 12])
+)
 def test_scores_are_those_of_the_tables(
-    make_tables: MakeTables, probed: Callable[..., Probes], seed: int, switches: int, joints: int, reach: int, how: dict
+    make_tables: MakeTables, probed: Callable[..., Probes], seed: int, switches: int, joints: int, reach: int, bins: int
 ) -> None:
-    tables = make_tables(seed, switches=switches, joints=joints, bins=4, reach=reach)
+    tables = make_tables(seed, switches=switches, joints=joints, bins=bins, reach=reach)
     if switches + joints == 0:
         return
     frames = probed(tables, 30)
-    how["shared"] = tuple(each for each in how["shared"] if joints == 3 and (each[0] is None or switches > 0))
-    layout = arrange(tables, **how)
-    assert layout.sum_bits == (8 if how["entry_bits"] == 8 and tables.bound <= 127 else 16)
+    layout = arrange(tables)
+    assert (layout.entry_bits, layout.sum_bits) == (8 if reach < 300 else 16, 8 if tables.bound <= 127 else 16)
     assert np.array_equal(layout.scores(frames.bits, frames.codes), plain_scores(tables, frames))
 
 
-@pytest.mark.parametrize("bins", ["direct", "trimmed", "search"])
-@pytest.mark.parametrize("entry_bits", [8, 16])
-def test_every_code_of_a_byte_finds_its_row(make_tables: MakeTables, bins: Bins, entry_bits: int) -> None:
-    tables = make_tables(seed=4, switches=0, joints=1, bins=9)
+@pytest.mark.parametrize("bins", [5, 9])
+@pytest.mark.parametrize("reach", [20, 300])
+def test_every_code_of_a_byte_finds_its_row(make_tables: MakeTables, bins: int, reach: int) -> None:
+    tables = make_tables(seed=4, switches=0, joints=1, bins=bins, reach=reach)
     codes = np.arange(256, dtype=np.uint16)[:, np.newaxis]
-    frames = Probes(np.zeros((256, 0), bool), codes)
-    scores = arrange(tables, bins=bins, entry_bits=entry_bits).scores(frames.bits, codes)
-    assert np.array_equal(scores, plain_scores(tables, frames))
+    layout, frames = arrange(tables), Probes(np.zeros((256, 0), bool), codes)
+    assert layout.joints[0].compared == (bins == 5)
+    assert np.array_equal(layout.scores(frames.bits, codes), plain_scores(tables, frames))
 
 
 def test_groups_are_consecutive_and_as_even_as_can_be(make_tables: MakeTables) -> None:
     tables = make_tables(switches=33)
-    assert [len(group) for group in arrange(tables).groups] == [5, 5, 5, 5, 5, 4, 4]
-    assert [len(group) for group in arrange(tables, n_groups=8).groups] == [5, 4, 4, 4, 4, 4, 4, 4]
+    assert [len(group) for group in arrange(tables).groups] == [4] * 8 + [1]
     assert [number for group in arrange(tables).groups for number in group] == list(range(33))
 
 
 def test_with_wide_entries_row_0_of_a_group_is_zero_and_row_2_to_the_b_its_switch_b(make_tables: MakeTables) -> None:
-    tables = make_tables(switches=11)
+    tables = make_tables(switches=11, reach=300)
     layout = arrange(tables)
     for numbers, lookup in zip(layout.groups, layout.lookups, strict=False):
         rows = lookup.rows
@@ -92,7 +82,7 @@ def test_with_wide_entries_row_0_of_a_group_is_zero_and_row_2_to_the_b_its_switc
 def test_narrow_entries_are_bytes_of_which_every_class_has_a_zero_in_every_look_up(
     make_tables: MakeTables, seed: int
 ) -> None:
-    layout = arrange(make_tables(seed), entry_bits=8)
+    layout = arrange(make_tables(seed))
     assert layout.biased
     for lookup in layout.lookups:
         assert lookup.rows.dtype == np.uint8
@@ -100,27 +90,14 @@ def test_narrow_entries_are_bytes_of_which_every_class_has_a_zero_in_every_look_
 
 
 def test_look_ups_lie_one_after_the_other(make_tables: MakeTables) -> None:
-    layout = arrange(without_thresholds(make_tables(joints=4), 1), bins="trimmed")
+    layout = arrange(without_thresholds(make_tables(joints=4), 1))
     made = layout.lookups
-    assert [lookup.index for lookup in made] == list(range(5))
-    assert [lookup.group for lookup in made] == [0, 1, None, None, None]
+    assert [lookup.index for lookup in made] == list(range(6))
+    assert [lookup.group for lookup in made] == [0, 1, 2, None, None, None]
     assert [joint.number for joint in layout.joints] == [0, 2, 3]
     ends = np.cumsum([len(lookup.rows) for lookup in made]).tolist()
     assert [lookup.first_row for lookup in made] == [0, *ends[:-1]]
     assert ends[-1] == layout.n_rows
-
-
-def test_joints_share_a_look_up_whose_rows_are_all_sums_of_theirs(make_tables: MakeTables) -> None:
-    tables = make_tables(switches=3, joints=3, bins=4)
-    layout = arrange(tables, shared=((0, (2,)), (None, (1, 0))))
-    (mixed, pair), bits = layout.lookups, np.array([[1, 0, 1]], bool)
-    assert (mixed.group, [joint.number for joint in mixed.joints], len(mixed.rows)) == (0, [2], 8 * 4)
-    assert (pair.group, [joint.number for joint in pair.joints], len(pair.rows)) == (None, [1, 0], 4 * 4)
-    # The highest codes add nothing to a row's number; a switch adds its bit.
-    assert [joint.weight for joint in (*mixed.joints, *pair.joints)] == [8, 1, 4]
-    assert np.array_equal(mixed.rows[0b101 + 8], tables.switch_rows[[0, 2]].sum(axis=0) + tables.joint_rows[2][2])
-    assert np.array_equal(pair.rows[1 + 4 * 3], tables.joint_rows[1][2] + tables.joint_rows[0][0])
-    assert layout.group_bytes(bits).tolist() == [[0b101]]
 
 
 def test_a_constant_joint_is_part_of_the_start(make_tables: MakeTables, probed: Callable[..., Probes]) -> None:
@@ -154,20 +131,22 @@ def test_ports_of_a_harness_are_the_bytes_that_show_a_kept_switch_boards_first()
 
 
 def test_groups_are_of_one_port_each_where_no_more_are_needed(make_tables: MakeTables) -> None:
-    eights = arrange(make_tables(switches=32), group_size=4)
+    eights = arrange(make_tables(switches=32))
     assert [[(f.port, f.bit, f.width, f.to) for f in fields] for fields in eights.fields[:3]] == [
         [(0, 0, 4, 0)],
         [(0, 4, 4, 0)],
         [(1, 0, 4, 0)],
     ]
-    wired = arrange(make_tables(switches=9), ports=((-1, 8, 0, 1), (2, 3, 4), (5, 7, -1, 6)), group_size=3)
+    wired = arrange(make_tables(switches=9), ((-1, 8, 0, 1), (2, 3, 4), (5, 7, -1, 6)))
     assert wired.groups == ((8, 0, 1), (2, 3, 4), (5, 7, 6))
     assert [len(fields) for fields in wired.fields] == [1, 1, 2]
-    assert arrange(make_tables(switches=33)).fields[1] == (Field(0, 5, 3, 0), Field(1, 0, 2, 3))
+    spanning = arrange(make_tables(switches=8), ((0, 1, 2), (3, 4, 5), (6, 7)))
+    assert spanning.groups == ((0, 1, 2, 3), (4, 5, 6, 7))
+    assert spanning.fields[0] == (Field(0, 0, 3, 0), Field(1, 0, 1, 3))
 
 
 def test_wide_codes_are_little_endian_at_even_offsets(make_tables: MakeTables) -> None:
-    layout = arrange(make_tables(switches=3, joints=2, highest=700), bins="search")
+    layout = arrange(make_tables(switches=3, joints=2, highest=700))
     frames = layout.frame_bytes(np.ones((1, 3), bool), np.array([[0x1234, 9]], np.uint16))
     assert layout.code_bits == 16
     assert frames.tolist() == [[7, 0, 0x34, 0x12, 9, 0]]
@@ -175,43 +154,18 @@ def test_wide_codes_are_little_endian_at_even_offsets(make_tables: MakeTables) -
 
 def test_a_threshold_of_254_is_the_last_that_a_byte_can_tell(make_tables: MakeTables) -> None:
     assert arrange(make_tables(highest=254)).code_bits == 8
-    assert arrange(make_tables(highest=255), bins="search").code_bits == 16
+    assert arrange(make_tables(highest=255)).code_bits == 16
 
 
-def test_trimmed_bins_serve_wide_codes_whose_thresholds_are_close(make_tables: MakeTables) -> None:
-    tables = make_tables(seed=2, switches=0, joints=1, highest=254)
-    shifted = IntegerTables(
-        tables.bias,
-        tables.switch_rows,
-        (tables.thresholds[0] + np.uint16(900),),
-        tables.joint_rows,
-        tables.switch_means,
-        tables.joint_means,
-        tables.scale,
-    )
-    frames = Probes(np.zeros((1300, 0), bool), np.arange(1300, dtype=np.uint16)[:, np.newaxis])
-    layout = arrange(shifted, bins="trimmed")
-    assert np.array_equal(layout.scores(frames.bits, frames.codes), plain_scores(shifted, frames))
-
-
-def refused(tables: IntegerTables, **how: object) -> str:
-    arranged: Callable[..., Layout] = arrange
+def refused(tables: IntegerTables) -> str:
     with pytest.raises(FirmwareError) as raised:
-        arranged(tables, **how)
+        arrange(tables)
     return str(raised.value)
 
 
 def test_what_cannot_be_laid_out_is_refused(make_tables: MakeTables) -> None:
-    wide = make_tables(highest=800)
     assert "uses no switch and no joint" in refused(make_tables(switches=0, joints=0))
-    assert "entries of 12 bits" in refused(make_tables(), entry_bits=12)
-    assert "groups of 9 switches" in refused(make_tables(), group_size=9)
-    assert "1 groups of at most 5 for 9 switches: use 2 groups or more" in refused(make_tables(), n_groups=1)
-    assert '"trimmed" or "search", not by "direct"' in refused(wide)
-    assert 'find their rows by "search"' in refused(wide, bins="trimmed")
-    assert "compile with --table-bits 8" in refused(make_tables(reach=300), entry_bits=8)
-    assert "a lookup of 512 rows" in refused(make_tables(joints=3, bins=8), shared=((None, (0, 1, 2)),))
-    assert "300 rows" in refused(make_tables(bins=300, highest=3000), bins="search")
+    assert "300 rows" in refused(make_tables(bins=300, highest=3000))
 
 
 @given(st.integers(2, 1024))

@@ -39,13 +39,6 @@ def avr(tool: Callable[[str], str]) -> None:
         tool("libsimavr-dev")
 
 
-@pytest.fixture
-def arm(tool: Callable[[str], str]) -> None:
-    """Need a compiler for Arm's cores, and their emulator."""
-    for program in ("arm-none-eabi-gcc", "qemu-system-arm"):
-        tool(program)
-
-
 def _random_model(seed: int) -> SegmentModel:
     """Return costs that differ from state to state, with some shortest durations in common, and all shifts in turn."""
     random = np.random.default_rng(seed)
@@ -104,12 +97,11 @@ def test_on_an_avr_it_is_pythons_state_at_every_tick(runs: Any, avr: None, seed:
 
 
 @pytest.mark.parametrize("core", ["cortex-m0plus", "cortex-m4"])
-def test_on_arms_cores_it_is_pythons_state_at_every_tick(runs: Any, arm: None, core: str) -> None:
-    target = TARGETS.named(core)
+def test_on_arms_cores_it_is_pythons_state_at_every_tick(runs: Any, cores: Any, core: str) -> None:
     for model in (_random_model(5), runs.models()["each type its own"]):
         lanes, refused = _lanes(runs, model, 250, 1)
         expected = runs.python_states(model, lanes, refused, LAG)
-        np.testing.assert_array_equal(runs.run_cortex(model, lanes, refused, LAG, target).states, expected)
+        np.testing.assert_array_equal(runs.run_cortex(model, lanes, refused, LAG, cores[core].emulate).states, expected)
 
 
 def test_on_an_avr_a_tick_of_14_types_and_none_takes_the_cycles_and_the_memory_that_the_docs_say(
@@ -135,15 +127,14 @@ def test_firmware_of_a_build_that_has_costs_of_segments_brings_the_decoder_along
     make_tables: Callable[..., IntegerTables],
     describe: Callable[[IntegerTables], Manifest],
     avr: None,
-    arm: None,
     target: str,
 ) -> None:
     tables = make_tables()
     manifest = _learnt(tables, describe)
     files = Firmware(tables, manifest, target).files()
     plain = Firmware(tables, describe(tables), target).files()
-    if target == "rust":
-        assert files.keys() - plain.keys() == {"src/segments.rs"}
+    if target == "micropython":
+        assert "Segmenter()" in files["README.md"]
         return
     more = {path.rsplit("/", 1)[-1] for path in files.keys() - plain.keys()}
     assert more >= {"thenar_glove_segments.h", "thenar_glove_segments.c"}
@@ -151,17 +142,11 @@ def test_firmware_of_a_build_that_has_costs_of_segments_brings_the_decoder_along
         assert "/src/thenar_glove_segments.c\n" in files["CMakeLists.txt"]
         assert "thenar_glove_segment_push\tKEYWORD2" in files["keywords.txt"]
         return
-    if target == "micropython":
-        assert "/thenar_glove_segments.c\n" in files["modules/thenar_glove/micropython.mk"]
-        assert "Segmenter()" in files["README.md"]
+    if "Makefile" not in files:
         return
     with workshop(files) as folder:
         call(["make", "all"], folder)
-        if target == "wasm":
-            assert "class Segmenter" in files["thenar_glove.js"]
-            assert b"segment_push" in (folder / "thenar_glove.wasm").read_bytes()
-        else:
-            assert (folder / "thenar_glove_segments.o").is_file()
+        assert (folder / "thenar_glove_segments.o").is_file()
 
 
 def test_more_types_than_a_byte_numbers_are_refused() -> None:

@@ -1,4 +1,4 @@
-"""The folders for this machine and for a Cortex-M, made and checked by their own Makefiles."""
+"""The folder for this machine, made and checked by its own Makefile."""
 
 import re
 import subprocess
@@ -20,13 +20,6 @@ MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
 Make = Callable[..., "subprocess.CompletedProcess[str]"]
 
-TOOLS = {
-    "host": ("gcc",),
-    "cortex-m0plus": ("arm-none-eabi-gcc", "qemu-system-arm"),
-    "cortex-m4": ("arm-none-eabi-gcc", "qemu-system-arm"),
-    "rv32imac": ("riscv64-unknown-elf-gcc", "qemu-system-riscv32"),
-}
-PARTS = tuple(TOOLS)
 AGREED = f"{CHECKS} frames, predicted as by Python\n"
 SHAPES = {
     "switches_and_joints": {"classes": 14, "switches": 33, "joints": 16},
@@ -37,9 +30,9 @@ SHAPES = {
 }
 
 
-def files_for(part: str, layout: Layout, manifest: Manifest) -> dict[str, str]:
+def files_for(layout: Layout, manifest: Manifest) -> dict[str, str]:
     library = Library("hand", manifest, layout, avr=False)
-    files = TARGETS[part].files(library)
+    files = TARGETS["host"].files(library)
     assert {path: files[path] for path in library.files} == library.files
     return files
 
@@ -48,9 +41,8 @@ def files_for(part: str, layout: Layout, manifest: Manifest) -> dict[str, str]:
 def make(tool: Callable[[str], str], tmp_path: Path) -> Make:
     """Return what writes files into a folder and runs make there."""
 
-    def make(part: str, files: Mapping[str, str], *arguments: str) -> "subprocess.CompletedProcess[str]":
-        for program in TOOLS[part]:
-            tool(program)
+    def make(files: Mapping[str, str], *arguments: str) -> "subprocess.CompletedProcess[str]":
+        tool("gcc")
         for name, text in files.items():
             (tmp_path / name).write_text(text)
         command = [tool("make"), "-s", *arguments]
@@ -61,86 +53,68 @@ def make(tool: Callable[[str], str], tmp_path: Path) -> Make:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", list(SHAPES))
-@pytest.mark.parametrize("part", PARTS)
 def test_a_folder_checks_itself_without_a_warning(
-    make: Make, make_tables: MakeTables, describe: Describe, part: str, shape: str
+    make: Make, make_tables: MakeTables, describe: Describe, shape: str
 ) -> None:
     tables = make_tables(**SHAPES[shape])
-    files = files_for(part, arrange(tables, bins="search"), describe(tables))
+    files = files_for(arrange(tables), describe(tables))
     assert [line for text in files.values() for line in text.splitlines() if len(line) > 120] == []
-    done = make(part, files, "CFLAGS=-O2 -Werror", "check")
+    done = make(files, "CFLAGS=-O2 -Werror", "check")
     assert (done.returncode, done.stdout + done.stderr) == (0, AGREED)
 
 
-@pytest.mark.parametrize("part", PARTS)
 def test_a_classifier_with_a_wrong_entry_fails_its_check(
-    make: Make, make_tables: MakeTables, describe: Describe, part: str
+    make: Make, make_tables: MakeTables, describe: Describe
 ) -> None:
     tables = make_tables()
-    files = files_for(part, arrange(tables), describe(tables))
+    files = files_for(arrange(tables), describe(tables))
     wrong = re.sub(
         r"START\((-?\d+), ", lambda found: f"START({int(found[1]) + 1}, ", files["thenar_hand_tables.c"], count=1
     )
     assert wrong != files["thenar_hand_tables.c"]
-    done = make(part, files | {"thenar_hand_tables.c": wrong}, "check")
+    done = make(files | {"thenar_hand_tables.c": wrong}, "check")
     assert done.returncode != 0
     assert "predictions differ from Python's\n" in done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("part", PARTS)
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [("{0, 1}, {0, 2},", "{0, 2}, {0, 1},"), ('"grasp 0",\n    "grasp 1"', '"grasp 1",\n    "grasp 0"')],
 )
 def test_a_wrong_bit_of_a_switch_and_a_wrong_name_fail_the_check(
-    make: Make, make_tables: MakeTables, describe: Describe, part: str, right: str, wrong: str
+    make: Make, make_tables: MakeTables, describe: Describe, right: str, wrong: str
 ) -> None:
     tables = make_tables()
-    files = files_for(part, arrange(tables), describe(tables))
+    files = files_for(arrange(tables), describe(tables))
     text = files["thenar_hand_tables.c"]
     assert text.count(right) == 1
-    done = make(part, files | {"thenar_hand_tables.c": text.replace(right, wrong)}, "check")
+    done = make(files | {"thenar_hand_tables.c": text.replace(right, wrong)}, "check")
     assert done.returncode != 0
     assert "predictions differ from Python's" in done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("part", PARTS)
 def test_make_builds_says_the_size_and_cleans_up(
-    make: Make, make_tables: MakeTables, describe: Describe, tmp_path: Path, part: str
+    make: Make, make_tables: MakeTables, describe: Describe, tmp_path: Path
 ) -> None:
     tables = make_tables()
-    files = files_for(part, arrange(tables), describe(tables))
-    made = "libthenar_hand.a" if part == "host" else "thenar_hand.elf"
-    assert make(part, files).returncode == 0
-    assert (tmp_path / made).exists()
-    size = make(part, {}, "size")
+    files = files_for(arrange(tables), describe(tables))
+    assert make(files).returncode == 0
+    assert (tmp_path / "libthenar_hand.a").exists()
+    size = make({}, "size")
     assert size.stdout.split()[:4] == ["text", "data", "bss", "dec"]
-    assert make(part, {}, "clean").returncode == 0
+    assert make({}, "clean").returncode == 0
     assert {path.name for path in tmp_path.iterdir()} == files.keys()
 
 
 @pytest.mark.parametrize("changed", ["thenar_hand.c", "thenar_hand.h", "thenar_hand_check.h"])
-@pytest.mark.parametrize("part", PARTS)
 def test_what_a_changed_file_is_part_of_is_made_again(
-    make: Make, make_tables: MakeTables, describe: Describe, part: str, changed: str
+    make: Make, make_tables: MakeTables, describe: Describe, changed: str
 ) -> None:
     tables = make_tables()
-    assert make(part, files_for(part, arrange(tables), describe(tables)), "check").returncode == 0
-    again = make(part, {}, "-n", "-W", changed, "check").stdout
+    assert make(files_for(arrange(tables), describe(tables)), "check").returncode == 0
+    again = make({}, "-n", "-W", changed, "check").stdout
     assert ("-c -o thenar_hand.o thenar_hand.c" in again) == (changed != "thenar_hand_check.h")
-    assert ("check.c" in again if part == "host" else "-c -o main.o main.c" in again) or changed == "thenar_hand.c"
-
-
-def test_flash_runs_the_command_that_it_is_given_and_asks_for_one_otherwise(
-    make: Make, make_tables: MakeTables, describe: Describe
-) -> None:
-    tables = make_tables()
-    files = files_for("cortex-m0plus", arrange(tables), describe(tables))
-    asked = make("cortex-m0plus", files, "flash")
-    assert asked.returncode != 0
-    assert asked.stdout == "set FLASH_WITH to the command that programs your part: see the top of the Makefile\n"
-    done = make("cortex-m0plus", {}, "flash", "FLASH_WITH=@echo programming $<")
-    assert (done.returncode, done.stdout) == (0, "programming thenar_hand.elf\n")
+    assert "check.c" in again
 
 
 def test_the_frames_are_the_extreme_ones_and_others_at_the_thresholds(make_tables: MakeTables) -> None:

@@ -10,7 +10,7 @@ from thenar.compiler import compile_build
 from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.firmware import FirmwareError, simavr
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.layout import Adding, Layout, arrange
+from thenar.compiler.firmware.layout import Layout, arrange
 from thenar.compiler.firmware.probes import Predictions, Probes, random_frames
 from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.compiler.recordings.graspset import GraspSet
@@ -103,7 +103,7 @@ def test_every_score_of_recordings_is_that_of_the_build(
 ) -> None:
     build, grasps = recorded
     frames = Probes(*select_inputs(grasps, build.manifest))
-    layout = arrange(build.tables, bins="search")
+    layout = arrange(build.tables)
     files = classifier_files("test", build.manifest, layout, avr=True)
     given = layout.frame_bytes(frames.bits, frames.codes)
     same_as_python(target.run(files, "test", layout, given, incremental=incremental), build.tables, frames)
@@ -123,35 +123,10 @@ def test_every_score_is_pythons_on_all_extreme_frames_and_random_ones(
     highest: int,
     incremental: bool,
 ) -> None:
-    tables = make_tables(seed=entry_bits + highest, highest=highest)
-    layout = arrange(tables, entry_bits=entry_bits, bins="direct" if highest < 255 else "search")
+    tables = make_tables(seed=entry_bits + highest, highest=highest, reach=20 if entry_bits == 8 else 300)
+    layout = arrange(tables)
     frames = probed(tables, 1000)
     same_as_python(answered(tables, describe, layout, target, frames, incremental), tables, frames)
-
-
-@BOTH
-@pytest.mark.parametrize("entry_bits", [16, 8])
-@pytest.mark.parametrize("adding", ["called", "unrolled"])
-@pytest.mark.parametrize(("classes", "switches", "joints"), [(14, 33, 16), (14, 33, 0), (3, 0, 4), (17, 12, 5)])
-def test_no_frame_takes_longer_than_the_static_bound_nor_far_less(
-    make_tables: MakeTables,
-    describe: Describe,
-    probed: Probed,
-    target: Target,
-    entry_bits: int,
-    adding: Adding,
-    classes: int,
-    switches: int,
-    joints: int,
-) -> None:
-    tables = make_tables(seed=1, classes=classes, switches=switches, joints=joints)
-    layout = arrange(tables, entry_bits=entry_bits, adding=adding)
-    answers = answered(tables, describe, layout, target, probed(tables, 200))
-    assert answers.cost is not None
-    assert answers.unit == "cycles"
-    bound = target.cost(layout).cycles
-    print(f"{answers.cost.min()} to {answers.cost.max()} cycles, bound {bound}, {answers.stack} bytes of stack")
-    assert bound - 16 <= answers.cost.max() <= bound
 
 
 @BOTH

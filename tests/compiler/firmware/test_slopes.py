@@ -1,21 +1,18 @@
-"""Firmware of tables with slopes: exact to the bit on every target, and counted to the cycle on an AVR."""
+"""Firmware of tables with slopes: exact to the bit on every target."""
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import product
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware.assembly import products
-from thenar.compiler.firmware.avr_costs import AvrCosts, rises, worst_frame
-from thenar.compiler.firmware.choose import features, fit_for
-from thenar.compiler.firmware.classifier import Library, classifier_files
-from thenar.compiler.firmware.layout import Adding, arrange
-from thenar.compiler.firmware.measuring import measure
+from thenar.compiler.firmware.choose import features
+from thenar.compiler.firmware.classifier import classifier_files
+from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.one_hand import on_bytes
 from thenar.compiler.firmware.probes import Probes, changing_frames, extreme_frames, joined, random_frames
 from thenar.compiler.firmware.targets import TARGETS
@@ -44,11 +41,11 @@ SHAPES: dict[str, Shape] = {
 EACH = pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
 
 
-def _tables(seed: int, shape: Shape) -> IntegerTables:
-    """Return random tables, whose rows of bins are small enough for bytes, or multiples of 256."""
+def _tables(seed: int, shape: Shape, most: int = 20) -> IntegerTables:
+    """Return random tables: rows of bins are at most `most`, or multiples of 256."""
     classes, switches, joints, binned, slopes, wide, coarse = shape
     random = np.random.default_rng(seed)
-    top, unit, most = (60_000 if wide else 255), (COARSE if coarse else 1), (2 if coarse else 20)
+    top, unit, most = (60_000 if wide else 255), (COARSE if coarse else 1), (2 if coarse else most)
 
     def rows(*size: int) -> np.ndarray:
         return (unit * random.integers(-most, most + 1, size)).astype(np.int16)
@@ -99,85 +96,47 @@ def _frames(tables: IntegerTables, n: int) -> Probes:
     return joined(extreme_frames(tables), random_frames(tables, n, 1), changing_frames(tables))
 
 
-def _is_exact(tables: IntegerTables, name: str, entry_bits: int, adding: Adding) -> None:
-    """Hold classify() and update() of a target against Python, and what they take against the model."""
-    layout = arrange(tables, entry_bits=entry_bits, bins="trimmed", adding=adding)
-    target, frames = TARGETS[name], _frames(tables, 40)
-    worst_bits, worst_codes = worst_frame(layout)
-    bits, codes = np.vstack([frames.bits, worst_bits]), np.vstack([frames.codes, worst_codes])
-    expected, cost = integer_scores(tables, bits, codes), target.cost(layout)
-    assert np.array_equal(layout.scores(bits, codes), expected)
+def _is_exact(tables: IntegerTables, runs: Any) -> None:
+    """Hold classify() and update() of a target against Python."""
+    layout = arrange(tables)
+    target, frames = getattr(runs, "target", runs), _frames(tables, 40)
+    expected = integer_scores(tables, frames.bits, frames.codes)
+    assert np.array_equal(layout.scores(frames.bits, frames.codes), expected)
     files = classifier_files("hand", numbered(tables), layout, avr=target.avr)
-    for incremental, most in ((False, cost.cycles), (True, cost.update_cycles)):
-        answers = target.run(files, "hand", layout, layout.frame_bytes(bits, codes), incremental=incremental)
+    sent = layout.frame_bytes(frames.bits, frames.codes)
+    for incremental in (False, True):
+        answers = runs.run(files, "hand", layout, sent, incremental=incremental)
         assert np.array_equal(answers.scores, expected)
         assert np.array_equal(answers.classes, expected.argmax(axis=1))
-        if answers.cost is None:
-            continue
-        assert answers.cost.max() <= most
-        if target.avr and not incremental:
-            costs = AvrCosts(layout, target.flash)
-            assert np.array_equal(answers.cost, costs.fixed_cycles + rises(layout, bits, codes))
-            assert answers.cost.max() == answers.cost[-1]
-        if target.avr and entry_bits == 8:
-            # Few frames have every class better than the one before; no frame opens and closes switches of all groups;
-            # and in few a wide code differs in its second byte alone, for which both are compared.
-            bytes_compared = tables.n_joints * len(layout.parts.firsts) * (1 if layout.code_bits == 8 else 6)
-            assert most <= answers.cost.max() + tables.n_classes + bytes_compared
 
 
-@pytest.mark.parametrize(
-    ("shape", "entry_bits"),
-    [pytest.param(shape, (8, 16)[n % 2], id=name) for n, (name, shape) in enumerate(SHAPES.items())],
-)
-def test_in_portable_c_scores_are_python_s(tool: Tool, shape: Shape, entry_bits: int) -> None:
-    tool("cc")
-    _is_exact(_tables(3, shape), "host", entry_bits, "called")
+# Rows whose entries fit in bytes, and rows that need words.
+WIDTHS = pytest.mark.parametrize("most", [20, 300], ids=["bytes", "words"])
 
 
 @EACH
-@pytest.mark.parametrize(("entry_bits", "adding"), [(8, "unrolled"), (16, "called")])
-def test_on_an_avr_scores_are_python_s_and_cycles_the_model_s(
-    tool: Tool, shape: Shape, entry_bits: int, adding: Adding
-) -> None:
+def test_in_portable_c_scores_are_python_s(tool: Tool, shape: Shape) -> None:
+    tool("cc")
+    _is_exact(_tables(3, shape), TARGETS["host"])
+    _is_exact(_tables(3, shape, 300), TARGETS["host"])
+
+
+@WIDTHS
+@EACH
+def test_on_an_avr_scores_are_python_s(tool: Tool, shape: Shape, most: int) -> None:
     tool("avr-gcc")
-    _is_exact(_tables(0, shape), "avr328p", entry_bits, adding)
+    _is_exact(_tables(0, shape, most), TARGETS["avr328p"])
 
 
 @pytest.mark.slow
+@WIDTHS
 @EACH
-@pytest.mark.parametrize("seed", range(3))
-def test_so_they_are_of_more_tables_and_on_larger_parts(tool: Tool, shape: Shape, seed: int) -> None:
-    for needed in ("avr-gcc", "arm-none-eabi-gcc", "qemu-system-arm"):
-        tool(needed)
-    tables = _tables(10 + seed, shape)
-    for name in ("avr2560", "cortex-m0plus", "cortex-m4"):
-        _is_exact(tables, name, 8, "called")
-        _is_exact(tables, name, 16, "unrolled")
-
-
-@EACH
-def test_flash_and_ram_are_within_the_bound(tool: Tool, shape: Shape) -> None:
+def test_so_they_are_of_more_tables_and_on_larger_parts(tool: Tool, cores: Any, shape: Shape, most: int) -> None:
     tool("avr-gcc")
-    tables = _tables(5, shape)
-    fit = fit_for(TARGETS["avr328p"], tables)
-    measured = measure(Library("hand", numbered(tables), fit.choice.layout, avr=True), fit)
-    assert measured.holds
-    assert measured.most_flash <= measured.flash + 9 * (tables.n_classes + 1) + 500
-
-
-@given(seed=st.integers(0, 1000))
-@settings(deadline=None, max_examples=30)
-def test_of_all_frames_of_small_tables_none_takes_longer(seed: int) -> None:
-    tables = _tables(seed, (5, 2, 2, 1, 2, False, False))
-    slopes = tuple(replace(slope, low=slope.low % 50, high=slope.low % 50 + 12, gain=4) for slope in tables.slopes)
-    layout = arrange(replace(tables, slopes=slopes, bias=tables.bias * 20), bins="trimmed")
-    codes = range(0, 256, 3)
-    frames = np.array(list(product((0, 1), (0, 1), codes, codes)))
-    longest = rises(layout, frames[:, :2].astype(bool), frames[:, 2:].astype(np.uint16)).max()
-    worst_bits, worst_codes = worst_frame(layout)
-    worst = rises(layout, worst_bits[np.newaxis], worst_codes[np.newaxis])
-    assert longest <= worst
+    for seed in range(10, 13):
+        tables = _tables(seed, shape, most)
+        for part in (TARGETS["avr2560"], cores["cortex-m0plus"], cores["cortex-m4"]):
+            _is_exact(tables, part)
 
 
 @given(st.lists(st.integers(-128, 127), min_size=1, max_size=14))
@@ -203,9 +162,6 @@ def test_a_glove_s_bytes_keep_a_slope_where_they_are_codes_and_have_a_row_each_e
     )
 
 
-def test_a_layout_says_that_codes_are_multiplied() -> None:
-    layout = arrange(_tables(1, SHAPES["switches, upper halves"]), entry_bits=8)
-    assert features(layout, TARGETS["avr328p"]) == (
-        "8-bit entries, the upper halves of steps, up to 5 switches per lookup, codes multiplied, "
-        "rows added by one routine"
-    )
+def test_a_layout_says_that_entries_are_upper_halves() -> None:
+    layout = arrange(_tables(1, SHAPES["switches, upper halves"]))
+    assert features(layout) == "8-bit entries, the upper halves of steps"

@@ -40,8 +40,8 @@ def test_every_score_and_class_is_python_s_without_a_warning_or_a_finding(
     incremental: bool,
     compiler: str,
 ) -> None:
-    tables = make_tables(classes=14, switches=33, joints=16)
-    layout, frames = arrange(tables, entry_bits=entry_bits), probed(tables, 10_000)
+    tables = make_tables(classes=14, switches=33, joints=16, reach=20 if entry_bits == 8 else 300)
+    layout, frames = arrange(tables), probed(tables, 10_000)
     answers = HOST.run(
         files(layout),
         "hand",
@@ -78,7 +78,7 @@ def test_so_it_is_for_builds_of_any_shape(
     incremental: bool,
 ) -> None:
     tables = make_tables(**SHAPES[shape])
-    layout = arrange(tables, bins="search" if SHAPES[shape].get("highest", 0) > 254 else "direct")
+    layout = arrange(tables)
     frames = probed(tables, 300)
     sent = layout.frame_bytes(frames.bits, frames.codes)
     same_as_python(HOST.run(files(layout), "hand", layout, sent, incremental=incremental), tables, frames)

@@ -110,8 +110,8 @@ def test_the_example_prints_the_grasp_that_python_finds(
     board: str,
     entry_bits: int,
 ) -> None:
-    tables = make_tables(**ON_A_BOARD[board])
-    elf = sketch(library(arrange(tables, entry_bits=entry_bits)), board)
+    tables = make_tables(**ON_A_BOARD[board], reach=20 if entry_bits == 8 else 300)
+    elf = sketch(library(arrange(tables)), board)
     build = Build(describe(tables), tables)
     # Nothing is wired: pulled up, every switch is open; the simulator's analog inputs are at 0 V.
     codes = np.ones(tables.n_joints, np.uint16)
@@ -169,7 +169,7 @@ def test_a_mega_takes_33_switches_and_16_joints(make_tables: MakeTables, library
 def test_it_refuses_readings_of_which_nothing_is_known(
     make_tables: MakeTables, library: Library, sketch: Sketch
 ) -> None:
-    made = library(arrange(make_tables(highest=1000), bins="search"), known=False)
+    made = library(arrange(make_tables(highest=1000)), known=False)
     assert "{0, 0}, /* j0: code 0 and code 50 */" in (made / "examples/Recognise/Recognise.ino").read_text()
     for given in ("-DCALIBRATED=1", "-DSHOW_READINGS"):
         sketch(made, "uno", given)

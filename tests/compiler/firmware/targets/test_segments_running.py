@@ -1,4 +1,4 @@
-"""The decoder of segments beside the classifier, in every language: Python's state at every frame of whole streams."""
+"""The decoder of segments beside the classifier, in C and MicroPython: Python's state at every frame of streams."""
 
 from collections.abc import Callable
 
@@ -20,15 +20,28 @@ from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
-KINDS = ("cortex-m0plus", "host", "micropython", "rust", "rv32imac", "wasm")
+KINDS = ("cortex-m0plus", "host", "micropython", "rv32imac")
+Running = Callable[..., Predictions]
 TICKS = 3 * STREAM_TICKS + 77  # several streams, the last without its end
 
 
 @pytest.fixture(params=KINDS)
-def target(request: pytest.FixtureRequest, tool: Callable[[str], str]) -> str:
-    if missing := TARGETS[request.param].missing():
+def running(request: pytest.FixtureRequest, tool: Callable[[str], str]) -> Running:
+    """Return what runs a manifest's classifier on frames, of which some inputs may be lost."""
+    target = TARGETS[request.param]
+    runs = target if target.kind else request.getfixturevalue("cores")[target.name]
+    if missing := runs.missing():
         tool(missing.split()[0])
-    return str(request.param)
+
+    def run(manifest: Manifest, tables: IntegerTables, frames: Probes, lost: Lost | None) -> Predictions:
+        layout = arrange(tables)
+        library = Library("hand", manifest, layout, avr=False)
+        files = target.sources(library) if target.kind else library.files | library.segments
+        sent = layout.frame_bytes(frames.bits, frames.codes)
+        found: Predictions = runs.run(files, "hand", layout, sent, incremental=lost is not None, lost=lost)
+        return found
+
+    return run
 
 
 def movements(tables: IntegerTables, seed: int) -> tuple[Probes, Lost]:
@@ -66,13 +79,6 @@ def scores_of(build: Build, frames: Probes, lost: Lost) -> NDArray[np.int64]:
     return np.array([without(bits, codes, row[:s], row[s:]) for bits, codes, row in held]) - LANE_OFFSET
 
 
-def ran(target: str, manifest: Manifest, tables: IntegerTables, frames: Probes, lost: Lost | None) -> Predictions:
-    member, layout = TARGETS[target], arrange(tables)
-    files = member.sources(Library("hand", manifest, layout, avr=False))
-    sent = layout.frame_bytes(frames.bits, frames.codes)
-    return member.run(files, "hand", layout, sent, incremental=lost is not None, lost=lost)
-
-
 def described(tables: IntegerTables, describe: Describe, kind: str) -> Manifest:
     """Return a manifest with costs of segments, and a class "none", a rejection of some of the frames, or neither."""
     manifest = replace(describe(tables), segments=model_of(tables, kind == "class none", 5))
@@ -87,14 +93,14 @@ def described(tables: IntegerTables, describe: Describe, kind: str) -> Manifest:
 
 @pytest.mark.parametrize("kind", ["class none", "refusals", "neither"])
 def test_every_state_is_python_s_with_missing_inputs_ends_and_restarts(
-    target: str, make_tables: MakeTables, describe: Describe, kind: str
+    running: Running, make_tables: MakeTables, describe: Describe, kind: str
 ) -> None:
     tables = make_tables(seed=4, classes=6, reach=60)
     manifest = described(tables, describe, kind)
     assert manifest.segments is not None
     frames, lost = movements(tables, 8)
     for missing in (None, lost):
-        found = ran(target, manifest, tables, frames, missing)
+        found = running(manifest, tables, frames, missing)
         scores = scores_of(Build(manifest, tables), frames, np.zeros_like(lost) if missing is None else lost)
         assert np.array_equal(found.scores, scores)
         refused = found.classes == tables.n_classes
@@ -106,8 +112,8 @@ def test_every_state_is_python_s_with_missing_inputs_ends_and_restarts(
 
 
 def test_a_build_without_costs_of_segments_has_no_decoder(
-    target: str, make_tables: MakeTables, describe: Describe
+    running: Running, make_tables: MakeTables, describe: Describe
 ) -> None:
     tables = make_tables()
     frames, _ = movements(tables, 1)
-    assert ran(target, describe(tables), tables, frames, None).states is None
+    assert running(describe(tables), tables, frames, None).states is None

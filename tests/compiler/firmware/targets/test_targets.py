@@ -18,7 +18,7 @@ def test_every_target_says_what_it_is_and_what_to_do_with_its_folder(name: str) 
     assert "{folder}" in target.next_step
     assert target.modes[0] == "classify"
     assert not target.kind or target.missing() is None or "apt-get install" in str(target.missing())
-    if target.kind and target.own_layout:
+    if target.kind and target.formula:
         assert target.compiler is not None
         assert target.size is not None
 
@@ -34,7 +34,7 @@ def test_an_atmega328p_has_32_kib_of_flash_and_2_of_ram() -> None:
 
 
 def test_what_is_verified_and_what_is_timed_is_read_off_the_targets() -> None:
-    assert kinds() == ("host", "avr", "cortex-m", "riscv", "xtensa", "micropython", "wasm", "rust")
+    assert kinds() == ("host", "avr", "micropython")
     assert timed() == ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "rv32imac", "host", "pi")
 
 
@@ -46,7 +46,6 @@ def test_a_target_that_is_none_is_refused_with_those_that_are() -> None:
 def test_a_target_without_a_simulator_says_so(make_tables: Callable[..., IntegerTables]) -> None:
     core = Target(name="rv64", part="rv64gc", help="a core", flash=1 << 17, ram=1 << 14)
     layout = arrange(make_tables())
-    assert core.cost(layout) == TARGETS["cortex-m4"].cost(layout)
     assert core.missing() == "thenar has no simulator of an rv64gc"
     with pytest.raises(FirmwareError, match="no simulator of an rv64gc"):
         core.run({}, "hand", layout, np.zeros((1, 5), np.uint8))

@@ -1,9 +1,7 @@
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.choose import choose, features, flash_shares
+from thenar.compiler.firmware.choose import features, fit_for
 from thenar.compiler.firmware.targets import TARGETS, timed
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
@@ -15,44 +13,28 @@ PYTHON = PythonCost(1.0, 0.1, 0.2, 0.3, 0.01, 0.02, 10.0)
 TABLES = random_tables(33, 16, 14)
 
 
-@pytest.mark.parametrize("target", ["avr328p", "avr2560"])
-def test_on_an_avr_the_options_are_the_layouts_worth_choosing_at_their_bounds_of_cycles(target: str) -> None:
-    avr, options = TARGETS[target], ClassifyModel(target).options(TABLES)
-    best = [(layout, cost) for layout, cost in choose(TABLES, avr).frontier if cost.flash <= flash_shares(avr)[1]]
-    assert [option.layout for option in options] == [features(layout, avr) for layout, _ in best]
-    assert [option.us for option in options] == [cost.cycles / 16 for _, cost in best]
-    assert [(option.flash, option.ram) for option in options] == [(cost.flash, cost.ram) for _, cost in best]
-    assert {option.how for option in options} == {"model"}
-
-
 @pytest.mark.parametrize("target", [target for target in timed() if target not in ("host", "pi")])
-def test_of_two_options_the_slower_is_smaller(target: str) -> None:
-    options = ClassifyModel(target).options(TABLES)
-    assert len(options) > 2
-    for faster, slower in pairwise(options):
-        assert faster.us < slower.us
-        assert faster.flash > slower.flash
+def test_an_option_costs_what_the_formula_of_the_target_says(target: str) -> None:
+    part, model = TARGETS[target], ClassifyModel(target)
+    (option,) = model.options(TABLES)
+    fit = fit_for(part, TABLES)
+    assert fit.cost is not None
+    assert (option.layout, option.us, option.how) == (features(fit.layout), model.us(fit.cost.cycles), "model")
+    assert (option.flash, option.ram) == (fit.cost.flash, fit.cost.ram)
 
 
-def test_layouts_that_leave_no_room_for_the_rest_of_the_firmware_are_no_options() -> None:
-    part, tables = TARGETS["avr328p"], random_tables(48, 22, 28)
-    most, options = flash_shares(part)[1], ClassifyModel("avr328p").options(tables)
-    assert any(cost.flash > most for _, cost in choose(tables, part).frontier)
-    assert options
-    assert all(option.flash <= most for option in options)
-
-
-def test_tables_that_fit_in_no_layout_have_no_option() -> None:
+def test_tables_that_do_not_fit_have_no_option() -> None:
     assert ClassifyModel("avr328p").options(random_tables(160, 22, 60)) == ()
 
 
 @pytest.mark.parametrize("target", ["cortex-m0plus", "cortex-m4"])
 def test_instructions_take_a_cycle_each_at_a_clock_that_is_said(target: str) -> None:
     usual, slow = ClassifyModel(target), ClassifyModel(target, clock_hz=8_000_000)
-    fastest = choose(TABLES, TARGETS[target]).frontier[0][1]
-    assert slow.options(TABLES)[0].us == fastest.cycles / 8
+    cost = fit_for(TARGETS[target], TABLES).cost
+    assert cost is not None
+    assert slow.options(TABLES)[0].us == cost.cycles / 8
     assert usual.options(TABLES)[0].us == pytest.approx(
-        fastest.cycles * 1e6 / {"cortex-m0plus": 48e6, "cortex-m4": 64e6}[target]
+        cost.cycles * 1e6 / {"cortex-m0plus": 48e6, "cortex-m4": 64e6}[target]
     )
     assert "at 8 MHz" in slow.note
     assert "lower bound" in slow.note

@@ -74,10 +74,7 @@
 thenar_glove_classify:
 #ifdef __AVR_HAVE_ELPM__
     /* Tables beyond the first 64 KiB would be misread: stop. */
-    ldi   r30, hh8(thenar_glove_rows + 455)
-    cpse  r30, r1
-    jmp   abort
-    ldi   r30, hh8(thenar_glove_bins + 511)
+    ldi   r30, hh8(thenar_glove_rows + 137)
     cpse  r30, r1
     jmp   abort
 #endif
@@ -86,7 +83,7 @@ thenar_glove_classify:
     std   Y+1, r1
     ldd   r30, Y+0
     tst   r30
-    breq  1f /* 0 times */
+    breq  1f
     start_without
     rjmp  2f
 1:
@@ -98,23 +95,43 @@ thenar_glove_classify:
     ldi   r27, hi8(7)
 2:
 
-    /* switches 0 to 5 */
+    /* switches 0 to 2 */
     ldd   r30, Y+2
-    andi  r30, 0x3f
+    andi  r30, 0x07
     to_row 0, r30
-    add_row
+    call  add_row_at_z
 
-    /* thumb_rotation, index_pij */
+    /* switches 3 to 5 */
+    ldd   r30, Y+2
+    lsl   r30
+    swap  r30
+    andi  r30, 0x07
+    to_row 48, r30
+    call  add_row_at_z
+
+    /* thumb_rotation */
     ldd   r30, Y+3
-    ldi   r31, hi8(thenar_glove_bins + 0)
-    lpm   r30, Z
-    mov   r0, r30
+    clr   r0
+    clr   r1
+    cpi   r30, lo8(61)
+    adc   r0, r1
+    cpi   r30, lo8(62)
+    adc   r0, r1
+    cpi   r30, lo8(141)
+    adc   r0, r1
+    to_row 96, r0
+    call  add_row_at_z
+
+    /* index_pij */
     ldd   r30, Y+4
-    ldi   r31, hi8(thenar_glove_bins + 256)
-    lpm   r30, Z
-    add   r30, r0
-    to_row 384, r30
-    add_row
+    clr   r0
+    clr   r1
+    cpi   r30, lo8(91)
+    adc   r0, r1
+    cpi   r30, lo8(201)
+    adc   r0, r1
+    to_row 120, r0
+    call  add_row_at_z
 
     to_glove 0
     st    Z+, r22
@@ -144,6 +161,10 @@ thenar_glove_answer:
     clr   r1
     pop   r29
     pop   r28
+    ret
+
+add_row_at_z:
+    add_row
     ret
     .size thenar_glove_classify, . - thenar_glove_classify
 
@@ -186,8 +207,8 @@ thenar_glove_update:
     ldd   r31, Y+1
     subi  r31, 1
     or    r30, r31
-    breq  1f /* 0 times */
-    rjmp thenar_glove_prepare
+    breq  1f
+    jmp   thenar_glove_prepare
 1:
 
 changes_0:
@@ -200,9 +221,9 @@ loads_0:
     ldd   r26, Z+4
     ldd   r27, Z+5
 
-    /* switches 0 to 5 */
+    /* switches 0 to 2 */
     ldd   r30, Y+2
-    andi  r30, 0x3f
+    andi  r30, 0x07
     ldd   r31, Y+5
     cp    r30, r31
     breq  1f
@@ -210,19 +231,38 @@ loads_0:
     movw  r0, r30
     ldi   r30, lo8(thenar_glove_rows + 0)
     ldi   r31, hi8(thenar_glove_rows + 0)
-    rcall switches_0
+    call  switches_0
 1:
 
-    /* thumb_rotation, index_pij */
-    ldd   r30, Y+3
-    ldd   r31, Y+7
-    brts  1f
+    /* switches 3 to 5 */
+    ldd   r30, Y+2
+    lsl   r30
+    swap  r30
+    andi  r30, 0x07
+    ldd   r31, Y+6
     cp    r30, r31
-    brne  1f
-    ldd   r30, Y+4
-    ldd   r31, Y+8
+    breq  1f
+    std   Y+6, r30
+    movw  r0, r30
+    ldi   r30, lo8(thenar_glove_rows + 48)
+    ldi   r31, hi8(thenar_glove_rows + 48)
+    call  switches_0
+1:
+
+    /* thumb_rotation */
+    ldd   r30, Y+3
+    ldd   r31, Y+9
+    brts  1f
     cpse  r30, r31
-1:  rcall change_0_1
+1:  call  change_0_2
+2:
+
+    /* index_pij */
+    ldd   r30, Y+4
+    ldd   r31, Y+10
+    brts  1f
+    cpse  r30, r31
+1:  call  change_0_3
 2:
 
     to_glove 0
@@ -247,36 +287,58 @@ thenar_glove_prepare:
     ldd   r30, Y+1
     tst   r30
     breq  1f
-    rjmp changes_0
+    jmp   changes_0
 1:  ldi   r30, 1
     std   Y+1, r30
     set
     ldi   r30, 0
     std   Y+5, r30
+    std   Y+6, r30
     to_glove START
-    rjmp loads_0
+    jmp   loads_0
 
-change_0_1:
-    ldd   r30, Y+3
-    std   Y+7, r30
-    ldi   r31, hi8(thenar_glove_bins + 0)
-    lpm   r30, Z
-    mov   r0, r30
-    ldd   r30, Y+4
-    std   Y+8, r30
-    ldi   r31, hi8(thenar_glove_bins + 256)
-    lpm   r30, Z
-    add   r30, r0
-    ldd   r31, Y+6
+change_0_2:
+    std   Y+9, r30
+    clr   r0
+    clr   r1
+    cpi   r30, lo8(61)
+    adc   r0, r1
+    cpi   r30, lo8(62)
+    adc   r0, r1
+    cpi   r30, lo8(141)
+    adc   r0, r1
+    mov   r30, r0
+    ldd   r31, Y+7
     brts  1f
     cp    r30, r31
     breq  2f
 1:
-    std   Y+6, r30
+    std   Y+7, r30
     movw  r0, r30
-    ldi   r30, lo8(thenar_glove_rows + 384)
-    ldi   r31, hi8(thenar_glove_rows + 384)
-    rjmp replace_0
+    ldi   r30, lo8(thenar_glove_rows + 96)
+    ldi   r31, hi8(thenar_glove_rows + 96)
+    jmp   replace_0
+2:  ret
+
+change_0_3:
+    std   Y+10, r30
+    clr   r0
+    clr   r1
+    cpi   r30, lo8(91)
+    adc   r0, r1
+    cpi   r30, lo8(201)
+    adc   r0, r1
+    mov   r30, r0
+    ldd   r31, Y+8
+    brts  1f
+    cp    r30, r31
+    breq  2f
+1:
+    std   Y+8, r30
+    movw  r0, r30
+    ldi   r30, lo8(thenar_glove_rows + 120)
+    ldi   r31, hi8(thenar_glove_rows + 120)
+    jmp   replace_0
 2:  ret
 
 /* Add row r0 of those at Z, and subtract row r1, unless the sums hold no rows yet. */
@@ -300,7 +362,7 @@ switches_0:
     tst   r0
     breq  1f
     to_row_r0
-    rcall add_row_at_z
+    call  add_row_at_z
 1:  pop   r30
     tst   r30
     brne  subtract_0
@@ -322,11 +384,6 @@ subtract_0:
     sbc   r27, r0
     ret
 
-add_row_at_z:
-    add_row
-    ret
-
-thenar_glove_update_near:
     .size thenar_glove_update, . - thenar_glove_update
 
     .section .text.thenar_glove_start_without, "ax", @progbits

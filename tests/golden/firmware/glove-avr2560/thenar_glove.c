@@ -229,12 +229,13 @@ static void take(uint32_t word, uint_fast16_t k, uint32_t ones, largest *best)
 /* Find the rows that an input adds. */
 static void find(const thenar_glove_frame *input, thenar_glove_seen *found)
 {
-    found->rows[0] = thenar_glove_rows[(input->switches[0] & 0x3Fu)];
-    found->rows[1] = thenar_glove_rows[64u + ((input->codes[0] <= 60u) ? 1u : 0u)
+    found->rows[0] = thenar_glove_rows[(input->switches[0] & 0x07u)];
+    found->rows[1] = thenar_glove_rows[8u + ((((uint32_t)input->switches[0] >> 3) & 0x07u))];
+    found->rows[2] = thenar_glove_rows[16u + ((input->codes[0] <= 60u) ? 1u : 0u)
         + ((input->codes[0] <= 61u) ? 1u : 0u)
-        + ((input->codes[0] <= 140u) ? 1u : 0u)
-        + (4u * (((input->codes[1] <= 90u) ? 1u : 0u)
-        + ((input->codes[1] <= 200u) ? 1u : 0u)))];
+        + ((input->codes[0] <= 140u) ? 1u : 0u)];
+    found->rows[3] = thenar_glove_rows[20u + ((input->codes[1] <= 90u) ? 1u : 0u)
+        + ((input->codes[1] <= 200u) ? 1u : 0u)];
 }
 
 #endif
@@ -256,12 +257,13 @@ static void add_up(thenar_glove *glove, largest *best)
 #else
     HIDE(row_bytes);
 #endif
-    ADD(ROW(0, (input->switches[0] & 0x3Fu)));
-    ADD(ROW(1, 64u + ((input->codes[0] <= 60u) ? 1u : 0u)
+    ADD(ROW(0, (input->switches[0] & 0x07u)));
+    ADD(ROW(1, 8u + ((((uint32_t)input->switches[0] >> 3) & 0x07u))));
+    ADD(ROW(2, 16u + ((input->codes[0] <= 60u) ? 1u : 0u)
             + ((input->codes[0] <= 61u) ? 1u : 0u)
-            + ((input->codes[0] <= 140u) ? 1u : 0u)
-            + (4u * (((input->codes[1] <= 90u) ? 1u : 0u)
-            + ((input->codes[1] <= 200u) ? 1u : 0u)))));
+            + ((input->codes[0] <= 140u) ? 1u : 0u)));
+    ADD(ROW(3, 20u + ((input->codes[1] <= 90u) ? 1u : 0u)
+            + ((input->codes[1] <= 200u) ? 1u : 0u)));
     ADD_START(start);
     PREDICT(0u, best);
 }
@@ -315,12 +317,13 @@ static void find_changes(thenar_glove *glove, changes *changed)
 #else
     HIDE(row_bytes);
 #endif
-    NOTE(0, ROW(0, (input->switches[0] & 0x3Fu)));
-    NOTE(1, ROW(1, 64u + ((input->codes[0] <= 60u) ? 1u : 0u)
+    NOTE(0, ROW(0, (input->switches[0] & 0x07u)));
+    NOTE(1, ROW(1, 8u + ((((uint32_t)input->switches[0] >> 3) & 0x07u))));
+    NOTE(2, ROW(2, 16u + ((input->codes[0] <= 60u) ? 1u : 0u)
             + ((input->codes[0] <= 61u) ? 1u : 0u)
-            + ((input->codes[0] <= 140u) ? 1u : 0u)
-            + (4u * (((input->codes[1] <= 90u) ? 1u : 0u)
-            + ((input->codes[1] <= 200u) ? 1u : 0u)))));
+            + ((input->codes[0] <= 140u) ? 1u : 0u)));
+    NOTE(3, ROW(3, 20u + ((input->codes[1] <= 90u) ? 1u : 0u)
+            + ((input->codes[1] <= 200u) ? 1u : 0u)));
     changed->again = !glove->begun || (end > &changed->rows[MOST_REPLACED]);
     changed->end = end;
 }

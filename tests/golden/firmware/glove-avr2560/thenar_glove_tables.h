@@ -9,8 +9,8 @@
 #define CLASSES THENAR_GLOVE_CLASSES
 #define INPUTS 8u
 #define PARTS 1u
-#define ROWS 76u
-#define LOOKUPS 2u
+#define ROWS 23u
+#define LOOKUPS 4u
 #define LANES 2u /* words of two sums */
 
 #ifdef __AVR__

@@ -2,8 +2,7 @@
  * @file thenar_glove.h
  * @brief Recognises 3 grasp types from 6 switches and 2 joints of a glove.
  *
- * Layout for this machine: 16-bit entries, up to 6 switches per lookup, codes looked up in 256 bytes a joint, up to
- * 2 joints per lookup, as on the smallest part that holds the build.
+ * Layout for this machine: 16-bit entries.
  *
  * From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.h.j2.
  */
@@ -64,7 +63,7 @@ typedef struct {
 
 /** The inputs included in the sums; private. */
 typedef struct {
-    const uint32_t *rows[2];
+    const uint32_t *rows[4];
 } thenar_glove_seen;
 
 /** One glove. A program may have any number; a copy is another glove. */

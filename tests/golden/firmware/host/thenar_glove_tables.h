@@ -9,8 +9,8 @@
 #define CLASSES THENAR_GLOVE_CLASSES
 #define INPUTS 8u
 #define PARTS 1u
-#define ROWS 76u
-#define LOOKUPS 2u
+#define ROWS 23u
+#define LOOKUPS 4u
 #define LANES 2u /* words of two sums */
 
 #define IN_FLASH
@@ -22,7 +22,6 @@
 typedef uint32_t thenar_glove_row[WORDS];
 
 extern const thenar_glove_row thenar_glove_rows[PARTS * ROWS];
-extern const uint8_t thenar_glove_bins[512];
 extern const char thenar_glove_names[4][14];
 
 /* The place of a switch in the input: byte and bit. */
