@@ -61,8 +61,9 @@ class Point:
 def drawn(seed: int) -> IntegerTables:
     """Return random tables of a build such as compile makes: of bins or of lines, with narrow or wide rows."""
     random = np.random.default_rng(seed)
-    classes, switches = int(random.integers(3, 33)), int(random.integers(4, 49))
-    joints = int(random.integers(0, 21))
+    classes, switches, joints = (int(random.integers(*ends)) for ends in ((3, 33), (4, 49), (1, 21)))
+    alone = random.choice(["switches", "joints", "neither"], p=(0.25, 0.15, 0.6))
+    switches, joints = switches * (alone != "joints"), joints * (alone != "switches")
     most, wide = int(random.choice([1, 25, 25, 300, 300])), random.random() < 0.2
     lines = int(random.integers(1, joints + 1)) if joints and random.random() < 0.25 else 0
     unit = COARSE if lines and random.random() < 0.5 else 1

@@ -185,7 +185,7 @@ def _check(target: "Target", mode: "Mode", *, writes: bool, measures: bool) -> N
     """Raise UsageError for options that conflict."""
     if mode == "scan" and measures:
         raise click.UsageError("A board that only scans has no classifier: leave out --measure.")
-    if target.formula is None and not target.any_part and measures:
+    if target.kind == "host" and measures:
         raise click.UsageError("The host has no cycle counts: --measure is for microcontrollers.")
     if not writes and not measures:
         raise click.UsageError("Nothing to do: name a folder to write with -o, or add --measure.")

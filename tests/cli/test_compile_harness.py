@@ -37,9 +37,7 @@ def test_a_proposed_harness_is_loaded_and_reads_every_kept_switch_in_one_go(
     assert len(scan.ports) == 1
     assert "mcp23017 at 0x20" in done.stdout
     assert "a whole scan: 1 transaction, 98.8 us on the wire, 100.0% of the 98.8 us" in " ".join(done.stdout.split())
-    verified = thenar("verify", build, set_file)
-    assert verified.returncode == 0
-    assert "scan map: 1.00 of 1 ports read on average until a row is decided" in " ".join(verified.stdout.split())
+    assert thenar("verify", build, set_file).returncode == 0
 
 
 def test_the_map_is_printed_chip_by_chip_with_its_share_of_all_that_is_wired(

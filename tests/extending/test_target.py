@@ -26,7 +26,7 @@ int main()
         for (unsigned i = 0; i < THENAR_GLOVE_SWITCHES; ++i)
             thenar_glove_set_switch(&glove, static_cast<thenar_glove_switch>(i), (closed >> i & 1u) != 0);
         glove.input.codes[0] = static_cast<thenar_glove_code>(code);
-        std::cout << thenar_glove_grasp(thenar_glove_held(&glove, thenar_glove_classify(&glove), 0u));
+        std::cout << thenar_glove_grasp(thenar_glove_held(&glove, thenar_glove_classify(&glove)));
         for (int score : glove.scores)
             std::cout << ' ' << score;
         std::cout << '\\n';
