@@ -16,12 +16,13 @@ from thenar.runtime.names import SHOWN, list_names, nearest, shortened
 from thenar.runtime.published import NONE
 
 from .cells import Parsed, Value, bits, codes, integers, names, numbers, times
-from .clocks import Course, possible_clocks
+from .clocks import Course, possible_clocks, words_of
 from .coding import CodingCost, coarse, code_joint
 from .columns import KEYS, Columns, Selection, read_columns, select
 from .errors import TYPES, ColumnsError, RecordingError, TableError, check_names, check_room, list_rows
-from .frames import check_trials
+from .frames import check_trials, looks_like_frames
 from .graspset import GraspSet
+from .inputs import WORDS
 from .summary import Finding, find_oddities
 from .table import Table, read_table
 from .taxonomy import Taxonomy, own, plain, published
@@ -453,7 +454,9 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         times_us=times_us,
         simulated=columns.simulated,
     )
+    grasp_set, believed = _believed(grasp_set, columns)
     warnings += [
+        *believed,
         *check_trials(grasp_set, ColumnsError),
         *aliases,
         *coarse(zip(costs, readings.joints.T, strict=True)),
@@ -466,6 +469,22 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
             '[[taxels]] of the columns.toml above which value they are closed (threshold = 0.4), or threshold = "otsu"'
         )
     return grasp_set, report_of(table.what, grasp_set, costs, warnings, notes)
+
+
+def _believed(grasp_set: GraspSet, columns: Columns) -> tuple[GraspSet, list[Finding]]:
+    """Return the set, and a finding where its rows are alike but count as trials all the same: one each, by a column
+    whose name says so. Nothing else in them differs from frames.
+    """
+    named = [name for name in columns.parts("trial") if words_of(name) & WORDS["trial"]]
+    alone = len(np.unique(grasp_set.trial_ids)) == len(grasp_set)
+    reason = looks_like_frames(grasp_set) if named and alone and not grasp_set.independent else None
+    if reason is None:
+        return grasp_set, []
+    message = (
+        f"{reason}: they count as trials, because column {shortened(named[0])} numbers them; if they are frames, their "
+        "accuracy will be too high: name the column that numbers whole trials"
+    )
+    return replace(grasp_set, independent=True), [Finding("alike trials", len(grasp_set), message)]
 
 
 def _renamed(table: Table, names: dict[str, str]) -> Table:

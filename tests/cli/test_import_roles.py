@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -171,6 +172,28 @@ def test_true_trials_in_blocks_are_imported_with_a_warning(frames: int, import_c
     assert len(set(grasp_set.trial_ids.tolist())) == 60
     assert "warning: trials resemble the trial before: within a subject, grasp type, object and session" in warnings
     assert "name the blocks (`session`)" in warnings
+
+
+def test_true_trials_of_one_row_in_blocks_are_imported_with_a_warning(
+    import_cells: Import, thenar: Callable[..., Any], tmp_path: Path
+) -> None:
+    cells = dict(in_blocks(1))
+    grasp_set, _, warnings = import_cells(cells)
+    assert len(set(grasp_set.trial_ids.tolist())) == 60
+    assert "warning: the rows look like frames of fewer trials: within a subject, grasp type" in warnings
+    assert "they count as trials, because column trial numbers them" in warnings
+    evaluated = thenar("evaluate", tmp_path / "set.grasps", "--tables", "compositions", "--repeats", 1)
+    assert evaluated.returncode == 0, evaluated.stderr
+    assert "each row counts as a trial" in " ".join(evaluated.stderr.split())
+    cells["sample_no"] = cells.pop("trial")
+    pd.DataFrame(cells).to_csv(tmp_path / "frames.csv", index=False)
+    (tmp_path / "columns.toml").write_text(
+        'label = "grasp"\ntrial = "sample_no"\n[[joints]]\ncolumns = ["f*"]\nunit = "counts"\n'
+    )
+    columns = ("--columns", tmp_path / "columns.toml")
+    refused = thenar("import", tmp_path / "frames.csv", "-o", tmp_path / "f.grasps", *columns)
+    assert refused.returncode == 2
+    assert "the rows look like frames of fewer trials" in refused.stderr
 
 
 def test_pieces_of_trials_are_no_trials(
