@@ -169,7 +169,7 @@ def find_frontier(
     made = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
         cache = Cache(store, report or _unheard, _ROUNDS, jobs=jobs)
-        with _taken_back_if_refused(made):
+        with _taken_back_if_refused(made, store):
             records = _records(grasp_set, harness, target, joint_us, record_time, filtered)
             equipment = equipment_for(target, _wirings(grasp_set, harness, target), cache, records)
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
@@ -185,11 +185,12 @@ def find_frontier(
 
 
 @contextmanager
-def _taken_back_if_refused(made: Sequence[Path]) -> Iterator[None]:
+def _taken_back_if_refused(made: Sequence[Path], store: Store) -> Iterator[None]:
     """Remove files and folders that a run made if its request is refused; files added by others meanwhile stay."""
     try:
         yield
     except (FrontierError, BuildError, HarnessError):
+        store.finish()
         with suppress(OSError):
             for path in made:
                 (path.rmdir if path.is_dir() else path.unlink)()
