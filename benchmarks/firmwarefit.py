@@ -98,7 +98,7 @@ def drawn(seed: int) -> IntegerTables:
 
 
 def runner(target: Target) -> Any:
-    """Return what runs a target's classifier and counts: the target itself, or its core in tests/qemu."""
+    """Return the target if thenar runs and counts its code, otherwise its core in tests/qemu."""
     if target.kind:
         return target
     sys.path.append(str(Path(__file__).parents[1] / "tests" / "qemu"))

@@ -60,7 +60,7 @@ class ClassifyModel:
         return self.target, self.clock_hz, self.python, self.factor
 
     def options(self, tables: IntegerTables) -> tuple[Classified, ...]:
-        """Return what tables cost; empty where they do not fit."""
+        """Return the cost of tables; empty where they do not fit."""
         if self.part is None:
             assert self.python is not None
             size = len(tables_to_bytes(tables))
