@@ -102,8 +102,8 @@ def _sum_macros(width: int, bits: int) -> list[str]:
     """Return the macros of words that are sums of their entries, each shifted to its lane."""
     letters = "abcd"[: 32 // bits]
     cells = (f"(uint32_t)(int32_t)({letter})" + (f" << {bits * at}" if at else "") for at, letter in enumerate(letters))
-    whole = "QUAD" if bits == 8 else "PAIR"
-    sums = " + ".join(f"({cell})" if "<<" in cell else cell for cell in cells)
+    whole, more = ("QUAD", " \\\n    + ") if bits == 8 else ("PAIR", " + ")
+    sums = more.join(f"({cell})" if "<<" in cell else cell for cell in cells)
     given, rest = ", ".join(letters), width % len(letters)
     macros = [f"{whole}({given}) ({sums})"]
     if rest:
@@ -270,8 +270,8 @@ def _row_lines(row: Sequence[int], entry_bits: int, what: str) -> list[str]:
         held = row[at : at + at_once]
         name = macro if len(held) == at_once else "REST"
         cells.append(f"{name}(" + ", ".join(f"{number:{digits}d}" for number in held) + ")")
-    half = 4
-    joined = [", ".join(cells[at : at + half]) for at in range(0, len(cells), half)]
+    most = 4 if sum(len(cell) + 2 for cell in cells[:4]) + len(_INDENT) < COLUMNS else 3
+    joined = [", ".join(cells[at : at + most]) for at in range(0, len(cells), most)]
     text = _INDENT + "{" + f",\n{_INDENT} ".join(joined) + "},"
     lines = text.split("\n")
     ending = f" /* {what} */"
