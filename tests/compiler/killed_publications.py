@@ -68,7 +68,7 @@ def _publish_frontier(files: Content, folder: Path) -> None:
 def _empty_store() -> str:
     with TemporaryDirectory() as folder:
         Store(Path(folder) / "store.sqlite", "scope").close()
-        return (Path(folder) / "store.sqlite").read_text("latin-1")
+        return (Path(folder) / "store.sqlite").read_bytes().decode("latin-1")
 
 
 BUILD = {"build.json": "new", "ensemble.bin": "new", "spec/spec.json": "new"}
@@ -107,11 +107,12 @@ def _before(kind: Kind, folder: Path) -> None:
     shutil.rmtree(folder.parent, ignore_errors=True)
     for path, text in {**kind.old, **kind.kept}.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text, "latin-1")
+        (folder / path).write_bytes(text.encode("latin-1"))
 
 
 def _content(folder: Path) -> Content:
-    return {str(path.relative_to(folder)): path.read_text("latin-1") for path in folder.rglob("*") if path.is_file()}
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    return {str(path.relative_to(folder)): path.read_bytes().decode("latin-1") for path in files}
 
 
 def _found(kind: Kind, folder: Path) -> str:

@@ -69,7 +69,7 @@ static void scan(uint32_t seed, uint32_t now_us)
     }
     thenar_board_found(known);
     thenar_debounce(keys, known, now_us);
-    thenar_board_scanned(keys, known, (seed & 8) != 0, now_us);
+    thenar_board_scanned(keys, known, now_us);
     thenar_board_grasp((uint8_t)seed, (uint16_t)(seed >> 8), (uint8_t)(seed & 3), now_us);
     full = (seed & 7) == 7;
 }
