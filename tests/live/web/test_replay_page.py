@@ -4,6 +4,7 @@ import os
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
@@ -57,7 +58,9 @@ def recording(run: Callable[[], Any], tmp_path: Path) -> tuple[Path, dict[int, t
         scene.grasps.wait(lambda grasp, after=begun_us: grasp.time_us > after + 400_000, begun_us)
         spans[row] = begun_us, now_us()
         for event, time_us in (("begun", begun_us), ("captured", spans[row][1]), ("accepted", spans[row][1])):
-            recorder.label(Label(time_us, event, number, answer, "A", "thing"))  # type: ignore[arg-type]
+            label = Label(time_us, event, number, answer, "A", "thing")  # type: ignore[arg-type]
+            # A run writes no labels itself: in its thread, as the next moment comes at any time.
+            recorder._thread.put(partial(recorder._recorder.label, label))
         recorder.mark(Mark(now_us(), f"row {row}"))
     running.end()
     recorder.close()
