@@ -107,7 +107,9 @@ for number in range(0, {switches}, 3):
 for joint in range({joints}):
     glove.set_code(joint, 40 * joint)
 grasp = glove.classify()
-print(glove.margin(), *[glove.probability(k) for k in range({classes})], glove.held(grasp), glove.held(grasp, 1))
+print(glove.margin(), *[glove.probability(k) for k in range({classes})], glove.held(grasp))
+glove.lose_switch(1, True)
+print(glove.held(grasp))
 print(library.NONE, library.NAMES[library.NONE])
 """
 
@@ -137,10 +139,11 @@ def test_margin_probability_and_refusal_are_python_s(
     manifest = structs.replace(describe(tables), rejection=rejection)
     files = TARGET.sources(Library("hand", manifest, layout, avr=False))
     program = MORE.format(switches=tables.n_switches, joints=j, classes=k)
-    said, of_none = printed(files, program, tmp_path).splitlines()
+    said, with_a_switch_lost, of_none = printed(files, program, tmp_path).splitlines()
     margin, *shares = map(int, said.split())
     assert margin == scores.max() - np.sort(scores)[-2]
-    assert shares == [*Softmax(tables.scale).probabilities(scores.tolist()), k, best]
+    assert shares == [*Softmax(tables.scale).probabilities(scores.tolist()), k]
+    assert int(with_a_switch_lost) == best
     assert of_none == f"{k} none"
 
 
