@@ -32,10 +32,10 @@ def test_costs_of_fifty_builds_are_near_those_of_the_formula(cores: Any, name: s
             points.append(point)
     assert len(points) == BUILDS
     for part, coefficients in (("time", formula.cycles), ("flash", formula.flash), ("ram", formula.ram)):
-        values = np.array([getattr(point, part) for point in points])
+        values = [int(getattr(point, part)) for point in points]
         found = np.abs(errors(coefficients, points, values))
         if part == "time" and not TARGETS[name].avr:
-            found *= values / np.maximum(values, LEAST)
+            found *= np.array(values) / np.maximum(values, LEAST)
         print(f"{name}, {part}: {100 * found.mean():.1f} %, at most {100 * found.max():.1f} %")
         assert found.mean() < 0.07, part
         assert found.max() < WITHIN[name], part
