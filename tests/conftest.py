@@ -127,6 +127,7 @@ IN_REAL_TIME = {"live"}
 # alone with a long one at the end, and what a module sets up is set up once.
 LONGEST = (
     "stability/test_catalogue.py",
+    "test_written_bytes.py",
     "fuzz/test_fuzz_recordings.py",
     "compiler/frontier/test_find.py",
     "fuzz/test_fuzz_files.py",
