@@ -86,14 +86,14 @@ def run_group(arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         raise
     except BaseException as fault:
-        if _nobody_reads(fault):
+        if _is_broken_pipe(fault):
             return 1
         echo(f"thenar: {_sentence(fault, arguments)}", err=True)
         return 2
     return code if isinstance(code, int) else 0
 
 
-def _nobody_reads(fault: BaseException) -> bool:
+def _is_broken_pipe(fault: BaseException) -> bool:
     """Return whether this is how click ends when the reader of standard output has gone, such as `head`."""
     reason = fault.__context__
     return isinstance(fault, SystemExit) and isinstance(reason, OSError) and reason.errno == errno.EPIPE

@@ -454,9 +454,9 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         times_us=times_us,
         simulated=columns.simulated,
     )
-    grasp_set, believed = _believed(grasp_set, columns)
+    grasp_set, alike = _trials_by_name(grasp_set, columns)
     warnings += [
-        *believed,
+        *alike,
         *check_trials(grasp_set, ColumnsError),
         *aliases,
         *coarse(zip(costs, readings.joints.T, strict=True)),
@@ -471,7 +471,7 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
     return grasp_set, report_of(table.what, grasp_set, costs, warnings, notes)
 
 
-def _believed(grasp_set: GraspSet, columns: Columns) -> tuple[GraspSet, list[Finding]]:
+def _trials_by_name(grasp_set: GraspSet, columns: Columns) -> tuple[GraspSet, list[Finding]]:
     """Return the set, and a finding where its rows are alike but count as trials all the same: one each, by a column
     whose name says so. Nothing else in them differs from frames.
     """
@@ -481,8 +481,8 @@ def _believed(grasp_set: GraspSet, columns: Columns) -> tuple[GraspSet, list[Fin
     if reason is None:
         return grasp_set, []
     message = (
-        f"{reason}: they count as trials, because column {shortened(named[0])} numbers them; if they are frames, their "
-        "accuracy will be too high: name the column that numbers whole trials"
+        f"{reason}: they count as trials, because column {shortened(named[0])} numbers them; the accuracy of frames "
+        "would be too high: if they are frames, name the column that numbers whole trials"
     )
     return replace(grasp_set, independent=True), [Finding("alike trials", len(grasp_set), message)]
 

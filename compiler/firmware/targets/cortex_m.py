@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from ..costs import Formula
+from ..costs import RAM_OF_32_BITS, Formula
 from ..tools import ARM_COMPILER
 from .base import Target
 
@@ -53,16 +53,7 @@ MEMBER = (
                 "padded rows": 0.8684,
                 "tables": 1.199,
             },
-            ram={
-                "one": 7.194,
-                "byte classes": 0.7187,
-                "found": 1.939,
-                "kept found": 0.1425,
-                "sum words": 12.53,
-                "compared codes": 1.396,
-                "ports": 3.09,
-                "input": 1.755,
-            },
+            ram=RAM_OF_32_BITS,
         ),
         flags=("-mcpu=cortex-m0plus", "-mthumb", "-O2", "-ffreestanding"),
     ),
@@ -105,16 +96,7 @@ MEMBER = (
                 "padded rows": 0.8981,
                 "tables": 1.318,
             },
-            ram={
-                "one": 7.194,
-                "byte classes": 0.7187,
-                "found": 1.939,
-                "kept found": 0.1425,
-                "sum words": 12.53,
-                "compared codes": 1.396,
-                "ports": 3.09,
-                "input": 1.755,
-            },
+            ram=RAM_OF_32_BITS,
         ),
         flags=("-mcpu=cortex-m4", "-mthumb", "-O2", "-ffreestanding"),
     ),

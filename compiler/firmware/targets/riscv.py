@@ -1,6 +1,6 @@
 """A 32-bit RISC-V core with multiplication and compressed instructions: RV32IMAC, as in a GD32VF103 or an FE310."""
 
-from ..costs import Formula
+from ..costs import RAM_OF_32_BITS, Formula
 from ..tools import RISCV_COMPILER
 from .base import Target
 
@@ -43,16 +43,7 @@ MEMBER = Target(
             "padded rows": 0.8083,
             "tables": 1.392,
         },
-        ram={
-            "one": 7.194,
-            "byte classes": 0.7187,
-            "found": 1.939,
-            "kept found": 0.1425,
-            "sum words": 12.53,
-            "compared codes": 1.396,
-            "ports": 3.09,
-            "input": 1.755,
-        },
+        ram=RAM_OF_32_BITS,
     ),
     compiler=RISCV_COMPILER,
     size=(("riscv64-unknown-elf-size",), "binutils-riscv64-unknown-elf"),
