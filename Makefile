@@ -66,7 +66,7 @@ pythons: $(VENV)/installed  ## .venv-3.x with thenar for every other Python of t
 .venv-3.%/installed: pyproject.toml
 	$(OTHER) -m venv .venv-3.$*
 	.venv-3.$*/bin/python -m pip install --quiet --upgrade "pip>=25.1"
-	.venv-3.$*/bin/python -m pip install --quiet --editable ".[compiler]"
+	.venv-3.$*/bin/python -m pip install --quiet --editable ".[compiler,stability]"
 	touch $@
 
 lint: $(VENV)/installed  ## ruff: rules and formatting; codespell: spelling, and the words of words.txt
