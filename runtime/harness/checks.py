@@ -1,7 +1,9 @@
 """The rules that a harness must satisfy beyond the types of its fields. The first fault in order counts."""
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 
+from thenar.drivers import cd74hc4067
 from thenar.drivers.errors import SettingError
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS
@@ -13,10 +15,13 @@ from thenar.drivers.spi.chips import SPI_CHIPS
 
 from ..names import fault, nearest, shortened
 from ..toml_source import Place, spelled
-from .wiring import BusWiring, ChipWiring, GloveWiring, Harness, SpiWiring, StreamWiring
+from .wiring import SLOWEST_HZ, BoardWiring, BusWiring, ChipWiring, GloveWiring, Harness, SpiWiring, StreamWiring
 
 Fault = tuple[Place, str]
 _SENSORS = (18, 22)
+_THRESHOLD = StreamWiring(port="-").threshold
+# As sketches name them: a number, or a macro of the board's core.
+_PIN = re.compile(r"\d{1,3}|[A-Za-z_][A-Za-z0-9_]{0,31}")
 
 
 def faults(harness: Harness) -> Iterator[Fault]:
@@ -126,8 +131,70 @@ def _of_stream(place: Place, stream: StreamWiring) -> Iterator[Fault]:
     if stream.sender is not None and (reason := _sender_fault(stream.port, stream.sender)):
         yield (*place, "from"), reason
     yield from _of_values(place, stream)
+    if stream.board is not None:
+        yield from _of_board((*place, "board"), stream, stream.board)
     columns = ((*place, "columns", number) for number in range(len(stream.columns)))
     yield from _of_names(((where, name) for where, name in zip(columns, stream.columns, strict=True) if name), "column")
+
+
+def _of_board(place: Place, stream: StreamWiring, board: BoardWiring) -> Iterator[Fault]:
+    if stream.columns or stream.time or stream.thresholds or stream.threshold != _THRESHOLD or stream.closed != "high":
+        yield place, "a board names its columns and sends its clock: leave out columns, time, thresholds and closed"
+    keys = () if board.matrix is None else board.matrix.keys
+    switches: list[tuple[Place, str]] = [
+        ((*place, "matrix", "keys", n, m), name) for n, row in enumerate(keys) for m, name in enumerate(row) if name
+    ]
+    for number, chip in enumerate(board.chips):
+        here = (*place, "chip", number)
+        if chip.mux is not None or (chip.kind in CHIPS and not chip.chip.registers):
+            yield here, "a board reads chips with registers that are on its bus itself: choose another chip"
+        switches += [((*here, "pins", pin), name) for pin, name in chip.pins.items()]
+    bus = BusWiring(device="", clock_hz=SLOWEST_HZ, chips=board.chips)
+    yield from _of_bus(place, bus)
+    pins: list[tuple[Place, str]] = [((*place, "pins", name), name) for name in board.pins]
+    for known, named in ((stream.used, pins), (stream.switches, switches)):
+        for where, name in named:
+            if name not in known:
+                yield where, f"the stream has no such column {shortened(repr(name))}{nearest(name, known)}"
+    yield from _of_names([*pins, *switches], "input")
+    yield from _of_board_pins(place, stream, board)
+
+
+def _of_board_pins(place: Place, stream: StreamWiring, board: BoardWiring) -> Iterator[Fault]:
+    """Yield pins that no sketch can name, that are used twice, or that do not suit their input."""
+    if len(board.select) not in (0, len(cd74hc4067.SELECTS)):
+        yield (*place, "select"), f"{len(board.select)} pins: a CD74HC4067 has four, S0 to S3"
+    used: list[tuple[Place, str]] = [((*place, "select", number), pin) for number, pin in enumerate(board.select)]
+    if (matrix := board.matrix) is not None:
+        used += [((*place, "matrix", "rows", number), pin) for number, pin in enumerate(matrix.rows)]
+        used += [((*place, "matrix", "columns", number), pin) for number, pin in enumerate(matrix.columns)]
+        shape = [len(matrix.columns)] * len(matrix.rows)
+        if [len(row) for row in matrix.keys] != shape:
+            yield (*place, "matrix", "keys"), f'must be {len(shape)} lists of {shape[0]} names, "" where there is no key'
+    commons: dict[str, None] = {}
+    seen: dict[str, Place] = {}
+    for name, pin in board.pins.items():
+        where, (common, _, channel) = (*place, "pins", name), pin.partition(".")
+        if channel:
+            if name in stream.switches:
+                yield where, f"{pin} is behind a multiplexer, which is for joints and taxels: use another pin"
+            if not (channel.isdecimal() and int(channel) < cd74hc4067.CHANNELS):
+                yield where, f"{shortened(repr(pin))} is no channel of a CD74HC4067: the channels of A0 are A0.0 to A0.15"
+            if not board.select:
+                yield (*place, "select"), "is missing: the pins at S0 to S3 of the multiplexers"
+            if pin in seen:
+                yield where, f"{pin} is already {spelled(seen[pin])}: use another channel"
+            seen[pin] = where
+            commons[common] = None
+        else:
+            used.append((where, pin))
+    used += [((*place, "pins"), pin) for pin in commons]
+    for where, pin in used:
+        if not _PIN.fullmatch(pin):
+            yield where, f'{shortened(repr(pin))} is no pin of a sketch: write "2", "A0" or "PA3"'
+        if pin in seen:
+            yield where, f"{pin} is already {spelled(seen[pin])}: use another pin"
+        seen[pin] = where
 
 
 def _sender_fault(port: str, sender: str) -> str:

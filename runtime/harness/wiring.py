@@ -80,55 +80,6 @@ class ScannerWiring(_Table, frozen=True):
     mux: Literal["cd74hc4067"] | None = None
 
 
-Range = tuple[float, float]
-
-
-class StreamWiring(_Table, frozen=True):
-    """Rows of numbers sent by a board or a program: lines (`thenar.drivers.line_reader`), LSL, a ROS topic.
-
-    sender       (`from`) the address of the only sender of datagrams that counts, with or without its port; None: the
-                 first one
-    columns      the columns in order, "" for unused ones; (): the sender names them
-    time         the column with the sender's clock, in `time_unit`
-    rate_hz      rows per second
-    switches     the columns that are switches: closed if the number is above the threshold, or, if `closed` is "low",
-                 if it is not; `thresholds` are those of single switches
-    joints       the columns that are joints, and the range of their numbers, which become the codes 1 to 255
-    taxels       the columns that are taxels, and the range of their numbers: each whole number is one code
-    calibration  path of a calibration of the joints
-    """
-
-    port: Text
-    baud: Baud = 115_200
-    sender: Text | None = field(name="from", default=None)
-    columns: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)] = ()
-    time: Text | None = None
-    time_unit: Literal["s", "ms", "us"] = "ms"
-    rate_hz: Annotated[float, Meta(ge=0.1, le=10_000.0)] = 50.0
-    switches: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)] = ()
-    threshold: float = 0.5
-    thresholds: dict[str, float] = {}
-    closed: Literal["low", "high"] = "high"
-    joints: dict[str, Range] = {}
-    taxels: dict[str, Range] = {}
-    calibration: Text | None = None
-
-    @property
-    def used(self) -> tuple[str, ...]:
-        """The columns that are used, without the sender's clock."""
-        return (*self.switches, *self.joints, *self.taxels)
-
-    @property
-    def sensor_names(self) -> tuple[str, ...]:
-        """The names of its joints, in the order of the frames' bytes."""
-        return tuple(self.joints)
-
-    @property
-    def period_us(self) -> int:
-        """The time from one row to the next."""
-        return round(1e6 / self.rate_hz)
-
-
 class MuxChannel(_Table, frozen=True):
     """A place behind a TCA9548A."""
 
@@ -168,6 +119,96 @@ class ChipWiring(_Table, frozen=True):
         """Its name in messages: "mcp23017 at 0x20" or "mcp23017 at 0x20 behind channel 2 of 0x70"."""
         behind = f" behind channel {self.mux.channel} of 0x{self.mux.address:02X}" if self.mux else ""
         return f"{self.kind} at 0x{self.address:02X}{behind}"
+
+
+class BoardMatrix(_Table, frozen=True):
+    """A matrix of keys on a board: one row at a time is driven low, and the columns are read with pull-ups.
+
+    keys       the switches, one list per row, "" where there is no key
+    diodes     whether every key has a diode, with its cathode towards the row
+    settle_us  from driving a row low to reading the columns
+    """
+
+    rows: Annotated[tuple[Text, ...], Meta(min_length=1)]
+    columns: Annotated[tuple[Text, ...], Meta(min_length=1)]
+    keys: tuple[tuple[str, ...], ...]
+    diodes: bool
+    settle_us: Annotated[int, Meta(ge=0, le=10_000)] = 20
+
+
+class BoardWiring(_Table, frozen=True):
+    """The inputs of the board that prints the rows of a stream. Pins are named as in sketches: "2", "A0", "PA3".
+
+    pins       the pin of each switch, which a closed switch connects to ground, and of each joint or taxel, an analog
+               one; "A0.3" is channel 3 of the CD74HC4067 whose common pin is connected to A0
+    select     the pins at S0 to S3 of all multiplexers
+    settle_us  from switching the multiplexers to reading them
+    matrix     switches in a matrix
+    chips      port expanders on the board's I2C bus
+    """
+
+    pins: dict[str, Text] = {}
+    select: tuple[Text, ...] = ()
+    settle_us: Annotated[int, Meta(ge=0, le=10_000)] = 100
+    matrix: BoardMatrix | None = None
+    chips: tuple[ChipWiring, ...] = field(default=(), name="chip")
+
+    @property
+    def wired(self) -> tuple[str, ...]:
+        """The names of everything that is wired."""
+        keys = () if self.matrix is None else (name for row in self.matrix.keys for name in row if name)
+        return (*self.pins, *keys, *(name for chip in self.chips for name in chip.numbered_pins.values()))
+
+
+Range = tuple[float, float]
+
+
+class StreamWiring(_Table, frozen=True):
+    """Rows of numbers sent by a board or a program: lines (`thenar.drivers.line_reader`), LSL, a ROS topic.
+
+    sender       (`from`) the address of the only sender of datagrams that counts, with or without its port; None: the
+                 first one
+    columns      the columns in order, "" for unused ones; (): the sender names them
+    time         the column with the sender's clock, in `time_unit`
+    rate_hz      rows per second
+    switches     the columns that are switches: closed if the number is above the threshold, or, if `closed` is "low",
+                 if it is not; `thresholds` are those of single switches
+    joints       the columns that are joints, and the range of their numbers, which become the codes 1 to 255
+    taxels       the columns that are taxels, and the range of their numbers: each whole number is one code
+    calibration  path of a calibration of the joints
+    board        the inputs of the board that prints the rows, for the sketch that `thenar firmware` writes for it
+    """
+
+    port: Text
+    baud: Baud = 115_200
+    sender: Text | None = field(name="from", default=None)
+    columns: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)] = ()
+    time: Text | None = None
+    time_unit: Literal["s", "ms", "us"] = "ms"
+    rate_hz: Annotated[float, Meta(ge=0.1, le=10_000.0)] = 50.0
+    switches: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)] = ()
+    threshold: float = 0.5
+    thresholds: dict[str, float] = {}
+    closed: Literal["low", "high"] = "high"
+    joints: dict[str, Range] = {}
+    taxels: dict[str, Range] = {}
+    calibration: Text | None = None
+    board: BoardWiring | None = None
+
+    @property
+    def used(self) -> tuple[str, ...]:
+        """The columns that are used, without the sender's clock."""
+        return (*self.switches, *self.joints, *self.taxels)
+
+    @property
+    def sensor_names(self) -> tuple[str, ...]:
+        """The names of its joints, in the order of the frames' bytes."""
+        return tuple(self.joints)
+
+    @property
+    def period_us(self) -> int:
+        """The time from one row to the next."""
+        return round(1e6 / self.rate_hz)
 
 
 class BusWiring(_Table, frozen=True):
