@@ -151,7 +151,7 @@ def _calibrate_taxels(glove: Path, output: Path, wearer: str, newtons: float | N
     keep_apart(glove, output)
     harness = replace(load_harness(glove), taxel_settings=TaxelSettings())  # it may name the file to be written
     if not harness.taxel_names:
-        raise click.UsageError(f"{glove.name} names no taxels: add `taxels` to a [[scanner]], or add a converter")
+        raise click.UsageError(f"{glove.name} names no taxels: add `taxels` to a [[stream]], or add a converter")
     _keep_stdin([stream.port for stream in harness.streams])
     with Sources(harness, (), whole_scan(harness, (), every_taxel=True)) as sources:
         calibrated = TaxelGuide(harness, sources, hold).calibration(wearer, newtons)
@@ -286,7 +286,7 @@ class StreamedJoints:
         device = harness.joint_device
         if not isinstance(device, StreamWiring):
             raise click.UsageError(f"{glove.name} has no [[stream]] with joints: name the port of the CyberGlove")
-        alone = replace(harness, buses=(), spi=(), scanners=(), streams=(device,), taxel_settings=TaxelSettings())
+        alone = replace(harness, buses=(), spi=(), streams=(device,), taxel_settings=TaxelSettings())
         self.url, self.names = device.port, device.sensor_names
         self._sources = Sources(alone, (), whole_scan(alone, ()))
 

@@ -251,8 +251,8 @@ def keep_apart(*paths: Path | None) -> None:
 
 def check_devices(harness: "Harness", path: Path) -> None:
     """Raise UsageError if the `harness` in `path` names no device: there would be nothing to read."""
-    if not (harness.cyberglove or harness.scanners or harness.buses or harness.spi or harness.streams):
-        takes = "add a [cyberglove], a [[scanner]], a [[bus]], an [[spi]] or a [[stream]]"
+    if not (harness.cyberglove or harness.buses or harness.spi or harness.streams):
+        takes = "add a [cyberglove], a [[bus]], an [[spi]] or a [[stream]]"
         raise click.UsageError(f"{path.name} names no device: {takes}")
 
 

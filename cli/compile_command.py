@@ -95,7 +95,7 @@ class _ChipOption(click.Option):
         measuring = _converters()
         chips = [kind for kind in _chips() if kind != _BOARD and kind not in measuring]
         self.help = (
-            f"Port expander to propose: {', '.join(chips)}; {_BOARD}, a scanner board; or a converter for taxels: "
+            f"Port expander to propose: {', '.join(chips)}; {_BOARD}, one that prints rows; or a converter for taxels: "
             f"{', '.join(measuring)}.  [default: {chips[0]}, and ads7828 for taxels]"
         )
         return super().get_help_record(ctx)
@@ -416,19 +416,12 @@ def _print_training(manifest: "Manifest") -> None:
 
 def _print_scan(scan: "ScanMap", harness: "Harness") -> None:
     """Print the map chip by chip, in reading order, with the time on the wire."""
-    from thenar.runtime.scanning.timing import scan_us, scanner_us, taxels_us
+    from thenar.runtime.scanning.timing import scan_us
 
     time = scan_us(scan, harness)
     if time.chips:
         _print_chips(time)
         out().print(_in_all(scan, harness, time))
-    for number, (board, pairs) in enumerate(zip(harness.scanners, scan.scanners, strict=True)):
-        levels = f", {len(scan.taxels[number])} levels of {len(board.taxels)} channels" if scan.taxels else ""
-        out().print(
-            f"board {board.port}: {len(pairs)} kept switches of {len(board.switches)} keys{levels}, "
-            f"{scanner_us(board):.0f} us a bitmap"
-            + (f", {taxels_us(board, channels):.0f} us its taxels" if (channels := scan.board_channels[number]) else "")
-        )
     for stream, read in zip(harness.streams, scan.streams, strict=True):
         count = len(read.switches) + len(read.levels)
         out().print(f"stream {stream.port}: {count} kept switches and levels, a row every {stream.period_us} us")

@@ -9,11 +9,9 @@ from .common import Number, OutputFolder, existing_file, existing_folder, json_f
 from .options import fitted_hand, layout_option
 
 if TYPE_CHECKING:
-    from thenar.compiler.glove.layout import BoardPins
     from thenar.compiler.glove.spec import SpecSummary
     from thenar.runtime.build import Build
     from thenar.runtime.harness.wiring import Harness
-    from thenar.runtime.manifest import Manifest
 
 _FOLDER = "spec"
 _WIRING = "glove.toml"
@@ -24,7 +22,6 @@ _WIRING = "glove.toml"
 @click.option("--hand-length", type=Number(100, 300), metavar="MM", help="Length from wrist to middle fingertip.")
 @layout_option
 @click.option("--glove", type=existing_file, help="The glove.toml of its wiring.  [default: propose a new one]")
-@click.option("--board", type=existing_file, help="The board.toml of the scanner board that reads the switches.")
 @click.option(
     "-o", "--output", type=OutputFolder(), help="Also write the files to this folder, replacing a spec there."
 )
@@ -34,7 +31,6 @@ def command(
     hand_length: float | None,
     layout: Path | None,
     glove: Path | None,
-    board: Path | None,
     output: Path | None,
 ) -> None:
     """Specify the reduced glove of a BUILD: switch positions, wiring, parts to buy, and expected performance.
@@ -56,9 +52,7 @@ def command(
     if output is not None:
         check_output(output)
     hand = fitted_hand(layout, list(dict.fromkeys(switch.source for switch in loaded.manifest.switches)), hand_length)
-    pins = () if board is None else (_board_pins(board, loaded.manifest),)
-    harness = _harness(build, loaded, glove, board)
-    spec = glove_spec(loaded.manifest, loaded.scan, harness, hand, pins)
+    spec = glove_spec(loaded.manifest, loaded.scan, _harness(build, loaded, glove), hand)
     written = ""
     if output is not None:
         files = files_of(spec)
@@ -67,43 +61,14 @@ def command(
     show(spec.summary, _print, written)
 
 
-def _harness(folder: Path, loaded: "Build", glove: Path | None, board: Path | None) -> "Harness | None":
-    """Return the named wiring, the board's, or the one in the build; None for a new one."""
-    from thenar.runtime.harness.loading import load_harness, parse_harness
+def _harness(folder: Path, loaded: "Build", glove: Path | None) -> "Harness | None":
+    """Return the named wiring, or the one in the build; None for a new one."""
+    from thenar.runtime.harness.loading import load_harness
 
     if glove is not None:
         return load_harness(glove)
-    if board is not None:
-        from thenar.compiler.firmware.board import glove_toml, load_board
-        from thenar.runtime.names import sound_name
-
-        name = sound_name(board.stem, "board")
-        return parse_harness(glove_toml(name, load_board(board), loaded.manifest), name)
     own = folder / _FOLDER / _WIRING
     return load_harness(own) if loaded.scan is not None and own.is_file() else None
-
-
-def _board_pins(path: Path, manifest: "Manifest") -> "BoardPins":
-    """Return the pins by which the board of a `board.toml` reads its keys."""
-    from dataclasses import replace
-
-    from thenar.compiler.firmware.board import check_switches, key_names, keys_of, load_board
-    from thenar.compiler.glove.layout import BoardPins
-    from thenar.runtime.harness.wiring import BusWiring
-
-    board = load_board(path)
-    names = keys_of(board, manifest.switches)
-    check_switches(board, names)
-    taxels = board.taxels
-    pins = BoardPins() if taxels is None else BoardPins(channels=taxels.inputs, selects=taxels.select)
-    if board.chips:
-        return replace(pins, bus=BusWiring(device=board.part, clock_hz=board.bus.clock_hz, chips=board.chips))
-    if board.matrix is None:
-        keys = tuple(board.pins[name] for name in key_names(board, names))
-        return replace(pins, signals=keys, lows=("",) * len(keys))
-    rows, columns = board.matrix.rows, board.matrix.columns
-    lows = tuple(row for row in rows for _ in columns)
-    return replace(pins, signals=columns * len(rows), lows=lows, diodes=board.matrix.diodes)
 
 
 def _print(spec: "SpecSummary", written: str) -> None:

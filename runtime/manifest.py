@@ -358,7 +358,7 @@ class Faults(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     """The worst fault of each kind on the training rows, in trials: of `total`, `correct` are right without a fault.
 
     lost   one input lost and replaced by its mean row; stuck: one input stuck at a value
-    dead   all levels of a taxel lost, all on a port, a chip or a scanner board, if a wiring is known, or all joints
+    dead   all levels of a taxel lost, all on a port, a chip or a stream, if a wiring is known, or all joints
     pair   two inputs lost; None for one input, and for so large a number that pairs were not evaluated
     """
 

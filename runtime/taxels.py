@@ -27,7 +27,7 @@ from .code_line import CodeLine, code_line
 from .frames import Mask
 from .manifest import Calibration, Switch, Threshold
 from .names import fault, list_names, shortened
-from .scanning.scanmap import BoardLevel, ScanMap
+from .scanning.scanmap import ScanMap, StreamLevel
 from .toml_source import read_source
 from .toml_struct import convert
 
@@ -209,11 +209,11 @@ def in_counts(scan: ScanMap, switches: Sequence[Switch], calibration: TaxelCalib
         for port in scan.ports
     )
 
-    def limits(levels: Sequence[BoardLevel]) -> tuple[BoardLevel, ...]:
+    def limits(levels: Sequence[StreamLevel]) -> tuple[StreamLevel, ...]:
         return tuple((at, limit(number, code), number) for at, code, number in levels)
 
     streams = tuple(replace(stream, levels=limits(stream.levels)) for stream in scan.streams)
-    return replace(scan, ports=ports, taxels=tuple(map(limits, scan.taxels)), streams=streams)
+    return replace(scan, ports=ports, streams=streams)
 
 
 def _check_counts(coded: Calibration, others: bool) -> None:

@@ -41,7 +41,7 @@ from .search import TAXEL_LEVELS, Candidate, Search
 from .stream import Stream, stream_of
 from .survey import Cuts, Survey
 from .timing.scan_times import Records, records_of
-from .timing.wirings import Wiring, reads_by_itself, wirings
+from .timing.wirings import Wiring, is_avr, wirings
 from .words import csv_bytes
 
 RecordTime = Literal["formula", "wire"]
@@ -212,7 +212,7 @@ def _records(
         None if harness is None else harness.cyberglove,
         wire_only=record_time == "wire",
         filtered=filtered,
-        masked=not reads_by_itself(target),
+        masked=not is_avr(target),
     )
 
 

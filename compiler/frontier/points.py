@@ -59,8 +59,8 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     rounds      None for a trainer without rounds
     width       bits that every sum fits; table_bits: 8 if firmware may store a byte per entry
     layout      of the tables in flash, in words; "" on host and pi, which have none
-    wiring      "as wired" (the given glove.toml), "board" (a switch scanner) or a kind of port expander; clock_hz of
-                its bus, or baud of the board's line; 0 if no switch is read
+    wiring      "as wired" (the given glove.toml), "board" (one that prints rows) or a kind of port expander; clock_hz
+                of its bus, or baud of the board's line; 0 if no switch is read
     trainer     of the model, and its `settings` that are not defaults; the paper's is not written
     keep_joints  number of joints that are read; None: all, if `inputs` has any
     levels      most levels of a taxel to choose from; None: there are no taxels, or none are read

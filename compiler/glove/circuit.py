@@ -1,6 +1,6 @@
 """The circuit of a glove (components and nets), and its bill of materials.
 
-It has switches, the connectors of their bundles, scanner boards and diodes; and expanders with their supply, address,
+It has switches, the connectors of their bundles, boards and diodes; and expanders with their supply, address,
 reset, bus pull-ups, muxes, and the host's plugs.
 """
 
@@ -258,14 +258,14 @@ def _add_connectors(circuit: Circuit, wires: Sequence[Wire]) -> None:
 
 
 def _add_board(circuit: Circuit, ref: str, ends: Sequence[End], multiplexers: Sequence[Unit]) -> None:
-    """Add a scanner board, with ground and every pin that a kept switch or a multiplexer needs."""
+    """Add a board, with ground and every pin that a kept switch or a multiplexer needs."""
     signals = {end.pad: end.pin for end in ends}
     lines = [f"{ref}_{pin}" for pin in cd74hc4067.SELECTS] if multiplexers else []
     lines += [f"{ref}_{cd74hc4067.COMMON}{unit.bus}" for unit in multiplexers]
     nets = dict.fromkeys([*(end.other for end in ends), *lines, GROUND])
     named = {**signals, **{str(number): net for number, net in enumerate(nets, start=len(signals) + 1)}}
     pins = tuple((pad, name, "bidirectional") for pad, name in named.items())
-    circuit.put(ref, Kind("scanner board", "thenar", f"board_{ref}", "", pins), on_board=False)
+    circuit.put(ref, Kind("board", "thenar", f"board_{ref}", "", pins), on_board=False)
     for number, net in enumerate(nets, start=len(signals) + 1):
         circuit.join(net, ref, str(number))
     for end in {end.pad: end for end in ends if end.unit.diodes and not end.taxel}.values():

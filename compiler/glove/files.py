@@ -4,7 +4,7 @@ import io
 import os
 import uuid
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -20,7 +20,6 @@ from thenar.runtime.scanning.scanmap import ScanMap
 
 from ..hand import HandShape
 from ..publication import check_folder, entries, publish_folder
-from .layout import BoardPins
 from .lists import materials_csv, readme_of, sensors_csv, wiring_csv
 from .parts import Circuit, Component, Kind
 from .pattern import LAYERS, Circle, Line, Pattern, Shape, Text
@@ -248,13 +247,12 @@ def spec_files(
     scan: ScanMap | None = None,
     harness: Harness | None = None,
     hand: HandShape | None = None,
-    boards: Sequence[BoardPins | None] = (),
 ) -> Mapping[str, bytes]:
     """Return name -> content of the files of a build's spec; the same arguments give the same bytes.
 
     Arguments and errors are those of `glove_spec`.
     """
-    return files_of(glove_spec(manifest, scan, harness, hand, boards))
+    return files_of(glove_spec(manifest, scan, harness, hand))
 
 
 def files_of(spec: GloveSpec) -> Mapping[str, bytes]:

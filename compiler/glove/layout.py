@@ -1,4 +1,4 @@
-"""The positions of the kept switches on the hand, the pin or key of each wire, and the bundles in between."""
+"""The positions of the kept switches on the hand, the pin of each wire, and the bundles in between."""
 
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from thenar.drivers import cd74hc4067
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, ScannerWiring, SpiWiring
+from thenar.runtime.harness.wiring import BoardWiring, BusWiring, ChipWiring, Harness, SpiWiring, StreamWiring
 from thenar.runtime.scanning.ports import levels_of
 
 from ..hand import HandShape
@@ -27,6 +27,8 @@ _RETURN = "black"
 # Estimates: the factor on the straight distance, and the extra length at the ends and at each switch.
 _DETOUR, _ENDS_MM, _SPLICE_MM, _STEP_MM = 1.25, 40.0, 10.0, 5
 _LONGEST_HEADER = 40
+# Of a board's own bus: what Arduino's cores start it with.
+_BOARD_HZ = 100_000
 Place = tuple[float, float]
 
 
@@ -93,26 +95,8 @@ def crowded(switches: Sequence[PlacedSensor], body_mm: float) -> list[tuple[int,
 
 
 @dataclass(frozen=True, slots=True)
-class BoardPins:
-    """The connections of a scanner board's keys, from its `board.toml`: key k is read at the pin signals[k].
-
-    lows[k] is the pin that is driven low to read it, the row of a matrix; "" if the switch goes to ground. With
-    `diodes` every switch has one, with its cathode towards the row. A board that reads its keys from expanders has
-    their `bus` instead. channels are the pins of its converter, one per taxel, or with `selects` one per multiplexer.
-    """
-
-    signals: tuple[str, ...] = ()
-    lows: tuple[str, ...] = ()
-    diodes: bool = False
-    bus: BusWiring | None = None
-    channels: tuple[str, ...] = ()
-    selects: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class Unit:
-    """A reader of switches: a chip of a harness, or, without `wiring`, a scanner board, or the multiplexer of a
-    `board`.
+    """A reader of switches: a chip of a harness, or, without `wiring`, a board, or the multiplexer of a `board`.
 
     ref is its designator in the netlist; place, its name in messages and tables.
     """
@@ -141,21 +125,22 @@ class End:
     taxel: bool = False
 
 
-def as_soldered(harness: Harness, boards: Sequence[BoardPins | None]) -> Harness:
-    """Return the harness with the buses of its boards as direct buses, and without the keys that are read through them.
-
-    A stream counts as sent by a board.
-    """
-    behind = {number: board.bus for number, board in enumerate(boards) if board is not None and board.bus is not None}
-    scanners = tuple(
-        replace(scanner, switches=()) if number in behind else scanner
-        for number, scanner in enumerate(harness.scanners)
-    )
-    senders = tuple(
-        ScannerWiring(port=stream.port, switches=stream.switches, taxels=tuple(stream.taxels))
+def as_soldered(harness: Harness) -> Harness:
+    """Return the harness with the chips of its boards on direct buses, and not among the boards' inputs."""
+    buses = [
+        BusWiring(device=stream.port, clock_hz=_BOARD_HZ, chips=stream.board.chips)
         for stream in harness.streams
-    )
-    return replace(harness, scanners=(*scanners, *senders), buses=(*harness.buses, *behind.values()), streams=())
+        if stream.board is not None and stream.board.chips
+    ]
+    return replace(harness, buses=(*harness.buses, *buses), streams=tuple(map(_without_chips, harness.streams)))
+
+
+def _without_chips(stream: StreamWiring) -> StreamWiring:
+    if stream.board is None:
+        return stream
+    behind = {name for chip in stream.board.chips for name in chip.pins.values()}
+    switches = tuple(name for name in stream.switches if name not in behind)
+    return replace(stream, switches=switches, board=replace(stream.board, chips=()))
 
 
 def elements_of(harness: Harness, names: Sequence[str]) -> tuple[str, ...]:
@@ -167,13 +152,10 @@ def elements_of(harness: Harness, names: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(taxels.get(number, name) for number, name in enumerate(names)))
 
 
-def ends_of(harness: Harness, names: Sequence[str], boards: Sequence[BoardPins | None] = ()) -> tuple[End, ...]:
-    """Return the ends of the switches called `names`, in order; each is wired once in the harness.
-
-    boards[n] describes the pins of scanner n; None or a missing entry means that they are unknown.
-    """
+def ends_of(harness: Harness, names: Sequence[str]) -> tuple[End, ...]:
+    """Return the ends of the switches called `names`, in order; each is wired once in the harness."""
     numbers, chips = {name: number for number, name in enumerate(names)}, count(1)
-    found = [*_of_chips(harness, numbers, chips), *_of_boards(harness, numbers, boards, chips)]
+    found = [*_of_chips(harness, numbers, chips), *_of_boards(harness, numbers, chips)]
     return tuple(sorted(found, key=lambda end: end.switch))
 
 
@@ -192,49 +174,51 @@ def _of_chips(harness: Harness, numbers: Mapping[str, int], used: Iterator[int])
         yield from (End(numbers[name], unit, pin, number(pin), other, taxels) for pin, name in kept.items())
 
 
+def _of_boards(harness: Harness, numbers: Mapping[str, int], used: Iterator[int]) -> Iterator[End]:
+    """Yield the ends at boards; the pins of a sender whose board is not known are its columns."""
+    for number, stream in enumerate(harness.streams):
+        board = stream.board or BoardWiring(pins={name: name for name in (*stream.switches, *stream.taxels)})
+        ref, matrix = f"A{number + 1}", board.matrix
+        unit = Unit(ref, f"board at {stream.port}", diodes=matrix is not None and matrix.diodes)
+        plain: list[tuple[str, str, str]] = []  # name, pin, other net
+        for name, pin in board.pins.items():
+            if name in numbers and not (stream.board is not None and "." in pin):
+                plain.append((name, pin, SUPPLY if name in stream.taxels else GROUND))
+        if matrix is not None:
+            keys = zip(matrix.rows, matrix.keys, strict=True)
+            plain += [
+                (name, column, f"{ref}_{row}")
+                for row, names in keys
+                for column, name in zip(matrix.columns, names, strict=True)
+                if name in numbers
+            ]
+        pads = {pin: str(pad) for pad, pin in enumerate(dict.fromkeys(pin for _, pin, _ in plain), start=1)}
+        for name, pin, other in plain:
+            yield End(numbers[name], unit, pin, pads[pin], other, taxel=name in stream.taxels)
+        if stream.board is not None:
+            yield from _of_multiplexers(stream, stream.board, ref, numbers, used)
+
+
 def _of_multiplexers(
-    scanner: ScannerWiring, board: str, numbers: Mapping[str, int], used: Iterator[int]
+    stream: StreamWiring, board: BoardWiring, ref: str, numbers: Mapping[str, int], used: Iterator[int]
 ) -> Iterator[End]:
     """Yield the ends of a board's taxels at its multiplexers; multiplexers without a kept taxel are left out."""
-    kept = [(channel, numbers[name]) for channel, name in enumerate(scanner.taxels) if name in numbers]
-    units: dict[int, Unit] = {}
-    for channel, switch in kept:
-        place, at = divmod(channel, cd74hc4067.CHANNELS)
-        if place not in units:
-            named = f"cd74hc4067 {place + 1} of the scanner board at {scanner.port}"
-            units[place] = Unit(f"U{next(used)}", named, place, board=board)
-        yield End(switch, units[place], f"I{at}", cd74hc4067.PACKAGE.number(f"I{at}"), SUPPLY, taxel=True)
-
-
-def _of_boards(
-    harness: Harness, numbers: Mapping[str, int], boards: Sequence[BoardPins | None], chips: Iterator[int]
-) -> Iterator[End]:
-    for number, scanner in enumerate(harness.scanners):
-        pins = boards[number] if number < len(boards) else None
-        kept = [(key, numbers[name]) for key, name in enumerate(scanner.switches) if name in numbers]
-        ref = f"A{number + 1}"
-        unit = Unit(ref, f"scanner board at {scanner.port}", diodes=pins is not None and pins.diodes)
-        signals = [f"key {key}" if pins is None else pins.signals[key] for key, _ in kept]
-        measured = (
-            [] if scanner.mux else [(at, numbers[name]) for at, name in enumerate(scanner.taxels) if name in numbers]
-        )
-        at = () if pins is None else pins.channels
-        channels = [at[channel] if at else f"channel {channel}" for channel, _ in measured]
-        pads = {name: str(pad) for pad, name in enumerate(dict.fromkeys([*signals, *channels]), start=1)}
-        for (_, switch), signal in zip(measured, channels, strict=True):
-            yield End(switch, unit, signal, pads[signal], SUPPLY, taxel=True)
-        if scanner.mux:
-            yield from _of_multiplexers(scanner, ref, numbers, chips)
-        for (key, switch), signal in zip(kept, signals, strict=True):
-            low = "" if pins is None else pins.lows[key]
-            yield End(switch, unit, signal, pads[signal], f"{ref}_{low}" if low else GROUND)
+    units: dict[str, Unit] = {}
+    for name, pin in board.pins.items():
+        common, _, channel = pin.partition(".")
+        if channel and name in numbers:
+            if common not in units:
+                place = f"cd74hc4067 at {common} of the board at {stream.port}"
+                units[common] = Unit(f"U{next(used)}", place, len(units), board=ref)
+            package = cd74hc4067.PACKAGE
+            yield End(numbers[name], units[common], f"I{channel}", package.number(f"I{channel}"), SUPPLY, taxel=True)
 
 
 class Wire(Struct, frozen=True):
     """A wire from switches to the wrist: through pin `pin` of connector `connector` to `net`.
 
     switches are the numbers of those on it: one for a signal, all that share it for a return. unit and input say which
-    pin or key reads it, and are empty for a return. length_mm is an estimate, None if the positions are unknown.
+    pin reads it, and are empty for a return. length_mm is an estimate, None if the positions are unknown.
     """
 
     bundle: str

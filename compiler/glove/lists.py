@@ -87,8 +87,8 @@ def expectations(expected: Expected) -> Iterator[str]:
             f"transaction{'s' if expected.transactions > 1 else ''}{full}. thenar doctor measures what the "
             "computer adds to each of them."
         )
-    for us in expected.boards_us:
-        yield f"A scanner board's keys and kept taxels take {us:.0f} us to convert and send."
+    for us in expected.rows_us:
+        yield f"A board sends a row every {us} us."
     if expected.glove_us is not None:
         yield (
             f"The CyberGlove sends a record of {expected.sensors} sensors every {expected.glove_us:.0f} us at best, by "

@@ -15,13 +15,12 @@ from thenar.runtime.scanning.plan import check_harness, unwired
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import own_joints, propose_cyberglove, propose_harness
 from thenar.runtime.scanning.scanmap import ScanMap
-from thenar.runtime.scanning.timing import glove_us, scan_us, scanner_us, taxels_us
+from thenar.runtime.scanning.timing import glove_us, scan_us
 
 from ..hand import HandShape
 from ..sensors import SensorCount
 from .circuit import BillLine, bill_of, bill_of_joints, glove_circuit
 from .layout import (
-    BoardPins,
     End,
     PlacedSensor,
     Wire,
@@ -46,7 +45,7 @@ class Expected(Struct, frozen=True):
 
     scan_us      scan of all kept switches on expanders, in `transactions` transactions, mux selections included
     full_us      scan of all switches that are wired to expanders, kept or not
-    boards_us    a full bitmap of each scanner board, with its kept taxels' conversions and codes
+    rows_us      from row to row of each stream with kept sensors
     glove_us     between records of the CyberGlove with `sensors` sensors, the build's joints; None without joints
     rates        the accuracy measured when the build was compiled
     faults       the accuracy on the training rows under the worst faults
@@ -56,7 +55,7 @@ class Expected(Struct, frozen=True):
     transactions: int
     scan_us: float
     full_us: float
-    boards_us: tuple[float, ...]
+    rows_us: tuple[int, ...]
     sensors: int
     glove_us: float | None
     rates: tuple[Recognised, ...]
@@ -72,10 +71,10 @@ def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected
         transactions=len(scan.ports) + time.selects,
         scan_us=time.us,
         full_us=time.full_us,
-        boards_us=tuple(
-            scanner_us(board) + taxels_us(board, channels)
-            for board, keys, channels in zip(harness.scanners, scan.scanners, scan.board_channels, strict=True)
-            if keys or channels
+        rows_us=tuple(
+            stream.period_us
+            for stream, read in zip(harness.streams, scan.streams, strict=True)
+            if read.switches or read.levels
         ),
         sensors=len(manifest.joints),
         glove_us=None if glove is None else glove_us(glove, len(manifest.joints)),
@@ -129,13 +128,12 @@ def glove_spec(
     scan: ScanMap | None = None,
     harness: Harness | None = None,
     hand: HandShape | None = None,
-    boards: Sequence[BoardPins | None] = (),
 ) -> GloveSpec:
     """Return the spec of a build's glove, wired with `harness`; without one, a wiring is proposed.
 
-    scan is the build's scan map, if it has one; hand, the hand that has positions for its switches. boards[n], if
-    given, says what its keys are wired to. Raises SpecError if the build keeps no switch, or has a scan map but no
-    harness is given; HarnessError if the harness lacks a kept switch, or does not match the scan map.
+    scan is the build's scan map, if it has one; hand, the hand that has positions for its switches. Raises SpecError
+    if the build keeps no switch, or has a scan map but no harness is given; HarnessError if the harness lacks a kept
+    switch, or does not match the scan map.
     """
     if not manifest.switches:
         raise SpecError("the build keeps no switch, so there is no glove to build: compile it with --inputs both")
@@ -144,8 +142,8 @@ def glove_spec(
     read = whole_scan(wired, asked) if scan is None else scan
     names = elements_of(wired, asked)
     known = hand if hand is not None and hand.knows(names) else None
-    soldered = as_soldered(wired, boards)
-    ends = ends_of(soldered, names, boards)
+    soldered = as_soldered(wired)
+    ends = ends_of(soldered, names)
     switches = place_sensors(names, {names[end.switch] for end in ends if end.taxel}, known)
     wires = wires_of(switches, ends, known)
     circuit = glove_circuit(switches, ends, wires, soldered, "" if known is None else known.part_number)
@@ -166,7 +164,7 @@ def glove_spec(
             *bill_of_joints([joint.name for joint in manifest.joints], wired.cyberglove is not None),
         ),
         expected=expected_of(manifest, read, wired),
-        remarks=(*_remarks(manifest, wired, switches, known), *_of_boards(boards)),
+        remarks=(*_remarks(manifest, wired, switches, known), *_of_boards(wired)),
     )
     return GloveSpec(summary, wired, read, circuit, pattern)
 
@@ -182,7 +180,7 @@ def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) 
         check_harness(scan, harness, names)
     if lacking := unwired(harness, names):
         raise HarnessError(
-            f"harness {harness.name!r} has no pin or key for {list_names(lacking)}, which the build keeps: "
+            f"harness {harness.name!r} has no pin or column for {list_names(lacking)}, which the build keeps: "
             "add what is missing to its file"
         )
     return _portable(harness)
@@ -202,13 +200,14 @@ def _portable(harness: Harness) -> Harness:
     )
 
 
-def _of_boards(boards: Sequence[BoardPins | None]) -> Iterator[str]:
-    """Yield where the multiplexers of each board go, if known."""
-    for number, pins in enumerate(boards, start=1):
-        if pins is not None and pins.selects:
+def _of_boards(harness: Harness) -> Iterator[str]:
+    """Yield where the multiplexers of each board go."""
+    for number, stream in enumerate(harness.streams, start=1):
+        if stream.board is not None and stream.board.select:
+            commons = dict.fromkeys(pin.partition(".")[0] for pin in stream.board.pins.values() if "." in pin)
             yield (
-                f"A{number}: S0 to S3 of its multiplexers go to {', '.join(pins.selects)}, their commons to "
-                f"{', '.join(pins.channels)}"
+                f"A{number}: S0 to S3 of its multiplexers go to {', '.join(stream.board.select)}, their commons to "
+                f"{', '.join(commons)}"
             )
 
 

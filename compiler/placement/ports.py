@@ -13,7 +13,7 @@ from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.scanning.plan import Costs, Unit, ports_in, unwired
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
-from thenar.runtime.scanning.timing import glove_us, scanner_us, taxels_us
+from thenar.runtime.scanning.timing import glove_us
 
 from .inputs import PlacementError
 
@@ -106,13 +106,6 @@ def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
     port_of: dict[int, int] = {}
     for number, port in enumerate(scan.ports):
         port_of |= dict.fromkeys(port.elements, number)
-    for number, board in enumerate(harness.scanners):
-        port_of |= dict.fromkeys((switch for _, switch in scan.scanners[number]), len(us))
-        us.append(scanner_us(board))
-        levels = scan.taxels[number] if scan.taxels else ()
-        channels = sorted({channel for channel, *_ in levels})
-        port_of |= {switch: len(us) + channels.index(channel) for channel, _, switch in levels}
-        us += [taxels_us(board, len(channels)) / len(channels) for _ in channels]
     for stream, read in zip(harness.streams, scan.streams, strict=True):
         port_of |= {pair[-1]: len(us) for pair in (*read.switches, *read.levels)}
         us.append(float(stream.period_us))

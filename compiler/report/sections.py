@@ -9,7 +9,7 @@ import msgspec
 from thenar.runtime.manifest import AUTO, Manifest
 from thenar.runtime.published import NONE
 from thenar.runtime.scanning.propose import own_joints
-from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us, scanner_us, taxels_us
+from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us
 
 from ..evaluation.rates import RecipeWords, placement_words
 from ..placement.gain import entropy_bits
@@ -301,13 +301,6 @@ def scan_sentences(content: ReportContent) -> Iterator[str]:
             f"A whole scan is {counted(len(scan.ports) + time.selects, 'transaction')}{muxes}: "
             f"{microseconds(time.us)} µs on the wire, {percent(time.share, NBSP)} of the "
             f"{microseconds(time.full_us)} µs that all {harness.on_chips} wired ones take."
-        )
-    for board, pairs, taxels in zip(harness.scanners, scan.scanners, scan.board_channels, strict=True):
-        codes = f"; {counted(taxels, 'taxel')}, {microseconds(taxels_us(board, taxels))} µs to convert and to send"
-        yield (
-            f"The board on {board.port} shows {counted(len(pairs), 'kept switch', 'kept switches')} of "
-            f"{counted(len(board.switches), 'key')}, {microseconds(scanner_us(board))} µs a bitmap on its line"
-            + (f"{codes}." if taxels else ".")
         )
     for stream, read in zip(harness.streams, scan.streams, strict=True):
         yield (

@@ -219,10 +219,6 @@ def groups_of(scan: ScanMap | None, sources: Sequence[str], n_joints: int) -> Ma
         chip = f"chip {port.chip + 1} of bus {port.bus + 1}"
         found[f"port {port.reading} of {chip}"] = port.elements
         found[chip] = found.get(chip, ()) + port.elements
-    boards, taxels = ((), ()) if scan is None else (scan.scanners, scan.taxels)
-    for number, (keys, converted) in enumerate(zip(boards, taxels or ((),) * len(boards), strict=True)):
-        if own := tuple(switch for *_, switch in (*keys, *converted)):
-            found[f"scanner board {number + 1}"] = own
     for number, stream in enumerate(() if scan is None else scan.streams):
         if own := tuple(pair[-1] for pair in (*stream.switches, *stream.levels)):
             found[f"stream {number + 1}"] = own

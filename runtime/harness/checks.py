@@ -1,7 +1,7 @@
 """The rules that a harness must satisfy beyond the types of its fields. The first fault in order counts."""
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from thenar.drivers import cd74hc4067
 from thenar.drivers.errors import SettingError
@@ -9,7 +9,6 @@ from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.line_reader import line_port_fault
 from thenar.drivers.ports import device_fault, port_fault
-from thenar.drivers.scanner_datagrams import scanner_port_fault
 from thenar.drivers.senders import parse_address
 from thenar.drivers.spi.chips import SPI_CHIPS
 
@@ -31,11 +30,6 @@ def faults(harness: Harness) -> Iterator[Fault]:
     if harness.cyberglove is not None:
         yield from _of_glove(harness.cyberglove)
     yield from _of_devices(harness)
-    for number, scanner in enumerate(harness.scanners):
-        if not (scanner.switches or scanner.taxels):
-            yield ("scanner", number), "the key switches is missing: a board has switches, taxels or both"
-        if scanner.mux and not scanner.taxels:
-            yield ("scanner", number, "mux"), "is a multiplexer without taxels: name them, or leave it out"
     for number, bus in enumerate(harness.buses):
         yield from _of_bus(("bus", number), bus)
     for number, chip in enumerate(harness.spi):
@@ -57,20 +51,16 @@ def _of_glove(glove: GloveWiring) -> Iterator[Fault]:
     yield from _of_names(named, "sensor")
 
 
-_FAULT_OF = {"scanner": scanner_port_fault, "stream": line_port_fault}
-
-
 def _of_devices(harness: Harness) -> Iterator[Fault]:
-    places: list[tuple[Place, str]] = [(("scanner", n, "port"), line.port) for n, line in enumerate(harness.scanners)]
-    places += [(("bus", n, "device"), bus.device) for n, bus in enumerate(harness.buses)]
+    places: list[tuple[Place, str]] = [(("bus", n, "device"), bus.device) for n, bus in enumerate(harness.buses)]
     places += [(("spi", n, "device"), chip.device) for n, chip in enumerate(harness.spi)]
     places += [(("stream", n, "port"), stream.port) for n, stream in enumerate(harness.streams)]
     if harness.cyberglove is not None:
         places.insert(0, (("cyberglove", "port"), harness.cyberglove.port))
     seen: dict[str, Place] = {}
     for place, device in places:
-        fault_of = device_fault if place[-1] == "device" else _FAULT_OF.get(str(place[0]), port_fault)
-        if reason := fault_of(device):
+        fault_of = device_fault if place[-1] == "device" else port_fault
+        if reason := (line_port_fault if place[0] == "stream" else fault_of)(device):
             yield place, f"{shortened(repr(device))} {reason}"
         if device in seen:
             yield place, f"{device} is already {spelled(seen[device])}: name each device in one entry only"
@@ -161,39 +151,44 @@ def _of_board(place: Place, stream: StreamWiring, board: BoardWiring) -> Iterato
 
 
 def _of_board_pins(place: Place, stream: StreamWiring, board: BoardWiring) -> Iterator[Fault]:
-    """Yield pins that no sketch can name, that are used twice, or that do not suit their input."""
+    """Yield pins that no sketch can name, or that are used twice, and multiplexers that cannot be read."""
     if len(board.select) not in (0, len(cd74hc4067.SELECTS)):
         yield (*place, "select"), f"{len(board.select)} pins: a CD74HC4067 has four, S0 to S3"
+    behind = {name: pin for name, pin in board.pins.items() if "." in pin}
+    yield from _of_multiplexed(place, stream, behind)
+    if behind and not board.select:
+        yield (*place, "select"), "is missing: the pins at S0 to S3 of the multiplexers"
     used: list[tuple[Place, str]] = [((*place, "select", number), pin) for number, pin in enumerate(board.select)]
     if (matrix := board.matrix) is not None:
         used += [((*place, "matrix", "rows", number), pin) for number, pin in enumerate(matrix.rows)]
         used += [((*place, "matrix", "columns", number), pin) for number, pin in enumerate(matrix.columns)]
-        shape = [len(matrix.columns)] * len(matrix.rows)
-        if [len(row) for row in matrix.keys] != shape:
-            yield (*place, "matrix", "keys"), f'must be {len(shape)} lists of {shape[0]} names, "" where there is no key'
-    commons: dict[str, None] = {}
-    seen: dict[str, Place] = {}
-    for name, pin in board.pins.items():
-        where, (common, _, channel) = (*place, "pins", name), pin.partition(".")
-        if channel:
-            if name in stream.switches:
-                yield where, f"{pin} is behind a multiplexer, which is for joints and taxels: use another pin"
-            if not (channel.isdecimal() and int(channel) < cd74hc4067.CHANNELS):
-                yield where, f"{shortened(repr(pin))} is no channel of a CD74HC4067: the channels of A0 are A0.0 to A0.15"
-            if not board.select:
-                yield (*place, "select"), "is missing: the pins at S0 to S3 of the multiplexers"
-            if pin in seen:
-                yield where, f"{pin} is already {spelled(seen[pin])}: use another channel"
-            seen[pin] = where
-            commons[common] = None
-        else:
-            used.append((where, pin))
-    used += [((*place, "pins"), pin) for pin in commons]
+        rows, columns = len(matrix.rows), len(matrix.columns)
+        if [len(row) for row in matrix.keys] != [columns] * rows:
+            yield (*place, "matrix", "keys"), f'must be {rows} lists of {columns} names, "" where there is no key'
+    used += [((*place, "pins", name), pin) for name, pin in board.pins.items() if name not in behind]
+    used += [((*place, "pins"), pin) for pin in dict.fromkeys(pin.partition(".")[0] for pin in behind.values())]
     for where, pin in used:
         if not _PIN.fullmatch(pin):
             yield where, f'{shortened(repr(pin))} is no pin of a sketch: write "2", "A0" or "PA3"'
+    yield from _used_twice(used)
+
+
+def _of_multiplexed(place: Place, stream: StreamWiring, behind: Mapping[str, str]) -> Iterator[Fault]:
+    """Yield faults of the inputs behind multiplexers, by the channel of each."""
+    for name, pin in behind.items():
+        where, channel = (*place, "pins", name), pin.partition(".")[2]
+        if name in stream.switches:
+            yield where, f"{pin} is behind a multiplexer, which is for joints and taxels: use another pin"
+        if not (channel.isdecimal() and int(channel) < cd74hc4067.CHANNELS):
+            yield where, f"{shortened(repr(pin))} is no channel of a CD74HC4067: the channels of A0 are A0.0 to A0.15"
+    yield from _used_twice([((*place, "pins", name), pin) for name, pin in behind.items()])
+
+
+def _used_twice(used: Iterable[tuple[Place, str]]) -> Iterator[Fault]:
+    seen: dict[str, Place] = {}
+    for where, pin in used:
         if pin in seen:
-            yield where, f"{pin} is already {spelled(seen[pin])}: use another pin"
+            yield where, f"{pin} is already {spelled(seen[pin])}: use another one"
         seen[pin] = where
 
 
@@ -245,9 +240,6 @@ def _of_elements(harness: Harness) -> Iterator[Fault]:
     """Yield names used twice; a taxel and a switch may not share a name either, since levels are named by taxel."""
 
     def wired() -> Iterator[tuple[Place, str]]:
-        for number, scanner in enumerate(harness.scanners):
-            for key, names in (("switches", scanner.switches), ("taxels", scanner.taxels)):
-                yield from ((("scanner", number, key, place), name) for place, name in enumerate(names) if name)
         for number, stream in enumerate(harness.streams):
             yield from ((("stream", number, "switches", place), name) for place, name in enumerate(stream.switches))
             for key, ranges in (("joints", stream.joints), ("taxels", stream.taxels)):

@@ -1,4 +1,4 @@
-"""The wiring of a glove: serial lines and buses, and the pin or key of each switch.
+"""The wiring of a glove: serial lines and buses, and the pin or column of each switch.
 
 The structs are the tables of `glove.toml`, field by field; a loaded harness is known to be valid.
 """
@@ -12,15 +12,12 @@ from msgspec import Meta, Struct, field
 
 from thenar.drivers.cyberglove_protocol import SENSORS, SENSORS_18, SENSORS_22
 from thenar.drivers.i2c.chips import CHIPS, Chip, Converter
-from thenar.drivers.scanner_protocol import MOST_ASKED
 from thenar.drivers.spi.chips import SPI_CHIPS, SpiChip
 
 from ..taxels import TaxelSettings
 
-# A board's bitmap has no room for more.
-MOST_KEYS = 2000
-# An ANALOG reply of a board has no room for more.
-MOST_CHANNELS = MOST_ASKED
+# A line has no room for more.
+MOST_COLUMNS = 2000
 # Clock rates of a bus.
 SLOWEST_HZ = 1000
 Text = Annotated[str, Meta(min_length=1)]
@@ -66,18 +63,6 @@ class GloveWiring(_Table, frozen=True):
     def sensor_names(self) -> tuple[str, ...]:
         """The names of all its sensors in wire order: ours, or the driver's."""
         return self.joints or (SENSORS_18 if self.all_sensors == SENSORS else SENSORS_22)
-
-
-class ScannerWiring(_Table, frozen=True):
-    """A switch-scanner board: key k of the board is switches[k], "" for none; channel c of its converter, if any, is
-    taxels[c], with 16 channels on each multiplexer `mux`.
-    """
-
-    port: Text
-    switches: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)] = ()
-    baud: Baud = 1_000_000
-    taxels: Annotated[tuple[str, ...], Meta(max_length=MOST_CHANNELS)] = ()
-    mux: Literal["cd74hc4067"] | None = None
 
 
 class MuxChannel(_Table, frozen=True):
@@ -182,11 +167,11 @@ class StreamWiring(_Table, frozen=True):
     port: Text
     baud: Baud = 115_200
     sender: Text | None = field(name="from", default=None)
-    columns: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)] = ()
+    columns: Annotated[tuple[str, ...], Meta(max_length=MOST_COLUMNS)] = ()
     time: Text | None = None
     time_unit: Literal["s", "ms", "us"] = "ms"
     rate_hz: Annotated[float, Meta(ge=0.1, le=10_000.0)] = 50.0
-    switches: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)] = ()
+    switches: Annotated[tuple[str, ...], Meta(max_length=MOST_COLUMNS)] = ()
     threshold: float = 0.5
     thresholds: dict[str, float] = {}
     closed: Literal["low", "high"] = "high"
@@ -267,7 +252,6 @@ class Harness(_Table, frozen=True):
 
     name: Text
     cyberglove: GloveWiring | None = None
-    scanners: tuple[ScannerWiring, ...] = field(default=(), name="scanner")
     buses: tuple[BusWiring, ...] = field(default=(), name="bus")
     spi: tuple[SpiWiring, ...] = ()
     streams: tuple[StreamWiring, ...] = field(default=(), name="stream")
@@ -276,19 +260,17 @@ class Harness(_Table, frozen=True):
 
     @property
     def switches(self) -> tuple[str, ...]:
-        """The names of all wired switches: the boards', then the chips', pin by pin, then the streams'."""
-        keys = (name for scanner in self.scanners for name in scanner.switches if name)
+        """The names of all wired switches: the chips', pin by pin, then the streams'."""
         chips = (chip for bus in self.buses for chip in bus.chips if not chip.measures)
         streams = (name for stream in self.streams for name in stream.switches)
-        return (*keys, *(name for chip in chips for name in chip.numbered_pins.values()), *streams)
+        return (*(name for chip in chips for name in chip.numbered_pins.values()), *streams)
 
     @property
     def taxel_names(self) -> tuple[str, ...]:
-        """The names of all wired taxels: the boards', then the converters', channel by channel, then the streams'."""
-        boards = (name for scanner in self.scanners for name in scanner.taxels if name)
+        """The names of all wired taxels: the converters', channel by channel, then the streams'."""
         chips: list[ChipWiring | SpiWiring] = [chip for bus in self.buses for chip in bus.chips if chip.measures]
         streams = (name for stream in self.streams for name in stream.taxels)
-        return (*boards, *(name for chip in (*chips, *self.spi) for name in chip.numbered_pins.values()), *streams)
+        return (*(name for chip in (*chips, *self.spi) for name in chip.numbered_pins.values()), *streams)
 
     @property
     def joint_device(self) -> GloveWiring | StreamWiring | None:
@@ -325,20 +307,18 @@ class Harness(_Table, frozen=True):
 
     @property
     def fingerprint(self) -> str:
-        """SHA-256, in hex, of the place of each switch: of chips, pins and keys in order.
+        """SHA-256, in hex, of the place of each switch: of chips, pins and columns in order.
 
         It does not cover ports, device files and clocks: a map of the switches stays valid when they change.
         """
         return hashlib.sha256(msgspec.json.encode(list(self._where()))).hexdigest()
 
     def _where(self) -> Iterator[object]:
-        yield [scanner.switches for scanner in self.scanners]
         for bus in self.buses:
             yield [
                 (chip.kind, chip.address, chip.mux, chip.closed, list(chip.numbered_pins.items())) for chip in bus.chips
             ]
-        if self.spi or any(scanner.taxels for scanner in self.scanners):
-            yield [(scanner.taxels, scanner.mux) for scanner in self.scanners]
+        if self.spi:
             yield [(chip.kind, list(chip.numbered_pins.items())) for chip in self.spi]
         if self.streams:
             yield [

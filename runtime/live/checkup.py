@@ -8,7 +8,6 @@ from time import monotonic, perf_counter
 import msgspec
 
 from thenar.drivers.errors import ThenarError
-from thenar.drivers.scanner import Scanner
 
 from ..frames import SwitchFrame
 from ..harness.wiring import GloveWiring, Harness
@@ -20,7 +19,6 @@ from ..sources.base import SOURCES
 from ..sources.cyberglove import GloveDevice
 from ..sources.i2c import I2cDevice, PortLevels
 from ..sources.rows import RowSource
-from ..sources.scanner import ScannerDevice
 from ..sources.spi import SpiConverter
 from ..taxels import Taxels, calibration_of
 from .quarantine import Chattering, numbers
@@ -40,7 +38,7 @@ RECORD = "a record"
 class Finding(msgspec.Struct, frozen=True):
     """The finding on a device; for a bus, chip by chip and as a whole.
 
-    predicted_us  from one record or full bitmap to the next, or the time of the readings, by the arithmetic of the
+    predicted_us  from one record or row to the next, or the time of the readings, by the arithmetic of the
                   wire, for a CyberGlove by its vendor's formula
     measured_us   the same as measured, the median; None if nothing came
     remarks       what is missing, slow or odd, in sentences
@@ -66,8 +64,6 @@ def check_up(
     """
     if (glove := harness.cyberglove) is not None:
         yield lambda: _glove(glove, sensors)
-    for number in range(len(harness.scanners)):
-        yield lambda number=number: _scanner(harness, number)  # type: ignore[misc]
     for number in range(len(harness.streams)):
         yield lambda number=number: _stream(harness, number)  # type: ignore[misc]
     for bus in sorted({port.bus for port in scan.ports}):
@@ -111,34 +107,6 @@ def _record(wiring: GloveWiring, read: Sequence[str]) -> Finding:
         return Finding(device.name, part, True, predicted, measured, (unmasked or "no record comes",))
     said = f"{measured:.0f} us were measured, {measured / predicted:.2f} of the vendor's formula, {predicted:.0f} us"
     return Finding(device.name, part, True, predicted, measured, (said,))
-
-
-def _scanner(harness: Harness, number: int) -> tuple[Finding, ...]:
-    device = ScannerDevice(harness, number, harness.switches, whole_scan(harness, harness.switches))
-    frames: list[SwitchFrame] = []
-
-    def read() -> SwitchFrame | None:
-        frame = device.read(_LISTEN_S)
-        frames.extend([] if frame is None else [frame])
-        return frame
-
-    try:
-        hello = device.driver.open()
-        device.close()
-        device.open()
-        measured = _gap(read)
-        remarks = (*_recognising(device.driver), *_counted(device), *_wrong(harness.switches, frames))
-    except ThenarError as wrong:
-        return (Finding(device.name, "", False, float(device.period_us), None, (str(wrong),)),)
-    finally:
-        device.close()
-    analog = device.driver.analog
-    channels = f", {analog.channels} channels of {analog.bits} bits" if analog is not None else ""
-    board = f"board {hello.board}, firmware {hello.major}.{hello.minor}.{hello.patch}, {hello.keys} keys{channels}"
-    found = Finding(device.name, board, True, float(device.period_us), measured, remarks)
-    highest = None if analog is None else (1 << analog.bits) - 1
-    wired = [name for name in harness.scanners[number].taxels if name]
-    return (_remarked(found), *taxel_findings(device.name, wired, harness, frames, highest))
 
 
 def _stream(harness: Harness, number: int) -> tuple[Finding, ...]:
@@ -208,17 +176,6 @@ def taxel_findings(
             if not fault and highest is not None and median_low(counts) in (0, highest):
                 remarks.append("at the end of the converter: at rest, pressed hard, or an open wire")
         yield Finding(device, f"taxel {name}", fault in ("", "saturated"), 0.0, None, tuple(remarks))
-
-
-def _recognising(board: Scanner) -> tuple[str, ...]:
-    """Return a remark if the board recognises grasps by itself."""
-    grasp, segment = board.grasp, board.segment
-    if grasp is None:
-        return ()
-    number = f"grasp type {grasp.number} of the build that it carries, counted from 0"
-    what = "no grasp type" if grasp.number is None else number
-    follows = "" if segment is None else f"; it follows segments, {segment.number} so far, the newest {segment.state}"
-    return (f"it recognises grasps by itself, last {what}{follows}",)
 
 
 def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[Finding, ...]:
@@ -313,7 +270,7 @@ def _duration(read: Callable[[], object]) -> float:
     return 1e6 * median(taken)
 
 
-def _counted(device: GloveDevice | ScannerDevice) -> tuple[str, ...]:
+def _counted(device: GloveDevice) -> tuple[str, ...]:
     """Return a remark on bytes lost or damaged on a line, if there were any."""
     wrong = [f"{count.name} {count.value}" for count in device.counts() if count.value and count.name in _WRONG]
     return (f"on its line: {', '.join(wrong)}",) if wrong else ()

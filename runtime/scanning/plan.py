@@ -96,7 +96,7 @@ def plan_scan(switch_names: Sequence[str], harness: Harness) -> ScanMap:
     """
     if lacking := unwired(harness, switch_names):
         raise HarnessError(
-            f"harness {harness.name!r} has no pin or key for {list_names(lacking)}, which the build keeps: "
+            f"harness {harness.name!r} has no pin or column for {list_names(lacking)}, which the build keeps: "
             "add what is missing to its file, or let --propose write one"
         )
     scan = whole_scan(harness, switch_names)
@@ -106,7 +106,7 @@ def plan_scan(switch_names: Sequence[str], harness: Harness) -> ScanMap:
 def check_harness(scan: ScanMap, harness: Harness, switch_names: Sequence[str]) -> None:
     """Raise HarnessError unless `scan` was made for `harness`; ports, devices and clocks may have changed since.
 
-    Every port is then a reading of an existing chip, and every bit and key is the switch of the build, by its name.
+    Every port is then a reading of an existing chip, and every bit and column is the switch of the build, by its name.
     """
     if scan.harness != harness.fingerprint:
         raise HarnessError(
@@ -121,8 +121,7 @@ def check_harness(scan: ScanMap, harness: Harness, switch_names: Sequence[str]) 
         for pin, switch in _pins(port, harness)
     }
     conversions = {(port.bus, port.chip, port.reading): port for port in wired.ports if port.levels}
-    boards = (wired.scanners, wired.taxels, wired.streams)
-    right = (scan.scanners, scan.taxels, scan.streams) == boards and all(
+    right = scan.streams == wired.streams and all(
         conversions.get((port.bus, port.chip, port.reading)) == port
         if port.levels
         else bool(pins := _pins(port, harness))
@@ -131,7 +130,7 @@ def check_harness(scan: ScanMap, harness: Harness, switch_names: Sequence[str]) 
     )
     if not right:
         raise HarnessError(
-            f"the build's scan map reads other pins or keys than harness {harness.name!r} has switches on: "
+            f"the build's scan map reads other pins or columns than harness {harness.name!r} has switches on: "
             "compile again with --glove"
         )
 

@@ -7,7 +7,7 @@ from thenar.drivers.i2c.chips import Chip, Reading
 
 from ..harness.wiring import ChipWiring, Harness, SpiWiring
 from ..names import taxel_and_code
-from .scanmap import SCHEMA, BoardLevel, Pair, Port, ScanMap, StreamRead
+from .scanmap import SCHEMA, Pair, Port, ScanMap, StreamLevel, StreamRead
 
 # The levels of each taxel: (code, number of the switch) pairs, ascending.
 Levels = Mapping[str, tuple[Pair, ...]]
@@ -92,21 +92,17 @@ def whole_scan(harness: Harness, switch_names: Sequence[str], *, every_taxel: bo
     levels = levels_of(harness, switch_names)
     on_taxels = {number for pairs in levels.values() for _, number in pairs}
     numbers = {name: number for number, name in enumerate(switch_names) if number not in on_taxels}
-    scanners = tuple(_keys(scanner.switches, numbers) for scanner in harness.scanners)
-    boards = tuple(_board_levels(scanner.taxels, levels) for scanner in harness.scanners)
     streams = tuple(
-        StreamRead(_keys(each.switches, numbers), _board_levels(tuple(each.taxels), levels)) for each in harness.streams
+        StreamRead(_places(each.switches, numbers), _levels(tuple(each.taxels), levels)) for each in harness.streams
     )
     converted = {taxel: levels.get(taxel, ()) for taxel in harness.taxel_names} if every_taxel else levels
     ports = ports_of(harness, numbers, converted)
-    return ScanMap(SCHEMA, harness.fingerprint, ports, scanners, boards if any(boards) else (), streams)
+    return ScanMap(SCHEMA, harness.fingerprint, ports, streams)
 
 
-def _keys(names: Sequence[str], numbers: Mapping[str, int]) -> tuple[Pair, ...]:
-    return tuple((key, numbers[name]) for key, name in enumerate(names) if name in numbers)
+def _places(names: Sequence[str], numbers: Mapping[str, int]) -> tuple[Pair, ...]:
+    return tuple((place, numbers[name]) for place, name in enumerate(names) if name in numbers)
 
 
-def _board_levels(taxels: Sequence[str], levels: Levels) -> tuple[BoardLevel, ...]:
-    return tuple(
-        (channel, code, number) for channel, taxel in enumerate(taxels) for code, number in levels.get(taxel, ())
-    )
+def _levels(taxels: Sequence[str], levels: Levels) -> tuple[StreamLevel, ...]:
+    return tuple((place, code, number) for place, taxel in enumerate(taxels) for code, number in levels.get(taxel, ()))

@@ -1,9 +1,9 @@
 """Propose a harness for a new reduced glove: the kept switches on the fewest ports, and the fewest bytes on the bus."""
 
 from collections.abc import Iterator, Sequence
-from itertools import islice
-from typing import Literal
+from itertools import count, islice
 
+from thenar.drivers import cd74hc4067
 from thenar.drivers.cyberglove_protocol import SENSORS, sensors_with
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS, Chip, Converter, expanders
@@ -11,24 +11,25 @@ from thenar.drivers.spi.chips import SPI_CHIPS
 
 from ..errors import HarnessError
 from ..harness.wiring import (
-    MOST_CHANNELS,
-    MOST_KEYS,
+    MOST_COLUMNS,
+    BoardWiring,
     BusWiring,
     ChipWiring,
     GloveWiring,
     Harness,
     MuxChannel,
-    ScannerWiring,
     SpiWiring,
+    StreamWiring,
 )
 from ..names import list_names, nearest, taxel_and_code
+from .timing import row_us
 
 # Supported by every board's I2C, and most chips; a slower chip slows it down.
 CLOCK_HZ = 400_000
 # The converter for taxels: the most channels on a bus, converted within the transfer that reads them.
 CONVERTER = "ads7828"
-# A board's converter alone has no more channels; CD74HC4067 multiply them.
-_BOARD_CHANNELS = 8
+# Of a board: the range of its converter, its fastest rows, and an Uno's analog pins and LED.
+_CONVERTER_RANGE, _FASTEST_HZ, _ANALOG_PINS, _LED = (0.0, 1023.0), 1000, 6, 13
 
 
 def propose_harness(
@@ -98,21 +99,39 @@ def propose_board(
     *,
     name: str = "proposed",
     port: str = "/dev/ttyACM0",
+    baud: int = 115_200,
     cyberglove: GloveWiring | None = None,
 ) -> Harness:
-    """Return a harness with all switches on one scanner board, one key each, in order, and the taxels whose levels are
-    among the names on its converter.
+    """Return a harness with all switches on the pins of one board that prints rows, and the taxels whose levels are
+    among the names on its converter of 10 bits; rows come as fast as the line allows, at most 1000 a second.
 
-    Raises HarnessError if no board has enough keys or channels.
+    Pins are numbered as on Arduino's boards: 0 and 1 (the serial port) and 13 (the LED) stay free.
+
+    Raises HarnessError for more switches and taxels than a row can have.
     """
     switches, taxels = _parted(switch_names, ())
-    kinds = (("switches", switches, MOST_KEYS, "keys"), ("taxels", taxels, MOST_CHANNELS, "channels"))
-    for what, names, most, places in kinds:
-        if len(names) > most:
-            raise HarnessError(f"{len(names)} {what}, but one board has {most} {places}: use several boards, by hand")
-    mux: Literal["cd74hc4067"] | None = "cd74hc4067" if len(taxels) > _BOARD_CHANNELS else None
-    board = ScannerWiring(port=port, switches=tuple(switches), taxels=tuple(taxels), mux=mux)
-    return Harness(name=name, cyberglove=cyberglove, scanners=(board,) if switch_names else ())
+    columns = len(switches) + len(taxels)
+    if columns > MOST_COLUMNS:
+        raise HarnessError(f"{columns} switches and taxels, but a row has at most {MOST_COLUMNS}: use several boards")
+    board = StreamWiring(
+        port=port,
+        baud=baud,
+        rate_hz=float(min(_FASTEST_HZ, int(1e6 / row_us(len(switches), len(taxels), baud)))),
+        switches=tuple(switches),
+        taxels=dict.fromkeys(taxels, _CONVERTER_RANGE),
+        board=_pins(switches, taxels),
+    )
+    return Harness(name=name, cyberglove=cyberglove, streams=(board,) if switch_names else ())
+
+
+def _pins(switches: Sequence[str], taxels: Sequence[str]) -> BoardWiring:
+    digital = (str(number) for number in count(2) if number != _LED)
+    pins = dict(zip(switches, digital, strict=False))
+    if len(taxels) <= _ANALOG_PINS:
+        return BoardWiring(pins=pins | {name: f"A{number}" for number, name in enumerate(taxels)})
+    channels = (f"A{number // cd74hc4067.CHANNELS}.{number % cd74hc4067.CHANNELS}" for number in count())
+    select = tuple(islice(digital, len(cd74hc4067.SELECTS)))
+    return BoardWiring(pins=pins | dict(zip(taxels, channels, strict=False)), select=select)
 
 
 def propose_cyberglove(joints: Sequence[str]) -> GloveWiring | None:
@@ -129,7 +148,7 @@ def own_joints(joints: Sequence[str]) -> str:
         return ""
     return (
         f"joints {list_names(joints)} need a source of your own: a board that prints them ([[stream]] of glove.toml), "
-        "the converter of a board ([analog] of board.toml), or a source that you add (docs/how-to/extend.md)"
+        "or a source that you add (docs/how-to/extend.md)"
     )
 
 

@@ -17,10 +17,10 @@ SCHEMA = 1
 MAX_BYTES = 4 << 20
 
 Number = Annotated[int, Meta(ge=0, le=65535)]
-# A bit of a reply, or a key of a board, and the number of its switch in the build.
+# A bit of a reply, or a place among a stream's switches, and the number of its switch in the build.
 Pair = tuple[Number, Number]
-# A channel of a board's converter, the code above which a level is closed, and the number of its switch in the build.
-BoardLevel = tuple[Number, Number, Number]
+# A place among a stream's taxels, the code above which a level is closed, and the number of its switch in the build.
+StreamLevel = tuple[Number, Number, Number]
 
 
 class Port(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -50,36 +50,22 @@ class StreamRead(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     switches: tuple[Pair, ...]
-    levels: tuple[BoardLevel, ...]
+    levels: tuple[StreamLevel, ...]
 
 
 class ScanMap(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The reading plan of a glove, with its ports in reading order.
-
-    scanners holds (key, number of the build's switch) pairs for every board of the harness; taxels holds every board's
-    levels, if any board measures levels; streams holds the used part of every stream.
-    """
+    """The reading plan of a glove, with its ports in reading order, and the used part of every stream."""
 
     schema: int
     harness: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
     ports: tuple[Port, ...]
-    scanners: tuple[tuple[Pair, ...], ...]
-    taxels: tuple[tuple[BoardLevel, ...], ...] = ()
     streams: tuple[StreamRead, ...] = ()
 
     @property
     def switches(self) -> tuple[int, ...]:
-        """The numbers of the build's switches that are read: from the boards, the ports, the streams."""
-        keys = (switch for pairs in self.scanners for _, switch in pairs)
-        levels = (switch for board in self.taxels for *_, switch in board)
+        """The numbers of the build's switches that are read: from the ports, then the streams."""
         streams = (pair[-1] for stream in self.streams for pair in (*stream.switches, *stream.levels))
-        return (*keys, *levels, *(switch for port in self.ports for switch in port.elements), *streams)
-
-    @property
-    def board_channels(self) -> tuple[int, ...]:
-        """The number of channels whose codes each board is asked for."""
-        levels = self.taxels or ((),) * len(self.scanners)
-        return tuple(len({channel for channel, *_ in board}) for board in levels)
+        return (*(switch for port in self.ports for switch in port.elements), *streams)
 
 
 def scanmap_to_bytes(scan: ScanMap) -> bytes:
@@ -111,18 +97,16 @@ def _check_once(scan: ScanMap, what: str) -> None:
             raise BuildError(f"{what}: the reading {shortened(repr(port.reading))} {reason}: compile the build again")
         if bool(port.switches) == bool(port.levels):
             raise BuildError(f"{what} has a port without switches, or with levels too: compile the build again")
-    if scan.taxels and (len(scan.taxels) != len(scan.scanners) or not any(scan.taxels)):
-        raise BuildError(f"{what} has taxels of other boards than it reads: compile the build again")
     readings = [(port.bus, port.chip, port.reading) for port in scan.ports]
     if len(set(readings)) < len(readings):
         raise BuildError(f"{what} reads a port twice: compile the build again")
-    sources = (*scan.scanners, *(pairs for port in scan.ports for pairs in (port.switches, port.levels)))
-    sources = (*sources, *(stream.switches for stream in scan.streams))
-    boards = (*scan.taxels, *(stream.levels for stream in scan.streams))
-    levels = [[(channel, code) for channel, code, _ in board] for board in boards]
+    sources = [pairs for port in scan.ports for pairs in (port.switches, port.levels)]
+    sources += [stream.switches for stream in scan.streams]
+    measured = [stream.levels for stream in scan.streams]
+    levels = [[(taxel, code) for taxel, code, _ in each] for each in measured]
     for numbers in (scan.switches, *([bit for bit, _ in pairs] for pairs in sources), *levels):
         if len(set(numbers)) < len(numbers):
             raise BuildError(f"{what} reads a bit or a switch twice: compile the build again")
-    for ascending in (*(port.levels for port in scan.ports), *boards):
+    for ascending in (*(port.levels for port in scan.ports), *measured):
         if list(ascending) != sorted(ascending):
             raise BuildError(f"{what} has levels out of order: compile the build again")

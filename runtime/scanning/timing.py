@@ -18,10 +18,9 @@ from thenar.drivers import cyberglove_protocol as glove_protocol
 from thenar.drivers.cyberglove_protocol import sending_us, shortest_us
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import Conversion, Reading
-from thenar.drivers.scanner_protocol import OVERHEAD, Analog
 from thenar.drivers.spi.chips import SELECT_US, Transfer
 
-from ..harness.wiring import GloveWiring, Harness, MuxChannel, ScannerWiring
+from ..harness.wiring import GloveWiring, Harness, MuxChannel
 from .ports import whole_scan
 from .scanmap import Port, ScanMap
 
@@ -200,34 +199,14 @@ def glove_us(glove: GloveWiring, sensors: int, *, wire_only: bool = False) -> fl
     return max(us, 1e6 / glove.rate_hz if glove.rate_hz else 0.0)
 
 
-# Minimum time from ANALOG to ANALOG; and the time of thenar's boards to convert a channel: 14 cycles of 125 kHz.
-_ANALOG_US, _CONVERSION_US = 2000.0, 112.0
+# A row of a board beside its switches and readings: name, sequence number, clock, checksum, end of line. A reading has
+# at most five digits.
+_ROW_BYTES, _READING_BYTES = len("$row,65535,4294967295,*00\r\n"), len(",65535")
 
 
-def analog_us(channels: int, baud: int) -> float:
-    """Return the period at which a board sends the codes of `channels` channels, in microseconds: the line is free for
-    at least half of the time.
-    """
-    return max(_ANALOG_US, 2 * _codes_us(channels, baud))
-
-
-def _codes_us(channels: int, baud: int) -> float:
-    return sending_us(OVERHEAD + Analog.LAYOUT.size + 2 * channels, baud)
-
-
-def conversions_us(scanner: ScannerWiring, channels: int) -> float:
-    """Return the time in which a board converts `channels`. Behind a multiplexer each first conversion is discarded."""
-    return channels * _CONVERSION_US * (1 if scanner.mux is None else 2)
-
-
-def taxels_us(scanner: ScannerWiring, channels: int) -> float:
-    """Return the time in which a board converts `channels` channels and sends their codes, in microseconds."""
-    return conversions_us(scanner, channels) + _codes_us(channels, scanner.baud) if channels else 0.0
-
-
-def scanner_us(scanner: ScannerWiring) -> float:
-    """Return the time of a board's full bitmap on its line, in microseconds."""
-    return sending_us(-(-len(scanner.switches) // 8) + OVERHEAD, scanner.baud)
+def row_us(switches: int, readings: int, baud: int) -> float:
+    """Return the time of a board's row on a serial line, in microseconds."""
+    return sending_us(_ROW_BYTES + -(-switches // 4) + readings * _READING_BYTES, baud)
 
 
 def _selected_us(ports: Iterable[Port], harness: Harness, ioctl_us: float) -> list[float]:

@@ -1,4 +1,4 @@
-"""The time of a scan: arithmetic of the wire, and the overhead of calls and firmware."""
+"""The time of a scan: arithmetic of the wire, and the overhead of calls."""
 
 import os
 import time
@@ -12,11 +12,10 @@ from statistics import median
 from msgspec.structs import replace
 
 from thenar.drivers.cyberglove_protocol import SENSORS, sensors_with
-from thenar.drivers.i2c.chips import Reading
-from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring
+from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.scanning.plan import Costs, plan_scan
 from thenar.runtime.scanning.scanmap import ScanMap
-from thenar.runtime.scanning.timing import analog_us, conversions_us, glove_us, reading_of, scanner_us
+from thenar.runtime.scanning.timing import glove_us
 
 from ...firmware.targets import TARGETS
 from ..points import How, Time
@@ -28,30 +27,18 @@ NO_TIME = Time(0.0, "wire")
 # and 6 us back; others measured 300 us (Pi Zero) with an older library.
 PI_CALL_US = 30.0
 _CALLS, _BATCHES = 200, 9
-# Cycles of thenar's scanning firmware while no switch changes, fitted to libsimavr's counts (`simulated`) for 1 to 100
-# switches on chips of three kinds, within 5 %: per scan, key, reading, and byte of its reply. A change also needs to be
-# debounced and reported: compiler.firmware.board_files has bounds.
-_SCAN, _KEY, _READING, _REPLY_BYTE = 520, 40, 530, 560
-_BOARD = "avr328p"
 
 
 @dataclass(frozen=True, slots=True)
 class Overhead:
-    """Microseconds in addition to the wire: per transaction, byte read, scan, and key read.
+    """Microseconds of each transaction in addition to the wire.
 
-    what  a sentence on these and their source; how: the source of a scan's time with them
+    what  a sentence on them and their source; how: the source of a scan's time with them
     """
 
     what: str
     call_us: float = 0.0
-    byte_us: float = 0.0
-    scan_us: float = 0.0
-    key_us: float = 0.0
     how: How = "wire"
-
-    def reading_us(self, reading: Reading) -> float:
-        """Return the overhead of one transaction beyond its SCL periods."""
-        return self.call_us + self.byte_us * reading.length
 
 
 WIRE_ONLY = Overhead("scans are those of the wire alone")
@@ -60,9 +47,7 @@ WIRE_ONLY = Overhead("scans are those of the wire alone")
 def overhead_of(target: str) -> Overhead:
     """Return the reading overhead on `target` (a name of `frontier --target`)."""
     if target in TARGETS and TARGETS[target].clock_hz is not None:
-        if "scan" in TARGETS[target].modes:
-            return firmware_overhead(target)
-        return Overhead(f"scans on {target} are those of the wire alone: thenar has no scanning firmware for it")
+        return Overhead(f"scans on {target} are those of the wire alone, without the time of its program")
     if target == "pi" and not on_a_pi():
         return Overhead(
             f"a transfer on a Raspberry Pi is taken to have {PI_CALL_US:g} us of overhead, which is a guess from a "
@@ -75,26 +60,6 @@ def overhead_of(target: str) -> Overhead:
         f"a transfer has {measured:.1f} us of overhead, measured here: the system call, without the adapter's driver",
         call_us=measured,
     )
-
-
-def firmware_overhead(target: str) -> Overhead:
-    """Return the overhead of thenar's scanning firmware on an AVR at its default clock, while no switch changes."""
-    part = TARGETS[target]
-    assert part.clock_hz is not None
-    us = 1e6 / part.clock_hz
-    return Overhead(
-        f"scans on {part.named} include the cycles of thenar's firmware while no switch changes",
-        call_us=_READING * us,
-        byte_us=_REPLY_BYTE * us,
-        scan_us=_SCAN * us,
-        key_us=_KEY * us,
-        how="model",
-    )
-
-
-def board_overhead() -> Overhead:
-    """Return the overhead of a scanner board with thenar's firmware before it sends."""
-    return firmware_overhead(_BOARD)
 
 
 def measured_call_us() -> float:
@@ -131,8 +96,8 @@ class ScanTimes:
     """Time of reading the kept switches.
 
     us     microseconds of a scan; buses are read one after another, as `scan_us` of the runtime adds them up
-    ports  transactions, where a board's frame is one; chips: a board is one
-    how    "wire", "model" if firmware cycles are included, or "guess" if a guess is
+    ports  transactions, where a stream's row is one; chips: those that are read
+    how    "wire", or "guess" if a guess is included
     """
 
     us: float
@@ -144,50 +109,36 @@ class ScanTimes:
 def scan_times(names: Sequence[str], wiring: Wiring, overhead: Overhead = WIRE_ONLY) -> ScanTimes:
     """Return the scan times of a build's switches `names`, in its order.
 
-    overhead is added to every transaction; a board has the overhead of thenar's firmware for scanning its keys before
-    it sends. Boards and buses work in parallel, so the slowest counts. Raises HarnessError if a switch has no place.
+    overhead is added to every transaction. Streams and buses work in parallel, so the slowest counts. Raises
+    HarnessError if a switch has no place.
     """
     if not len(names):
         return ScanTimes(0.0, 0, 0, "wire")
     harness = wiring.harness_of(names)
     scan = plan_scan(names, harness)
-    wanted = zip(harness.scanners, scan.scanners, scan.board_channels, strict=True)
-    boards = [(board, channels) for board, keys, channels in wanted if keys or channels]
-    streams = [
-        stream for stream, read in zip(harness.streams, scan.streams, strict=True) if read.switches + read.levels
+    rows_us = [
+        float(stream.period_us)
+        for stream, read in zip(harness.streams, scan.streams, strict=True)
+        if read.switches + read.levels
     ]
-    rows_us = (float(stream.period_us) for stream in streams)
-    board_us = max((*(_board_us(*board) for board in boards), *rows_us), default=0.0)
     return ScanTimes(
-        us=max(_bus_us(scan, harness, overhead), board_us),
-        ports=len(scan.ports) + len(boards) + len(streams),
-        chips=len({(port.bus, port.chip) for port in scan.ports}) + len(boards),
-        how="model" if boards else overhead.how,
+        us=max(_bus_us(scan, harness, overhead), *rows_us, 0.0),
+        ports=len(scan.ports) + len(rows_us),
+        chips=len({(port.bus, port.chip) for port in scan.ports}),
+        how=overhead.how,
     )
-
-
-def _board_us(board: ScannerWiring, channels: int) -> float:
-    """Return the time of a board for this number of taxels: their codes come in separate frames, after all are
-    converted.
-    """
-    own = board_overhead()
-    keys_us = own.scan_us + own.key_us * len(board.switches) + scanner_us(board)
-    if not channels:
-        return keys_us
-    return max(keys_us, analog_us(channels, board.baud), conversions_us(board, channels))
 
 
 def _bus_us(scan: ScanMap, harness: Harness, overhead: Overhead) -> float:
     """Return the time of a scan of the chips, if there are any."""
     if not scan.ports:
         return 0.0
-    costs, read = Costs(scan.ports, harness), 0
-    us = [overhead.scan_us + overhead.key_us * len(scan.switches)]
-    for number, port in enumerate(scan.ports):
+    costs, read, us = Costs(scan.ports, harness), 0, list[float]()
+    for number in range(len(scan.ports)):
         # Selecting a channel is a transaction as well.
         wire_ns = costs.after(read, number)
         selected = wire_ns > costs.after(read | 1 << number, number)
-        us.append(wire_ns / 1000 + overhead.reading_us(reading_of(port, harness)) + overhead.call_us * selected)
+        us.append(wire_ns / 1000 + overhead.call_us * (1 + selected))
         read |= 1 << number
     return fsum(us)
 

@@ -22,7 +22,7 @@ CLOCKS_HZ = (100_000, 400_000, 1_000_000)
 BAUDS = (115_200, 1_000_000)
 # Chips that SPI0 of a Raspberry Pi selects.
 _SELECTS = 2
-# The clocks that board.toml allows for an AVR's bus.
+# The clocks that an AVR's bus is run at.
 _AVR_HZ = range(50_000, 400_001)
 
 
@@ -30,8 +30,8 @@ _AVR_HZ = range(50_000, 400_001)
 class Wiring:
     """A wiring of switches.
 
-    name      "as wired" (the given harness), "board" (a switch scanner), or a kind of port expander or of converter for
-              a new glove
+    name      "as wired" (the given harness), "board" (one that prints rows), or a kind of port expander or of converter
+              for a new glove
     clock_hz  of the bus, of a converter's SPI, or baud of the board's line
     harness   the given one, for "as wired"
     muxes     whether chips may go behind a TCA9548A
@@ -51,8 +51,7 @@ class Wiring:
             return self.harness
         glove = propose_cyberglove(joints)
         if self.name == BOARD:
-            proposed = propose_board(names, cyberglove=glove)
-            return replace(proposed, scanners=tuple(replace(each, baud=self.clock_hz) for each in proposed.scanners))
+            return propose_board(names, baud=self.clock_hz, cyberglove=glove)
         proposed = propose_harness(names, self.name, cyberglove=glove)
         if self.name in SPI_CHIPS:
             if len(proposed.spi) > _SELECTS:
@@ -71,7 +70,7 @@ class Wiring:
     def _check_muxes(self, harness: Harness) -> None:
         measuring = [chip for bus in harness.buses for chip in bus.chips if chip.measures]
         if measuring and not self.muxes:
-            raise HarnessError(f"taxels need a {measuring[0].kind}, which the firmware does not read")
+            raise HarnessError(f"taxels need a {measuring[0].kind}, which a board's sketch does not read")
         if measuring and self.clock_hz > measuring[0].chip.clock_hz:
             raise HarnessError(
                 f"taxels need a {measuring[0].kind}, which runs at {measuring[0].chip.clock_hz} Hz at most"
@@ -79,7 +78,7 @@ class Wiring:
         if not any(chip.mux for bus in harness.buses for chip in bus.chips):
             return
         if not self.muxes:
-            raise HarnessError(f"{self.name} chips need a TCA9548A here, whose channels the firmware cannot select")
+            raise HarnessError(f"{self.name} chips need a TCA9548A here, whose channels a board's sketch cannot select")
         if self.clock_hz > tca9548a.CLOCK_HZ:
             raise HarnessError(
                 f"{self.name} chips need a TCA9548A, which runs at {tca9548a.CLOCK_HZ} Hz at most: slow the bus down"
@@ -92,10 +91,10 @@ def wirings(
     """Return the candidate wirings for `target` (a name of `thenar frontier --target`): the given one, and those of a
     new glove with `switches` and `taxels`. Taxels are on ADS7828, or on one of the converters on SPI.
 
-    An AVR reads its chips itself: without muxes, with registers, at 50 to 400 kHz, as board.toml has it. Other wirings,
-    including scanner boards, are not among its candidates.
+    An AVR reads its chips itself: without muxes, with registers, at 50 to 400 kHz. Other wirings, including boards that
+    print rows, are not among its candidates.
     """
-    avr = reads_by_itself(target)
+    avr = is_avr(target)
     found = (
         []
         if given is None or not (given.switches or given.taxel_names) or (avr and not _of_an_avr(given))
@@ -111,9 +110,9 @@ def wirings(
     return tuple(found if avr else [*found, *(Wiring(BOARD, baud) for baud in BAUDS)])
 
 
-def reads_by_itself(target: str) -> bool:
-    """Return whether thenar's firmware for `target` reads the glove, without a computer."""
-    return target in TARGETS and "scan" in TARGETS[target].modes
+def is_avr(target: str) -> bool:
+    """Return whether `target` is an AVR, which reads the glove without a computer."""
+    return target in TARGETS and TARGETS[target].avr
 
 
 def names_of(count: int) -> list[str]:
@@ -123,7 +122,7 @@ def names_of(count: int) -> list[str]:
 
 def _as_wired(given: Harness) -> Wiring:
     clocks = [bus.clock_hz for bus in given.buses if bus.chips]
-    lines = [board.baud for board in given.scanners] or [chip.clock_hz for chip in given.spi]
+    lines = [chip.clock_hz for chip in given.spi] or [stream.baud for stream in given.streams]
     return Wiring(AS_WIRED, min(clocks or lines), given)
 
 
@@ -131,5 +130,5 @@ def _of_an_avr(given: Harness) -> bool:
     chips = [chip for bus in given.buses for chip in bus.chips]
     plain = all(chip.mux is None and chip.chip.registers and not chip.measures for chip in chips)
     return (
-        plain and not given.scanners and not given.spi and len(given.buses) == 1 and given.buses[0].clock_hz in _AVR_HZ
+        plain and not given.streams and not given.spi and len(given.buses) == 1 and given.buses[0].clock_hz in _AVR_HZ
     )
