@@ -174,7 +174,7 @@ def check_switches(board: Board, switches: Sequence[str]) -> None:
     lacking = [name for name in switches if name not in wired]
     if lacking:
         raise FirmwareError(
-            f"the board has no pin or key for {list_names(lacking)}, which the build keeps: add what is missing to "
+            f"the board has no pin or column for {list_names(lacking)}, which the build keeps: add what is missing to "
             "its board.toml, or compile the build for the switches that are there"
         )
     if not switches and not board.channels:

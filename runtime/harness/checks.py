@@ -20,7 +20,7 @@ Fault = tuple[Place, str]
 _SENSORS = (18, 22)
 _THRESHOLD = StreamWiring(port="-").threshold
 # As sketches name them: a number, or a macro of the board's core.
-_PIN = re.compile(r"\d{1,3}|[A-Za-z_][A-Za-z0-9_]{0,31}")
+_PIN = re.compile(r"\d{1,4}|[A-Za-z_][A-Za-z0-9_]{0,31}")
 
 
 def faults(harness: Harness) -> Iterator[Fault]:
@@ -146,8 +146,8 @@ def _of_board(place: Place, stream: StreamWiring, board: BoardWiring) -> Iterato
         for where, name in named:
             if name not in known:
                 yield where, f"the stream has no such column {shortened(repr(name))}{nearest(name, known)}"
-    yield from _of_names([*pins, *switches], "input")
     yield from _of_board_pins(place, stream, board)
+    yield from _of_names([*pins, *switches], "input")
 
 
 def _of_board_pins(place: Place, stream: StreamWiring, board: BoardWiring) -> Iterator[Fault]:

@@ -3,12 +3,12 @@ import sys
 from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
-from threading import Event
+from threading import Event, Thread
 
 import pytest
 
 from thenar.cli import run
-from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
+from thenar.drivers.closing import Closing
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine, load_taxel_calibration
 
@@ -16,31 +16,39 @@ HANGING_S = 60.0
 REST = (40, 0, 900, 500)
 
 
-class Pressed(ScannerBoard):
-    """A board of four channels whose ANALOGs hold the codes of `script` one after the other, and then the last."""
+class Pressed(Closing):
+    """A sender of four columns whose rows hold the codes of `script` one after the other, and then the last."""
 
-    def __init__(self) -> None:
-        super().__init__(1, 1, channels=4)
-        self.codes = REST
-        self.script: deque[Sequence[int | None]] = deque()
+    def __init__(self, line: PtyLine) -> None:
+        self.script: deque[Sequence[int]] = deque()
         self.done = Event()
+        self._line, self._codes, self._stop = line, REST, Event()
+        self._thread = Thread(target=self._send, daemon=True)
+        self._thread.start()
 
-    def _converted(self) -> tuple[int, ...]:
-        if self.script:
-            self.codes = self.script.popleft()
-            if not self.script:
-                self.done.set()
-        return super()._converted()
+    def _send(self) -> None:
+        while not self._stop.wait(0.002):
+            if self.script:
+                self._codes = tuple(self.script.popleft())
+                if not self.script:
+                    self.done.set()
+            self._line.send(",".join(map(str, self._codes)).encode() + b"\n")
+
+    def close(self) -> None:
+        self._stop.set()
+        self._thread.join()
 
 
 def calibrated(folder: Path, presses: Sequence[Sequence[int]], *options: str) -> tuple[int, str]:
-    """Hold each press for ten ANALOGs when asked to; return exit code and what was said on stderr."""
-    glove, board = folder / "glove.toml", Pressed()
+    """Hold each press for ten rows when asked to; return exit code and what was said on stderr."""
+    glove = folder / "glove.toml"
     glove.write_text(
-        f'[[scanner]]\nport = "{folder}/port"\ntaxels = ["p0", "", "p1", "p2"]\n[taxels]\ncalibration = "pads.toml"\n'
+        f'[[stream]]\nport = "{folder}/port"\nrate_hz = 500\ncolumns = ["p0", "", "p1", "p2"]\n'
+        "taxels = { p0 = [0, 1023], p1 = [0, 1023], p2 = [0, 1023] }\n"
+        '[taxels]\ncalibration = "pads.toml"\n'
     )
     command = [sys.executable, "-m", "thenar.cli", "calibrate", str(glove), "--taxels", "-o", str(folder / "pads.toml")]
-    with PtyLine(folder / "port", 1_000_000) as line, EmulatedScanner(line, 1, board=board):
+    with PtyLine(folder / "port", 115_200) as line, Pressed(line) as board:
         pipe = subprocess.PIPE
         with subprocess.Popen(
             [*command, "--hold", "0.05", *options], stdin=pipe, stdout=subprocess.DEVNULL, stderr=pipe, text=True
@@ -75,7 +83,7 @@ def test_where_nothing_moves_nothing_is_written(tmp_path: Path) -> None:
 
 
 def test_presses_have_no_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "glove.toml").write_text('[[scanner]]\nport = "nowhere"\ntaxels = ["p0"]\n')
+    (tmp_path / "glove.toml").write_text('[[stream]]\nport = "nowhere"\ntaxels = { p0 = [0, 1023] }\n')
     asked = ["calibrate", str(tmp_path / "glove.toml"), "--taxels", "-o", str(tmp_path / "pads.toml"), "--web"]
     assert run([*asked, "127.0.0.1:0"]) == 2
     assert "leave out --web or --taxels" in capsys.readouterr().err

@@ -58,18 +58,20 @@ def test_a_board_is_proposed_with_a_key_for_every_kept_switch(thenar: Thenar, se
     assert done.returncode == 0, done.stderr
     harness = load_harness(glove)
     kept = tuple(switch.name for switch in Build.load(build).manifest.switches)
-    assert [board.switches for board in harness.scanners] == [kept]
+    assert [stream.switches for stream in harness.streams] == [kept]
     assert not harness.buses
 
 
-def test_boards_are_told_with_their_keys(thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path) -> None:
+def test_streams_are_told_with_their_switches(
+    thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path
+) -> None:
     glove = tmp_path / "board.toml"
-    keys = ", ".join(f'"{name}"' for name in small_set.switch_names)
-    glove.write_text(f'[[scanner]]\nport = "/dev/ttyACM0"\nswitches = [{keys}, "", "spare"]\n')
+    names = ", ".join(f'"{name}"' for name in small_set.switch_names)
+    glove.write_text(f'[[stream]]\nport = "/dev/ttyACM0"\nrate_hz = 200\nswitches = [{names}, "spare"]\n')
     done = thenar("compile", set_file, "-o", tmp_path / "build", *FEW, "--glove", glove)
     assert done.returncode == 0, done.stderr
     kept = len(Build.load(tmp_path / "build").manifest.switches)
-    assert f"board /dev/ttyACM0: {kept} kept switches of 8 keys, 70 us a bitmap" in " ".join(done.stdout.split())
+    assert f"stream /dev/ttyACM0: {kept} kept switches and levels, a row every 5000 us" in " ".join(done.stdout.split())
 
 
 def test_a_file_is_replaced_only_if_asked(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
@@ -118,7 +120,7 @@ def test_a_harness_without_the_kept_switches_is_told_which(thenar: Thenar, set_f
     glove.write_text("")
     done = thenar("compile", set_file, "-o", tmp_path / "build", *FEW, "--glove", glove)
     assert done.returncode == 2
-    assert "harness 'glove' has no pin or key for s" in done.stderr
+    assert "harness 'glove' has no pin or column for s" in done.stderr
 
 
 def test_a_preset_sets_options_and_explicit_ones_win(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:

@@ -210,7 +210,7 @@ def test_a_matrix_that_lacks_a_kept_switch_names_it(thenar: Thenar, build: Path,
         made = ("--mode", mode, "--board", tmp_path / "board.toml", "-o", tmp_path / "made")
         done = thenar("firmware", build, "--target", "avr328p", *made)
         assert (done.returncode, done.stdout) == (2, "")
-        assert f"the board has no pin or key for {first}, which the build keeps" in done.stderr
+        assert f"the board has no pin or column for {first}, which the build keeps" in done.stderr
 
 
 def test_tables_too_large_for_a_glove_name_a_remedy_that_works(thenar: Thenar, tmp_path: Path) -> None:

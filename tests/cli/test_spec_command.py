@@ -106,44 +106,6 @@ def test_a_glove_is_described_as_it_is_wired(thenar: Thenar, hand_set: GraspSet,
     assert "wired as bench" in said(thenar("spec", build)), "the wiring that the build holds"
 
 
-def test_a_matrix_is_described_by_its_board(thenar: Thenar, hand_build: Path, tmp_path: Path) -> None:
-    board = tmp_path / "board.toml"
-    board.write_text(
-        'part = "atmega328p"\n[matrix]\nrows = ["PD2", "PD3"]\ncolumns = ["PB0", "PB1"]\ndiodes = true\n'
-        f"switches = [{json.dumps(NAMES[:2])}, {json.dumps(NAMES[2:])}]\n"
-    )
-    done = thenar("spec", hand_build, "--board", board, "--json", "-o", tmp_path / "spec")
-    assert done.returncode == 0, done.stderr
-    (reader,) = json.loads(done.stdout)["readers"]
-    names = [switch.name for switch in Build.load(hand_build).manifest.switches]
-    pins = [("PB0", "PB1")[NAMES.index(name) % 2] for name in names]
-    assert (reader["ref"], reader["pins"]) == ("A1", pins)
-    assert load_harness(tmp_path / "spec" / "glove.toml").scanners[0].switches == NAMES
-
-
-@pytest.mark.parametrize("joined", [True, False])
-def test_a_board_is_described_by_its_pins_or_its_expanders(
-    thenar: Thenar, hand_build: Path, tmp_path: Path, joined: bool
-) -> None:
-    pins = ("GPA0", "GPA1", "GPB0", "GPB1") if joined else ("PD2", "PD3", "PB0", "PB1")
-    wired = "\n".join(f'{name} = "{pin}"' for name, pin in zip(NAMES, pins, strict=True))
-    if joined:
-        wired = ", ".join(f'{pin} = "{name}"' for name, pin in zip(NAMES, pins, strict=True))
-        wired = f'[[chip]]\nkind = "mcp23017"\naddress = 0x20\npins = {{ {wired} }}'
-    else:
-        wired = f"[pins]\n{wired}"
-    board = tmp_path / "board.toml"
-    board.write_text(f'part = "atmega328p"\nscan_us = 3000\n{wired}\n')
-    done = thenar("spec", hand_build, "--board", board, "--json")
-    assert done.returncode == 0, done.stderr
-    (reader,) = json.loads(done.stdout)["readers"]
-    names = [switch.name for switch in Build.load(hand_build).manifest.switches]
-    assert reader["ref"] == ("U1" if joined else "A1")
-    assert dict(zip(reader["switches"], reader["pins"], strict=True)) == {
-        number: pins[NAMES.index(name)] for number, name in enumerate(names, start=1)
-    }
-
-
 def test_a_glove_of_ones_own_has_no_pattern_and_no_length(thenar: Thenar, build_folder: Path, tmp_path: Path) -> None:
     told = said(thenar("spec", build_folder, "-o", tmp_path / "spec"))
     assert "the positions of this glove's sensors are unknown" in told

@@ -255,7 +255,7 @@ def test_compiling_again_without_a_harness_takes_the_map_away(
 
 
 def test_a_harness_that_lacks_a_kept_switch_makes_no_build(grasp_set: GraspSet, tmp_path: Path) -> None:
-    with pytest.raises(HarnessError, match="'bare' has no pin or key for s"):
+    with pytest.raises(HarnessError, match="'bare' has no pin or column for s"):
         compile_build(grasp_set, tmp_path / "build", rounds=2, folds=0, harness=Harness(name="bare"))
     assert not (tmp_path / "build").exists()
 

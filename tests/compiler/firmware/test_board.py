@@ -159,7 +159,7 @@ def test_in_a_matrix_keys_count_row_by_row_whatever_the_build_keeps() -> None:
 def test_a_switch_that_the_build_keeps_must_be_wired() -> None:
     board = parse_board(UNO + PINS)
     check_switches(board, ["a"])
-    with pytest.raises(FirmwareError, match=r"no pin or key for x, y, which the build keeps: add what is missing"):
+    with pytest.raises(FirmwareError, match=r"no pin or column for x, y, which the build keeps: add what is missing"):
         check_switches(board, ["a", "x", "y"])
     with pytest.raises(FirmwareError, match="keeps no switch"):
         check_switches(board, [])

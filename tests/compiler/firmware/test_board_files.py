@@ -221,7 +221,7 @@ def test_a_board_that_only_scans_needs_no_joints(generate: Generate) -> None:
 
 
 def test_a_board_that_lacks_a_kept_switch_is_refused(generate: Generate) -> None:
-    with pytest.raises(FirmwareError, match="no pin or key for s2, which the build keeps"):
+    with pytest.raises(FirmwareError, match="no pin or column for s2, which the build keeps"):
         generate(UNO + PINS.replace("s2", "s5"))
 
 

@@ -17,8 +17,8 @@ NAMES = ["s0", "s1", "s2"]
 def test_whatever_times_depend_on_is_part_of_the_question(grasp_set: GraspSet) -> None:
     glove, board = propose_harness(NAMES), propose_board(NAMES)
     slower = replace(glove, buses=tuple(replace(bus, clock_hz=100_000) for bus in glove.buses))
-    other = replace(board, scanners=tuple(replace(each, baud=9600) for each in board.scanners), buses=slower.buses)
-    faster = replace(other, scanners=board.scanners)
+    other = replace(board, streams=tuple(replace(each, baud=9600) for each in board.streams), buses=slower.buses)
+    faster = replace(other, streams=board.streams)
     equipments = [
         Equipment(MODEL, wirings(None), WIRE_ONLY),
         Equipment(ClassifyModel("avr328p"), wirings(None), WIRE_ONLY),

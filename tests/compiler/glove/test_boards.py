@@ -1,4 +1,4 @@
-"""Scanner boards whose wiring is known: pins, matrices with and without diodes, expanders behind a board."""
+"""Boards whose wiring is known: pins, matrices with and without diodes, expanders behind a board."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from thenar.compiler.glove.files import spec_files
-from thenar.compiler.glove.layout import BoardPins
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, ScannerWiring
+from thenar.runtime.harness.wiring import BoardMatrix, BoardWiring, ChipWiring, Harness, StreamWiring
 from thenar.runtime.manifest import Manifest
 
 if TYPE_CHECKING:
@@ -17,13 +16,16 @@ if TYPE_CHECKING:
 Reader = Callable[[bytes], "Netlist"]
 Manifests = Callable[..., Manifest]
 NAMES = ("a", "b", "c")
-HARNESS = Harness(name="h", scanners=(ScannerWiring(port="/dev/ttyACM0", switches=("a", "b", "c", "")),))
 
 
-def test_switches_on_pins_of_their_own_go_to_ground(read_netlist: Reader, manifest_of: Manifests) -> None:
-    board = BoardPins(("PD2", "PD3", "PB0", "PB1"), ("",) * 4)
-    netlist = read_netlist(spec_files(manifest_of(NAMES), None, HARNESS, boards=[board])["glove.net"])
-    for number, pin in enumerate(("PD2", "PD3", "PB0"), start=1):
+def wired_by(board: BoardWiring) -> Harness:
+    return Harness(name="h", streams=(StreamWiring(port="/dev/ttyACM0", switches=NAMES, board=board),))
+
+
+def test_switches_on_pins_go_to_ground(read_netlist: Reader, manifest_of: Manifests) -> None:
+    board = BoardWiring(pins={"a": "2", "b": "3", "c": "A0"})
+    netlist = read_netlist(spec_files(manifest_of(NAMES), None, wired_by(board))["glove.net"])
+    for number, pin in enumerate(("2", "3", "A0"), start=1):
         assert netlist.net_of(f"SW{number}", "1") == netlist.net_of("A1", netlist.pin_of("A1", pin))
         assert netlist.net_of(f"SW{number}", "2") == "GND"
 
@@ -32,10 +34,9 @@ def test_switches_on_pins_of_their_own_go_to_ground(read_netlist: Reader, manife
 def test_in_a_matrix_each_switch_joins_its_column_to_its_row(
     read_netlist: Reader, manifest_of: Manifests, diodes: bool
 ) -> None:
-    """Rows PD2, PD3 and columns PB0, PB1: key k stands at row k / 2, column k % 2."""
-    board = BoardPins(("PB0", "PB1") * 2, ("PD2", "PD2", "PD3", "PD3"), diodes)
-    netlist = read_netlist(spec_files(manifest_of(NAMES), None, HARNESS, boards=[board])["glove.net"])
-    for number, (column, row) in enumerate([("PB0", "PD2"), ("PB1", "PD2"), ("PB0", "PD3")], start=1):
+    matrix = BoardMatrix(rows=("2", "3"), columns=("8", "9"), keys=(("a", "b"), ("c", "")), diodes=diodes)
+    netlist = read_netlist(spec_files(manifest_of(NAMES), None, wired_by(BoardWiring(matrix=matrix)))["glove.net"])
+    for number, (column, row) in enumerate([("8", "2"), ("9", "2"), ("8", "3")], start=1):
         assert netlist.net_of(f"SW{number}", "2") == f"A1_{row}"
         assert column_of(netlist, number, diodes) == netlist.net_of("A1", netlist.pin_of("A1", column))
     assert sum(ref[0] == "D" for ref in netlist.components) == 3 * diodes
@@ -56,10 +57,10 @@ def column_of(netlist: "Netlist", switch: int, diodes: bool) -> str:
 def test_expanders_behind_a_board_are_wired_and_the_host_still_reads_the_board(
     read_netlist: Reader, manifest_of: Manifests
 ) -> None:
-    chip = ChipWiring(kind="mcp23017", address=0x21, pins={"GPA0": "a", "GPB0": "b", "GPB1": "c"})
-    board = BoardPins(bus=BusWiring(device="atmega328p", clock_hz=400_000, chips=(chip,)))
-    files = spec_files(manifest_of(NAMES), None, HARNESS, boards=[board])
+    chip = ChipWiring(kind="mcp23017", address=0x21, pins={"GPA0": "a", "GPB0": "b"})
+    harness = wired_by(BoardWiring(pins={"c": "4"}, chips=(chip,)))
+    files = spec_files(manifest_of(NAMES), None, harness)
     netlist = read_netlist(files["glove.net"])
-    for number, pin in enumerate(("GPA0", "GPB0", "GPB1"), start=1):
-        assert netlist.net_of(f"SW{number}", "1") == netlist.net_of("U1", netlist.pin_of("U1", pin))
-    assert parse_harness(files["glove.toml"].decode(), "glove.toml") == HARNESS
+    for number, (ref, pin) in enumerate((("U1", "GPA0"), ("U1", "GPB0"), ("A1", "4")), start=1):
+        assert netlist.net_of(f"SW{number}", "1") == netlist.net_of(ref, netlist.pin_of(ref, pin))
+    assert parse_harness(files["glove.toml"].decode(), "glove.toml") == harness

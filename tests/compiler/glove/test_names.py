@@ -77,5 +77,5 @@ def test_every_file_is_well_formed_and_gives_the_names_back(
 
 def test_no_board_is_proposed_that_its_own_loader_would_refuse() -> None:
     assert len(propose_board([f"s{n}" for n in range(2000)]).switches) == 2000
-    with pytest.raises(ValueError, match="2001 switches, but one board has 2000 keys"):
+    with pytest.raises(ValueError, match="2001 switches and taxels, but a row has at most 2000"):
         propose_board([f"s{n}" for n in range(2001)])

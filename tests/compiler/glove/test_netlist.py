@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from thenar.compiler.glove.files import spec_files
-from thenar.compiler.glove.layout import BoardPins
 from thenar.compiler.glove.spec import glove_spec
 from thenar.compiler.hand import HandShape
 from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.runtime.harness.loading import load_harness, parse_harness
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel, ScannerWiring
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel, StreamWiring
 from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
@@ -170,27 +169,32 @@ def test_every_wire_of_the_list_is_on_the_net_of_its_switches(
         assert nets == {netlist.net_of(wire.connector, str(wire.pin))} == {wire.net}
 
 
-def test_a_board_has_a_pin_for_every_kept_key_and_one_for_ground(read_netlist: Reader, manifest_of: Manifests) -> None:
-    board = ScannerWiring(port="/dev/ttyACM0", switches=("x", "b", "", "a"))
-    harness = Harness(name="h", scanners=(board,))
+def test_a_sender_has_a_pin_for_every_kept_column_and_one_for_ground(
+    read_netlist: Reader, manifest_of: Manifests
+) -> None:
+    board = StreamWiring(port="/dev/ttyACM0", switches=("x", "b", "a"))
+    harness = Harness(name="h", streams=(board,))
     netlist = read_netlist(spec_files(manifest_of(["a", "b"]), None, harness)["glove.net"])
-    assert reached(netlist, 1) == [("A1", "key 3")]
-    assert reached(netlist, 2) == [("A1", "key 1")]
+    assert reached(netlist, 1) == [("A1", "a")]
+    assert reached(netlist, 2) == [("A1", "b")]
     assert netlist.net_of("A1", netlist.pin_of("A1", "GND")) == netlist.net_of("SW1", "2") == "GND"
     assert netlist.off_board == {"SW1", "SW2", "A1"}
 
 
 _TAXELS = """
-[[scanner]]
+[[stream]]
 port = "/dev/a"
 switches = ["s0"]
-taxels = ["", "t0", "t1"]
+taxels = { t0 = [0, 1023], t1 = [0, 1023] }
+[stream.board]
+pins = { s0 = "2", t0 = "A1", t1 = "A2" }
 
-[[scanner]]
+[[stream]]
 port = "/dev/b"
-switches = []
-taxels = ["t2", "spare", {empty}"t3"]
-mux = "cd74hc4067"
+taxels = { t2 = [0, 1023], spare = [0, 1023], t3 = [0, 1023] }
+[stream.board]
+pins = { t2 = "A0.0", spare = "A0.1", t3 = "A1.1" }
+select = ["8", "9", "10", "11"]
 
 [[bus]]
 device = "/dev/i2c-1"
@@ -202,7 +206,7 @@ AIN2 = "t4"
 [[bus.chip]]
 kind = "ads7828"
 address = 0x49
-mux = {{ address = 0x70, channel = 3 }}
+mux = { address = 0x70, channel = 3 }
 [bus.chip.pins]
 CH7 = "t5"
 
@@ -223,7 +227,7 @@ def test_every_taxel_is_half_a_divider_at_the_channel_that_measures_it(
     read_netlist: Reader, manifest_of: Manifests
 ) -> None:
     """Two levels of a taxel are one pad; t3 is on the second multiplexer, on its second channel."""
-    harness = parse_harness(_TAXELS.format(empty='"", ' * 15), "glove.toml")
+    harness = parse_harness(_TAXELS, "glove.toml")
     coded = Calibration(0, "t0", "N", 0, 0.0, 1000, 5.0)
 
     def level(taxel: str, code: int) -> Switch:
@@ -236,7 +240,7 @@ def test_every_taxel_is_half_a_divider_at_the_channel_that_measures_it(
     assert [switch.name for switch in spec.summary.sensors] == ["s0", *(f"t{n}" for n in range(8))]
     netlist = read_netlist(spec_files(manifest, None, harness)["glove.net"])
     wanted = [
-        *(("A1", "channel 1"), ("A1", "channel 2"), ("U5", "I0"), ("U6", "I1")),
+        *(("A1", "A1"), ("A1", "A2"), ("U5", "I0"), ("U6", "I1")),
         *(("U1", "AIN2"), ("U2", "CH7"), ("U3", "CH1"), ("U4", "CH3")),
     ]
     for number, channel in enumerate(wanted, start=2):
@@ -254,15 +258,14 @@ def test_every_taxel_is_half_a_divider_at_the_channel_that_measures_it(
     assert all("A2" in [ref for ref, _ in netlist.nets[net]] for net in commons)
     nodes = [node for net in netlist.nets.values() for node in net]
     assert len(nodes) == len(set(nodes)), "a pin on two nets"
-    assert spec.scan.taxels == (((1, 7, 1), (1, 9, 2), (2, 9, 3)), ((0, 9, 4), (17, 9, 5)))
+    assert [stream.levels for stream in spec.scan.streams] == [
+        ((0, 7, 1), (0, 9, 2), (1, 9, 3)),
+        ((0, 9, 4), (2, 9, 5)),
+    ]
     assert [port.levels for port in spec.scan.ports] == [((9, 6 + n),) for n in range(4)]
-    pins = BoardPins(signals=("PD2",), lows=("",), channels=("ADC0", "ADC1", "ADC2"))
-    muxed = BoardPins(channels=("ADC0", "ADC1"), selects=("PB0", "PB1", "PB2", "PB3"))
-    named = read_netlist(spec_files(manifest, None, harness, None, (pins, muxed))["glove.net"])
-    read = [reached(named, number, kind)[0] for number, kind in ((1, "SW"), (2, "PAD"), (3, "PAD"))]
-    assert read == [("A1", "PD2"), ("A1", "ADC1"), ("A1", "ADC2")]
-    remarks = glove_spec(manifest, None, harness, None, (pins, muxed)).summary.remarks
-    assert remarks[-1] == "A2: S0 to S3 of its multiplexers go to PB0, PB1, PB2, PB3, their commons to ADC0, ADC1"
+    assert reached(netlist, 1) == [("A1", "2")]
+    remarks = spec.summary.remarks
+    assert remarks[-1] == "A2: S0 to S3 of its multiplexers go to 8, 9, 10, 11, their commons to A0, A1"
     (said,) = [remark for remark in spec.summary.remarks if "pad t0," in remark]
     assert said.startswith("PAD2 ")
     assert "codes above 7" in said

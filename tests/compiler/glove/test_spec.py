@@ -9,7 +9,7 @@ from thenar.compiler.glove.spec import SpecError, glove_spec
 from thenar.compiler.hand import HandShape
 from thenar.drivers.i2c.chips import expanders
 from thenar.runtime.errors import HarnessError
-from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring
+from thenar.runtime.harness.wiring import GloveWiring, Harness, StreamWiring
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
@@ -39,13 +39,11 @@ def test_the_scan_takes_what_the_wire_takes(manifest_of: Manifests) -> None:
     assert expected.rates == manifest_of(names).rates
 
 
-def test_a_boards_bitmap_takes_its_time_on_the_line(manifest_of: Manifests) -> None:
-    idle = ScannerWiring(port="/dev/ttyACM1", switches=("x",))
-    board = ScannerWiring(port="/dev/ttyACM0", switches=("a",), baud=1_000_000)
-    expected = glove_spec(manifest_of(["a"]), None, Harness(name="h", scanners=(idle, board))).summary.expected
-    assert expected.transactions == 0
-    assert len(expected.boards_us) == 1
-    assert 70 <= expected.boards_us[0] <= 120
+def test_a_board_with_kept_switches_takes_from_row_to_row(manifest_of: Manifests) -> None:
+    idle = StreamWiring(port="/dev/ttyACM1", switches=("x",))
+    board = StreamWiring(port="/dev/ttyACM0", switches=("a",), rate_hz=200.0)
+    expected = glove_spec(manifest_of(["a"]), None, Harness(name="h", streams=(idle, board))).summary.expected
+    assert (expected.transactions, expected.rows_us) == (0, (5000,))
 
 
 def test_a_build_without_switches_has_no_glove(manifest_of: Manifests) -> None:
@@ -64,7 +62,7 @@ def test_a_scan_map_needs_its_own_harness(manifest_of: Manifests) -> None:
 
 
 def test_a_harness_without_a_kept_switch_is_refused(manifest_of: Manifests) -> None:
-    with pytest.raises(HarnessError, match="no pin or key for b, which"):
+    with pytest.raises(HarnessError, match="no pin or column for b, which"):
         glove_spec(manifest_of(["a", "b"]), None, propose_harness(["a"]))
 
 

@@ -8,12 +8,11 @@ from hypothesis import strategies as st
 
 from thenar.compiler.placement.inputs import PlacementError
 from thenar.compiler.placement.ports import PortCosts, port_costs, ports_of_whole_glove
-from thenar.drivers.scanner_protocol import OVERHEAD, Analog
 from thenar.runtime.errors import HarnessError
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, ScannerWiring
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_board, propose_harness
-from thenar.runtime.scanning.timing import scan_us, scanner_us
+from thenar.runtime.scanning.timing import scan_us
 
 sizes = st.integers(1, 200)
 
@@ -58,20 +57,11 @@ def test_ports_behind_a_channel_share_its_selection() -> None:
         assert costs.us[port] == pytest.approx(48 * 2.5 + 1.3 + share)
 
 
-def test_a_board_is_one_port_that_costs_its_whole_frame() -> None:
-    harness = propose_board(names_of(50))
+def test_a_stream_is_one_port_that_costs_its_period() -> None:
+    harness = propose_board([*names_of(50), "t0>4", "t0>7"])
     assert port_costs(harness, ["s3", "s40"]) == port_costs(harness, ["s40", "s3"])
-    costs = port_costs(harness, ["s3", "s40"])
-    assert (costs.port_of, costs.us) == ((0, 0), (scanner_us(harness.scanners[0]),))
-
-
-def test_a_taxel_of_a_board_costs_its_conversion_and_its_bytes_and_a_share_of_the_frame() -> None:
-    """A conversion takes 14 cycles of 125 kHz, twice behind a multiplexer; the frame is 6 + 4 bytes and 2 a code."""
-    board = ScannerWiring(port="p", switches=("k0", "k1"), taxels=("t0", "t1", "t2", "t3"), mux="cd74hc4067")
-    costs = port_costs(Harness(name="x", scanners=(board,)), ["k1", "k0", "t3>9", "t0>4", "t0>7"])
-    line_us = (OVERHEAD + Analog.LAYOUT.size + 2 * 2) * 10
-    assert costs.port_of == (0, 0, 2, 1, 1)
-    assert costs.us == pytest.approx((scanner_us(board), *2 * [2 * 112 + line_us / 2]))
+    costs = port_costs(harness, ["s3", "t0>7", "t0>4"])
+    assert (costs.port_of, costs.us) == ((0, 0, 0), (float(harness.streams[0].period_us),))
 
 
 def test_a_switch_that_is_wired_to_nothing_is_named() -> None:

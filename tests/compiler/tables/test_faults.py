@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from thenar.compiler.tables import faults
 from thenar.compiler.tables.faults import count_faults, groups_of, worst_faults
-from thenar.runtime.scanning.scanmap import Port, ScanMap
+from thenar.runtime.scanning.scanmap import Port, ScanMap, StreamRead
 from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables, Pair, Slope
 
@@ -105,7 +105,10 @@ def test_the_worst_of_each_kind_is_the_first_of_several_with_the_names_of_its_in
     tables = tables_of(random, 3, 3, 1, slope=False)
     bits, codes = random.random((40, 3)) < 0.5, random.integers(0, 32, (40, 1)).astype(np.uint16)
     scan = ScanMap(
-        1, "0" * 64, (Port(0, 1, "GPIOA", ((0, 2),), False), Port(0, 1, "GPIOB", ((0, 0),), False)), (((4, 1),),)
+        1,
+        "0" * 64,
+        (Port(0, 1, "GPIOA", ((0, 2),), False), Port(0, 1, "GPIOB", ((0, 0),), False)),
+        (StreamRead(((4, 1),), ()),),
     )
     groups = groups_of(scan, ("a", "pad", "pad"), 1)
     assert groups == {
@@ -113,7 +116,7 @@ def test_the_worst_of_each_kind_is_the_first_of_several_with_the_names_of_its_in
         "port GPIOA of chip 2 of bus 1": (2,),
         "chip 2 of bus 1": (2, 0),
         "port GPIOB of chip 2 of bus 1": (0,),
-        "scanner board 1": (1,),
+        "stream 1": (1,),
         "the joints' device": (3,),
     }
     labels = random.integers(0, 3, 40)

@@ -18,9 +18,20 @@ rate_hz = 100
 sensors = 18
 calibration = "anna.toml"
 
-[[scanner]]
+[[stream]]
 port = "/dev/ttyACM0"
-switches = ["s100", "", "s102"]
+switches = ["s100", "s102"]
+taxels = { s103 = [0, 1023], s104 = [0, 1023] }
+
+[stream.board]
+pins = { s103 = "A0", s104 = "A1.3" }
+select = ["4", "5", "6", "7"]
+matrix = { rows = ["8", "9"], columns = ["10"], keys = [["s100"], [""]], diodes = true }
+
+[[stream.board.chip]]
+kind = "mcp23017"
+address = 0x21
+pins = { GPA0 = "s102" }
 
 [[bus]]
 device = "/dev/i2c-1"

@@ -10,7 +10,7 @@ from thenar.drivers.i2c.chips.pcf8574 import Pcf8574
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness import checks, wiring
 from thenar.runtime.harness.loading import load_harness, parse_harness
-from thenar.runtime.harness.wiring import Debounce, GloveWiring, Harness, MuxChannel, ScannerWiring
+from thenar.runtime.harness.wiring import Debounce, GloveWiring, Harness, MuxChannel
 from thenar.runtime.taxels import TaxelSettings
 
 Load = Callable[[str], Harness]
@@ -29,13 +29,15 @@ def test_every_table_of_the_file_arrives(load: Load, full_text: str, tmp_path: P
     calibration = str(tmp_path / "anna.toml")
     glove = GloveWiring(port="/dev/ttyUSB0", baud="auto", rate_hz=100.0, sensors=18, calibration=calibration)
     assert (harness.name, harness.cyberglove) == ("bench", glove)
-    assert harness.scanners == (ScannerWiring(port="/dev/ttyACM0", switches=("s100", "", "s102")),)
+    (stream,) = harness.streams
+    assert stream.board is not None
+    assert (stream.port, sorted(stream.board.wired)) == ("/dev/ttyACM0", ["s100", "s102", "s103", "s104"])
     (bus,) = harness.buses
     assert (bus.device, bus.clock_hz, len(bus.chips)) == ("/dev/i2c-1", 400_000, 3)
     assert bus.chips[0].numbered_pins == {0: "s001", 11: "s014"}
     assert (bus.chips[1].mux, bus.chips[1].closed) == (MuxChannel(address=0x70, channel=2), "high")
     assert harness.debounce == Debounce(press_lockout_ms=4.0)
-    assert harness.switches == ("s100", "s102", "s001", "s014", "s020", "s021", "s030")
+    assert harness.switches == ("s001", "s014", "s020", "s021", "s030", "s100", "s102")
 
 
 def test_an_empty_file_is_a_glove_with_nothing_on_it_named_after_the_file(load: Load) -> None:
@@ -75,11 +77,7 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
             "line 2: cyberglove.port: 'spy:///dev/null?file=a' is not a supported port: a port is a device such as",
         ),
         (
-            "[[scanner]]\nswitches = []\nport = 'loop://'",
-            "line 3: scanner[0].port: 'loop://' is not a supported port",
-        ),
-        (
-            "[[scanner]]\nport = 'socket://a:1?x'\nswitches = []",
+            "[[stream]]\nport = 'socket://a:1?x'\nswitches = ['a']",
             "port: 'socket://a:1?x' has the option 'x', which it does not support",
         ),
         *(
@@ -113,19 +111,19 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
             f"[cyberglove]\nport = 'x'\njoints = {['', 'a'] * 9}",
             "line 3: cyberglove.joints[3]: sensor 'a' is already cyberglove.joints[1]",
         ),
-        ("[[scaner]]", "line 1: scaner: this key is unknown (did you mean 'scanner'?)"),
-        ("[[scanner]]\nport = 'x'", "line 1: scanner[0]: the key switches is missing"),
+        ("[[steam]]", "line 1: steam: this key is unknown (did you mean 'stream'?)"),
+        ("[[stream]]\nport = 'x'", "line 1: stream[0]: must have one of the keys switches, joints and taxels"),
         (
-            "[[scanner]]\nport = 'x'\nswitches = ['a', '', '', 'a']",
-            "line 3: scanner[0].switches[3]: switch 'a' is already scanner[0].switches[0]: wire it in one place",
+            "[[stream]]\nport = 'x'\nswitches = ['a', 'b', 'a']",
+            "line 3: stream[0].switches[2]: switch 'a' is already stream[0].switches[0]: wire it in one place",
         ),
         (
-            "[[scanner]]\nport = 'x'\nswitches = [' a']",
-            "scanner[0].switches[0]: ' a' is not a valid name of a switch: it begins",
+            "[[stream]]\nport = 'x'\nswitches = [' a']",
+            "stream[0].switches[0]: ' a' is not a valid name of a switch: it begins",
         ),
         (
-            "[cyberglove]\nport = 'x'\n[[scanner]]\nport = 'x'\nswitches = []",
-            "line 4: scanner[0].port: x is already cyberglove.port: name each device in one entry only",
+            "[cyberglove]\nport = 'x'\n[[stream]]\nport = 'x'\nswitches = ['a']",
+            "line 4: stream[0].port: x is already cyberglove.port: name each device in one entry only",
         ),
         (BUS + BUS, "line 4: bus[1].device: /dev/i2c-1 is already bus[0].device"),
         (BUS + "clock_hz = 5", "line 3: bus[0].clock_hz: must be at least 1000, not 5"),
@@ -233,8 +231,34 @@ def test_a_clock_beyond_what_a_chip_is_made_for_is_refused(
 
 
 def test_a_switch_on_a_board_and_on_a_chip_is_refused(load: Load) -> None:
-    text = "[[scanner]]\nport = 'x'\nswitches = ['s1']\n" + BUS + CHIP + "pins.GPA0 = 's1'"
-    assert "bus[0].chip[0].pins.GPA0: switch 's1' is already scanner[0].switches[0]" in complaint(load, text)
+    text = "[[stream]]\nport = 'x'\nswitches = ['s1']\n" + BUS + CHIP + "pins.GPA0 = 's1'"
+    assert "bus[0].chip[0].pins.GPA0: switch 's1' is already stream[0].switches[0]" in complaint(load, text)
+
+
+@pytest.mark.parametrize(
+    ("instead", "of", "message"),
+    [
+        ('s103 = "10"', 's103 = "A0"', "pins.s103: 10 is already stream[0].board.matrix.columns[0]: use another one"),
+        ('s103 = "A1"', 's103 = "A0"', "board.pins: A1 is already stream[0].board.pins.s103: use another one"),
+        ('s103 = "A1.3"', 's103 = "A0"', "pins.s104: A1.3 is already stream[0].board.pins.s103: use another one"),
+        ('s104 = "A1.16"', 's104 = "A1.3"', "pins.s104: 'A1.16' is no channel of a CD74HC4067: the channels of A0"),
+        ('s100 = "A1.3"', 's104 = "A1.3"', "pins.s100: A1.3 is behind a multiplexer, which is for joints and taxels"),
+        ('s103 = "A0;"', 's103 = "A0"', """pins.s103: 'A0;' is no pin of a sketch: write "2", "A0" or "PA3\""""),
+        ('select = ["4"]', 'select = ["4", "5", "6", "7"]', "board.select: 1 pins: a CD74HC4067 has four, S0 to S3"),
+        ("", 'select = ["4", "5", "6", "7"]', "board.select: is missing: the pins at S0 to S3 of the multiplexers"),
+        ('[["s100"]]', '[["s100"], [""]]', 'matrix.keys: must be 2 lists of 1 names, "" where there is no key'),
+        ('[["s102"], [""]]', '[["s100"], [""]]', "chip[0].pins.GPA0: input 's102' is already stream[0].board.matrix"),
+        ('[["s103"], [""]]', '[["s100"], [""]]', "keys[0][0]: the stream has no such column 's103' (did you mean"),
+        ('s999 = "A0"', 's103 = "A0"', "pins.s999: the stream has no such column 's999'"),
+        ('kind = "pcf8574"', 'kind = "mcp23017"', "chip[0]: a board reads chips with registers that are on its bus"),
+        ('closed = "low"\ntaxels', "taxels", "board: a board names its columns and sends its clock: leave out columns"),
+    ],
+)
+def test_what_is_wrong_with_a_board_is_told_with_its_place(
+    load: Load, full_text: str, instead: str, of: str, message: str
+) -> None:
+    assert of in full_text
+    assert message in complaint(load, full_text.replace(of, instead, 1))
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
@@ -250,12 +274,12 @@ def test_a_harness_error_is_one_of_ours_and_a_value_error() -> None:
 def test_the_fingerprint_is_of_what_hangs_where_and_of_nothing_else(load: Load, full_text: str) -> None:
     harness = load(full_text)
     (bus,) = harness.buses
-    (board,) = harness.scanners
+    (stream,) = harness.streams
     elsewhere = replace(
         harness,
         name="other",
         cyberglove=None,
-        scanners=(replace(board, port="/dev/ttyACM7", baud=115_200),),
+        streams=(replace(stream, port="/dev/ttyACM7", baud=9600, board=None),),
         buses=(replace(bus, device="/dev/i2c-3", clock_hz=100_000),),
         debounce=Debounce(enabled=False),
     )
@@ -269,7 +293,7 @@ def test_the_fingerprint_is_of_what_hangs_where_and_of_nothing_else(load: Load, 
         replace(chip, pins={"GPA0": "s014", "GPB3": "s001"}),
     ]
     changed = [replace(harness, buses=(replace(bus, chips=(other, *bus.chips[1:])),)) for other in others]
-    changed.append(replace(harness, scanners=(replace(board, switches=("s102", "", "s100")),)))
+    changed.append(replace(harness, streams=(replace(stream, switches=("s102", "s100")),)))
     prints = {harness.fingerprint, *(other.fingerprint for other in changed)}
     assert len(prints) == 1 + len(changed)
     reordered = replace(chip, pins={"GPB3": "s014", "GPA0": "s001"})

@@ -10,13 +10,14 @@ from thenar.drivers.ports import port_fault
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import (
+    BoardWiring,
     BusWiring,
     ChipWiring,
     Debounce,
     GloveWiring,
     Harness,
     MuxChannel,
-    ScannerWiring,
+    StreamWiring,
 )
 from thenar.runtime.harness.writing import harness_to_toml, write_record_us
 from thenar.runtime.names import fault
@@ -26,6 +27,11 @@ Load = Callable[[str], Harness]
 
 names = st.text(max_size=6).filter(lambda name: not fault(name))
 ports = names.filter(lambda name: not port_fault(name))
+
+
+def board_of(switches: tuple[str, ...]) -> BoardWiring:
+    chip = ChipWiring(kind="mcp23017", address=0x23, pins={"GPA0": switches[0]})
+    return BoardWiring(pins={name: f"A{number}" for number, name in enumerate(switches[1:])}, chips=(chip,))
 
 
 @st.composite
@@ -49,7 +55,8 @@ def harnesses(draw: st.DrawFn) -> Harness:
                 closed=draw(st.sampled_from(["low", "high"] if kind.registers and kind in switched else ["low"])),
             )
         )
-    board = ScannerWiring(port="p", switches=("", *(next(left) for _ in range(draw(st.integers(0, 4))))))
+    switches = tuple(next(left) for _ in range(draw(st.integers(1, 4))))
+    stream = StreamWiring(port="p", switches=switches, board=draw(st.none() | st.builds(board_of, st.just(switches))))
     glove = st.builds(
         GloveWiring,
         port=ports,
@@ -62,7 +69,7 @@ def harnesses(draw: st.DrawFn) -> Harness:
     return Harness(
         name=draw(names),
         cyberglove=draw(st.none() | glove),
-        scanners=(board,),
+        streams=(stream,),
         buses=(BusWiring(device="/dev/i2c-1", chips=tuple(chips)),),
         debounce=Debounce(enabled=draw(st.booleans()), release_ms=draw(st.floats(0.0, 1000.0))),
         taxel_settings=TaxelSettings(

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import strategies as st
 
 from thenar.drivers.i2c.chips import CHIPS
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel, ScannerWiring
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel, StreamWiring
 
 _KINDS = ("mcp23017", "pcf8575", "tca6424a", "mcp23008")
 # Where a chip may be: straight on bus 0 or 1, or behind one of two muxes of bus 0. Its address goes by its number.
@@ -37,7 +37,7 @@ def _harnesses(draw: st.DrawFn, chips: int = 3, pins: int = 6) -> Harness:
     keys = [f"s{switch + index}" for index in range(draw(st.integers(0, 3)))]
     return Harness(
         name="any",
-        scanners=(ScannerWiring(port="p", switches=("", *keys)),) if keys else (),
+        streams=(StreamWiring(port="p", switches=("unused", *keys)),) if keys else (),
         buses=tuple(
             BusWiring(device=f"/dev/i2c-{bus}", clock_hz=draw(st.sampled_from([100_000, 400_000])), chips=tuple(wired))
             for bus, wired in enumerate(buses)

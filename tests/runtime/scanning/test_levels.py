@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, ScannerWiring, SpiWiring
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, SpiWiring, StreamWiring
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.plan import Costs, check_harness, plan_scan
 from thenar.runtime.scanning.ports import whole_scan
@@ -23,9 +23,9 @@ def ads1115(number: int, *taxels: str) -> ChipWiring:
     return ChipWiring(kind="ads1115", address=0x48 + number, pins=pins)
 
 
-def glove(*chips: ChipWiring, spi: tuple[SpiWiring, ...] = (), scanners: tuple[ScannerWiring, ...] = ()) -> Harness:
+def glove(*chips: ChipWiring, spi: tuple[SpiWiring, ...] = (), streams: tuple[StreamWiring, ...] = ()) -> Harness:
     bus = BusWiring(device="/dev/i2c-1", clock_hz=400_000, chips=chips)
-    return Harness(name="x", scanners=scanners, buses=(bus,), spi=spi)
+    return Harness(name="x", streams=streams, buses=(bus,), spi=spi)
 
 
 MIXED = glove(
@@ -33,7 +33,7 @@ MIXED = glove(
     ads1115(0, "t0", "t1", "t2"),
     ChipWiring(kind="ads7828", address=0x4B, pins={"CH6": "t3"}),
     spi=(SpiWiring(device="/dev/spidev0.0", kind="mcp3208", pins={"CH0": "t4", "CH5": "t5"}),),
-    scanners=(ScannerWiring(port="p", switches=("s2",), taxels=("", "t6")),),
+    streams=(StreamWiring(port="p", switches=("s2",), taxels={"t7": (0, 1023), "t6": (0, 1023)}),),
 )
 names = st.one_of(
     st.sampled_from(["s0", "s>1", "s2"]),
@@ -57,17 +57,10 @@ def test_all_levels_of_a_taxel_are_one_conversion_and_every_kept_name_is_read_on
         assert {kept[number]: code for code, number in port.levels} == {
             name: int(name.split(">")[1]) for name in kept if name.startswith(f"{taxel}>")
         }
-    boards = scan.taxels[0] if scan.taxels else ()
-    assert [(kept[number], channel) for channel, _, number in boards] == sorted(
+    (stream,) = scan.streams
+    assert [(kept[number], place) for place, _, number in stream.levels] == sorted(
         ((name, 1) for name in kept if name.startswith("t6>")), key=lambda pair: int(pair[0][3:])
     )
-    assert bool(scan.taxels) == ("t6" in taxels)
-
-
-def test_a_map_without_levels_has_the_bytes_that_it_always_had() -> None:
-    data = scanmap_to_bytes(whole_scan(MIXED, ["s0", "s>1", "s2"]))
-    assert b"levels" not in data
-    assert b"taxels" not in data
 
 
 def test_with_every_taxel_those_without_levels_are_converted_too() -> None:
@@ -99,27 +92,22 @@ def test_a_name_that_looks_like_a_level_and_is_a_switch_of_the_wiring_is_one() -
 def test_a_conversion_that_the_wiring_does_not_have_is_refused(change: dict[str, object]) -> None:
     harness = glove(ads1115(0, "t0", "t1"))
     scan = plan_scan(["t0>7"], harness)
-    with pytest.raises(HarnessError, match="reads other pins or keys than harness 'x'"):
+    with pytest.raises(HarnessError, match="reads other pins or columns than harness 'x'"):
         check_harness(replace(scan, ports=(replace(scan.ports[0], **change),)), harness, ["t0>7"])
 
 
 def test_taxels_that_are_wired_to_nothing_are_named() -> None:
-    with pytest.raises(HarnessError, match="'x' has no pin or key for t9>7, t1, which the build keeps"):
+    with pytest.raises(HarnessError, match="'x' has no pin or column for t9>7, t1, which the build keeps"):
         plan_scan(["t0>7", "t9>7", "t1"], glove(ads1115(0, "t0")))
 
 
-def test_what_hangs_where_is_in_the_fingerprint_and_an_old_wirings_is_as_it_was() -> None:
-    (chip, *_), bus = MIXED.buses[0].chips, MIXED.buses[0]
-    plain = Harness(
-        name="x", scanners=(ScannerWiring(port="p", switches=("s2",)),), buses=(replace(bus, chips=(chip,)),)
-    )
-    assert plain.fingerprint.startswith("c4d6577dcb549f708877628c79b7de99")
+def test_what_hangs_where_is_in_the_fingerprint() -> None:
     others = [
         MIXED,
         replace(MIXED, spi=()),
         replace(MIXED, spi=(replace(MIXED.spi[0], kind="mcp3008"),)),
         replace(MIXED, spi=(replace(MIXED.spi[0], pins={"CH1": "t4", "CH5": "t5"}),)),
-        replace(MIXED, scanners=(replace(MIXED.scanners[0], taxels=("t6",)),)),
+        replace(MIXED, streams=(replace(MIXED.streams[0], taxels={"t6": (0, 1023)}),)),
     ]
     assert len({other.fingerprint for other in others}) == len(others)
     moved = replace(MIXED, spi=(replace(MIXED.spi[0], device="/dev/spidev1.1", hz=500_000),))
@@ -185,10 +173,10 @@ def test_a_new_glove_has_its_taxels_on_converters(count: int) -> None:
     assert harness.taxel_names == tuple(f"t{number}" for number in range(count))
     assert sorted(whole_scan(harness, kept).switches) == list(range(2 * count + 1))
     assert parse_harness(harness_to_toml(harness), "glove.toml") == harness
-    if count <= 122:
-        board = propose_board(kept)
-        assert (board.scanners[0].switches, board.scanners[0].taxels) == (("s0",), harness.taxel_names)
-        assert (board.scanners[0].mux is None) == (count <= 8)
+    (stream,) = propose_board(kept).streams
+    assert stream.board is not None
+    assert sorted(stream.board.wired) == sorted(("s0", *harness.taxel_names))
+    assert bool(stream.board.select) == (count > 6)
 
 
 @pytest.mark.parametrize("kind", ["ads1115", "ads7828", "mcp3208", "mcp3004"])
@@ -202,6 +190,6 @@ def test_the_converters_of_a_new_glove_may_be_chosen(kind: str) -> None:
     assert parse_harness(harness_to_toml(harness), "glove.toml") == harness
 
 
-def test_no_board_has_so_many_channels() -> None:
-    with pytest.raises(HarnessError, match="123 taxels, but one board has 122 channels: use several boards, by hand"):
-        propose_board([f"t{number}>5" for number in range(123)])
+def test_no_row_has_so_many_columns() -> None:
+    with pytest.raises(HarnessError, match="2001 switches and taxels, but a row has at most 2000: use several boards"):
+        propose_board([f"t{number}>5" for number in range(2001)])

@@ -52,8 +52,8 @@ def test_every_kept_switch_is_read_once_with_the_fewest_writes_to_muxes(
         chip = harness.buses[port.bus].chips[port.chip]
         for bit, number in port.switches:
             assert chip.numbered_pins[reading_of(port, harness).pins[bit]] == kept[number]
-    for board, pairs in zip(harness.scanners, scan.scanners, strict=True):
-        assert all(board.switches[key] == kept[number] for key, number in pairs)
+    for stream, read in zip(harness.streams, scan.streams, strict=True):
+        assert all(stream.switches[place] == kept[number] for place, number in read.switches)
     if len(scan.ports) <= 6:
         least = min(mux_writes(some, harness) for some in permutations(scan.ports))
         assert scan_us(scan, harness).selects == mux_writes(scan.ports, harness) == least
@@ -63,7 +63,7 @@ def test_every_kept_switch_is_read_once_with_the_fewest_writes_to_muxes(
 def test_switches_that_are_wired_to_nothing_are_named(eight_chips: EightChips) -> None:
     names = [*names_of(14), *(f"t{number}" for number in range(7))]
     with pytest.raises(
-        HarnessError, match=r"'full' has no pin or key for t0, t1, t2, t3, t4 and 2 more, which the build"
+        HarnessError, match=r"'full' has no pin or column for t0, t1, t2, t3, t4 and 2 more, which the build"
     ):
         plan_scan(names, eight_chips(1))
 
@@ -95,22 +95,26 @@ def test_a_port_that_the_wiring_does_not_have_is_refused_whoever_sealed_the_map(
     scan = plan_scan(names_of(28), harness)
     for number in range(len(scan.ports)):
         ports = [replace(port, **change) if place == number else port for place, port in enumerate(scan.ports)]
-        with pytest.raises(HarnessError, match="reads other pins or keys than harness 'full'"):
+        with pytest.raises(HarnessError, match="reads other pins or columns than harness 'full'"):
             check_harness(replace(scan, ports=tuple(ports)), harness, names_of(28))
 
 
-def test_a_key_that_the_board_does_not_have_is_refused_whoever_sealed_the_map() -> None:
+def test_a_column_that_the_stream_does_not_have_is_refused_whoever_sealed_the_map() -> None:
     board = propose_board(names_of(3))
     scan = plan_scan(names_of(3), board)
     check_harness(scan, board, names_of(3))
-    for scanners in ((), (((0, 0), (1, 1), (7, 2)),), (((0, 1), (1, 0), (2, 2)),), (*scan.scanners, ())):
-        with pytest.raises(HarnessError, match="reads other pins or keys than harness"):
-            check_harness(replace(scan, scanners=scanners), board, names_of(3))
+    (read,) = scan.streams
+    for pairs in (((0, 0), (1, 1), (7, 2)), ((0, 1), (1, 0), (2, 2))):
+        with pytest.raises(HarnessError, match="reads other pins or columns than harness"):
+            check_harness(replace(scan, streams=(replace(read, switches=pairs),)), board, names_of(3))
+    for streams in ((), (read, read)):
+        with pytest.raises(HarnessError, match="reads other pins or columns than harness"):
+            check_harness(replace(scan, streams=streams), board, names_of(3))
 
 
 def test_a_build_without_switches_reads_nothing(eight_chips: EightChips) -> None:
     scan: ScanMap = plan_scan([], eight_chips(1))
-    assert (scan.ports, scan.scanners) == ((), ())
+    assert (scan.ports, scan.streams) == ((), ())
 
 
 def test_ports_behind_one_channel_and_one_mux_stay_together(eight_chips: EightChips) -> None:

@@ -12,6 +12,7 @@ from thenar.runtime.scanning.scanmap import (
     SCHEMA,
     Port,
     ScanMap,
+    StreamRead,
     check_switches,
     scanmap_from_bytes,
     scanmap_to_bytes,
@@ -21,7 +22,7 @@ SCAN = ScanMap(
     SCHEMA,
     "0" * 64,
     (Port(0, 1, "AB", ((0, 2), (9, 0)), False), Port(0, 0, "A", ((3, 4),), True)),
-    (((0, 1), (5, 3)), ()),
+    (StreamRead(((0, 1), (5, 3)), ()), StreamRead((), ())),
 )
 
 
@@ -29,7 +30,7 @@ def test_a_map_is_read_as_it_was_written() -> None:
     data = scanmap_to_bytes(SCAN)
     assert data.endswith(b"}\n")
     assert scanmap_from_bytes(data) == SCAN
-    assert SCAN.switches == (1, 3, 2, 0, 4)
+    assert SCAN.switches == (2, 0, 4, 1, 3)
 
 
 def changed(**fields: Any) -> bytes:
@@ -54,10 +55,8 @@ PORT = {"bus": 0, "chip": 1, "reading": "AB", "switches": [[0, 2]], "closed_high
         (changed(ports=[PORT | {"bus": -1}]), "is not a build's: .*bus"),
         (changed(ports=[PORT | {"switches": []}]), "has a port without switches, or with levels too"),
         (changed(ports=[PORT | {"levels": [[7, 3]]}]), "has a port without switches, or with levels too"),
-        (changed(taxels=[[[0, 7, 5]]]), "has taxels of other boards than it reads"),
-        (changed(taxels=[[], []]), "has taxels of other boards than it reads"),
-        (changed(taxels=[[[0, 8, 5], [0, 7, 6]], []]), "has levels out of order"),
-        (changed(taxels=[[[0, 7, 5], [0, 7, 6]], []]), "twice: compile the build again"),
+        (changed(streams=[{"switches": [], "levels": [[0, 8, 5], [0, 7, 6]]}]), "has levels out of order"),
+        (changed(streams=[{"switches": [], "levels": [[0, 7, 5], [0, 7, 6]]}]), "twice: compile the build again"),
         (changed(ports=[PORT | {"closed_high": 1}]), "is not a build's: .*closed_high"),
         (scanmap_to_bytes(SCAN) + b"\n", "is altered"),
         (json.dumps(json.loads(scanmap_to_bytes(SCAN))).encode(), "is altered"),
@@ -72,11 +71,11 @@ def test_what_is_no_map_is_refused_by_name(data: bytes, reason: str) -> None:
 @pytest.mark.parametrize(
     "scan",
     [
-        ScanMap(1, "0" * 64, (Port(0, 0, "A", ((0, 0),), False), Port(0, 0, "A", ((1, 1),), False)), ()),
-        ScanMap(1, "0" * 64, (Port(0, 0, "A", ((0, 0), (0, 1)), False),), ()),
-        ScanMap(1, "0" * 64, (Port(0, 0, "A", ((0, 0), (1, 0)), False),), ()),
-        ScanMap(1, "0" * 64, (Port(0, 0, "A", ((0, 0),), False),), (((3, 0),),)),
-        ScanMap(1, "0" * 64, (), (((3, 0), (3, 1)),)),
+        ScanMap(1, "0" * 64, (Port(0, 0, "A", ((0, 0),), False), Port(0, 0, "A", ((1, 1),), False))),
+        ScanMap(1, "0" * 64, (Port(0, 0, "A", ((0, 0), (0, 1)), False),)),
+        ScanMap(1, "0" * 64, (Port(0, 0, "A", ((0, 0), (1, 0)), False),)),
+        ScanMap(1, "0" * 64, (Port(0, 0, "A", ((0, 0),), False),), (StreamRead(((3, 0),), ()),)),
+        ScanMap(1, "0" * 64, (), (StreamRead(((3, 0), (3, 1)), ()),)),
     ],
 )
 def test_a_map_that_reads_a_thing_twice_is_refused(scan: ScanMap) -> None:

@@ -6,10 +6,9 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.drivers.i2c.chips import CHIPS
-from thenar.drivers.scanner_protocol import State, encode, frame
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, GloveWiring, Harness, MuxChannel, ScannerWiring
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, GloveWiring, Harness, MuxChannel
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.timing import free_us, glove_us, port_us, scan_us, scanner_us, select_us
+from thenar.runtime.scanning.timing import free_us, glove_us, port_us, row_us, scan_us, select_us
 
 EightChips = Callable[..., Harness]
 
@@ -110,11 +109,10 @@ def test_nothing_to_read_takes_no_time() -> None:
     assert (time.us, time.full_us, time.share, time.chips) == (0.0, 0.0, 0.0, ())
 
 
-@pytest.mark.parametrize("keys", [1, 8, 9, 64, 160])
-def test_a_bitmap_takes_what_its_bytes_take(keys: int) -> None:
-    size = len(encode(frame(State(closed=1, keys=keys), 0)))
-    scanner = ScannerWiring(port="p", switches=("",) * keys, baud=115_200)
-    assert scanner_us(scanner) == pytest.approx(size * 10 / 115_200 * 1e6)
+@pytest.mark.parametrize(("switches", "bits"), [(1, "1"), (8, "FF"), (9, "1FF"), (0, "")])
+def test_a_row_takes_what_its_bytes_take(switches: int, bits: str) -> None:
+    row = f"$row,65535,4294967295,{bits},65535,65535*00\r\n"
+    assert row_us(switches, 2, 115_200) == pytest.approx(len(row) * 10 / 115_200 * 1e6)
 
 
 def test_a_cyberglove_is_as_fast_as_its_line_and_its_digitising_allow() -> None:

@@ -160,7 +160,7 @@ def umockdev(tool: Callable[[str], str]) -> None:
 
 @pytest.mark.usefixtures("umockdev")
 def test_the_arithmetic_is_that_of_an_emulated_bus_to_the_last_period_of_scl() -> None:
-    errors = scan_errors(replace(two_muxes(), scanners=propose_board(["key"]).scanners))
+    errors = scan_errors(replace(two_muxes(), streams=propose_board(["key"]).streams))
     # Five sizes of nine sorts of new gloves; the one at 1 MHz has no room for the largest.
     assert len(errors) == 1 + 5 * 9 - 1
     assert max(errors) < 1e-12

@@ -2,14 +2,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.firmware import board as boards
-from thenar.compiler.firmware.board import Board, BoardBus
 from thenar.compiler.frontier.timing.wirings import AS_WIRED, BOARD, CLOCKS_HZ, Wiring, wirings
 from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.checks import faults
-from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.harness.wiring import BoardWiring, Harness, StreamWiring
 from thenar.runtime.scanning.propose import propose_board, propose_harness
 
 sizes = st.integers(1, 200)
@@ -29,17 +27,18 @@ def test_every_wiring_that_fits_is_a_sound_harness_of_all_the_switches_at_its_cl
             assert not list(faults(harness))
             assert sorted(harness.switches) == sorted(names_of(size))
             assert (harness.cyberglove is not None) == (joints in (SENSORS_18, SENSORS_22))
-            rates = [bus.clock_hz for bus in harness.buses] + [board.baud for board in harness.scanners]
+            rates = [bus.clock_hz for bus in harness.buses] + [board.baud for board in harness.streams]
             assert rates == [wiring.clock_hz]
 
 
 @given(st.integers(1, 112))
-def test_a_board_accepts_every_wiring_of_an_avr_that_fits(size: int) -> None:
+def test_a_board_reads_the_chips_of_every_wiring_of_an_avr_that_fits(size: int) -> None:
+    switches = tuple(names_of(size))
     for wiring in wirings(None, "avr328p"):
-        if wiring.fits(names_of(size)):
-            (bus,) = wiring.harness_of(names_of(size)).buses
-            board = Board(part="atmega328p", bus=BoardBus(clock_hz=bus.clock_hz), chips=bus.chips)
-            assert not list(boards.faults(board))
+        if wiring.fits(switches):
+            (bus,) = wiring.harness_of(switches).buses
+            board = StreamWiring(port="/dev/ttyACM0", switches=switches, board=BoardWiring(chips=bus.chips))
+            assert not list(faults(Harness(name="board", streams=(board,))))
 
 
 def test_a_new_glove_has_every_sort_of_chip_at_every_clock_that_it_allows_or_a_board() -> None:
@@ -82,7 +81,7 @@ def test_the_given_harness_comes_first_and_stays_as_it_is() -> None:
 
 
 def test_the_clock_of_a_given_board_is_its_baud() -> None:
-    assert wirings(propose_board(names_of(5)))[0].clock_hz == 1_000_000
+    assert wirings(propose_board(names_of(5)))[0].clock_hz == 115_200
 
 
 @pytest.mark.parametrize(
@@ -96,7 +95,7 @@ def test_the_clock_of_a_given_board_is_its_baud() -> None:
     ],
     ids=["no registers", "mux", "board", "1 MHz", "nothing"],
 )
-def test_an_avr_has_no_wiring_that_its_firmware_could_not_read(harness: Harness) -> None:
+def test_an_avr_has_no_wiring_that_a_sketch_could_not_read(harness: Harness) -> None:
     assert AS_WIRED not in [wiring.name for wiring in wirings(harness, "avr2560")]
 
 
@@ -110,6 +109,6 @@ def test_a_mux_slows_a_bus_down_or_there_is_no_room() -> None:
     assert fast.fits(names_of(112))
     with pytest.raises(HarnessError, match="TCA9548A"):
         fast.harness_of(names_of(113))
-    with pytest.raises(HarnessError, match="channels the firmware cannot select"):
+    with pytest.raises(HarnessError, match="channels a board's sketch cannot select"):
         Wiring("mcp23017", 400_000, muxes=False).harness_of(names_of(113))
     assert not Wiring("mcp23017", 100_000).fits(names_of(1000))
