@@ -30,10 +30,9 @@ for _signal in (signal.SIGHUP, signal.SIGINT):
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-# Every run draws the same examples, on every machine: what failed once fails again. (Among mutants it is theirs.)
+# Every run draws the same examples, on every machine: what failed once fails again.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
-if "quick_verdict" not in sys.modules:
-    settings.load_profile("repeatable")
+settings.load_profile("repeatable")
 
 WEKA_JAR = Path("/usr/share/java/weka.jar")  # where Debian's package puts it
 

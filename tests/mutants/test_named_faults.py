@@ -1,6 +1,6 @@
 """Faults to fear most, by name: each is made in a throw-away copy, where the tests named beside it must catch it.
 
-`make mutants` makes thousands without choosing; these are chosen, among them what a mutation tool does not think of.
+`make mutants` draws its faults; these are chosen, among them what no tool thinks of.
 """
 
 import os
