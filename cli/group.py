@@ -23,14 +23,16 @@ from thenar.drivers.names import shortened
 
 from .lines import echo
 
-COMMANDS = (
-    *("simulate", "import", "export", "merge", "split", "info", "place", "draw"),
-    *("evaluate", "frontier", "compile", "verify", "segment", "teach"),
-    *("firmware", "spec", "run", "monitor", "calibrate", "record", "emulate", "doctor", "stability"),
-)
+# In the order of work.
+GROUPS = {
+    "Data": ("import", "simulate", "info", "draw", "merge", "split", "export"),
+    "Choose and measure": ("place", "evaluate", "frontier", "stability"),
+    "Build": ("compile", "verify", "spec", "firmware"),
+    "Live": ("doctor", "calibrate", "record", "run", "monitor", "segment", "teach", "emulate"),
+}
+COMMANDS = tuple(name for names in GROUPS.values() for name in names)
 
-# Options that were renamed, for the hint.
-RENAMED = {"--placement": "--method"}
+_WHOLE = 1000  # letters: longer than any first sentence
 
 
 class _LazyGroup(click.Group):
@@ -47,6 +49,14 @@ class _LazyGroup(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the commands by group, with the first sentence of each one's help."""
+        width = max(map(len, COMMANDS))
+        for title, names in GROUPS.items():
+            found = [(name.ljust(width), self.get_command(ctx, name)) for name in names]
+            with formatter.section(title):
+                formatter.write_dl([(name, each.get_short_help_str(_WHOLE)) for name, each in found if each])
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
@@ -102,8 +112,6 @@ def _is_broken_pipe(fault: BaseException) -> bool:
 def _sentence(fault: BaseException, arguments: Sequence[str]) -> str:
     """Return the sentence that reports an error."""
     match fault:
-        case click.NoSuchOption() if fault.option_name in RENAMED:
-            return f"{fault.message} Did you mean '{RENAMED[fault.option_name]}'?"
         case click.ClickException():
             return fault.format_message()
         case ThenarError() | BrokenExecutor():

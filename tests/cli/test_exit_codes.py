@@ -57,7 +57,7 @@ def test_help_that_lists_the_methods_loads_numpy_at_most(command: str) -> None:
 def test_no_command_at_all_shows_the_help(thenar: Thenar) -> None:
     done = thenar()
     assert done.returncode == 2
-    assert "Commands:" in done.stdout + done.stderr
+    assert "Choose and measure:" in done.stdout + done.stderr
 
 
 def test_an_unknown_command_is_one_sentence(thenar: Thenar) -> None:

@@ -22,7 +22,6 @@ from thenar.simulator.scenes import shipped
         ("compile {set} -o new --preset smalest", "smallest"),
         ("compile {set} -o new --trainer logitbost", "logitboost"),
         ("compile {set} -o new --metod id3", "--method"),
-        ("compile {set} -o new --placement id3", "--method"),
         ("compile {set} -o new --roundz 3", "--rounds"),
         ("place {set} --method eliminaton", "elimination"),
         ("frontier {set} -o new --methods id3,cmin", "cmim"),
