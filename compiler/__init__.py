@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from .placement.methods.base import METHODS
     from .placement.selectors import ID3Selector, SwitchSelector
     from .recordings.columns import Columns
+    from .recordings.dataframes import from_dataframe
+    from .recordings.export import to_dataframe
     from .recordings.graspset import GraspSet, Joint
     from .recordings.merging import merge, split
     from .samples import Samples
@@ -59,6 +61,8 @@ _HOMES = {
     ".placement.methods.base": ("METHODS",),
     ".placement.selectors": ("ID3Selector", "SwitchSelector"),
     ".recordings.columns": ("Columns",),
+    ".recordings.dataframes": ("from_dataframe",),
+    ".recordings.export": ("to_dataframe",),
     ".recordings.graspset": ("GraspSet", "Joint"),
     ".recordings.merging": ("merge", "split"),
     ".samples": ("Samples",),
@@ -101,9 +105,11 @@ __all__ = [
     "dask_cluster",
     "evaluate",
     "find_frontier",
+    "from_dataframe",
     "grow_id3",
     "merge",
     "split",
+    "to_dataframe",
     "verify",
     "verify_faults",
 ]

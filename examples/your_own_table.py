@@ -22,7 +22,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from thenar.compiler import GraspSet, compile_build, evaluate, verify
+from thenar.compiler import compile_build, evaluate, from_dataframe, verify
 from thenar.runtime import Build
 
 here = Path(globals().get("__file__", "your_own_table.py")).resolve().parent
@@ -35,7 +35,7 @@ table.iloc[:3, :8]
 # The meaning of each column is found from its name and values. To correct it, pass a `columns.toml` as second argument.
 
 # %%
-grasp_set = GraspSet.from_dataframe(table)
+grasp_set = from_dataframe(table)
 print(len(grasp_set), "frames of", grasp_set.trial_ids.max() + 1, "trials; people:", *table["person"].unique())
 
 # %% [markdown]

@@ -27,14 +27,37 @@ _WHAT = "the DataFrame"
 
 
 def from_dataframe(frame: "pd.DataFrame", columns: Columns | str | Path | None = None) -> GraspSet:
-    """Return the set in a DataFrame, as `GraspSet.from_dataframe` describes it."""
+    """Return the set in a DataFrame with one row per frame; its index is ignored.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        Any dtypes: switches are bool, or 0 and 1; joints are numbers; names are text, numbers or categories. NaN, None
+        and NA are missing values.
+    columns : Columns, str or Path, optional
+        The roles of the columns: `thenar.compiler.Columns`, or the path of a columns.toml. A frame from `to_dataframe`
+        has them in its `attrs`; for any other they are guessed from names and values, as by `thenar import`.
+
+    Raises
+    ------
+    TableError, ColumnsError, RecordingError
+        As for an import of the same table; the message names rows, as counted by `iloc`, and columns.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from thenar.compiler import Columns, from_dataframe
+    >>> frame = pd.DataFrame({"grasp": ["pinch", "hook"], "thumb": [True, False], "n": [1, 2]})
+    >>> from_dataframe(frame, Columns(label="grasp", switches=("thumb",), trial="n"))
+    GraspSet: 2 trials of 2 frames, 2 grasp types (own), 1 switches, 0 joints, 1 subjects, 1 objects
+    """
     table = table_of(frame)
     if columns is None:
         columns = _said(frame) or _proposed(table)
     grasp_set, report = import_table(table, columns if isinstance(columns, Columns) else read_columns(Path(columns)))
     for finding in report.warnings:
         if finding.kind == POSSIBLE_CLOCKS:
-            warnings.warn(finding.message, stacklevel=3)
+            warnings.warn(finding.message, stacklevel=2)
     return grasp_set
 
 

@@ -169,7 +169,28 @@ def to_csv(grasp_set: GraspSet, codes: bool = False, delimiter: str = ",") -> st
 
 
 def to_dataframe(grasp_set: GraspSet, codes: bool = False) -> "pd.DataFrame":
-    """Return the set as a DataFrame, as `GraspSet.to_dataframe` describes it."""
+    """Return a set as a pandas DataFrame, from which `from_dataframe` restores the same set.
+
+    Parameters
+    ----------
+    grasp_set : GraspSet
+        The set.
+    codes : bool
+        Give the integer codes (uint16) of joints and taxels instead of their values (float64).
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per frame: "grasp" (a category of the taxonomy's types, in order, and "none" if it occurs), "subject"
+        and "object" (str), "session" (str; only if there are several), "trial" (int64), "time_us" (int64; if known),
+        the switches (bool), taxels and joints, in the set's order. If an input has one of these names, an underscore is
+        appended to the column. `attrs["thenar"]` is the text of a columns.toml: roles, calibrations, taxonomy, and the
+        simulator of the grasps. Parquet keeps it.
+
+    Examples
+    --------
+    >>> to_dataframe(grasp_set).groupby("subject")["grasp"].value_counts()  # doctest: +SKIP
+    """
     import pandas as pd
 
     heads = heads_of(grasp_set)

@@ -15,9 +15,8 @@ times     (n,) int64                microseconds; only where they are known, and
 import hashlib
 from dataclasses import dataclass, field
 from html import escape
-from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Self, TypeVar
+from typing import Self, TypeVar
 
 import msgspec
 import numpy as np
@@ -34,11 +33,6 @@ from .arrays import AnyArray, pack, unpack
 from .errors import LARGEST, RecordingError, check_names, check_room, check_simulated
 from .taxonomy import Taxonomy
 from .trials import groups
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from .columns import Columns
 
 CODES = 65536
 # Far enough from the limits of doubles that spans and margins of values stay finite, and steps keep all their bits.
@@ -389,61 +383,6 @@ class GraspSet:
         """
         several = (self.sessions != "1").any() or self.times_us.size > 0 or self.is_none.any()
         return 1 + bool(self.independent or self.taxel_columns or several)
-
-    @classmethod
-    def from_dataframe(cls, frame: "pd.DataFrame", columns: "Columns | str | Path | None" = None) -> "GraspSet":
-        """Return the set in a DataFrame with one row per frame; its index is ignored.
-
-        Parameters
-        ----------
-        frame : pandas.DataFrame
-            Any dtypes: switches are bool, or 0 and 1; joints are numbers; names are text, numbers or categories. NaN,
-            None and NA are missing values.
-        columns : Columns, str or Path, optional
-            The roles of the columns: `thenar.compiler.Columns`, or the path of a columns.toml. A frame from
-            `to_dataframe` has them in its `attrs`; for any other they are guessed from names and values, as by `thenar
-            import`.
-
-        Raises
-        ------
-        TableError, ColumnsError, RecordingError
-            As for an import of the same table; the message names rows, as counted by `iloc`, and columns.
-
-        Examples
-        --------
-        >>> import pandas as pd
-        >>> from thenar.compiler import Columns, GraspSet
-        >>> frame = pd.DataFrame({"grasp": ["pinch", "hook"], "thumb": [True, False], "n": [1, 2]})
-        >>> GraspSet.from_dataframe(frame, Columns(label="grasp", switches=("thumb",), trial="n"))
-        GraspSet: 2 trials of 2 frames, 2 grasp types (own), 1 switches, 0 joints, 1 subjects, 1 objects
-        """
-        # Imported late: the modules that read and write tables import this one.
-        found: GraspSet = import_module(".dataframes", __package__).from_dataframe(frame, columns)
-        return found
-
-    def to_dataframe(self, codes: bool = False) -> "pd.DataFrame":
-        """Return the set as a pandas DataFrame, from which `from_dataframe` restores the same set.
-
-        Parameters
-        ----------
-        codes : bool
-            Give the integer codes (uint16) of joints and taxels instead of their values (float64).
-
-        Returns
-        -------
-        pandas.DataFrame
-            One row per frame: "grasp" (a category of the taxonomy's types, in order, and "none" if it occurs),
-            "subject" and "object" (str), "session" (str; only if there are several), "trial" (int64), "time_us" (int64;
-            if known), the switches (bool), taxels and joints, in the set's order. If an input has one of these names,
-            an underscore is appended to the column. `attrs["thenar"]` is the text of a columns.toml: roles,
-            calibrations, taxonomy, and the simulator of the grasps. Parquet keeps it.
-
-        Examples
-        --------
-        >>> grasp_set.to_dataframe().groupby("subject")["grasp"].value_counts()  # doctest: +SKIP
-        """
-        frame: pd.DataFrame = import_module(".export", __package__).to_dataframe(self, codes)
-        return frame
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

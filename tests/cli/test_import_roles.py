@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from thenar.cli import run
-from thenar.compiler import Columns, GraspSet
+from thenar.compiler import Columns, GraspSet, from_dataframe
 from thenar.compiler.recordings.columns import JointColumns
 
 Cells = Mapping[str, "list[str] | NDArray[np.generic]"]
@@ -144,7 +144,7 @@ def test_a_clock_among_the_inputs_of_a_users_columns_is_named(tmp_path: Path, im
     for words in ("2 inputs may be clocks", "x (it rises from trial to trial", "nsecs (its name"):
         assert words in warnings
     with pytest.warns(UserWarning, match="2 inputs may be clocks"):
-        GraspSet.from_dataframe(pd.DataFrame(cells), columns)
+        from_dataframe(pd.DataFrame(cells), columns)
 
 
 @pytest.mark.parametrize("name", ["Nr", "x"])

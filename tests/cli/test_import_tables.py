@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from thenar.cli import run
-from thenar.compiler import GraspSet
+from thenar.compiler import GraspSet, from_dataframe
 
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 
@@ -173,7 +173,7 @@ def test_lists_in_cells_become_columns(kind: str, capsys: pytest.CaptureFixture[
     assert np.array_equal(sets[1].codes, sets[0].codes)
     lists = table.assign(data=[[float(cell) for cell in row[2:]] for row in rows(3)], trial=table["trial"].astype(int))
     for made in (lists, lists.assign(data=[np.array(row) for row in lists["data"]])):
-        assert np.array_equal(GraspSet.from_dataframe(made).codes, sets[0].codes)
+        assert np.array_equal(from_dataframe(made).codes, sets[0].codes)
     lists.to_parquet("t.parquet")
     assert np.array_equal(imported("t.parquet", capsys).codes, sets[0].codes)
 
