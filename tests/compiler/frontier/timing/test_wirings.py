@@ -2,8 +2,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.firmware import board as boards
-from thenar.compiler.firmware.board import Board, BoardBus
 from thenar.compiler.frontier.timing.wirings import AS_WIRED, BOARD, CLOCKS_HZ, Wiring, wirings
 from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 from thenar.drivers.i2c.chips import CHIPS
@@ -31,15 +29,6 @@ def test_every_wiring_that_fits_is_a_sound_harness_of_all_the_switches_at_its_cl
             assert (harness.cyberglove is not None) == (joints in (SENSORS_18, SENSORS_22))
             rates = [bus.clock_hz for bus in harness.buses] + [board.baud for board in harness.scanners]
             assert rates == [wiring.clock_hz]
-
-
-@given(st.integers(1, 112))
-def test_a_board_accepts_every_wiring_of_an_avr_that_fits(size: int) -> None:
-    for wiring in wirings(None, "avr328p"):
-        if wiring.fits(names_of(size)):
-            (bus,) = wiring.harness_of(names_of(size)).buses
-            board = Board(part="atmega328p", bus=BoardBus(clock_hz=bus.clock_hz), chips=bus.chips)
-            assert not list(boards.faults(board))
 
 
 def test_a_new_glove_has_every_sort_of_chip_at_every_clock_that_it_allows_or_a_board() -> None:
