@@ -12,12 +12,13 @@ from thenar.drivers.spi.chips import SPI_CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.wiring import (
+    BoardMatrix,
+    BoardWiring,
     BusWiring,
     ChipWiring,
     Debounce,
     GloveWiring,
     Harness,
-    ScannerWiring,
     SpiWiring,
     StreamWiring,
 )
@@ -29,11 +30,12 @@ EXAMPLES = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 TABLES: dict[str, type[msgspec.Struct]] = {
     "": Harness,
     "`[cyberglove]`": GloveWiring,
-    "`[[scanner]]`": ScannerWiring,
     "`[[bus]]`": BusWiring,
     "`[[bus.chip]]`": ChipWiring,
     "`[[spi]]`": SpiWiring,
     "`[[stream]]`": StreamWiring,
+    "`[stream.board]`": BoardWiring,
+    "`[stream.board.matrix]`": BoardMatrix,
     "`[debounce]`": Debounce,
     "`[taxels]`": TaxelSettings,
 }
@@ -65,7 +67,7 @@ def documented() -> Iterator[tuple[str, str, str]]:
 
 def test_every_key_is_there_with_its_default() -> None:
     found = list(documented())
-    nested = {"cyberglove", "scanner", "bus", "chip", "spi", "stream", "debounce"}
+    nested = {"cyberglove", "bus", "chip", "spi", "stream", "board", "matrix", "debounce"}
     for table, kind in TABLES.items():
         tables = nested | ({"taxels"} if kind is Harness else set())
         keys = {field.encode_name: field for field in msgspec.structs.fields(kind) if field.encode_name not in tables}

@@ -120,7 +120,7 @@ def consecutive(n_switches: int) -> Ports:
 
 
 def ports_of(pairs: Iterable[tuple[int, int]]) -> Ports:
-    """Return the ports of a chip's reply or of a bitmap of keys, given as `pairs` of bit and switch; bytes without a
+    """Return the ports of a chip's reply or of a stream's switches, given as `pairs` of bit and switch; bytes without a
     switch are left out.
     """
     ports: dict[int, list[int]] = {}
@@ -130,14 +130,17 @@ def ports_of(pairs: Iterable[tuple[int, int]]) -> Ports:
 
 
 def ports_of_scan(scan: ScanMap | None) -> Ports | None:
-    """Return the ports of a build compiled for a harness: those of its boards, then of its readings, byte by byte."""
+    """Return the ports of a build compiled for a harness: those of its streams, then of its readings, byte by byte."""
     if scan is None:
         return None
     # Levels are not bits of any port: a device compares them, and gives them in the order of their codes.
-    levels = [[level[-1] for level in board] for board in (*scan.taxels, *(each.levels for each in scan.streams))]
+    levels = [[level[-1] for level in stream.levels] for stream in scan.streams]
     levels += [[switch for _, switch in port.levels] for port in scan.ports]
-    boards = (*scan.scanners, *(stream.switches for stream in scan.streams))
-    pairs = (*boards, *(port.switches for port in scan.ports), *map(enumerate, levels))
+    pairs = (
+        *(stream.switches for stream in scan.streams),
+        *(port.switches for port in scan.ports),
+        *map(enumerate, levels),
+    )
     return tuple(chain(*map(ports_of, pairs)))
 
 

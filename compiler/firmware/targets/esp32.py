@@ -5,15 +5,13 @@ to the flash, the PSRAM or the USB port, have no pull-up (which only analog inpu
 chips or modules. Analog pins are those of ADC1, since ADC2 does not convert while Wi-Fi is on.
 """
 
-from typing import Any
-
+from ..costs import Formula
 from .package import M4, Package, family
 from .riscv import MEMBER as _RISCV
 
 
-def _esp(name: str, what: str, **given: Any) -> Package:
-    values = {"formula": M4, "rank": 31, "flash": 16 << 20, "ram": 256 << 10, **given}
-    return family(name=name, what=what, **values)
+def _esp(name: str, what: str, formula: Formula | None = M4, **pins: tuple[int, ...]) -> Package:
+    return family(name, formula, what, rank=31, flash=16 << 20, ram=256 << 10, **pins)
 
 
 MEMBER = (

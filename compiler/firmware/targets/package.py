@@ -117,8 +117,7 @@ _MOST = 64 << 10
 
 def family(name: str, formula: Formula | None, what: str, **given: Any) -> Package:
     """Return a package for parts whose cost is that of a similar core."""
-    values = {"name": name, "part": name, "help": what, "most_flash": _MOST, "formula": formula, "next_step": _NEXT}
-    return Package(**values, **given)
+    return Package(name=name, part=name, help=what, most_flash=_MOST, formula=formula, next_step=_NEXT, **given)
 
 
 # Flash is that of a family's largest usual part, RAM that of its smallest.

@@ -521,3 +521,25 @@ def test_on_an_uno_rows_hold_the_levels_of_pins_and_analog_pins(
         for row in rows:
             assert row.closed == closed
             assert all(abs(code - 1024 * mv / 5000) <= 2 for code, mv in zip(row.readings, volts, strict=True))
+
+
+PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "wire-a-board.md"
+EXAMPLES = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+
+
+@pytest.mark.parametrize("text", EXAMPLES, ids=range(len(EXAMPLES)))
+def test_every_example_of_the_page_is_a_board_whose_sketch_compiles(
+    text: str, named: Named, compiled: Callable[..., Path]
+) -> None:
+    harness = parse_harness(text, "glove.toml")
+    (stream,) = harness.streams
+    files = rows_files("hand", named(stream.switches, list(stream.joints), list(stream.taxels)), harness)
+    assert re.findall(r'^ +",(\w+)"$', files["hand/hand.ino"], re.MULTILINE) == [*stream.used]
+    assert compiled(files).is_file()
+
+
+def test_the_lines_that_the_documentation_shows_are_sound() -> None:
+    devices = (PAGE.parents[1] / "reference" / "devices.md").read_text(encoding="utf-8")
+    columns, row = re.findall(r"^    (\$(?:columns|row),\S+)$", devices, re.MULTILINE)
+    assert fields_of(f"{columns}\r\n")[1:] == ["thumb_tip", "index_tip", "index_mcp"]
+    assert row_of(f"{row}\r\n", 2) == Row(17, 3_400_112, {0, 1}, [512])

@@ -1,7 +1,7 @@
 /* board: prints what a glove's sensors read, a line for each row.
 
-     $columns,thumb_tip,index_tip,index_mcp*5A     once a second: the names of the switches, then of the readings
-     $row,17,3400112,3,512*1F                      number of the row, clock, switches, then every reading
+     $columns,thumb_tip,index_tip,index_mcp*0E     once a second: the names of the switches, then of the readings
+     $row,17,3400112,3,512*5C                      number of the row, clock, switches, then every reading
 
    The row's number is 0 to 65535, then 0 again. The clock is micros(). Switches are a hexadecimal number whose bit k is
    switch k, 1 is closed. Readings are what analogRead() returns. The two digits after the asterisk are the exclusive or
@@ -12,7 +12,7 @@
      #define SSID "..."
      #define PASSWORD "..."
      #define HOST "192.168.1.20"     the address of the computer that runs thenar
-     #define PORT 5253               its port: in glove.toml, port = "udp://:5253"
+     #define PORT 5253               its port: in glove.toml, port = "udp://0.0.0.0:5253"
 
    thenar 0.1.0, template rows/NAME.ino.j2. */
 #include <Arduino.h>
