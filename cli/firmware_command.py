@@ -1,4 +1,4 @@
-"""`thenar firmware`: write a build as C99 for a microcontroller."""
+"""`thenar firmware`: write a build as C99 for a microcontroller, or a sketch for a board that prints rows."""
 
 import shlex
 from collections.abc import Iterable
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from thenar.compiler.firmware.generate import Firmware
     from thenar.compiler.firmware.measuring import Measured
     from thenar.compiler.firmware.sensors import Sensors
-    from thenar.compiler.firmware.targets import Target
-    from thenar.compiler.firmware.targets.base import Mode
     from thenar.runtime.build import Build
 
 
@@ -33,12 +31,6 @@ def _targets() -> Iterable[str]:
     from thenar.compiler.firmware.targets import TARGETS
 
     return TARGETS
-
-
-def _modes() -> Iterable[str]:
-    from thenar.compiler.firmware.targets import TARGETS
-
-    return dict.fromkeys(mode for target in TARGETS.values() for mode in target.modes)
 
 
 _ANY = " Use `generic` for any other part with a C99 compiler."
@@ -56,18 +48,15 @@ class _Command(click.Command):
 
 @click.command("firmware", cls=_Command)
 @click.argument("build", metavar="BUILD", type=existing_folder)
-@click.option(
-    "--target", type=OneOf("target", _targets, _ANY), required=True, help="Target of the firmware: see below."
-)
+@click.option("--target", type=OneOf("target", _targets, _ANY), help="Target of the library: see below.")
 @click.option("-o", "--output", metavar="DIR", type=OutputFolder(), help="Folder to write the firmware into.")
 @click.option(
     "--mode",
-    type=OneOf("mode", _modes),
+    type=click.Choice(["classify", "rows"]),
     default="classify",
     show_default=True,
-    help="A library that classifies frames; a board that scans switches; or a glove that scans and classifies.",
+    help="A library that classifies frames; or an Arduino sketch for a board that prints the rows of a stream.",
 )
-@click.option("--board", metavar="board.toml", type=existing_file, help="Wiring of the microcontroller.")
 @click.option(
     "--calibration",
     metavar="HAND.toml",
@@ -78,13 +67,13 @@ class _Command(click.Command):
     "--glove",
     metavar="glove.toml",
     type=existing_file,
-    help="The glove whose readings a library converts: the ranges of its streams, its calibrations.",
+    help="The glove whose readings a library converts, or whose [stream.board] a sketch reads.",
 )
 @click.option(
     "--name",
     default="glove",
     show_default=True,
-    help="Name of files and functions, thenar_NAME: a to z, digits and _, at most 32.",
+    help="Name of files and functions, thenar_NAME, or of the sketch: a to z, digits and _, at most 32.",
 )
 @click.option(
     "--flash-limit",
@@ -101,10 +90,9 @@ class _Command(click.Command):
 @json_flag
 def command(
     build: Path,
-    target: str,
+    target: str | None,
     output: Path | None,
-    mode: "Mode",
-    board: Path | None,
+    mode: str,
     calibration: Path | None,
     glove: Path | None,
     name: str,
@@ -121,20 +109,24 @@ def command(
     \b
     Example:
         thenar firmware build/ --target avr328p -o firmware/ --measure
-        thenar firmware build/ --target avr2560 --mode glove --board board.toml -o firmware/
         thenar firmware build/ --target esp32 -o components/thenar_glove
+        thenar firmware build/ --mode rows --glove glove.toml -o board/
     """
-    from thenar.compiler.firmware.board import load_board
     from thenar.compiler.firmware.generate import Firmware, write_folder
     from thenar.compiler.firmware.measuring import measure as measured_of
-    from thenar.compiler.firmware.targets import TARGETS
     from thenar.runtime.build import Build
 
-    _check(TARGETS[target], mode, writes=output is not None, measures=measure)
-    _check_calibrated(mode, calibration, glove)
-    loaded, sensors = _converting(Build.load(build), mode, calibration, glove)
-    wiring = None if board is None else load_board(board)
-    firmware = Firmware(loaded.tables, loaded.manifest, target, mode, name, wiring, flash_limit, loaded.scan, sensors)
+    if mode == "rows":
+        _check_rows(**{"target": target, "calibration": calibration, "flash-limit": flash_limit, "measure": measure})
+        return _write_sketches(build, glove, output, name, overwrite=overwrite)
+    if target is None:
+        raise click.UsageError("A library needs a target: name one with --target.")
+    _check(target, writes=output is not None, measures=measure)
+    if glove is not None and calibration is not None:
+        raise click.UsageError("glove.toml names its calibration: leave out --calibration, or --glove.")
+    loaded = Build.load(build)
+    sensors = _sensors(loaded, calibration, glove)
+    firmware = Firmware(loaded.tables, loaded.manifest, target, name, flash_limit, loaded.scan, sensors)
     fit = firmware.fit
     measured = None
     if measure:
@@ -146,46 +138,55 @@ def command(
     if wants_json():
         print_json(_document(fit, measured, sorted(files)))
     else:
-        if mode != "scan":
-            _print(fit, measured)
-        _print_firmware(firmware, target, output)
+        _print(fit, measured)
+        if output is not None:
+            _print_next_step(firmware, target, output)
     return 0
 
 
-def _converting(
-    build: "Build", mode: "Mode", calibration: Path | None, glove: Path | None
-) -> "tuple[Build, Sensors | None]":
-    """Return the build, and how a library converts raw readings to its codes, if a calibration is known. A glove's
-    firmware takes no conversion: its build is for the bytes of the calibrated hand.
-    """
-    from thenar.compiler.firmware.one_hand import for_one_hand
+def _check_rows(**options: object) -> None:
+    """Raise UsageError if an option was given that is for libraries."""
+    if given := [option for option, value in options.items() if value]:
+        raise click.UsageError(f"--{given[0]} is for libraries, not for sketches that print rows: leave it out.")
+
+
+def _write_sketches(build: Path, glove: Path | None, output: Path | None, name: str, *, overwrite: bool) -> int:
+    from thenar.compiler.firmware.generate import write_folder
+    from thenar.compiler.firmware.rows import rows_files
+    from thenar.runtime.build import Build
+    from thenar.runtime.harness.loading import load_harness
+
+    if glove is None or output is None:
+        raise click.UsageError(
+            "A sketch needs the glove's wiring and a folder to write: name them with --glove and -o."
+        )
+    files = rows_files(name, Build.load(build).manifest, load_harness(glove))
+    write_folder(files, output, overwrite=overwrite)
+    if wants_json():
+        print_json({"files": sorted(files)})
+    else:
+        readme = shlex.quote(str(output / "README.md"))
+        out().print(f"{output}: a sketch for Arduino's cores; {readme} explains how to compile it", soft_wrap=True)
+    return 0
+
+
+def _sensors(build: "Build", calibration: Path | None, glove: Path | None) -> "Sensors | None":
+    """Return how a library converts raw readings to its codes, if a calibration or a glove is known."""
     from thenar.compiler.firmware.sensors import sensors_of
     from thenar.runtime.calibration import load_calibration
     from thenar.runtime.harness.loading import load_harness
 
     hand = None if calibration is None else load_calibration(calibration)
-    if mode == "classify" and (hand or glove):
-        return build, sensors_of(build.manifest, None if glove is None else load_harness(glove), hand)
-    return build if hand is None else for_one_hand(build, hand), None
+    if glove is None and hand is None:
+        return None
+    return sensors_of(build.manifest, None if glove is None else load_harness(glove), hand)
 
 
-def _check_calibrated(mode: "Mode", calibration: Path | None, glove: Path | None) -> None:
-    """Raise UsageError if a mode takes no calibration, or if two are given."""
-    if calibration is not None and mode == "scan":
-        raise click.UsageError(
-            "--calibration is for the modes classify and glove: a scanning board reads no CyberGlove, so leave it out."
-        )
-    if glove is not None and mode != "classify":
-        raise click.UsageError("--glove is for --mode classify: describe a board's wiring with --board.")
-    if glove is not None and calibration is not None:
-        raise click.UsageError("glove.toml names its calibration: leave out --calibration, or --glove.")
-
-
-def _check(target: "Target", mode: "Mode", *, writes: bool, measures: bool) -> None:
+def _check(target: str, *, writes: bool, measures: bool) -> None:
     """Raise UsageError for options that conflict."""
-    if mode == "scan" and measures:
-        raise click.UsageError("A board that only scans has no classifier: leave out --measure.")
-    if target.kind == "host" and measures:
+    from thenar.compiler.firmware.targets import TARGETS
+
+    if TARGETS[target].kind == "host" and measures:
         raise click.UsageError("The host has no cycle counts: --measure is for microcontrollers.")
     if not writes and not measures:
         raise click.UsageError("Nothing to do: name a folder to write with -o, or add --measure.")
@@ -198,15 +199,10 @@ def _print(fit: "Fit", measured: "Measured | None") -> None:
         console.print(measured.note, soft_wrap=True)
 
 
-def _print_firmware(firmware: "Firmware", target: str, output: Path | None) -> None:
-    """Print what the firmware does with segments and, if it was written, what to do with it."""
+def _print_next_step(firmware: "Firmware", target: str, output: Path) -> None:
     from thenar.compiler.firmware.targets import TARGETS
 
-    if firmware.segments:
-        out().print(f"{firmware.segments}.", soft_wrap=True)
-    if output is None:
-        return
-    if firmware.mode == "classify" and (said := TARGETS[target].said(firmware.library())):
+    if said := TARGETS[target].said(firmware.library()):
         out().print(f"{said}.", soft_wrap=True)
     next_step = TARGETS[target].next_step.format(folder=shlex.quote(str(output)))
     out().print(f"{output}: firmware for {target}; {next_step}", soft_wrap=True)

@@ -20,10 +20,8 @@ from ..additive.logit import ColumnTables
 from ..boosting.classifier import LogitBoostClassifier
 from ..boosting.stumps import Stumps
 from ..evaluation.folds import Fold
-from ..firmware.board import Board
 from ..firmware.classifier import LIBRARY_NAME
 from ..firmware.generate import Firmware, write_folder
-from ..firmware.targets.base import Mode
 from ..placement.elements import elements_of
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import information_alone
@@ -64,8 +62,6 @@ class Build(LoadedBuild):
         folder: str | Path,
         target: str = "avr328p",
         *,
-        mode: Mode = "classify",
-        board: Board | None = None,
         name: str = LIBRARY_NAME,
         flash: int | None = None,
         overwrite: bool = False,
@@ -78,10 +74,6 @@ class Build(LoadedBuild):
             The folder to write.
         target : str
             The name of `thenar firmware --target`: one of `TARGETS`.
-        mode : {"classify", "scan", "glove"}
-            Classifier only, a board that scans, or a glove that predicts by itself.
-        board : Board, optional
-            How the microcontroller is wired, for the modes "scan" and "glove".
         name : str
             The prefix of every C name.
         flash : int, optional
@@ -94,9 +86,9 @@ class Build(LoadedBuild):
         MemberError
             If there is no such target.
         FirmwareError
-            If the build does not fit the target, or the arguments contradict each other.
+            If the build does not fit the target.
         """
-        files = Firmware(self.tables, self.manifest, target, mode, name, board, flash, self.scan).files()
+        files = Firmware(self.tables, self.manifest, target, name, flash, self.scan).files()
         write_folder(files, Path(folder), overwrite=overwrite)
         return tuple(Path(folder) / path for path in files)
 

@@ -1,4 +1,4 @@
-"""The files of a firmware folder, from tables, target and mode; the folder is written atomically.
+"""The files of a firmware folder, from tables and a target; the folder is written atomically.
 
 `SHA256SUMS`, which `sha256sum -c` reads, lists the files that thenar has written. Other files, such as a compiler's
 objects, belong to the user and are kept.
@@ -16,70 +16,38 @@ from thenar.runtime.tables import IntegerTables
 
 from ..publication import check_folder, entries, publish_folder
 from . import FirmwareError
-from .board import Board, check_switches, keys_of
-from .board_files import (
-    board_files,
-    config_of,
-    follows_segments,
-    key_ports,
-    segments_in_words,
-    whole_folder,
-)
-from .choose import Fit, fit_for, smallest_fit
+from .choose import Fit, fit_for
 from .classifier import LIBRARY_NAME, Library
-from .layout import Ports, ports_of_scan
-from .protocol import protocol_files
+from .layout import ports_of_scan
 from .sensors import Sensors
 from .targets import TARGETS, Target
-from .targets.base import Mode
 from .words import Names, check_name
 
 
 @dataclass(frozen=True, eq=False)
 class Firmware:
-    """Firmware of `tables` for `target`, one of TARGETS, in `mode`.
+    """The library that classifies frames by `tables`, for `target`, one of TARGETS.
 
     names        the names of grasp types, switches and joints: a build's manifest, or words.numbered(tables)
-    mode         "classify": a library; "scan": a board that scans switches; "glove": one that also recognises
     name         of its files and functions: lower-case letters, digits and _, at most 32
-    board        how the microcontroller is wired; the modes scan and glove need it, the mode classify rejects it
+    flash        how many bytes of flash the classifier may take; None: three quarters of the part's
     scan         how the build's harness is read, if it has one: a library takes its switches from these readings
     sensors      the known sensors of the glove whose readings a library converts; None: only the names are known
-    flash        how many bytes of flash the classifier may take; None: three quarters of the part's
 
-    Raises FirmwareError where these are inconsistent, or the name cannot be used in C; MemberError if there is no such
-    target.
+    Raises FirmwareError if the name cannot be used in C; MemberError if there is no such target.
     """
 
     tables: IntegerTables
     names: Names
     target: str
-    mode: Mode = "classify"
     name: str = LIBRARY_NAME
-    board: Board | None = None
     flash: int | None = None
     scan: ScanMap | None = None
     sensors: Sensors | None = None
 
     def __post_init__(self) -> None:
         check_name(self.name)
-        target = self._target
-        if self.mode == "classify":
-            if self.board is not None:
-                raise FirmwareError("the mode classify reads no board: leave the board out, or use scan or glove")
-        elif self.mode not in target.modes:
-            *others, last = (name for name, each in TARGETS.items() if self.mode in each.modes)
-            able = f"{', '.join(others)} and {last}"
-            raise FirmwareError(f"the mode {self.mode} is available for {able}, not for {self.target}")
-        elif self.board is None:
-            raise FirmwareError(f"the mode {self.mode} needs a board.toml that describes the microcontroller's wiring")
-        elif self.mode == "glove" and len(keys_of(self.board, self.names.switches)) < len(self.names.switches):
-            raise FirmwareError(
-                "the build keeps levels of taxels, which firmware of the mode glove cannot read: use the mode scan, "
-                "and recognise on the host"
-            )
-        elif self.board.part != target.part:
-            raise FirmwareError(f"the board has an {self.board.part}, but the target {self.target} is {target.named}")
+        TARGETS.named(self.target)
 
     @property
     def _target(self) -> Target:
@@ -88,26 +56,7 @@ class Firmware:
     @cached_property
     def fit(self) -> Fit:
         """The part of the target, and the layout of the build. Raises FirmwareError if it does not fit."""
-        if self.mode == "scan":  # a board that only scans contains no classifier
-            return smallest_fit(self.tables, flash=self.flash)
-        return fit_for(self._target, self.tables, self.flash, self._ports)
-
-    @property
-    def _ports(self) -> Ports | None:
-        """The ports of the switches: eight consecutive keys of the board each, or readings of the build's harness.
-
-        Raises FirmwareError if the board lacks a switch.
-        """
-        if self.board is None:
-            return ports_of_scan(self.scan)
-        keys = keys_of(self.board, self.names.switches)
-        check_switches(self.board, keys)
-        return key_ports(self.board, keys)
-
-    @property
-    def segments(self) -> str:
-        """A sentence on whether the firmware of a glove follows segments; "" where its build has no segment costs."""
-        return segments_in_words(self.board, self.names) if self.mode == "glove" and self.board is not None else ""
+        return fit_for(self._target, self.tables, self.flash, ports_of_scan(self.scan))
 
     def library(self, notes: Sequence[str] = ()) -> Library:
         """Return the classifier alone, with lines for its opening comments."""
@@ -117,20 +66,9 @@ class Firmware:
         """Return path -> text of the firmware; the result is deterministic.
 
         notes are lines for the opening comment of the classifier's header, by default those of the fit. Raises
-        FirmwareError where the build does not fit, or the board cannot do what the mode needs.
+        FirmwareError where the build does not fit.
         """
-        library = self.library(self.fit.notes() if notes is None else notes)
-        return self._target.files(library) if self.board is None else self._of_board(self.board, library)
-
-    def _of_board(self, board: Board, library: Library) -> dict[str, str]:
-        name, names, tables = self.name, self.names, self.tables
-        switches, glove = keys_of(board, names.switches), self.mode == "glove"
-        segments = glove and follows_segments(board, names)
-        config = config_of(board, switches, tables, recognises=glove, segments=segments)
-        files = protocol_files(config) | board_files(name, names, library.layout, board, self.mode)
-        if glove:
-            files |= library.files | (library.segments if segments else {})
-        return whole_folder(name, board, self.mode, files)
+        return self._target.files(self.library(self.fit.notes() if notes is None else notes))
 
 
 SUMS = "SHA256SUMS"

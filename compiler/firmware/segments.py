@@ -85,13 +85,6 @@ def decoder_values(model: SegmentModel) -> dict[str, Any]:
     }
 
 
-def segmenter_bytes(model: SegmentModel) -> int:
-    """Return the bytes of RAM of the decoder's `thenar_NAME_segmenter` on an AVR."""
-    K, rings, lag = model.n_types, len({least for least in model.least if least > 1}), lag_of(model)
-    waiting = sum(least - 1 for least in model.least)
-    return 4 * (K + 1) + 12 + 2 * max(rings, 1) + 2 * max(waiting, 1) + (4 + 2 * -(-(K + 1) // 8)) * lag
-
-
 def lag_of(model: SegmentModel) -> int:
     """Return the ticks until a tick's state is known."""
     return min(max(LAG_US // model.tick_us, 1), 250)

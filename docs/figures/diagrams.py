@@ -245,7 +245,6 @@ def wiring() -> tuple[int, str, list[str]]:
     rows = (
         (("switches",), ("port expanders", "and multiplexers"), "I2C", "[[bus]]"),
         (("taxels",), ("converters", ""), "I2C or SPI", "[[bus]], [[spi]]"),
-        (("switches, taxels",), ("scanner board", "scans a matrix"), "serial or Wi-Fi", "[[scanner]]"),
         (("any sensors",), ("your board", "prints lines"), "serial, TCP, UDP", "[[stream]]"),
         (("CyberGlove",), ("interface box", ""), "serial", "[cyberglove]"),
     )
@@ -274,7 +273,7 @@ def key(x: float, y: float, name: str, row: float) -> list[str]:
 
 def matrix() -> tuple[int, str, list[str]]:
     """Return the circuit of the matrix in docs/how-to/wire-a-board.md."""
-    columns, rows = {"PB0": 84, "PB1": 284, "PB2": 484}, {"PD2": 130, "PD3": 222}
+    columns, rows = {"8": 84, "9": 284, "10": 484}, {"2": 130, "3": 222}
     names = (("thumb_distal_5", "palm_heel_6", ""), ("index_distal_5", "", "middle_distal_8"))
     shapes = [text(8, 34, "columns,", "note"), text(8, 50, "pulled up", "note")]
     for name, x in columns.items():

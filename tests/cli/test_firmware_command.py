@@ -1,32 +1,22 @@
+import dataclasses
 import json
 import re
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from thenar.compiler import GraspSet, Joint, Options, compile_build
-from thenar.compiler.recordings.taxonomy import own
-from thenar.drivers.calibration import GloveCalibration, SensorCalibration
+from thenar.compiler import GraspSet, compile_build
 from thenar.runtime.build import Build
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 Tool = Callable[[str], str]
 
-BOARD = 'part = "atmega328p"\n[pins]\n' + "\n".join(f's{number} = "PD{number + 2}"' for number in range(6)) + "\n"
-
 
 @pytest.fixture(scope="module")
 def build(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return compile_build(small_set, tmp_path_factory.mktemp("builds") / "build", rounds=10, folds=0).folder
-
-
-@pytest.fixture
-def board(tmp_path: Path) -> Path:
-    (tmp_path / "board.toml").write_text(BOARD)
-    return tmp_path / "board.toml"
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -117,13 +107,40 @@ def test_on_this_machine_there_is_nothing_to_count(thenar: Thenar, build: Path) 
     assert "The host has no cycle counts" in done.stderr
 
 
-def test_a_board_that_scans_is_written(thenar: Thenar, build: Path, board: Path, tmp_path: Path) -> None:
-    arguments = ("--target", "avr328p", "--mode", "scan", "--board", board, "-o", tmp_path / "made")
-    done = thenar("firmware", build, *arguments)
+def glove_toml(build: Path, without: str = "", no_pin: str = "", matrix: str = "") -> str:
+    """Return a glove.toml with the elements of a build on pins of a board, except one, and one without a pin."""
+    manifest = Build.load(build).manifest
+    switches, joints = (
+        [each.name for each in kind if each.name != without] for kind in (manifest.switches, manifest.joints)
+    )
+    pins = {name: str(pin) for pin, name in enumerate(switches, 2)} | {
+        name: f"A{pin}" for pin, name in enumerate(joints)
+    }
+    pins.pop(no_pin, None)
+    wired = ", ".join(f'"{name}" = "{pin}"' for name, pin in pins.items())
+    ranges = ", ".join(f"{name} = [0, 1023]" for name in joints)
+    columns = [*switches, *["x", "y", "z"] * bool(matrix)]
+    return (
+        f'name = "glove"\n[[stream]]\nport = "/dev/ttyACM0"\nswitches = {columns}\n'
+        f"joints = {{ {ranges} }}\n[stream.board]\npins = {{ {wired} }}\n{matrix}"
+    )
+
+
+@pytest.fixture
+def glove(build: Path, tmp_path: Path) -> Path:
+    """Return a glove.toml with all elements of the build on pins of a board."""
+    (tmp_path / "glove.toml").write_text(glove_toml(build))
+    return tmp_path / "glove.toml"
+
+
+def test_a_sketch_that_prints_rows_is_written(thenar: Thenar, build: Path, glove: Path, tmp_path: Path) -> None:
+    made = tmp_path / "made"
+    done = thenar("firmware", build, "--mode", "rows", "--glove", glove, "--name", "left", "-o", made)
     assert done.returncode == 0, done.stderr
-    assert {"main.c", "Makefile", "glove.toml", "thenar_board.c"} <= content(tmp_path / "made").keys()
-    assert "thenar_glove.c" not in content(tmp_path / "made")
-    assert "layout" not in done.stdout
+    assert done.stdout == f"{made}: a sketch for Arduino's cores; {made}/README.md explains how to compile it\n"
+    assert content(made).keys() == {"left/left.ino", "README.md", "SHA256SUMS"}
+    again = ("firmware", build, "--mode", "rows", "--glove", glove, "-o", made, "--overwrite", "--json")
+    assert json.loads(thenar(*again).stdout) == {"files": ["README.md", "glove/glove.ino"]}
 
 
 def test_firmware_is_replaced_when_asked_and_the_users_files_stay(thenar: Thenar, build: Path, tmp_path: Path) -> None:
@@ -166,82 +183,73 @@ def test_a_glove_s_ranges_are_what_its_pins_read_and_boards_that_fit_are_told(
     [
         (("--target", "avr328p"), "name a folder to write with -o"),
         (("--target", "pdp11", "-o", "made"), "there is no target 'pdp11': choose one of host"),
-        (("--target", "avr328p", "--mode", "scan", "-o", "made"), "the mode scan needs a board.toml"),
-        (("--target", "avr328p", "--mode", "scan", "--measure"), "A board that only scans has no classifier"),
+        (("-o", "made"), "A library needs a target: name one with --target"),
         (
-            ("--target", "avr328p", "--mode", "scan", "--calibration", "{board}", "-o", "made"),
-            "a scanning board reads no CyberGlove",
-        ),
-        (
-            ("--target", "avr328p", "--mode", "glove", "--glove", "{board}", "-o", "made"),
-            "--glove is for --mode classify",
-        ),
-        (
-            ("--target", "avr328p", "--calibration", "{board}", "--glove", "{board}", "-o", "made"),
+            ("--target", "avr328p", "--calibration", "{glove}", "--glove", "{glove}", "-o", "made"),
             "leave out --calibration, or --glove",
         ),
-        (("--target", "avr328p", "--board", "{board}", "-o", "made"), "the mode classify reads no board"),
+        (("--mode", "rows", "-o", "made"), "name them with --glove and -o"),
+        (("--mode", "rows", "--glove", "{glove}"), "name them with --glove and -o"),
+        (("--mode", "rows", "--target", "avr328p", "--glove", "{glove}", "-o", "made"), "--target is for libraries"),
+        (("--mode", "rows", "--measure", "--glove", "{glove}", "-o", "made"), "--measure is for libraries"),
         (
-            ("--target", "avr2560", "--mode", "scan", "--board", "{board}", "-o", "made"),
-            "the board has an atmega328p, but the target avr2560 is an atmega2560",
+            ("--mode", "rows", "--flash-limit", "9", "--glove", "{glove}", "-o", "made"),
+            "--flash-limit is for libraries",
         ),
+        (("--mode", "rows", "--name", "../x", "--glove", "{glove}", "-o", "made"), "'../x' cannot be the name"),
         (("--target", "avr328p", "--flash-limit", "32769", "-o", "made"), "an atmega328p has 32768 bytes"),
         (("--target", "avr328p", "--name", "../x", "-o", "made"), "'../x' cannot be the name: use lower-case"),
         (("--target", "avr328p", "-o", "nowhere/made"), "nowhere is no folder: make it first"),
     ],
 )
 def test_what_cannot_be_is_one_sentence(
-    thenar: Thenar, build: Path, board: Path, arguments: tuple[str, ...], message: str
+    thenar: Thenar, build: Path, glove: Path, arguments: tuple[str, ...], message: str
 ) -> None:
-    done = thenar("firmware", build, *(argument.format(board=board) for argument in arguments))
+    done = thenar("firmware", build, *(argument.format(glove=glove) for argument in arguments))
     assert (done.returncode, done.stdout) == (2, "")
     assert message in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert not Path("made").exists()
 
 
-def test_a_matrix_that_lacks_a_kept_switch_names_it(thenar: Thenar, build: Path, tmp_path: Path) -> None:
-    first, *others = [switch.name for switch in Build.load(build).manifest.switches]
-    columns = [f"PB{number}" for number in range(len(others))]
-    matrix = {"rows": ["PD2"], "columns": columns, "switches": [others]}
-    lines = (f"{key} = {json.dumps(value)}\n" for key, value in matrix.items())
-    (tmp_path / "board.toml").write_text(f'part = "atmega328p"\n[matrix]\ndiodes = true\n{"".join(lines)}')
-    for mode in ("glove", "scan"):
-        made = ("--mode", mode, "--board", tmp_path / "board.toml", "-o", tmp_path / "made")
-        done = thenar("firmware", build, "--target", "avr328p", *made)
-        assert (done.returncode, done.stdout) == (2, "")
-        assert f"the board has no pin or column for {first}, which the build keeps" in done.stderr
+GHOSTS = 'matrix = { rows = ["20", "21"], columns = ["22", "23"], keys = [["s0", "x"], ["y", "z"]], diodes = false }'
 
 
-def test_tables_too_large_for_a_glove_name_a_remedy_that_works(thenar: Thenar, tmp_path: Path) -> None:
-    joints, types, random = [f"j{number}" for number in range(16)], 8, np.random.default_rng(1)
-    labels = np.arange(10 * types) % types
-    centres = random.integers(40, 200, (types, len(joints)))
-    grasp_set = GraspSet(
-        switches=(labels[:, np.newaxis] == np.arange(2)),
-        switch_names=("s0", "s1"),
-        codes=(centres[labels] + random.integers(-9, 10, (len(labels), len(joints)))).astype(np.uint16),
-        joints=tuple(Joint(name, "deg", 0, 0.0, 255, 127.5) for name in joints),
-        grasps=np.array([f"g{label}" for label in labels]),
-        taxonomy=own([f"g{label}" for label in range(types)]),
-        subjects=np.full(len(labels), "A"),
-        objects=np.full(len(labels), "thing"),
-        trials=np.arange(len(labels)),
-    )
-    sensors = f"[cyberglove]\njoints = {json.dumps([*joints, '', ''])}\n"
-    (tmp_path / "board.toml").write_text(f'part = "atmega2560"\n[pins]\ns0 = "PA0"\ns1 = "PA1"\n{sensors}')
-    hand = GloveCalibration(sensors=tuple(SensorCalibration(name, 40, 0.0, 200, 90.0) for name in joints))
-    (tmp_path / "hand.toml").write_text(hand.to_toml())
-    said = {}
-    for linear in (1, 0):
-        settings: dict[str, float | str] = {"penalty": 1.0, "smoothness": 1.0, "linear": linear}
-        options = Options(trainer="logit", max_bins=16, settings=settings, folds=0, refuse=0.0)
-        made = compile_build(grasp_set, tmp_path / "build", options, jobs=1)
-        wired = ("--board", tmp_path / "board.toml", "--calibration", tmp_path / "hand.toml", "-o", tmp_path / "made")
-        said[linear] = thenar("firmware", made.folder, "--target", "avr2560", "--mode", "glove", *wired)
-    assert said[1].returncode == 2
-    assert "an array of an AVR has at most 32767: compile with --linear 0 --max-bins 16" in said[1].stderr
-    assert said[0].returncode == 0, said[0].stderr
+@pytest.mark.parametrize(
+    ("glove", "message"),
+    [
+        ({"without": "s0"}, "harness 'glove' has no s0, which the build keeps: add it"),
+        ({"no_pin": "s0"}, "the board at /dev/ttyACM0 has no pin for s0, which the build keeps: add it"),
+        (
+            {"no_pin": "s0", "matrix": GHOSTS},
+            "the matrix has no diodes, so that of s0, y, x, z the fourth reads closed when three are: put a diode",
+        ),
+    ],
+)
+def test_a_board_that_cannot_read_a_kept_element_is_refused(
+    thenar: Thenar, build: Path, tmp_path: Path, glove: dict[str, str], message: str
+) -> None:
+    (tmp_path / "glove.toml").write_text(glove_toml(build, **glove))
+    done = thenar("firmware", build, "--mode", "rows", "--glove", tmp_path / "glove.toml", "-o", tmp_path / "made")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+    assert not (tmp_path / "made").exists()
+
+
+def test_a_stream_without_a_board_has_no_sketch(thenar: Thenar, build: Path, glove: Path, tmp_path: Path) -> None:
+    glove.write_text(glove.read_text().partition("[stream.board]")[0])
+    done = thenar("firmware", build, "--mode", "rows", "--glove", glove, "-o", tmp_path / "made")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "no stream of harness 'glove' has a board with elements of the build: describe the board's" in done.stderr
+
+
+def test_a_name_that_ends_a_column_is_refused(thenar: Thenar, small_set: GraspSet, tmp_path: Path) -> None:
+    named = dataclasses.replace(small_set, switch_names=("tip, left", *small_set.switch_names[1:]))
+    build = compile_build(named, tmp_path / "build", rounds=10, folds=0).folder
+    (tmp_path / "glove.toml").write_text(glove_toml(build))
+    done = thenar("firmware", build, "--mode", "rows", "--glove", tmp_path / "glove.toml", "-o", tmp_path / "made")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "'tip, left' cannot be the name of a column, which ends at a comma or an asterisk" in done.stderr
 
 
 def test_a_folder_that_is_no_build_is_named(thenar: Thenar, tmp_path: Path) -> None:

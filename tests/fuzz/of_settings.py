@@ -1,4 +1,4 @@
-"""What users write by hand, or let thenar write for them: gloves, boards, calibrations, preshapes, scenes, postures."""
+"""What users write by hand, or let thenar write for them: gloves, calibrations, preshapes, scenes, postures."""
 
 from functools import cache
 from pathlib import Path
@@ -7,8 +7,7 @@ from tempfile import TemporaryDirectory
 from material import GLOVE_TOML, GRASPS, SENSORS, Format, build_files, harness, make_folder
 from mutating import toml_file
 
-from thenar.compiler.firmware.board import load_board
-from thenar.compiler.firmware.generate import Firmware
+from thenar.compiler.firmware.rows import rows_files
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.placement.ports import ports_of_whole_glove
 from thenar.compiler.recordings.taxonomy import collected
@@ -43,12 +42,18 @@ def _kept() -> list[str]:
     return [switch.name for switch in _build().manifest.switches]
 
 
+def _gloves() -> list[bytes]:
+    return [GLOVE_TOML.encode(), harness_to_toml(harness()).encode(), _BOARD.encode()]
+
+
 def _glove(data: bytes, folder: Path) -> None:
-    """Plan, time and write a wiring, and make the devices of it, none of which is opened."""
+    """Plan, time and write a wiring, the sketches of its boards, and make its devices, none of which is opened."""
     path = folder / "glove.toml"
     path.write_bytes(data)
     found = load_harness(path)
     parse_harness(harness_to_toml(found), "written.toml")
+    if any(stream.board for stream in found.streams):
+        rows_files("board", _build().manifest, found)
     ports_of_whole_glove(found, found.switches)
     Sources(found, found.switches, whole_scan(found, found.switches))
     scan = plan_scan(_kept(), found)
@@ -56,29 +61,23 @@ def _glove(data: bytes, folder: Path) -> None:
     spec_files(_build().manifest, None, found)
 
 
-_PINS = "\n".join(f'finger_{number} = "PB{number}"' for number in range(4))
-_BOARDS = (
-    f'part = "atmega328p"\nclock_hz = 16000000\nbaud = 1000000\nboard = 1\nscan_us = 1000\nstate_us = 0\n'
-    f'[debounce]\npress_us = 5000\nrelease_us = 10000\n[pins]\n{_PINS}\nfinger_4 = "PD2"\nfinger_5 = "PD3"\n',
-    'part = "atmega2560"\n[matrix]\nrows = ["PA0", "PA1"]\ncolumns = ["PC0", "PC1", "PC2"]\ndiodes = true\n'
-    'settle_us = 20\nswitches = [["finger_0", "finger_1", "finger_2"], ["finger_3", "finger_4", "finger_5"]]\n'
-    "[cyberglove]\nuart = 1\nbaud = 115200\nsensors = 18\nrate_hz = 90\n",
-    'part = "atmega328p"\nscan_us = 3000\n[bus]\nclock_hz = 400000\n[[chip]]\nkind = "mcp23017"\n'
-    'address = 0x20\npins = { GPA0 = "finger_0", GPB0 = "finger_1", GPA2 = "finger_2" }\n[[chip]]\n'
-    'kind = "tca6424a"\naddress = 0x22\nclosed = "high"\n'
-    'pins = { P00 = "finger_3", P21 = "finger_4", P22 = "finger_5" }\n'
-    f'[analog]\n{SENSORS[0]} = "ADC0"\n{SENSORS[1]} = "ADC1"\n{SENSORS[2]} = "ADC2"\n',
-)
-
-
-def _board(data: bytes, folder: Path) -> None:
-    """Write the firmware of a board, which recognises where it reads joints."""
-    path = folder / "board.toml"
-    path.write_bytes(data)
-    board = load_board(path)
-    platform = board.microcontroller.name
-    for mode in ("scan", "glove"):
-        Firmware(_build().tables, _build().manifest, platform, mode, board=board).files()
+_FINGERS = [f"finger_{number}" for number in range(6)]
+_BOARD = f"""\
+name = "board"
+[[stream]]
+port = "/dev/ttyACM0"
+rate_hz = 200
+switches = {_FINGERS}
+joints = {{ {SENSORS[0]} = [0, 1023], {SENSORS[1]} = [0, 1023], {SENSORS[2]} = [0, 1023] }}
+[stream.board]
+pins = {{ finger_0 = "2", {SENSORS[0]} = "A0", {SENSORS[1]} = "A1.3", {SENSORS[2]} = "A1.4" }}
+select = ["4", "5", "6", "7"]
+matrix = {{ rows = ["8", "9"], columns = ["10"], keys = [["finger_1"], ["finger_2"]], diodes = true }}
+[[stream.board.chip]]
+kind = "mcp23017"
+address = 0x20
+pins = {{ GPA0 = "finger_3", GPB0 = "finger_4", GPA2 = "finger_5" }}
+"""
 
 
 def _calibrations() -> list[bytes]:
@@ -163,8 +162,7 @@ def _objects(data: bytes, folder: Path) -> None:
 
 
 FORMATS = (
-    Format("glove.toml", lambda: [GLOVE_TOML.encode(), harness_to_toml(harness()).encode()], toml_file, _glove),
-    Format("board.toml", lambda: [text.encode() for text in _BOARDS], toml_file, _board),
+    Format("glove.toml", _gloves, toml_file, _glove),
     Format("calibration.toml", _calibrations, toml_file, _calibration),
     Format("preshapes.toml", _preshape_tables, toml_file, _preshapes),
     Format("scene.toml", _scenes, toml_file, _scene),

@@ -1,11 +1,8 @@
 """The harness's programs, compiled, and small AVR programs for them."""
 
-import importlib.util
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -37,15 +34,3 @@ def compiled(tool: Callable[[str], str], tmp_path: Path) -> Compile:
         return elf
 
     return compiled
-
-
-@pytest.fixture(scope="session")
-def simulated() -> Any:
-    """Return the module with SimulatedBoard, which tests of other folders load too."""
-    spec = importlib.util.spec_from_file_location("simulated", Path(__file__).with_name("simulated.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module

@@ -3,9 +3,8 @@
 from thenar.drivers.members import Members
 
 from .base import Target
-from .wired import Wired
 
-__all__ = ["TARGETS", "Target", "Wired", "kinds", "timed", "wired"]
+__all__ = ["TARGETS", "Target", "kinds", "timed"]
 
 TARGETS: Members[Target] = Members("firmware target", Target, __name__, "thenar.targets")
 
@@ -13,11 +12,6 @@ TARGETS: Members[Target] = Members("firmware target", Target, __name__, "thenar.
 def kinds() -> tuple[str, ...]:
     """Return the names of the kinds whose code can be run: those of `thenar verify --firmware`."""
     return tuple(dict.fromkeys(target.kind for target in TARGETS.values() if target.kind))
-
-
-def wired() -> dict[str, Wired]:
-    """Return the parts that board firmware supports, by their names in board.toml."""
-    return {target.part: target for target in TARGETS.values() if isinstance(target, Wired)}
 
 
 def timed() -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""AVRs: the parts of Arduino's Uno and Mega, with the pins and the baud rates for board firmware."""
+"""AVRs: the parts of Arduino's Uno and Mega."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,34 +7,21 @@ from typing import TYPE_CHECKING, ClassVar
 
 from ..costs import Formula
 from ..tools import AVR_COMPILER
-from .wired import Wired
+from .base import Target
 
 if TYPE_CHECKING:
     from ..classifier import Library
     from ..layout import Layout
     from ..probes import Frames, Lost, Predictions
 
-_DIVIDERS = 4096
-_USUAL = (9600, 19_200, 38_400, 57_600, 76_800, 115_200, 230_400, 250_000, 500_000, 1_000_000, 2_000_000)
-_EXACT = 0.005
-
 
 @dataclass(frozen=True, kw_only=True)
-class Avr(Wired):
-    """An AVR. Its pins exclude crystal and reset.
-
-    jtag      pins that the JTAG interface occupies until it is disabled
-    avrdude   its name in avrdude, and `programmer` the usual boards' boot loader there
-    brown_out the recommended brown-out fuses at its highest clock
-    """
+class Avr(Target):
+    """An AVR; programmer is the boot loader of its usual boards, in avrdude."""
 
     avr: ClassVar[bool] = True
 
-    jtag: tuple[str, ...]
-    highest_hz: int
-    avrdude: str
     programmer: str
-    brown_out: str = "4.3 V, extended fuse 0xFC; at 8 MHz or less 2.7 V, 0xFD"
 
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text: the library, a Makefile (program, size, flash) and an initial main()."""
@@ -71,49 +58,11 @@ class Avr(Wired):
         return run(files, name, layout, frames, self.part, self.flags, incremental=incremental, lost=lost)
 
 
-@dataclass(frozen=True, slots=True)
-class BaudSetting:
-    """The values of UBRRn and of U2Xn, and the resulting error of the rate, as a fraction."""
-
-    ubrr: int
-    double: bool
-    error: float
-
-
-def best_setting(baud: int, clock_hz: int) -> BaudSetting | None:
-    """Return the setting nearest to `baud`, with a clock divider of 16 or 8 (U2X) times UBRRn + 1; None if none exists.
-
-    Of equally near ones it is the one without U2X, whose receiver samples twice as often and tolerates more error.
-    """
-    found = [setting for double in (False, True) if (setting := _setting(baud, clock_hz, double))]
-    return min(found, key=lambda setting: (abs(setting.error), setting.double), default=None)
-
-
-def near_rates(baud: int, clock_hz: int) -> tuple[int, ...]:
-    """Return the four standard rates nearest to `baud` with an error of at most half a percent, in rising order."""
-    good = [rate for rate in _USUAL if (best := best_setting(rate, clock_hz)) and abs(best.error) < _EXACT]
-    return tuple(sorted(sorted(good, key=lambda rate: abs(rate - baud))[:4]))
-
-
-def _setting(baud: int, clock_hz: int, double: bool) -> BaudSetting | None:
-    step = 8 if double else 16
-    ubrr = max(round(clock_hz / (step * baud)) - 1, 0)
-    return BaudSetting(ubrr, double, clock_hz / (step * (ubrr + 1)) / baud - 1.0) if ubrr < _DIVIDERS else None
-
-
-def _pins(**ports: int) -> tuple[str, ...]:
-    return tuple(f"P{port}{bit}" for port, count in ports.items() for bit in range(count))
-
-
-def _channels(*ports: str) -> dict[str, str]:
-    return {f"ADC{8 * place + bit}": f"P{port}{bit}" for place, port in enumerate(ports) for bit in range(8)}
-
-
 # `lpm` reaches the first 64 KiB of the flash, which the tables share with all other constants. The clocks are those of
 # Arduino's boards.
 _avr = partial(
     Avr,
-    help="a library with a Makefile, or the complete firmware of a board",
+    help="a library with a Makefile",
     next_step="`make -C {folder}` compiles it",
     carried=True,
     most_flash=48 << 10,
@@ -123,8 +72,6 @@ _avr = partial(
     size=(("avr-size",), "binutils-avr"),
 )
 
-# ATmega48A/PA/88A/PA/168A/PA/328/P, DS40002061: PB6 and PB7 carry the crystal, PC6 is RESET; ADC6 and ADC7 have
-# separate pins, which only the packages with 32 leads have.
 _ATMEGA328P = _avr(
     name="avr328p",
     formula=Formula(
@@ -177,17 +124,9 @@ _ATMEGA328P = _avr(
     flags=("-mmcu=atmega328p", "-Os"),
     flash=32 << 10,
     ram=2 << 10,
-    pins=_pins(B=6, C=6, D=8),
-    uarts=(("PD0", "PD1"),),
-    twi=("PC4", "PC5"),
-    analog=_channels("C") | {"ADC6": "", "ADC7": ""},
-    jtag=(),
-    highest_hz=20_000_000,
-    avrdude="m328p",
     programmer="arduino",
 )
 
-# ATmega640/1280/1281/2560/2561, DS40002211: crystal and RESET have separate pins.
 _ATMEGA2560 = _avr(
     name="avr2560",
     formula=Formula(
@@ -241,16 +180,7 @@ _ATMEGA2560 = _avr(
     flags=("-mmcu=atmega2560", "-Os"),
     flash=256 << 10,
     ram=8 << 10,
-    pins=_pins(A=8, B=8, C=8, D=8, E=8, F=8, G=6, H=8, J=8, K=8, L=8),
-    uarts=(("PE0", "PE1"), ("PD2", "PD3"), ("PH0", "PH1"), ("PJ0", "PJ1")),
-    twi=("PD1", "PD0"),
-    analog=_channels("F", "K"),
-    jtag=("PF4", "PF5", "PF6", "PF7"),
-    highest_hz=16_000_000,
-    avrdude="m2560",
     programmer="wiring",
 )
 
 MEMBER = (_ATMEGA328P, _ATMEGA2560)
-AVRS: Mapping[str, Avr] = {part.part: part for part in MEMBER}
-"""The parts that board firmware supports, by their names in board.toml."""

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from ..layout import Layout
     from ..probes import Frames, Lost, Predictions
 
-Mode = Literal["classify", "scan", "glove"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
@@ -28,7 +26,7 @@ class Target:
     name : str
         Its name for `--target`.
     part : str
-        Its name for compilers, messages and board.toml, and in generated files.
+        Its name for compilers and messages, and in generated files.
     title : str, optional
         Its name in prose, by default that of the part.
     help : str
@@ -58,7 +56,6 @@ class Target:
 
     avr: ClassVar[bool] = False
     """Whether an AVR's assembly adds up the rows: costs are then in cycles."""
-    modes: ClassVar[tuple[Mode, ...]] = ("classify",)
 
     name: str
     part: str

@@ -5,7 +5,7 @@ Layout and fields of the Arduino library are those of its specification, revisio
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from ..costs import Formula
 from .base import Target
@@ -24,12 +24,21 @@ _CONSTANTS = ("CLASSES", "SWITCHES", "PORTS", "JOINTS")
 
 @dataclass(frozen=True, kw_only=True)
 class Package(Target):
-    """A package for a part of a family, or for any part."""
+    """A package for a part of a family, or for any part.
+
+    digital, analog  the pins for the example for Arduino: purely digital ones, and those that are also inputs of the
+                     converter; (): numbered as on an Uno or a Mega
+    """
+
+    digital: tuple[int, ...] = ()
+    analog: tuple[int, ...] = ()
 
     @property
     def example_pins(self) -> "Pins | None":
-        """The pins for the example for Arduino; None: numbered as on an Uno or a Mega."""
-        return None
+        """The pins for the example, if they are known."""
+        from ..example import Pins
+
+        return Pins(self.part, self.digital, self.analog) if self.digital else None
 
     def files(self, library: "Library") -> dict[str, str]:
         """Return path -> text of the package thenar_NAME: the classifier in src/, the files that each ecosystem
@@ -75,8 +84,6 @@ class Package(Target):
         return str(Wiring.of(library, self.example_pins))
 
 
-P = TypeVar("P", bound=Package)
-
 _BESIDE = (
     "library.properties",
     "keywords.txt",
@@ -108,10 +115,9 @@ _NEXT = "{folder}/README.md explains how to use it in each ecosystem"
 _MOST = 64 << 10
 
 
-def family(shape: type[P], name: str, formula: Formula | None, what: str, **given: Any) -> P:
+def family(name: str, formula: Formula | None, what: str, **given: Any) -> Package:
     """Return a package for parts whose cost is that of a similar core."""
-    values = {"name": name, "part": name, "help": what, "most_flash": _MOST, "formula": formula, "next_step": _NEXT}
-    return shape(**{**values, **given})
+    return Package(name=name, part=name, help=what, most_flash=_MOST, formula=formula, next_step=_NEXT, **given)
 
 
 # Flash is that of a family's largest usual part, RAM that of its smallest.
@@ -124,8 +130,18 @@ MEMBER = (
         rank=30,
         any_part=True,
     ),
+    # RP2040 datasheet, Pico W datasheet: the module uses 23, 24, 25 and 29 itself.
     family(
-        Package,
+        "rp2040",
+        M0PLUS,
+        "a package for pico-sdk, Arduino, PlatformIO, Zephyr: Raspberry Pi Pico, Cortex-M0+",
+        rank=32,
+        flash=16 << 20,
+        ram=256 << 10,
+        digital=tuple(range(23)),
+        analog=(26, 27, 28),
+    ),
+    family(
         "rp2350",
         M4,
         "a package as for rp2040: Raspberry Pi Pico 2, Cortex-M33 or RISC-V",
@@ -134,7 +150,6 @@ MEMBER = (
         ram=512 << 10,
     ),
     family(
-        Package,
         "nrf52",
         M4,
         "a package for Zephyr (nRF Connect), Arduino, PlatformIO: nRF52832, nRF52840, Cortex-M4F",
@@ -143,7 +158,6 @@ MEMBER = (
         ram=64 << 10,
     ),
     family(
-        Package,
         "stm32",
         M4,
         "a package for STM32CubeIDE and any CMSIS project, Zephyr, Arduino, PlatformIO; counted as Cortex-M4",
@@ -151,7 +165,5 @@ MEMBER = (
         flash=2 << 20,
         ram=20 << 10,
     ),
-    family(
-        Package, "generic", M4, "a package for any other part that has a C99 compiler; counted as Cortex-M4", rank=36
-    ),
+    family("generic", M4, "a package for any other part that has a C99 compiler; counted as Cortex-M4", rank=36),
 )

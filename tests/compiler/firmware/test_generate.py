@@ -6,12 +6,8 @@ from pathlib import Path
 import pytest
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.board import Board, parse_board
 from thenar.compiler.firmware.generate import Firmware, write_folder
-from thenar.compiler.firmware.one_hand import for_one_hand
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.firmware.targets.base import Mode
-from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
@@ -20,16 +16,6 @@ MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
 Tool = Callable[[str], str]
 
-PINS = "\n".join(f's{number} = "PD{number + 2}"' for number in range(6)) + '\ns6 = "PB0"\ns7 = "PB1"\ns8 = "PB2"\n'
-CHIP = "pins = { " + ", ".join(f'GP{"AB"[n // 7]}{n % 7} = "s{n}"' for n in range(9)) + " }\n"
-CYBERGLOVE = '[cyberglove]\nsensors = 18\njoints = ["j0", "j1", "j2"' + ', ""' * 15 + "]\n"
-BOARDS = {
-    "scan pins": ("scan", "atmega328p", "[pins]\n" + PINS),
-    "scan chip": ("scan", "atmega2560", '[[chip]]\nkind = "mcp23017"\naddress = 0x20\n' + CHIP),
-    "glove analog": ("glove", "atmega328p", "[pins]\n" + PINS + '[analog]\nj0 = "ADC0"\nj1 = "ADC1"\nj2 = "ADC2"\n'),
-    "glove chip": ("glove", "atmega2560", '[[chip]]\nkind = "mcp23017"\naddress = 0x20\n' + CHIP + CYBERGLOVE),
-}
-PLATFORM = {target.part: name for name, target in TARGETS.items()}
 COMPILERS = {"avr": "avr-gcc", "host": "gcc"}
 
 
@@ -37,20 +23,6 @@ COMPILERS = {"avr": "avr-gcc", "host": "gcc"}
 def build(make_tables: MakeTables, describe: Describe) -> Build:
     tables = make_tables()
     return Build(describe(tables), tables)
-
-
-def board_of(case: str) -> tuple[Mode, Board]:
-    mode, part, text = BOARDS[case]
-    return mode, parse_board(f'part = "{part}"\n' + text)  # type: ignore[return-value]
-
-
-def of_board(build: Build, case: str) -> dict[str, str]:
-    mode, board = board_of(case)
-    hand = GloveCalibration(sensors=tuple(SensorCalibration(f"j{n}", 40, 0.0, 200, 90.0) for n in range(3)))
-    if mode == "glove":
-        build = for_one_hand(build, hand)
-    request = Firmware(build.tables, build.manifest, PLATFORM[board.part], mode, board=board)
-    return request.files()
 
 
 def classifier(build: Build, platform: str) -> dict[str, str]:
@@ -78,15 +50,6 @@ def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
         assert "\n18 frames, predicted as by Python\n" in make(folder, "check")
     make(folder, "clean")
     assert {path.name for path in folder.iterdir()} == {*classifier(build, platform), "SHA256SUMS"}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("case", BOARDS)
-def test_the_folder_of_a_board_compiles_without_a_warning(build: Build, case: str, tmp_path: Path, tool: Tool) -> None:
-    tool("avr-gcc")
-    folder = write_folder(of_board(build, case), tmp_path / "firmware")
-    make(folder)
-    make(folder, "size")
 
 
 @pytest.mark.parametrize("platform", TARGETS)
@@ -148,36 +111,6 @@ def test_notes_stand_in_the_opening_of_the_header(build: Build) -> None:
 def test_too_little_flash_is_refused(build: Build, platform: str) -> None:
     with pytest.raises(FirmwareError, match=r"takes about \d+ bytes of flash"):
         Firmware(build.tables, build.manifest, platform, flash=500).files()
-
-
-@pytest.mark.parametrize(
-    ("platform", "mode", "board", "message"),
-    [
-        ("avr328p", "classify", "scan pins", "the mode classify reads no board"),
-        (
-            "cortex-m4",
-            "scan",
-            "scan pins",
-            "the mode scan is available for avr328p, avr2560, esp32, esp32c3, esp32c6, esp32s2, esp32s3 and rp2040, "
-            "not for cortex-m4",
-        ),
-        (
-            "arduino",
-            "glove",
-            "scan pins",
-            "the mode glove is available for avr328p, avr2560, esp32, esp32c3, esp32c6, esp32s2, esp32s3 and rp2040, "
-            "not for arduino",
-        ),
-        ("avr328p", "scan", None, r"the mode scan needs a board\.toml"),
-        ("avr2560", "scan", "scan pins", "the board has an atmega328p, but the target avr2560 is an atmega2560"),
-    ],
-)
-def test_what_does_not_go_together_is_refused(
-    build: Build, platform: str, mode: Mode, board: str | None, message: str
-) -> None:
-    wiring = None if board is None else board_of(board)[1]
-    with pytest.raises(FirmwareError, match=message):
-        Firmware(build.tables, build.manifest, platform, mode, board=wiring)
 
 
 @pytest.mark.slow

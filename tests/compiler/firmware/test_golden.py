@@ -11,71 +11,39 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.board import parse_board
 from thenar.compiler.firmware.generate import Firmware
-from thenar.compiler.firmware.targets.base import Mode
+from thenar.compiler.firmware.rows import rows_files
 from thenar.runtime.build import Build
+from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Switch
 from thenar.runtime.tables import IntegerTables
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "firmware"
-WHOLE = ("host", "avr328p", "glove-avr2560")
+WHOLE = ("host", "avr328p", "rows")
 DIGESTS = GOLDEN / "digests.json"
 
 SWITCHES = ("thumb tip", "index tip", "index middle", "middle tip", "palm radial", "palm ulnar")
 JOINTS = ("thumb_rotation", "index_pij")
 GRASPS = ("power grip", "tip pinch", "lateral pinch")
 
-SCAN_BOARD = """\
-part = "atmega328p"
-[pins]
-"thumb tip" = "PD2"
-"index tip" = "PD3"
-"index middle" = "PD4"
-"middle tip" = "PD5"
-"palm radial" = "PB0"
-"palm ulnar" = "PB1"
-"""
-
-GLOVE_BOARD = """\
-part = "atmega2560"
-[[chip]]
+GLOVE = f"""\
+name = "golden"
+[[stream]]
+port = "/dev/ttyACM0"
+rate_hz = 100
+switches = {[*SWITCHES]}
+joints = {{ thumb_rotation = [0, 1023], index_pij = [0, 1023] }}
+[stream.board]
+pins = {{ "thumb tip" = "2", thumb_rotation = "A0", index_pij = "A1.3" }}
+select = ["4", "5", "6", "7"]
+matrix = {{ rows = ["8", "9"], columns = ["10"], keys = [["index tip"], ["index middle"]], diodes = true }}
+[[stream.board.chip]]
 kind = "mcp23017"
 address = 0x20
-pins = { GPA0 = "thumb tip", GPA1 = "index tip", GPA2 = "index middle", GPB0 = "middle tip" }
-[[chip]]
-kind = "pca9555"
-address = 0x21
-pins = { P00 = "palm radial", P01 = "palm ulnar" }
-[cyberglove]
-uart = 1
-sensors = 18
+pins = {{ GPA0 = "middle tip", GPA3 = "palm radial", GPB0 = "palm ulnar" }}
 """
 
-SKETCH_BOARD = """\
-part = "esp32"
-[wifi]
-[pins]
-"thumb tip" = "GPIO4"
-"index tip" = "GPIO5"
-"index middle" = "GPIO13"
-"middle tip" = "GPIO14"
-"palm radial" = "GPIO18"
-"palm ulnar" = "GPIO19"
-"""
-
-CASES: dict[str, tuple[str, Mode, str | None]] = {
-    "host": ("host", "classify", None),
-    "avr328p": ("avr328p", "classify", None),
-    "avr2560": ("avr2560", "classify", None),
-    "cortex-m0plus": ("cortex-m0plus", "classify", None),
-    "cortex-m4": ("cortex-m4", "classify", None),
-    "rv32imac": ("rv32imac", "classify", None),
-    "arduino": ("arduino", "classify", None),
-    "scan-avr328p": ("avr328p", "scan", SCAN_BOARD),
-    "scan-esp32": ("esp32", "scan", SKETCH_BOARD),
-    "glove-avr2560": ("avr2560", "glove", GLOVE_BOARD),
-}
+CASES = ("host", "avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "rv32imac", "arduino", "rows")
 
 
 def small_build() -> Build:
@@ -112,10 +80,10 @@ def small_build() -> Build:
 
 
 def made(case: str) -> dict[str, str]:
-    target, mode, board = CASES[case]
     build = small_build()
-    wiring = None if board is None else parse_board(board)
-    return Firmware(build.tables, build.manifest, target, mode, board=wiring).files()
+    if case == "rows":
+        return rows_files("board", build.manifest, parse_harness(GLOVE, "glove.toml"))
+    return Firmware(build.tables, build.manifest, case).files()
 
 
 def content(folder: Path) -> dict[str, str]:

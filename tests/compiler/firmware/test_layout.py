@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.layout import NO_SWITCH, Field, arrange, parts_of, ports_of_scan
 from thenar.compiler.firmware.probes import Probes
-from thenar.runtime.scanning.scanmap import Port, ScanMap
+from thenar.runtime.scanning.scanmap import Port, ScanMap, StreamRead
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -118,8 +118,9 @@ def test_frames_hold_the_bytes_of_ports_then_codes(make_tables: MakeTables) -> N
     assert wired.frame_bytes(bits, np.array([[7, 254]], np.uint16)).tolist() == [[0b110, 0b1, 7, 254]]
 
 
-def test_ports_of_a_harness_are_the_bytes_that_show_a_kept_switch_boards_first() -> None:
-    scan = ScanMap(1, "0" * 64, (Port(0, 1, "GPIO", ((17, 3), (1, 2)), True),), (((9, 0), (40, 1)),))
+def test_ports_of_a_harness_are_the_bytes_that_show_a_kept_switch_streams_first() -> None:
+    ports, streams = (Port(0, 1, "GPIO", ((17, 3), (1, 2)), True),), (StreamRead(((9, 0), (40, 1)), ()),)
+    scan = ScanMap(1, "0" * 64, ports, (), streams=streams)
     none = NO_SWITCH
     assert ports_of_scan(scan) == (
         (none, 0, *[none] * 6),

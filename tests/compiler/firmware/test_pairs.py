@@ -7,7 +7,6 @@ import pytest
 
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import arrange
-from thenar.compiler.firmware.one_hand import on_bytes
 from thenar.compiler.firmware.probes import changing_frames, extreme_frames, joined, lost_inputs, random_frames
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.words import numbered
@@ -66,19 +65,3 @@ def _is_exact(tables: IntegerTables, name: str) -> None:
 def test_scores_are_python_s(tool: Tool, shape: tuple[int, int, bool], most: int, name: str) -> None:
     tool("cc" if name == "host" else "avr-gcc")
     _is_exact(_tables(3, shape, most), name)
-
-
-def test_a_glove_s_bytes_have_the_rows_of_their_codes_and_byte_0_is_a_missing_joint() -> None:
-    tables = _tables(4, (5, 3, True))
-    random = np.random.default_rng(0)
-    codes = [np.sort(random.integers(280, 520, 256))[:: (-1) ** joint].tolist() for joint in range(JOINTS)]
-    of_bytes = on_bytes(tables, codes)
-    frames = random_frames(of_bytes, 300, 1)
-    sent = np.maximum(frames.codes, 1)
-    meant = np.stack([np.array(codes[joint])[sent[:, joint]] for joint in range(JOINTS)], axis=1).astype(np.uint16)
-    assert np.array_equal(integer_scores(of_bytes, frames.bits, sent), integer_scores(tables, frames.bits, meant))
-    one, other = Scorer(of_bytes), Scorer(tables)
-    lost = random.random((300, JOINTS)) < 0.5
-    for bits, byte, code, missing in zip(frames.bits, sent, meant, lost, strict=True):
-        here, there = (each.lanes_without(bits, x, [False] * 3, missing) for each, x in ((one, byte), (other, code)))
-        assert here == there

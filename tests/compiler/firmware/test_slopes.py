@@ -13,7 +13,6 @@ from thenar.compiler.firmware.assembly import products
 from thenar.compiler.firmware.choose import features
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import arrange
-from thenar.compiler.firmware.one_hand import on_bytes
 from thenar.compiler.firmware.probes import Probes, changing_frames, extreme_frames, joined, random_frames
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.words import numbered
@@ -147,19 +146,6 @@ def test_equal_entries_share_a_product(row: list[int]) -> None:
             added[k] += entry if alike else -entry
     assert added == row
     assert len(products(row)) == len({abs(entry) for entry in row} - {0})
-
-
-def test_a_glove_s_bytes_keep_a_slope_where_they_are_codes_and_have_a_row_each_elsewhere() -> None:
-    tables = _tables(4, (5, 3, 3, 1, 3, False, False))
-    identity, other = list(range(256)), [min(3 + code * code // 300, 250) for code in range(256)]
-    codes = [identity, other, identity]
-    of_bytes = on_bytes(tables, codes)
-    assert [slope.joint for slope in of_bytes.slopes] == [0, 2]
-    frames = random_frames(tables, 300, 1)
-    meant = np.stack([np.array(codes[joint])[frames.codes[:, joint]] for joint in range(3)], axis=1).astype(np.uint16)
-    assert np.array_equal(
-        integer_scores(of_bytes, frames.bits, frames.codes), integer_scores(tables, frames.bits, meant)
-    )
 
 
 def test_a_layout_says_that_entries_are_upper_halves() -> None:

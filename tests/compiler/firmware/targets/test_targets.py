@@ -16,7 +16,6 @@ def test_every_target_says_what_it_is_and_what_to_do_with_its_folder(name: str) 
     target = TARGETS[name]
     assert (target.name, bool(target.help), bool(target.part)) == (name, True, True)
     assert "{folder}" in target.next_step
-    assert target.modes[0] == "classify"
     assert not target.kind or target.missing() is None or "apt-get install" in str(target.missing())
     if target.kind and target.formula:
         assert target.compiler is not None
