@@ -1,4 +1,4 @@
-"""The decoder of segments: C99 for every target, assembly for an AVR, and the values for other languages."""
+"""The decoder of segments: C99 for every target, and the values for other languages."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,17 +9,12 @@ from thenar.runtime.segmenting.model import SegmentModel
 from . import FirmwareError
 
 LAG_US = 150_000
-# An AVR's assembly can address this many states from one pointer, and multiplies by one byte.
-_MOST_ASSEMBLED, _MOST_GAIN, _MOST_STATES = 15, 255, 255
+_MOST_STATES = 255  # which a byte numbers
 
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """A state's cost, and where it waits until it has lasted long enough: a ring, and a place in its rows.
-
-    Assembly that iterates over the states finds a state's ring if it differs from the previous state's, and advances
-    the ring at the last state that uses it.
-    """
+    """A state's cost, and where it waits until it has lasted long enough: a ring, and a place in its rows."""
 
     enter: int
     direct: int
@@ -28,8 +23,6 @@ class _State:
     least: int
     ring: int
     place: int
-    found: bool
-    turned: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +35,11 @@ class _Ring:
 
 
 def segment_files(name: str, model: SegmentModel, *, avr: bool) -> dict[str, str]:
-    """Return the texts of thenar_`name`_segments.h and .c, and with `avr` of the assembly where there is one.
+    """Return the texts of thenar_`name`_segments.h and .c, which with `avr` keep their tables in an AVR's flash.
 
     They extend the classifier of the same name. Raises FirmwareError if there are too many states.
     """
     values = decoder_values(model)
-    assembled = avr and len(values["states"]) <= _MOST_ASSEMBLED and model.gain <= _MOST_GAIN
     limit = -(-model.most * 256 // model.gain) << model.shift
     clipped = model.most if limit <= 65535 else min((65535 >> model.shift) * model.gain >> 8, model.most)
     values |= {
@@ -56,15 +48,11 @@ def segment_files(name: str, model: SegmentModel, *, avr: bool) -> dict[str, str
         "limit": min(limit, 65535),
         "clipped": clipped,
         "avr": avr,
-        "assembled": assembled,
-        "one_gap": len({direct - enter for direct, enter in zip(model.direct, model.enter, strict=True)}) == 1,
-        "least_enter": min(model.enter),
         "one_leave": len(set(model.leave)) == 1,
     }
-    endings = (".h", ".c", "_avr.S")[: 2 + assembled]
     return {
         f"thenar_{name}_segments{ending}": render(f"segments/thenar_NAME_segments{ending}.j2", **values)
-        for ending in endings
+        for ending in (".h", ".c")
     }
 
 
@@ -105,15 +93,11 @@ def _laid_out(model: SegmentModel) -> tuple[list[_State], list[_Ring]]:
         end = begin + width * (least - 1)
         numbers[least] = len(rings)
         rings.append(_Ring(begin, end, width))
-    found = {
-        k: least for k, least in enumerate(model.least) if least > 1 and (k in {0, K} or least != model.least[k - 1])
-    }
     usual = max(model.stay, key=model.stay.count)
     states = []
     for k, least in enumerate(model.least):
         change = (model.enter[k], model.direct[k], model.leave[k]) if k < K else (0, 0, 0)
-        place, later = model.least[:k].count(least), any(number > k and each == least for number, each in found.items())
         # Only differences between states matter, so the usual cost is subtracted; smaller ones wrap modulo 2^16.
         stay = (model.stay[k] - usual) % 65536
-        states.append(_State(*change, stay, least, numbers.get(least, 0), place, k in found, k in found and not later))
+        states.append(_State(*change, stay, least, numbers.get(least, 0), model.least[:k].count(least)))
     return states, rings
