@@ -113,7 +113,7 @@ def random_board(rng: random.Random) -> Board:
 class World:
     """What a sketch finds at its pins and its bus: the board's inputs, and the time that calls take."""
 
-    def __init__(self, board: Board, clock: int = 0, tick_us: int = 7) -> None:
+    def __init__(self, board: Board, clock: int = 0, tick_us: int = 11) -> None:
         self.board, self.clock, self.tick_us = board, clock, tick_us
         self.closed: set[str] = set()
         self.values: dict[str, int] = {}
