@@ -113,7 +113,7 @@ def random_board(rng: random.Random) -> Board:
 class World:
     """What a sketch finds at its pins and its bus: the board's inputs, and the time that calls take."""
 
-    def __init__(self, board: Board, clock: int = 0, tick_us: int = 4) -> None:
+    def __init__(self, board: Board, clock: int = 0, tick_us: int = 11) -> None:
         self.board, self.clock, self.tick_us = board, clock, tick_us
         self.closed: set[str] = set()
         self.values: dict[str, int] = {}
@@ -509,7 +509,7 @@ def test_on_an_uno_rows_hold_the_levels_of_pins_and_analog_pins(
         closed, volts = {n for n in range(5) if rng.random() < 0.5}, [rng.randint(0, 4990) for _ in range(2)]
         levels = [f"{AVR_PINS['abcde'[n]]}=0" for n in closed]
         levels += [f"ADC{n}={millivolts}" for n, millivolts in enumerate(volts)]
-        command = [program, "atmega328p", "16000000", elf, "300000", *levels]
+        command = [str(program), "atmega328p", "16000000", str(elf), "300000", *levels]
         text = subprocess.run(command, capture_output=True, check=True).stdout.decode()
         lines = re.findall(r"[^\n]*\n", text)
         assert fields_of(lines[0]) == ["columns", *"abcde", "i", "k"]
