@@ -162,7 +162,7 @@ def _of_board_row(fields: Sequence[str], columns: int) -> Row | Damaged | None:
     switches, bits = columns - len(readings), int(closed or "0", 16)
     if switches < 0 or len(closed) != -(-switches // 4) or bits >> switches:
         return Damaged()
-    values = [float(bits >> switch & 1) for switch in range(switches)]
+    values: list[float | None] = [float(bits >> switch & 1) for switch in range(switches)]
     values += [float(reading) if reading else None for reading in readings]
     return Row(None, tuple(values), clock_us / 1e6, sequence=sequence)
 
