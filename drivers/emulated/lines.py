@@ -76,6 +76,10 @@ class BoardSender(LineSender):
         self._sequence, self._named_s = 0, -math.inf
         super().__init__(send, (*switches, *readings), rate_hz, None, "us")
 
+    def restart(self) -> None:
+        """Begin anew, as after a reset."""
+        self._began, self._sequence, self._named_s = monotonic(), 0, -math.inf
+
     def line(self, now_s: float) -> bytes:
         """Return the row for a time `now_s` after the start, behind the names of the columns once a second."""
         names, values = b"", self._values
