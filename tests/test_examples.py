@@ -18,9 +18,6 @@ from sklearn.neighbors import KNeighborsClassifier
 from sklearn.preprocessing import StandardScaler
 
 from thenar.compiler import GraspSet
-from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
-from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.drivers.scanner_protocol import DEGRADED, NO_GRASP
 from thenar.runtime import Build
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -33,7 +30,7 @@ HARNESS = """\
 name = "bench"
 [cyberglove]
 port = "/dev/ttyUSB0"
-[[scanner]]
+[[stream]]
 port = "/dev/ttyACM0"
 switches = [{}]
 """
@@ -125,33 +122,6 @@ def test_barrett_preshape_says_where_eight_joints_shall_stand(bench: Path) -> No
         assert len(joints) == 8
         assert joints[0].startswith("finger_1/prox_joint=")
     assert all(before != after for before, after in pairwise(preshapes))
-
-
-class Recognising(ScannerBoard):
-    """A board that recognises grasp type `number` whenever it scans, degraded if it recognises none."""
-
-    number = 1
-
-    def scan(self, closed: int, now: int, *, unread: int = 0) -> list[bytes]:
-        flags = DEGRADED if self.number == NO_GRASP else 0
-        return [*super().scan(closed, now, unread=unread), *self.recognised(self.number, 7, flags, now)]
-
-
-@slow
-def test_board_grasps_names_what_a_board_recognises_by_itself(bench: Path) -> None:
-    grasps, board = Build.load(bench / "build").grasps, Recognising(1, 8)
-    command = example("board_grasps.py", "build", str(bench / "board"))
-    with (
-        PtyLine(bench / "board", 115200) as line,
-        EmulatedScanner(line, 8, board=board),
-        subprocess.Popen(command, cwd=bench, stdout=subprocess.PIPE, text=True) as process,
-    ):
-        assert process.stdout is not None
-        for number, said in ((1, f"{grasps[1]} ahead by 7 steps"), (NO_GRASP, "unknown ahead by 7 steps degraded")):
-            board.number = number
-            while (told := process.stdout.readline().rstrip("\n").partition(" ")[2]) != said:
-                assert told
-        process.terminate()
 
 
 @slow

@@ -69,7 +69,7 @@ def material(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> P
         assert run(["export", "set.grasps", "-o", "table.csv", "--columns", "columns.toml"]) == 0
         assert run(["compile", "set.grasps", "-o", "build", "--rounds", "2", "--folds", "0", "--no-report"]) == 0
         names = ", ".join(f'"{name}"' for name in small_set.switch_names)
-        Path("glove.toml").write_text(f'[[scanner]]\nport = "{folder}/none"\nswitches = [{names}]\n')
+        Path("glove.toml").write_text(f'[[stream]]\nport = "{folder}/none"\nswitches = [{names}]\n')
         Path("objects.toml").write_text('cup = ["mug"]\n')
         # Libraries are loaded whole before any work is interrupted.
         assert run(["info", "set.grasps", "--plot", "set.png"]) == 0
