@@ -74,10 +74,10 @@ def glove(played: Played, port: str = "glove", sensors: Literal[18, 22] = SENSOR
 
 
 def board(played: Played, port: str = "board", keys: int = 0, baud: int = 115_200) -> Harness:
-    """Return a glove whose kept switches are wired to the first keys of a board with at least `keys` keys."""
-    names = [*played.kept, *[""] * (keys - len(played.kept))]
-    text = f'name = "board"\n[[scanner]]\nport = "{port}"\nbaud = {baud}\nswitches = {names!r}\n'
-    return parse_harness(text, "board")
+    """Return a glove whose kept switches are the first of a board that prints at least `keys` of them."""
+    names = [*played.kept, *(f"spare_{number}" for number in range(len(played.kept), keys))]
+    text = f'name = "board"\n[[stream]]\nport = "{port}"\nbaud = {baud}\nrate_hz = 100\nswitches = {names!r}\n'
+    return parse_harness(text + "[stream.board]\n", "board")
 
 
 def with_glove(harness: Harness, wiring: GloveWiring) -> Harness:

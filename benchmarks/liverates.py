@@ -19,11 +19,13 @@ from liveplay import Played, board, glove, with_glove
 from livewire import Rate
 
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
+from thenar.drivers.emulated.lines import BoardSender
 from thenar.drivers.emulated.serial_line import PtyLine
+from thenar.drivers.lines import checked, switches_field
+from thenar.drivers.serial_line import BITS_A_BYTE
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.scanning.timing import free_us, glove_us, scanner_us
+from thenar.runtime.scanning.timing import free_us, glove_us
 from thenar.simulator.playing.bench import Bench
 
 LIVEWIRE = Path(__file__).with_name("livewire.py")
@@ -69,24 +71,26 @@ def of_glove(scene: Played, joints: Path, sensors: Literal[18, 22], seconds: flo
 
 
 def of_board(scene: Played, keys: int, baud: int, hz: int, seconds: float) -> Found:
-    """Measure a board that sends its state at `hz`, 0: as often as its line permits; together with a CyberGlove."""
+    """Measure a board that prints rows at `hz`, 0: as often as its line permits; together with a CyberGlove."""
+    row = len(checked(("row", "65535", "4294967295", switches_field(0, keys))))
     with TemporaryDirectory() as folder:
         harness = with_glove(board(scene, f"{folder}/board", keys, baud), glove(scene, f"{folder}/glove"))
-        frame_us = scanner_us(harness.scanners[0])
-        period_us = 1e6 / hz if hz else frame_us
-        model = ScannerBoard(1, keys, scan_us=100, state_us=-int(-period_us // 1), heartbeat_us=0)
+        stream = harness.streams[0]
+        names = len(checked(("columns", *stream.switches)))
+        stream = msgspec.structs.replace(stream, rate_hz=hz or (baud / BITS_A_BYTE - names) / row)
+        harness = msgspec.structs.replace(harness, streams=(stream,))
         with (
             PtyLine(Path(folder, "board"), baud) as line,
             PtyLine(Path(folder, "glove")) as other,
-            EmulatedScanner(line, keys, board=model) as device,
+            BoardSender(line.send, stream.switches, (), stream.rate_hz) as device,
             EmulatedCyberGlove(other) as hand,
-            changing(scene, lambda closed, _: device.set(closed)),
+            changing(scene, lambda closed, _: device.show(closed)),
             changing(scene, lambda _, raw: hand.set(raw)),
-            _metered(lambda: line.sent_bytes * 10e6 / baud / frame_us) as sent_hz,
+            _metered(lambda: line.sent_bytes / row) as sent_hz,
         ):
             run = _ran(scene.folder, harness, seconds, folder)
-    what = f"board of {keys} keys, {baud} baud" + (f", {hz} scans a second" if hz else "")
-    return Found(what, 1e6 / period_us, sent_hz(), run.switches_hz, run)
+    what = f"board of {keys} switches, {baud} baud" + (f", {hz} rows a second" if hz else "")
+    return Found(what, stream.rate_hz, sent_hz(), run.switches_hz, run)
 
 
 def of_bus(scene: Played, what: str, harness: Harness, seconds: float) -> Found:
@@ -153,13 +157,14 @@ def _metered(counted: Callable[[], float]) -> Iterator[Callable[[], float]]:
         )
 
 
-def changing(scene: Played, show: Callable[[int, bytes], None]) -> AbstractContextManager[None]:
-    """Show row after row of the performance: the kept switches as keys, and the glove's bytes."""
+def changing(scene: Played, show: Callable[[dict[str, float], bytes], None]) -> AbstractContextManager[None]:
+    """Show row after row of the performance: the values of the kept switches, and the glove's bytes."""
     rows = count()
 
     def step() -> None:
         row = next(rows) % len(scene.performance)
-        show(scene.keys[row], scene.performance.sensors[row].tobytes())
+        closed = {name: float(scene.keys[row] >> bit & 1) for bit, name in enumerate(scene.kept)}
+        show(closed, scene.performance.sensors[row].tobytes())
 
     return _every(_CHANGE_S, step)
 

@@ -19,7 +19,7 @@ from liverates import changing
 
 from thenar.cli import run
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.lines import BoardSender
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.harness.writing import harness_to_toml
 
@@ -40,7 +40,7 @@ class Way:
 
 
 def way(scene: Played) -> Way:
-    """Return the path of a frame of a scanner board and a CyberGlove, to JSON lines and a preshape."""
+    """Return the path of a row of a board and a CyberGlove, to JSON lines and a preshape."""
     before, after = _calls(scene, SHORT), _calls(scene, LONG)
     grasps = LONG - SHORT
     found = {key: (count - before.get(key, 0)) / grasps for key, count in after.items()}
@@ -59,9 +59,9 @@ def _calls(scene: Played, frames: int) -> Calls:
         with (
             PtyLine(folder / "board", 115_200) as line,
             PtyLine(folder / "glove") as other,
-            EmulatedScanner(line, len(scene.kept)) as device,
+            BoardSender(line.send, scene.kept, (), harness.streams[0].rate_hz) as device,
             EmulatedCyberGlove(other) as hand,
-            changing(scene, lambda closed, _: device.set(closed)),
+            changing(scene, lambda closed, _: device.show(closed)),
             changing(scene, lambda _, raw: hand.set(raw)),
         ):
             command = [sys.executable, __file__, str(folder / "calls"), "run", str(scene.folder)]

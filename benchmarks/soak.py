@@ -2,9 +2,9 @@
 
     python benchmarks/soak.py [--minutes N]
 
-A CyberGlove, a scanner board, and expanders on I2C where umockdev is installed; JSON lines, a socket that is read,
-health, preshapes, and a recording until its file has 256 MiB. Prints a line per minute (six lines in shorter runs) and
-exits with 1 if memory, threads, file descriptors or the CPU per grasp grew, or if the run ended.
+A CyberGlove, a board that prints rows, and expanders on I2C where umockdev is installed; JSON lines, a socket that is
+read, health, preshapes, and a recording until its file has 256 MiB. Prints a line per minute (six lines in shorter
+runs) and exits with 1 if memory, threads, file descriptors or the CPU per grasp grew, or if the run ended.
 """
 
 import argparse
@@ -91,8 +91,8 @@ def glove_of_all(scene: Played) -> Harness:
     if shutil.which("umockdev-wrapper") is None:
         return with_glove(board(scene), glove(scene))
     half = len(scene.kept) // 2
-    boards = replace(board(scene), scanners=(replace(board(scene).scanners[0], switches=scene.kept[:half]),))
-    return replace(wired(scene, scene.kept[half:], 100_000), name="soak", scanners=boards.scanners)
+    stream = replace(board(scene).streams[0], switches=scene.kept[:half])
+    return replace(wired(scene, scene.kept[half:], 100_000), name="soak", streams=(stream,))
 
 
 def started(scene: Played, bench: Bench, folder: Path) -> "subprocess.Popen[bytes]":

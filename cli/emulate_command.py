@@ -46,7 +46,6 @@ _GRACE_S = 5.0
 _BY_ITSELF_S = 1.0
 _FRAME_US = 10_000
 _HARNESS, _CALIBRATION, _TAXELS = "glove.toml", "calibration.toml", "taxels.toml"
-_BITS = 10
 _LONGEST_PATH = 4095  # of Linux
 # A shell reports a command ended by a signal as this plus the signal's number.
 _KILLED = 128
@@ -104,10 +103,11 @@ def command(
     """Emulate the devices of a harness and play on them: a SCENE (a shipped one or a .toml file), a .grasps set, or the
     .mcap recording of a live run.
 
-    A CyberGlove and scanner boards appear as serial ports in DIR, paced like the wire, with the scene's wire effects;
-    streams send lines on loopback, over the transport that their port names; expanders and converters appear on
-    /dev/i2c-N and /dev/spidevB.C, through umockdev. A COMMAND runs next to the emulated glove and sees it: {glove} in
-    its arguments is replaced by the glove.toml that names the emulated ports. It is ended when the playback is over.
+    A CyberGlove appears as a serial port in DIR, paced like the wire, and so do streams from serial ports, all with the
+    scene's wire effects; other streams send lines on loopback, over the transport that their port names; expanders and
+    converters appear on /dev/i2c-N and /dev/spidevB.C, through umockdev. A COMMAND runs next to the emulated glove and
+    sees it: {glove} in its arguments is replaced by the glove.toml that names the emulated ports. It is ended when the
+    playback is over.
 
     \b
     Example:
@@ -137,7 +137,6 @@ def command(
                 cable=cable,
                 adapter=adapter,
                 taxel_names=performance.taxel_names,
-                bits=max(_BITS, int(performance.taxels.max(initial=0)).bit_length()),
                 joints=tuple(zip(performance.joint_names, performance.joint_units, strict=True)),
             )
         )

@@ -7,13 +7,23 @@
 
 Any other line is a misfit. A value that is not a finite number, such as nan, is None; the rest of its line counts. So
 is a text, such as a label, in a row whose number of columns is known.
+
+The boards whose sketches thenar writes print lines in the style of NMEA 0183, with a checksum:
+
+    $columns,thumb,index,flex*49         the names of the switches, then of the readings, about once a second
+    $row,17,3400112,3,512*1B             sequence number, clock in microseconds, switches in hex, readings
+
+The checksum is the XOR of all bytes between $ and *. The sequence number has 16 bits, the clock 32. Bit k of the hex
+number, of a digit for every four switches, is switch k. A reading without a value is empty.
 """
 
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import xor
 from typing import Any, NamedTuple
 
 from .names import LONGEST_SHOWN, shortened
@@ -24,19 +34,27 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 _NO_NUMBER = re.compile(r"|[+-]?nan|[+-]?inf(inity)?|null|none|na|-", re.IGNORECASE)
 _NAME = re.compile(r"[^\W\d][^,;:\t\"{}]*")
 _DIGITS = 400
+_CHECKED = re.compile(rb"\$([^$*]*)\*([0-9A-F]{2})")
+_CHECKSUM = re.compile(rb"\*[0-9A-F]{2}$")
+_COUNT, _READING = re.compile("[0-9]{1,10}"), re.compile("(-?[0-9]{1,10})?")
+_SWITCHES = re.compile("[0-9A-F]*")
+# The first of a board's sequence numbers, and of its clock's microseconds, that does not exist.
+SEQUENCES, CLOCK_US = 1 << 16, 1 << 32
 
 
 class Row(NamedTuple):
     """The content of one line: values, None where one is not a number; and names, None if only the order is known.
 
-    time_s   the sender's clock, if the transport carries it outside the columns
-    came_us  when it came, by the monotonic clock, if the transport says so; None: when it was read
+    time_s    the sender's clock, if it is outside the columns
+    came_us   when it came, by the monotonic clock, if the transport says so; None: when it was read
+    sequence  its number, from 0 to SEQUENCES - 1, if the sender counts its rows
     """
 
     names: tuple[str, ...] | None
     values: tuple[float | None, ...]
     time_s: float | None = None
     came_us: int | None = None
+    sequence: int | None = None
 
 
 class Header(NamedTuple):
@@ -73,8 +91,28 @@ class Splitter:
         return [line for line in lines if line]
 
 
-def parsed(line: bytes, columns: int = 0) -> Row | Header | None:
-    """Parse a line; None for a misfit. `columns` is the known number of columns; 0: unknown."""
+def checked(fields: Iterable[str]) -> bytes:
+    """Return the line of a board with these fields, with its checksum and its end."""
+    body = ",".join(fields).encode()
+    return b"$%b*%02X\r\n" % (body, reduce(xor, body, 0))
+
+
+def switches_field(closed: int, switches: int) -> str:
+    """Return the field of a row for so many `switches`, of which those with a bit in `closed` are closed."""
+    digits = -(-switches // 4)
+    return f"{closed:0{digits}X}" if digits else ""
+
+
+class Damaged(NamedTuple):
+    """A line that a board did not print: its checksum or its form is wrong."""
+
+
+def parsed(line: bytes, columns: int = 0) -> Row | Header | Damaged | None:
+    """Parse a line; None for a misfit. `columns` is the known number of columns; 0: unknown, and then a board's row is
+    a misfit, too. The time of a board's row is that of its clock, which begins again after CLOCK_US.
+    """
+    if _is_of_board(line):
+        return _of_board(line, columns)
     try:
         text = line.decode("utf-8")
     except UnicodeDecodeError:
@@ -90,6 +128,43 @@ def parsed(line: bytes, columns: int = 0) -> Row | Header | None:
     if worded and all(map(_NAME.fullmatch, fields)) and not all(map(_NO_NUMBER.fullmatch, fields)):
         return Header(tuple(fields)) if _sound(fields) else None
     return _row(None, fields, columns)
+
+
+def _is_of_board(line: bytes) -> bool:
+    """Return whether a line has the beginning or the end of a board's: damage of one byte leaves one of them."""
+    return line[:1] == b"$" or _CHECKSUM.search(line) is not None
+
+
+def _of_board(line: bytes, columns: int) -> Row | Header | Damaged | None:
+    """Parse a line with a checksum, or what is left of one."""
+    found = _CHECKED.fullmatch(line)
+    if found is None or reduce(xor, found[1], 0) != int(found[2], 16):
+        return Damaged()
+    try:
+        kind, *fields = found[1].decode("utf-8").split(",")
+    except UnicodeDecodeError:
+        return Damaged()
+    if kind == "columns":
+        sound = _sound(fields) and all(map(str.isprintable, fields))
+        return Header(tuple(fields)) if fields and sound else Damaged()
+    return _of_board_row(fields, columns) if kind == "row" else None
+
+
+def _of_board_row(fields: Sequence[str], columns: int) -> Row | Damaged | None:
+    if len(fields) < 3 or not all(map(_COUNT.fullmatch, fields[:2])):
+        return Damaged()
+    sequence, clock_us, closed, readings = int(fields[0]), int(fields[1]), fields[2], fields[3:]
+    sound = sequence < SEQUENCES and clock_us < CLOCK_US and _SWITCHES.fullmatch(closed)
+    if not sound or not all(map(_READING.fullmatch, readings)):
+        return Damaged()
+    if not columns:
+        return None
+    switches, bits = columns - len(readings), int(closed or "0", 16)
+    if switches < 0 or len(closed) != -(-switches // 4) or bits >> switches:
+        return Damaged()
+    values: list[float | None] = [float(bits >> switch & 1) for switch in range(switches)]
+    values += [float(reading) if reading else None for reading in readings]
+    return Row(None, tuple(values), clock_us / 1e6, sequence=sequence)
 
 
 def _fields(text: str) -> list[str]:
@@ -157,11 +232,13 @@ class LineCounts:
     """Counts of lines since the driver was made.
 
     misfits   lines without a row: garbage, half a line, a message, names of columns that no row has
+    damaged   lines of a board whose checksum or form is wrong
     overlong  lines longer than any row
     foreign   rows of another sender than the one that counts
     """
 
     misfits: int = 0
+    damaged: int = 0
     overlong: int = 0
     foreign: int = 0
 
@@ -169,7 +246,10 @@ class LineCounts:
 class LineParser:
     """Parses rows from chunks of bytes; odd is the last misfit, for display.
 
-    columns  how many columns rows have until a header says otherwise; 0: unknown
+    Once a line with a right checksum has come, only such lines are rows: what is left of a damaged one may look like a
+    row of numbers.
+
+    columns  how many columns rows have until a header says otherwise; 0: unknown, and then a board's rows are left out
     """
 
     def __init__(self, columns: int = 0) -> None:
@@ -177,29 +257,62 @@ class LineParser:
         self.begin()
 
     def begin(self) -> None:
-        """Reset: an incomplete line and the names of the columns are forgotten."""
+        """Reset: an incomplete line, the names of the columns and the clock of a board are forgotten."""
         self._splitter = Splitter()
         self._names: tuple[str, ...] | None = None
         # A header that no row has followed yet, and the misfit before it: it may be a message.
         self._header: tuple[str, ...] = ()
         self._odd_before = ""
+        self._checked = False
+        self._clock_us: int | None = None
 
     def feed(self, chunk: bytes) -> list[Row]:
         """Return the rows whose lines `chunk` completes, with names if a header came before them."""
         rows = []
         before = self._splitter.overlong
         for line in self._splitter.feed(chunk):
-            found = self._parsed(line)
-            if isinstance(found, Row):
-                rows.append(self._with_names(found))
-            elif found is None or found.names != self._names:
-                self._take_misfit(line, found)
+            found = self._of_board(line) if _is_of_board(line) else self._of_line(line)
+            if found is not None:
+                rows.append(found)
         self.counts.overlong += self._splitter.overlong - before
         return rows
 
-    def _parsed(self, line: bytes) -> Row | Header | None:
-        found = parsed(line, len(self._names or ()) or self._columns)
-        return parsed(line, len(self._header)) if found is None and self._header else found
+    def _of_board(self, line: bytes) -> Row | None:
+        found = parsed(line, self._known)
+        if isinstance(found, Damaged):
+            self.counts.damaged += 1
+            return None
+        self._checked = True
+        if isinstance(found, Row):
+            return found._replace(names=self._names, time_s=self._unwrapped_s(round((found.time_s or 0.0) * 1e6)))
+        if isinstance(found, Header):
+            self._names = found.names
+        elif not line.startswith(b"$row,"):
+            self._take_misfit(line, None)
+        return None
+
+    def _unwrapped_s(self, clock_us: int) -> float:
+        """Return the time of a board's clock, which has made less than half a turn since its last row."""
+        last_us = clock_us if self._clock_us is None else self._clock_us
+        self._clock_us = last_us + (clock_us - last_us + CLOCK_US // 2) % CLOCK_US - CLOCK_US // 2
+        return self._clock_us / 1e6
+
+    def _of_line(self, line: bytes) -> Row | None:
+        found = None
+        if not self._checked:
+            found = parsed(line, self._known)
+            if found is None and self._header:
+                found = parsed(line, len(self._header))
+        if isinstance(found, Row):
+            return self._with_names(found)
+        header = found if isinstance(found, Header) else None
+        if header is None or header.names != self._names:
+            self._take_misfit(line, header)
+        return None
+
+    @property
+    def _known(self) -> int:
+        return len(self._names or ()) or self._columns
 
     def _take_misfit(self, line: bytes, header: Header | None) -> None:
         """Count a line that is no row, or not yet the header of one; a word alone is a message."""

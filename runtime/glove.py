@@ -146,7 +146,7 @@ class Glove:
                 preshapes, loaded, segments=by_segments, change_while_held=change_while_held
             )
         calibration = system.calibration
-        read = system.sensor_names if whole else system.read_sensors
+        read = system.read_sensors(all_sensors=whole)
         self._angles = None if calibration is None else AngleReader(system.sensor_names, calibration, read)
         self._measured: GloveFrame | None = None
         self._newest_angles: JointAngles | None = None

@@ -30,7 +30,7 @@ HARNESS = """\
 name = "bench"
 [cyberglove]
 port = "/dev/ttyUSB0"
-[[scanner]]
+[[stream]]
 port = "/dev/ttyACM0"
 switches = [{}]
 """

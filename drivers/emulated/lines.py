@@ -1,6 +1,7 @@
 """Emulated boards or programs that send rows of numbers as lines: over a pty, TCP, UDP, Unix socket or WebSocket."""
 
 import contextlib
+import math
 import socket
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING
 from ..closing import Closing
 from ..errors import DeviceError, SettingError
 from ..extras import optional
+from ..lines import CLOCK_US, SEQUENCES, checked, switches_field
 
 if TYPE_CHECKING:
     from websockets.sync.server import ServerConnection
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
 _UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 # A client that does not accept a line within this time is dropped.
 _SEND_S = 0.2
+# A board names its columns so often.
+_NAMED_S = 1.0
 
 
 class LineSender(Closing):
@@ -57,6 +61,34 @@ class LineSender(Closing):
         while not self._stop.wait(max(0.0, due - monotonic())):
             self._send(self.line(monotonic() - self._began))
             due = max(due + self._period_s, monotonic() - self._period_s)
+
+
+class BoardSender(LineSender):
+    """Sends the current values like the sketch of a board that prints these switches and readings, which are rounded.
+
+    Numbers of rows count from 0, and the board's clock from the start.
+    """
+
+    def __init__(
+        self, send: Callable[[bytes], None], switches: Sequence[str], readings: Sequence[str], rate_hz: float
+    ) -> None:
+        self._switches, self._readings = tuple(switches), tuple(readings)
+        self._sequence, self._named_s = 0, -math.inf
+        super().__init__(send, (*switches, *readings), rate_hz, None, "us")
+
+    def restart(self) -> None:
+        """Begin anew, as after a reset."""
+        self._began, self._sequence, self._named_s = monotonic(), 0, -math.inf
+
+    def line(self, now_s: float) -> bytes:
+        """Return the row for a time `now_s` after the start, behind the names of the columns once a second."""
+        names, values = b"", self._values
+        if now_s - self._named_s >= _NAMED_S:
+            names, self._named_s = checked(("columns", *self._switches, *self._readings)), now_s
+        closed = sum(1 << bit for bit, name in enumerate(self._switches) if values[name] >= 1)
+        head = (str(self._sequence), str(round(now_s * 1e6) % CLOCK_US), switches_field(closed, len(self._switches)))
+        self._sequence = (self._sequence + 1) % SEQUENCES
+        return names + checked(("row", *head, *(str(round(values[name])) for name in self._readings)))
 
 
 class SocketLines(Closing):

@@ -87,6 +87,7 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
         raise DeviceError(f"{port}: {_no_rows(bare, reader) or other or 'nothing comes'}")
     wrong, such = counts.misfits + counts.overlong, f", such as {odd}" if odd else ""
     remarks = [f"{wrong} lines were not rows{such}" if wrong > 1 else f"1 line was not a row: {odd}"] if wrong else []
+    remarks += [f"{counts.damaged} lines were damaged: check the cable and the baud rate"] if counts.damaged else []
     remarks += [other] if other else []
     remarks += [f"{counts.foreign} rows of another sender were left out"] if counts.foreign else []
     return _proposed(bare, came, reader.kind, remarks)

@@ -278,7 +278,7 @@ class Sources:
 
     switch_names  the wanted switches, in the order of the frames' bits: a build's kept switches
     scan          the ports of the I2C expanders to read, in order
-    sensors       the joints' sensors in use; None: all, and all the time
+    sensors       the joints' sensors in use by a build; None: there is no build, everything is in use
 
     changed       whether a device came, went or failed differently since this was last set to False
 
@@ -299,8 +299,8 @@ class Sources:
         self._gloves = tuple(source for kind, source in made if kind.reads == "joints")
         self._arrivals = Arrivals(len(switch_names), [reader.owned for reader in self._readers])
         if sensors is not None:
-            for glove in self._gloves:
-                glove.read_only(sensors)
+            for device in self._devices:
+                device.read_only(sensors)
         self.take: Callable[..., Taken] = partial(self._arrivals.take, self._patience_us)
         self.changed = True
         self._keepers = [

@@ -96,20 +96,29 @@ class System:
         return numbers_of(device.joints)
 
     @property
-    def read_sensors(self) -> tuple[str, ...]:
-        """The sensors that a run reads, in wire order: those of the build's joints, or all if it has none, or if the
-        harness sets no mask.
+    def _needed(self) -> tuple[str, ...]:
+        """The sensors of the build's joints, in wire order."""
+        joints = {joint.name for joint in self.build.manifest.joints}
+        return tuple(name for name in self.sensor_names if name in joints)
+
+    def read_sensors(self, *, all_sensors: bool = False) -> tuple[str, ...]:
+        """Return the sensors that a run reads, in wire order: those of the build's joints, if it has any, for a board,
+        which may print no others, and for a CyberGlove with a mask, unless it is to send `all_sensors`; else all.
         """
-        glove, joints = self.harness.cyberglove, {joint.name for joint in self.build.manifest.joints}
-        some = tuple(name for name in self.sensor_names if name in joints)
-        return some if some and glove is not None and glove.mask else self.sensor_names
+        device = self.harness.joint_device
+        if isinstance(device, StreamWiring):
+            some = device.board is not None
+        else:
+            some = device is not None and device.mask and not all_sensors
+        return self._needed if some and self._needed else self.sensor_names
 
     def sources(self, *, all_sensors: bool = False) -> Sources:
         """Return the devices; with `all_sensors` the CyberGlove also sends the sensors that the build does not use.
 
         Raises SettingError if the calibration of the taxels cannot serve the build.
         """
-        sensors = None if all_sensors else self.read_sensors
+        streamed = isinstance(self.harness.joint_device, StreamWiring)
+        sensors = self._needed if streamed else self.read_sensors(all_sensors=all_sensors)
         taxels = calibration_of(self.harness.taxel_settings)
         scan = in_counts(self.scan, self.build.manifest.switches, taxels)
         return Sources(self.harness, self.switch_names, scan, sensors)

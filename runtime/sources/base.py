@@ -62,8 +62,8 @@ class Source(ABC):
         return ""
 
     def read_only(self, sensors: Sequence[str]) -> None:  # noqa: B027
-        """Allow the source to leave other sensors than these out of its frames, as 0. Called before `open`; sources of
-        switches, and those that send by themselves, ignore it.
+        """Allow the source to leave other joints' sensors than these out of its frames, as 0, and taxels without
+        levels. Called before `open`, for a build; sources of switches alone ignore it.
         """
 
 

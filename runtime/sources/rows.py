@@ -2,12 +2,12 @@
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
 from thenar.drivers.line_reader import RowReader
-from thenar.drivers.lines import Row
+from thenar.drivers.lines import SEQUENCES, Row
 from thenar.drivers.senders import SILENCE_US
 
 from ..frames import PERIODS, GloveFrame, Mask, Pauses, SwitchFrame, now_us
@@ -86,8 +86,8 @@ class SenderClock:
 class RowCounts:
     """Counts of a sender's rows, since the source was made.
 
-    wrong_columns  rows without the columns that are used, or of another number of them
-    missing        values of used columns that were not there, or not numbers
+    wrong_columns  rows without the columns that are needed, or of another number of them
+    missing        values of needed columns that were not there, or not numbers
     out_of_range   values beyond the range in glove.toml, clipped to it
     repeated       rows that came twice
     untimed        rows whose clock was not there, not finite, or beyond all dates, and were left out
@@ -112,7 +112,7 @@ class RowCounts:
 
 @dataclass(slots=True)
 class RowWatch:
-    """The arrival of rows: gaps, by the sender's clock if there is one, and the rate.
+    """The arrival of rows: gaps, by the numbers of rows or else by the sender's clock if there is one, and the rate.
 
     hz         rows a second over the last second or longer; None: not known yet
     steady_hz  the lower of the last two such rates: rows that had been waiting for this program come all at once
@@ -123,25 +123,22 @@ class RowWatch:
     hz: float | None = None
     steady_hz: float = 0.0
     _last_us: float | None = None
+    _last: int | None = None
     _stamped: bool = False
     _since_us: int | None = None
     _rows: int = 0
 
     def begin(self) -> None:
         """Start afresh, after a break that is not a gap between rows."""
-        self._last_us = self._since_us = None
+        self._last_us = self._last = self._since_us = None
 
-    def row(self, came_us: int, sent_us: float | None) -> None:
+    def row(self, came_us: int, sent_us: float | None, sequence: int | None = None) -> None:
         """Take a row that counts."""
         self.counts.rows += 1
-        if self._stamped != (sent_us is not None):  # times of two clocks have no gap between them
-            self._last_us, self._stamped = None, sent_us is not None
-        time_us = came_us if sent_us is None else sent_us
-        longest_us = 1.5 * self.period_us if sent_us is not None else max(2 * self.period_us, _BUNCH_US)
-        if self._last_us is not None and time_us - self._last_us > longest_us:
+        lost = self._lost(came_us, sent_us) if sequence is None else self._skipped(sequence)
+        if lost is not None:
             self.counts.gaps += 1
-            self.counts.lost += max(round((time_us - self._last_us) / self.period_us) - 1, 0)
-        self._last_us = time_us
+            self.counts.lost += lost
         if self._since_us is None:
             self._since_us, self._rows = came_us, 0
             return
@@ -151,16 +148,34 @@ class RowWatch:
             self.hz, self.steady_hz = hz, min(hz, self.hz or 0.0)
             self._since_us, self._rows = came_us, 0
 
+    def _skipped(self, sequence: int) -> int | None:
+        """Return how many numbers are missing before this one, None if none is."""
+        last, self._last = self._last, sequence
+        return None if last is None else (sequence - last - 1) % SEQUENCES or None
+
+    def _lost(self, came_us: int, sent_us: float | None) -> int | None:
+        """Return how many rows are missing by the time of this one, None if there is no gap before it."""
+        if self._stamped != (sent_us is not None):  # times of two clocks have no gap between them
+            self._last_us, self._stamped = None, sent_us is not None
+        time_us = came_us if sent_us is None else sent_us
+        longest_us = 1.5 * self.period_us if sent_us is not None else max(2 * self.period_us, _BUNCH_US)
+        last_us, self._last_us = self._last_us, time_us
+        if last_us is None or time_us - last_us <= longest_us:
+            return None
+        return max(round((time_us - last_us) / self.period_us) - 1, 0)
+
 
 class Columns:
     """Finds the used columns by the names that rows have, or by the order in glove.toml in rows without names.
 
+    needed  those of the used columns that rows must have; replace it before the first row
     found   the columns of the last row that is not from this glove; None: there was none
-    absent  the used columns that the last row with names lacks
+    absent  the needed columns that the last row with names lacks
     """
 
     def __init__(self, wanted: Sequence[str], columns: Sequence[str], time: str | None) -> None:
         self._wanted, self._columns, self._time = tuple(wanted), tuple(columns), time
+        self.needed = frozenset(wanted)
         self._names: tuple[str, ...] | None = None
         self._places: tuple[int | None, ...] | None = None
         self.found: tuple[str, ...] | None = None
@@ -175,19 +190,27 @@ class Columns:
         self.found = row.names or tuple(f"column {number + 1}" for number in range(len(row.values)))
         return None
 
+    def missing(self, values: Sequence[float | None]) -> int:
+        """Return how many of these values of the wanted columns are needed, and None."""
+        return sum(value is None and name in self.needed for name, value in zip(self._wanted, values, strict=True))
+
     def _placed(self, names: tuple[str, ...] | None) -> tuple[int | None, ...] | None:
         order = self._columns if names is None else names
         places = {name: place for place, name in enumerate(order) if name}
-        found = tuple(places.get(name) for name in self._wanted)
-        # A row that lacks a sensor counts; one that lacks its clock, or most used columns, is not from this glove.
-        if 2 * found.count(None) > len(found) or (self._time is not None and self._time not in places):
+        absent = tuple(name for name in self._wanted if name in self.needed and name not in places)
+        # A row that lacks a sensor counts; one that lacks its clock, or most needed columns, is not from this glove.
+        if 2 * len(absent) > len(self.needed) or (self._time is not None and self._time not in places):
             return None
-        self.absent = tuple(name for name in self._wanted if name not in places)
-        return found
+        self.absent = absent
+        return tuple(places.get(name) for name in self._wanted)
 
 
 class RowSource(Source):
-    """Stream number `number` of a harness: switches as in `scan`, all joints, all taxels."""
+    """Stream number `number` of a harness: switches as in `scan`, all joints, all taxels.
+
+    Its rows must have the switches of `scan`, the taxels with levels in it, and the joints that `read_only` names.
+    Without that call, which comes for a build, they must have all joints, and without levels all taxels.
+    """
 
     def __init__(self, reader: RowReader, harness: Harness, number: int, names: Sequence[str], scan: ScanMap) -> None:
         wiring, read = harness.streams[number], scan.streams[number]
@@ -197,6 +220,7 @@ class RowSource(Source):
         self.longest_us = PERIODS * self.period_us
         wanted = (*wiring.used, *([] if wiring.time is None else [wiring.time]))
         self._columns = Columns(wanted, wiring.columns, wiring.time)
+        self._read = frozenset(wiring.switches[place] for place, _ in read.switches)
         low = wiring.closed == "low"
         self._switches = [
             (place, wiring.thresholds.get(wiring.switches[place], wiring.threshold), low, 1 << switch)
@@ -215,6 +239,8 @@ class RowSource(Source):
         self._levels = [levels.get(place, []) for place in range(len(self._taxel_names))]
         self.owned: Mask = sum(bit for *_, bit in self._switches)
         self.owned |= sum(1 << switch for each in self._levels for _, switch in each)
+        self._measured = frozenset(self._taxel_names[place] for place in levels)
+        self._need(wiring.joints, self._measured or wiring.taxels)
         self._sends_switches = bool(self.owned or self._taxel_names)
         self._debounce = harness.debounce
         self.watch = RowWatch(wiring.period_us)
@@ -237,6 +263,14 @@ class RowSource(Source):
             Taxels([name], [levels], self._calibration, self._settings, grid.last)
             for name, levels, grid in zip(self._taxel_names, self._levels, self._grids, strict=True)
         ]
+
+    def _need(self, joints: Iterable[str], taxels: Iterable[str]) -> None:
+        time = () if self.wiring.time is None else (self.wiring.time,)
+        self._columns.needed = self._read.union(joints, taxels, time)
+
+    def read_only(self, sensors: Sequence[str]) -> None:
+        """Accept rows that lack other joints than these, and taxels without levels."""
+        self._need([name for name in self.wiring.joints if name in sensors], self._measured)
 
     def open(self) -> None:
         """Open the reader."""
@@ -264,8 +298,8 @@ class RowSource(Source):
             if known_us is None:
                 return
             time_us, self._last = known_us, (sent_us, values)
-        counts.missing += values.count(None)
-        self.watch.row(came_us, sent_us)
+        counts.missing += self._columns.missing(values)
+        self.watch.row(came_us, sent_us, row.sequence)
         self._make_frames(time_us, values)
 
     def _sent_us(self, row: Row, values: Sequence[float | None]) -> float | None:
@@ -377,7 +411,10 @@ class RowSource(Source):
         if now_us() < self._fault_until_us:
             return self._fault
         if self._columns.absent:
-            return f"its rows lack {list_names(self._columns.absent)}: name columns in glove.toml as it does"
+            advice = (
+                "name columns in glove.toml as it does" if self.wiring.board is None else "upload this build's sketch"
+            )
+            return f"its rows lack {list_names(self._columns.absent)}: {advice}"
         return self._wrong_rate() or self._faulty_taxels()
 
     def _wrong_rate(self) -> str:

@@ -15,8 +15,8 @@ from .ramp import NEVER, Ramp
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Traffic:
-    """The bytes of n repetitions, F frames each; of a frame's B bytes the first `scanner` are on the scanner's line,
-    the others on the CyberGlove's.
+    """The bytes of n repetitions, F frames each; of a frame's B bytes the first `board` are on the board's line, the
+    others on the CyberGlove's.
 
     A byte keeps its index from sending to receiving, so that faults of one byte do not affect another.
 
@@ -28,7 +28,7 @@ class Traffic:
     data: NDArray[np.uint8]
     at_us: NDArray[np.int64]
     arrives: NDArray[np.bool_]
-    scanner: int
+    board: int
 
 
 Integers = NDArray[np.int64]
@@ -60,7 +60,7 @@ class Batch:
     on_us, off_us (n, s)  when each switch closes and opens; NEVER
     frame_us    (n, F)    when each frame's scan begins
     delay_us              delay of the reading of each switch, broadcast to (n, F, s); None: 0
-    bits        (n, F, s) the scanner's readings; for a place with a taxel, those of a switch there
+    bits        (n, F, s) the board's readings; for a place with a taxel, those of a switch there
     sensors_deg (n, F, 18) angles of the CyberGlove's sensors
     raw         (n, F, 18) uint8, its bytes, 1 to 255
     traffic               the bytes on the serial lines, between sending and receiving

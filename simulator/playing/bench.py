@@ -11,8 +11,7 @@ from thenar.drivers.calibration import SensorCalibration
 from thenar.drivers.closing import Closing
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c, EmulatedSpi
-from thenar.drivers.emulated.lines import LineSender, lines_like
-from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
+from thenar.drivers.emulated.lines import BoardSender, LineSender, lines_like
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, SpiWiring, StreamWiring
@@ -73,7 +72,7 @@ class Bench(Closing):
 
     harness      the same harness with the ports of the emulated devices
     environment  variables that a process needs to see the emulated I2C buses and SPI devices
-    lines        the serial lines, the CyberGlove's first, then the scanners'
+    lines        the serial lines, the CyberGlove's first, then the streams'
     """
 
     def __init__(
@@ -84,11 +83,10 @@ class Bench(Closing):
         cable: Callable[[int], Cable | None] = lambda _line: None,
         adapter: AdapterKind = "any",
         taxel_names: Sequence[str] = (),
-        bits: int = 10,
         joints: Sequence[tuple[str, str]] = (),
     ) -> None:
-        """Start the devices. cable(n) is applied to the messages of serial line n; boards convert to `bits` bits;
-        joints are the names and units of those that streams send.
+        """Start the devices. cable(n) is applied to the messages of serial line n; joints are the names and units of
+        those that streams send.
 
         Raises DeviceError if a package for the emulation is not installed.
         """
@@ -102,16 +100,6 @@ class Bench(Closing):
                 baud = harness.cyberglove.baud
                 line = self._line("cyberglove", _USUAL_BAUD if baud == "auto" else baud, stack)
                 self.glove = stack.enter_context(EmulatedCyberGlove(line, sensors=harness.cyberglove.all_sensors))
-            self.scanners = tuple(
-                stack.enter_context(
-                    EmulatedScanner(
-                        self._line(f"scanner{number}", wiring.baud, stack),
-                        len(wiring.switches),
-                        board=ScannerBoard(1, max(len(wiring.switches), 1), channels=len(wiring.taxels), bits=bits),
-                    )
-                )
-                for number, wiring in enumerate(harness.scanners)
-            )
             self.i2c: EmulatedI2c | None = None
             if harness.buses or harness.spi:
                 spi = [EmulatedSpi(wiring.device, wiring.kind) for wiring in harness.spi]
@@ -142,6 +130,9 @@ class Bench(Closing):
         else:
             line = self._line(f"stream{number}", wiring.baud, stack)
             send, port = line.send, str(line.link)
+        if wiring.board is not None:
+            readings = (*wiring.joints, *wiring.taxels)
+            return stack.enter_context(BoardSender(send, wiring.switches, readings, wiring.rate_hz)), port
         time = () if wiring.time is None else (wiring.time,)
         columns = wiring.columns or (*time, *wiring.used)
         sender = LineSender(send, columns, wiring.rate_hz, wiring.time, wiring.time_unit)
@@ -179,11 +170,6 @@ class Bench(Closing):
             sender.show(self._numbers_of(number, closed, taxels, joints))
         if self.glove is not None:
             self.glove.set(sensors)
-        for scanner, wiring in zip(self.scanners, self.harness.scanners, strict=True):
-            keys = [self._numbers.get(name) for name in wiring.switches]
-            scanner.set(sum(1 << key for key, number in enumerate(keys) if number is not None and closed[number]))
-            numbers = [self._taxels.get(name) for name in wiring.taxels]
-            scanner.press([0 if number is None else taxels[number] for number in numbers])
         if self.i2c is not None:
             spi = [[codes_of(chip, taxels, self._taxels)] for chip in self.harness.spi]
             self.i2c.set_all(
@@ -223,10 +209,6 @@ def _moved(harness: Harness, folder: Path, ports: Sequence[str]) -> Harness:
     return msgspec.structs.replace(
         harness,
         cyberglove=None if glove is None else msgspec.structs.replace(glove, port=str(folder / "cyberglove")),
-        scanners=tuple(
-            msgspec.structs.replace(wiring, port=str(folder / f"scanner{number}"))
-            for number, wiring in enumerate(harness.scanners)
-        ),
         streams=tuple(
             msgspec.structs.replace(wiring, port=port, sender=None)
             for wiring, port in zip(harness.streams, ports, strict=True)

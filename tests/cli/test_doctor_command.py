@@ -10,7 +10,6 @@ from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.cyberglove_box import Doubts
-from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
 from thenar.drivers.emulated.serial_line import PtyLine
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
@@ -69,7 +68,7 @@ def test_a_port_that_is_not_there_is_exit_code_1(thenar: Thenar, tmp_path: Path)
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("table", ["[cyberglove]\nport = {}", "[[scanner]]\nswitches = ['s']\nport = {}"])
+@pytest.mark.parametrize("table", ["[cyberglove]\nport = {}", "[[stream]]\nswitches = ['s']\nport = {}"])
 def test_a_port_that_would_write_to_a_file_is_refused_and_the_file_kept(
     thenar: Thenar, tmp_path: Path, table: str
 ) -> None:
@@ -109,26 +108,3 @@ def test_a_harness_without_devices_is_refused(thenar: Thenar, tmp_path: Path) ->
     done = thenar("doctor", tmp_path / "glove.toml")
     assert done.returncode == 2
     assert "glove.toml names no device" in done.stderr
-
-
-class Recognising(ScannerBoard):
-    """A board that recognises grasp type 2 whenever it scans, held as its seventh grasp."""
-
-    def scan(self, closed: int, now: int, *, unread: int = 0) -> list[bytes]:
-        keys = super().scan(closed, now, unread=unread)
-        return [*keys, *self.recognised(2, 100, 0, now), *self.segmented(7, 2, 2, now)]
-
-
-@pytest.mark.parametrize(("board", "remark"), [(Recognising(1, 2, segments=True), True), (ScannerBoard(1, 2), False)])
-def test_of_a_board_that_recognises_by_itself_it_says_so(
-    thenar: Thenar, tmp_path: Path, board: ScannerBoard, remark: bool
-) -> None:
-    (tmp_path / "glove.toml").write_text(f'[[scanner]]\nport = "{tmp_path}/port"\nswitches = ["s0", "s1"]\n')
-    with PtyLine(tmp_path / "port", 115200) as line, EmulatedScanner(line, 2, board=board):
-        done = thenar("doctor", tmp_path / "glove.toml")
-    assert done.returncode == 0, done.stderr
-    said = (
-        "it recognises grasps by itself, last grasp type 2 of the build that it carries, counted from 0; "
-        "it follows segments, 7 so far, the newest held"
-    )
-    assert (said in " ".join(done.stdout.split())) is remark

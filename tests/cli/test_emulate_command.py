@@ -47,7 +47,7 @@ def glove(tmp_path: Path) -> Path:
     path = tmp_path / "glove.toml"
     path.write_text(
         '[cyberglove]\nport = "/dev/ttyUSB0"\n\n'
-        '[[scanner]]\nport = "/dev/ttyACM0"\nswitches = ["thumb_distal_1", "", "palm_heel_6"]\n'
+        '[[stream]]\nport = "/dev/ttyACM0"\nswitches = ["thumb_distal_1", "palm_heel_6"]\n[stream.board]\n'
     )
     return path
 
@@ -59,14 +59,14 @@ def test_a_command_runs_beside_the_emulated_glove_and_its_exit_code_is_handed_on
     program = "import os, sys; print(os.path.realpath(sys.argv[2])); sys.exit(7)"
     done = thenar(
         *("emulate", scene, "--glove", glove, "--dir", folder, "--log", log, "--repeat"),
-        *("--", sys.executable, "-c", program, "{glove}", folder / "scanner0"),
+        *("--", sys.executable, "-c", program, "{glove}", folder / "stream0"),
     )
     assert done.returncode == 7, done.stderr
     assert done.stdout.startswith("/dev/pts/")
     harness = load_harness(folder / "glove.toml")
     assert harness.cyberglove is not None
     assert harness.cyberglove.port == str(folder / "cyberglove")
-    assert harness.scanners[0].port == str(folder / "scanner0")
+    assert harness.streams[0].port == str(folder / "stream0")
     assert load_calibration(Path(str(harness.cyberglove.calibration))).subject == "A"
     lines = [json.loads(line) for line in log.read_text().splitlines()]
     assert [line["row"] for line in lines[:14]] == list(range(len(lines[:14])))
@@ -86,7 +86,7 @@ def test_a_set_of_grasps_is_played_row_by_row(thenar: Thenar, scene: Path, tmp_p
     made, glove, log = tmp_path / "set.grasps", tmp_path / "glove.toml", tmp_path / "log.jsonl"
     assert thenar("simulate", scene, "-o", made).returncode == 0
     grasp_set = GraspSet.load(made)
-    glove.write_text(f'[[scanner]]\nport = "x"\nswitches = {json.dumps(list(grasp_set.switch_names))}\n')
+    glove.write_text(f'[[stream]]\nport = "x"\nswitches = {json.dumps(list(grasp_set.switch_names))}\n')
     done = thenar("emulate", made, "--glove", glove, "--dir", tmp_path / "em", "--period-ms", 2, "--log", log)
     assert done.returncode == 0, done.stderr
     assert [json.loads(line)["grasp"] for line in log.read_text().splitlines()] == grasp_set.grasps.tolist()
@@ -198,7 +198,7 @@ def test_a_second_ctrl_c_leaves_no_command_behind(scene: Path, glove: Path, tmp_
 
 def test_a_switch_that_is_not_played_is_told(thenar: Thenar, scene: Path, tmp_path: Path) -> None:
     path = tmp_path / "glove.toml"
-    path.write_text('[[scanner]]\nport = "/dev/ttyACM0"\nswitches = ["thumb_distal_1", "thumb_dorsal_1"]\n')
+    path.write_text('[[stream]]\nport = "/dev/ttyACM0"\nswitches = ["thumb_distal_1", "thumb_dorsal_1"]\n')
     done = thenar("emulate", scene, "--glove", path, "--dir", tmp_path / "em", "--", sys.executable, "-c", "pass")
     assert done.returncode == 0, done.stderr
     assert "has no switch thumb_dorsal_1: always open" in done.stderr
@@ -267,11 +267,15 @@ def test_a_scene_with_taxels_is_recognised_live_from_a_boards_switches_and_count
     done = thenar("simulate", scene, "-o", made)
     assert done.returncode == 0, done.stderr
     training = ("--inputs", "switches", "--rounds", 20, "--folds", 0, "--no-report")
-    done = thenar("compile", made, "-o", build, *training, "--propose", glove, "--chip", "board")
+    grasp_set = GraspSet.load(made)
+    pads = [column.name for column in grasp_set.taxel_columns]
+    switches = [name for name in grasp_set.switch_names if name not in pads]
+    glove.write_text(
+        f'[[stream]]\nport = "tcp://board:1"\nrate_hz = 200\nswitches = {json.dumps(switches)}\n'
+        f"taxels = {{ {', '.join(f'{name} = [0, 4095]' for name in pads)} }}\n[stream.board]\n"
+    )
+    done = thenar("compile", made, "-o", build, *training, "--glove", glove)
     assert done.returncode == 0, done.stderr
-    harness = load_harness(glove)
-    assert harness.scanners[0].taxels
-    assert harness.scanners[0].switches
     log, grasps = tmp_path / "played.jsonl", tmp_path / "grasps.jsonl"
     done = thenar(
         *("emulate", scene, "--glove", glove, "--dir", tmp_path / "em", "--period-ms", 250, "--log", log, "--repeat"),

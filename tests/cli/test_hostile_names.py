@@ -26,7 +26,7 @@ from thenar.simulator import load_scene
 EVIL = "\x1b]0;x\x07\x9b31m\u202e\u2066\x7fa"
 QUOTED = json.dumps(EVIL).replace("\x7f", "\\u007f")
 UNSAFE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
-GLOVE = 'name = "bench"\n[[scanner]]\nport = "/dev/none"\nswitches = ["a"]\n'
+GLOVE = 'name = "bench"\n[[stream]]\nport = "/dev/none"\nswitches = ["a"]\n'
 TABLE = f"grasp,{EVIL},b\ncup,1,0\npen,0,1\n"
 
 FIELD = json.dumps({EVIL: 1}, ensure_ascii=False)

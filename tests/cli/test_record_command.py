@@ -23,7 +23,7 @@ from thenar.cli import run
 from thenar.compiler import GraspSet
 from thenar.compiler.recordings.graspset import Joint
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
+from thenar.drivers.emulated.lines import BoardSender
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.recording.guide import read_journal
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine
@@ -34,9 +34,10 @@ pytestmark = pytest.mark.slow
 GLOVE = """name = "bench"
 [cyberglove]
 port = "{folder}/glove"
-[[scanner]]
-port = "{folder}/scanner"
-switches = ["s1", "", "s2", "s3"]
+[[stream]]
+port = "{folder}/board"
+rate_hz = 200
+switches = ["s1", "s2", "s3"]
 """
 OBJECTS = 'cup = ["mug", "jar"]\npen = ["biro"]\n'
 
@@ -110,9 +111,12 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def scanner(folder: Path) -> Iterator[EmulatedScanner]:
-    with PtyLine(folder / "scanner", 1_000_000) as line, EmulatedScanner(line, 4) as scanner:
-        yield scanner
+def board(folder: Path) -> Iterator[BoardSender]:
+    with (
+        PtyLine(folder / "board") as line,
+        BoardSender(line.send, ("s1", "s2", "s3"), ("p0", "p1"), 200) as board,
+    ):
+        yield board
 
 
 @pytest.fixture
@@ -136,8 +140,8 @@ def start(folder: Path) -> Iterator[Start]:
 
 
 @pytest.fixture(autouse=True)
-def hands(scanner: EmulatedScanner, glove: EmulatedCyberGlove) -> None:
-    scanner.set(0b0101)
+def hands(board: BoardSender, glove: EmulatedCyberGlove) -> None:
+    board.show({"s1": 1, "s2": 1})
 
 
 def finished(terminal: Terminal) -> tuple[int, str]:
@@ -155,7 +159,7 @@ def reviewed(terminal: Terminal, number: int) -> None:
         terminal.press(b"\r")
 
 
-def test_a_whole_collection_becomes_a_set(folder: Path, start: Start, scanner: EmulatedScanner) -> None:
+def test_a_whole_collection_becomes_a_set(folder: Path, start: Start, board: BoardSender) -> None:
     terminal = start("--seed", "5", "--no-none")
     terminal.until(rb"Enter: start the countdown")
     terminal.press(b"\r")
@@ -212,13 +216,12 @@ def test_after_a_kill_the_same_command_goes_on_where_it_was(folder: Path, start:
 
 
 def test_pads_are_recorded_beside_the_rest_and_survive_a_kill(
-    folder: Path, start: Start, scanner: EmulatedScanner, glove: EmulatedCyberGlove
+    folder: Path, start: Start, board: BoardSender, glove: EmulatedCyberGlove
 ) -> None:
-    taxels = 'taxels = ["p0", "p1"]\n[taxels]\ncalibration = "pads.toml"\n'
+    taxels = 'taxels = { p0 = [0, 1023], p1 = [0, 1023] }\n[taxels]\ncalibration = "pads.toml"\n'
     (folder / "glove.toml").write_text(GLOVE.format(folder=folder) + taxels)
     (folder / "pads.toml").write_text(TaxelCalibration(unit="N", taxels=(TaxelLine("p0", 100, 900, 2.0),)).to_toml())
-    scanner.reboot(ScannerBoard(1, 4, channels=2))
-    scanner.press((500, 40))
+    board.show({"p0": 500, "p1": 40})
     first = start("--seed", "5", "--no-none")
     first.until(rb"Enter: start the countdown")
     first.press(b"\r")
@@ -243,7 +246,7 @@ def test_pads_are_recorded_beside_the_rest_and_survive_a_kill(
     assert (folder / "again.grasps").read_bytes() == (folder / "set.grasps").read_bytes()
 
 
-def test_redone_and_left_is_what_was_accepted(folder: Path, start: Start, scanner: EmulatedScanner) -> None:
+def test_redone_and_left_is_what_was_accepted(folder: Path, start: Start, board: BoardSender) -> None:
     terminal = start()
     terminal.until(rb"Enter: start the countdown")
     terminal.press(b"\r")
@@ -260,9 +263,7 @@ def test_redone_and_left_is_what_was_accepted(folder: Path, start: Start, scanne
     assert len(GraspSet.load(folder / "set.grasps")) == 1
 
 
-def test_a_trial_is_undone_another_skipped_and_a_pause_is_one(
-    folder: Path, start: Start, scanner: EmulatedScanner
-) -> None:
+def test_a_trial_is_undone_another_skipped_and_a_pause_is_one(folder: Path, start: Start, board: BoardSender) -> None:
     terminal = start("--seed", "5", "--no-none")
     terminal.until(rb"s: skip this one")
     terminal.press(b"s")
@@ -271,7 +272,7 @@ def test_a_trial_is_undone_another_skipped_and_a_pause_is_one(
     reviewed(terminal, 2)
     terminal.press(b"\r")
     reviewed(terminal, 3)
-    scanner.set(0b0001)
+    board.show({"s2": 0})
     # The second was a mistake, and so is the third.
     terminal.press(b"u")
     reviewed(terminal, 2)
@@ -448,9 +449,9 @@ def test_without_its_devices_nothing_is_recorded(folder: Path) -> None:
 
 
 def test_without_a_terminal_lines_are_the_keys_and_the_empty_hand_is_recorded_too(
-    folder: Path, scanner: EmulatedScanner
+    folder: Path, board: BoardSender
 ) -> None:
-    scanner.set(0)
+    board.show({"s1": 0, "s2": 0})
     options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--objects", folder / "objects.toml"]
     options += ["--subject", "A", "--repetitions", "1", "--countdown", "0", "-o", folder / "set.grasps"]
     command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]

@@ -218,7 +218,7 @@ GLOVE = """
 port = "/dev/ttyUSB0"
 sensors = 18
 joints = ["j0", "j1", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l", "m", "n", "o", "p", "q", "r"]
-[[scanner]]
+[[stream]]
 port = "/dev/ttyACM0"
 switches = ["s0", "s1", "s2", "s3", "s4", "s5"]
 """

@@ -33,7 +33,15 @@ address = 0x20
 pins = { GPB1 = "s0" }
 """
 GLOVES = {
-    "board": '[[scanner]]\nport = "/dev/ttyACM0"\nswitches = ["s0"]\ntaxels = ["p0", "", "p1", "p2"]\n',
+    "board": """
+[[stream]]
+port = "/dev/ttyACM0"
+rate_hz = 200
+switches = ["s0"]
+taxels = { p0 = [0, 1023], p1 = [0, 1023], p2 = [0, 1023] }
+[stream.board]
+pins = { s0 = "2", p0 = "A0", p1 = "A1", p2 = "A2" }
+""",
     "i2c": f"""{_BUS}
 [[bus.chip]]
 kind = "ads1115"

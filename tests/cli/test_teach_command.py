@@ -29,7 +29,7 @@ GLOVE = """
 port = "/dev/ttyUSB0"
 sensors = 18
 joints = ["bend", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l", "m", "n", "o", "p", "q", "r"]
-[[scanner]]
+[[stream]]
 port = "/dev/ttyACM0"
 switches = ["s0", "s1", "s2"]
 """

@@ -72,7 +72,7 @@ def glove(tmp_path: Path) -> Path:
     """Return a harness whose board never comes: a run of it goes on all the same."""
     path = tmp_path / "glove.toml"
     names = [f"s{number}" for number in range(6)]
-    path.write_text(f'name = "glove <b>"\n[[scanner]]\nport = "{tmp_path}/none"\nswitches = {json.dumps(names)}\n')
+    path.write_text(f'name = "glove <b>"\n[[stream]]\nport = "{tmp_path}/none"\nswitches = {json.dumps(names)}\n')
     return path
 
 
@@ -213,7 +213,7 @@ def test_monitor_shows_a_run_elsewhere(
     with monitor.page() as live:
         assert told(live, "build")["grasps"] == ["cup", "pen", "rod", "none"]
         assert told(live, "frame")["grasp"] == "unknown"
-        assert told(live, "health")["devices"][0]["name"].startswith("scanner")
+        assert told(live, "health")["devices"][0]["name"].startswith("stream")
         detailed = told(live, "frame", lambda frame: "closed" in frame)
         assert (detailed["closed"], detailed["joints"], detailed["probabilities"]) == (5 * "0", None, None)
         ask(live, do="record")
@@ -268,7 +268,7 @@ def test_what_is_no_recording_is_refused(thenar: Thenar, build_folder: Path, rec
         assert done.returncode == 2, done.stderr
         assert said in " ".join(done.stderr.split())
         assert "Traceback" not in done.stderr
-    other = recording.read_bytes().replace(b"scanner", b"scannen")
+    other = recording.read_bytes().replace(b"[[stream", b"[[strean")
     (tmp_path / "other.mcap").write_bytes(other)
     done = thenar("monitor", tmp_path / "other.mcap", "--build", build_folder)
     assert done.returncode == 2

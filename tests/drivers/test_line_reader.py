@@ -6,12 +6,13 @@ import socket
 import sys
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from time import monotonic, monotonic_ns
 
 import pytest
 
-from thenar.drivers.emulated.lines import DatagramLines, LineSender, SocketLines, lines_like
+from thenar.drivers.emulated.lines import BoardSender, DatagramLines, LineSender, SocketLines, lines_like
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.line_reader import LineReader, line_port_fault
@@ -51,6 +52,21 @@ def test_the_same_rows_come_by_every_way(way: tuple[str, Send]) -> None:
         reader.close()
         reader.open()
         assert heard(reader, 2)
+
+
+def test_a_board_is_emulated_with_names_numbers_and_its_clock(way: tuple[str, Send]) -> None:
+    port, send = way
+    with LineReader(port) as reader, BoardSender(send, ("a", "b"), ("i",), 200) as sender:
+        reader.open()
+        sender.show({"b": 1, "i": 511.6})
+        rows = heard(reader, 250)
+        assert {row.names for row in rows} == {("a", "b", "i")}
+        assert rows[-1].values == (0, 1, 512)
+        first, times = rows[0].sequence or 0, [row.time_s or 0.0 for row in rows]
+        assert [row.sequence for row in rows] == list(range(first, first + 250))
+        assert all(earlier < later for earlier, later in pairwise(times))
+        assert 1.0 < times[-1] - times[0] < LONG_S
+        assert reader.counts().damaged <= 1  # cut by the beginning
 
 
 def test_a_datagram_holds_several_lines_and_its_last_needs_no_end() -> None:

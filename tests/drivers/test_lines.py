@@ -1,12 +1,27 @@
 """Lines of numbers, whatever comes between them."""
 
 import json
+from typing import NamedTuple
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.lines import LONGEST, Header, LineParser, Row, Splitter, parsed
+from thenar.drivers.lines import (
+    CLOCK_US,
+    LONGEST,
+    SEQUENCES,
+    Damaged,
+    Header,
+    LineCounts,
+    LineParser,
+    Row,
+    Splitter,
+    checked,
+    parsed,
+    switches_field,
+)
 
 numbers = st.floats(-1e9, 1e9).map(lambda number: round(number, 6))
 rows = st.lists(numbers, min_size=2, max_size=8)
@@ -140,3 +155,152 @@ def test_ten_megabytes_without_a_line_feed_fill_no_memory_and_the_next_row_count
     assert splitter.overlong == 1
     assert splitter.feed(b"7" * (LONGEST + 1) + b"\n3,4\n") == [b"3,4"]
     assert splitter.overlong == 2
+
+
+class Sent(NamedTuple):
+    """A board's row as its sketch has it."""
+
+    sequence: int
+    clock_us: int
+    closed: tuple[bool, ...]
+    readings: tuple[int | None, ...]
+
+    def line(self) -> bytes:
+        mask = sum(1 << switch for switch, closed in enumerate(self.closed) if closed)
+        readings = ("" if reading is None else str(reading) for reading in self.readings)
+        head = ("row", str(self.sequence), str(self.clock_us), switches_field(mask, len(self.closed)))
+        return checked((*head, *readings))
+
+    def row(self, names: tuple[str, ...] | None) -> Row:
+        values = (*map(float, self.closed), *(None if reading is None else float(reading) for reading in self.readings))
+        return Row(names, values, self.clock_us / 1e6, sequence=self.sequence)
+
+
+board_names = st.text(st.characters(categories=("L", "N", "P", "S"), exclude_characters=",*$"), min_size=1)
+readings = st.lists(st.none() | st.integers(-(10**9), 10**9), max_size=4).map(tuple)
+sent_rows = st.builds(
+    Sent,
+    st.integers(0, SEQUENCES - 1),
+    st.integers(0, CLOCK_US - 1),
+    st.lists(st.booleans(), max_size=9).map(tuple),
+    readings,
+).filter(lambda sent: bool(sent.closed or sent.readings))
+
+
+@st.composite
+def boards(draw: st.DrawFn) -> tuple[LineParser, Sent, tuple[str, ...]]:
+    """Return a row, the names of its columns, and a parser that knows them."""
+    sent, parser = draw(sent_rows), LineParser()
+    columns = len(sent.closed) + len(sent.readings)
+    called = tuple(draw(st.lists(board_names, min_size=columns, max_size=columns, unique=True)))
+    assert parser.feed(checked(("columns", *called))) == []
+    return parser, sent, called
+
+
+@given(boards())
+def test_what_a_board_prints_is_its_row(case: tuple[LineParser, Sent, tuple[str, ...]]) -> None:
+    parser, sent, called = case
+    assert parsed(checked(("columns", *called)).strip()) == Header(called)
+    assert parser.feed(sent.line()) == [sent.row(called)]
+    assert parser.feed(sent.line().replace(b"\r", b"")) == [sent.row(called)]
+    assert LineParser(len(called)).feed(sent.line()) == [sent.row(None)]
+    assert parser.counts == LineCounts()
+
+
+@given(boards(), st.data())
+def test_no_change_and_no_loss_of_one_byte_makes_another_row(
+    case: tuple[LineParser, Sent, tuple[str, ...]], data: st.DataObject
+) -> None:
+    """Nor of a line without CR, whose lost end joins it to the next one."""
+    parser, sent, called = case
+    whole = sent.line().replace(b"\r", b"" if data.draw(st.booleans()) else b"\r")
+    place = data.draw(st.integers(0, len(whole) - 1))
+    other = data.draw(st.binary(max_size=1))
+    rows = parser.feed(whole[:place] + other + whole[place + 1 :] + whole)
+    assert len(rows) <= 2
+    assert set(rows) <= {sent.row(called)}
+    parser.feed(b"\n")
+    assert parser.feed(whole) == [sent.row(called)]
+
+
+@given(boards(), st.binary(max_size=60), st.integers(0, 99))
+def test_a_line_without_a_checksum_is_no_row_of_a_board(
+    case: tuple[LineParser, Sent, tuple[str, ...]], noise: bytes, at: int
+) -> None:
+    parser, sent, _ = case
+    assert parser.feed(b"\n1,2,3\n" + str(at).encode() + b"\nms,thumb\n" + noise.replace(b"$", b"") + b"\n4,5\n") == []
+    assert parser.feed(sent.line())
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        "row,1,2,5,7,8",  # a switch more than there are
+        "row,1,2,03,7,8",
+        "row,1,2,,7,8",
+        "row,1,2,a,7,8",
+        "row,1,2,+1,7,8",
+        "row,65536,2,1,7,8",
+        "row,1,4294967296,1,7,8",
+        "row,-1,2,1,7,8",
+        "row,1,2,1,7,8.5",
+        "row,1,2,1,7, 8",
+        "row,1,2,1,7,8,9,10,11",
+        "row,1,2",
+        "columns",
+        "columns,a,a",
+        "columns,a,,b",
+        "columns,a,b\0",
+    ],
+)
+def test_a_line_of_another_form_is_damaged(fields: str) -> None:
+    parser = LineParser()
+    parser.feed(checked(("columns", "a", "b", "c", "d")))
+    assert parser.feed(checked(fields.split(","))) == []
+    assert parser.counts == LineCounts(damaged=1)
+    assert parser.feed(checked(("row", "1", "2", "1", "7", "8")))[0].values == (1, 0, 7, 8)
+
+
+def test_a_row_before_its_columns_is_left_out_and_begin_forgets_them() -> None:
+    parser, row = LineParser(), checked(("row", "1", "2", "1", "7"))
+    for _ in range(2):
+        assert parser.feed(row) == []
+        assert len(parser.feed(checked(("columns", "a", "b")) + row)) == 1
+        parser.begin()
+    assert parser.counts == LineCounts()
+    assert parser.feed(checked(("GPGLL", "1")) + b"$1,2\n") == []
+    assert parser.counts.misfits + parser.counts.damaged == 2
+    assert isinstance(parsed(b"$row,1"), Damaged)
+
+
+@given(st.integers(0, CLOCK_US - 1), st.lists(st.integers(-(10**6), CLOCK_US // 2 - 1), max_size=20))
+def test_the_clock_goes_on_where_it_begins_again(first: int, steps: list[int]) -> None:
+    parser, clock_us = LineParser(1), first
+    for step in (0, *steps):
+        clock_us += step
+        (row,) = parser.feed(checked(("row", "0", str(clock_us % CLOCK_US), "", "5")))
+        assert row.time_s == clock_us / 1e6
+
+
+# Of 10^5 lines: how many count with other content than was sent. XOR misses an even number of lost bytes of one value.
+WRONG = {"1 in 100": 358, "two": 3_762, "burst": 93}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pattern", WRONG)
+def test_lost_bytes_that_the_checksum_does_not_show(pattern: str) -> None:
+    """A row of 16 switches and 8 joints, of which bytes are lost at random, or up to 64 in a row, line ends too."""
+    random, parser, wrong = np.random.default_rng(1), LineParser(24), 0
+    for number in range(100_000):
+        closed, codes = tuple((random.random(16) < 0.5).tolist()), tuple(random.integers(0, 1024, 8).tolist())
+        sent = Sent(number % SEQUENCES, number * 5000 % CLOCK_US, closed, codes)
+        line = np.frombuffer(sent.line(), dtype=np.uint8)
+        if pattern == "burst":
+            lost = random.integers(len(line)) + np.arange(random.integers(2, 65))
+        elif pattern == "two":
+            lost = random.choice(len(line), 2, replace=False)
+        else:
+            lost = np.flatnonzero(random.random(len(line)) < 0.01)
+        rows = parser.feed(np.delete(line, lost[lost < len(line)]).tobytes())
+        wrong += any(row != sent.row(None) for row in rows)
+    assert wrong == WRONG[pattern]

@@ -1,4 +1,4 @@
-"""What holds for everything that reads bytes from a line, whatever the bytes: no errors of others, no look ahead, no
+"""What holds for what reads a CyberGlove's bytes, whatever they are: no errors of others, no look ahead, no
 growth, and back in step within one frame of any damage.
 """
 
@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers import cyberglove_protocol, scanner_protocol
+from thenar.drivers import cyberglove_protocol
 from thenar.drivers.cyberglove_protocol import (
     INFORMATION,
     REPLY_BYTES,
@@ -23,9 +23,7 @@ from thenar.drivers.cyberglove_protocol import (
     setting,
 )
 from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts, GloveState
-from thenar.drivers.scanner_protocol import FromBoard, Heartbeat, MessageError, State, frame, from_board
 
-KEYS = 40
 Feed = Callable[[bytes], list[Any]]
 
 
@@ -49,33 +47,9 @@ def glove(sensors: int, status: bool) -> Parser:
     return Parser(make, tuple(map(cyberglove_protocol.encode, records)), sensors + 5)
 
 
-def scanner(read: Callable[[scanner_protocol.Frame], Any]) -> Parser:
-    def make() -> tuple[Feed, Callable[[], int]]:
-        decoder = scanner_protocol.FrameDecoder()
-        return (
-            lambda chunk: [read(received) for received in decoder.feed(chunk)],
-            lambda: len(decoder._pieces._rest),
-        )
-
-    every = (1 << KEYS) - 1
-    messages: list[FromBoard] = [State(0, KEYS), State(every, KEYS), Heartbeat(0, 0, KEYS)]
-    messages.append(Heartbeat(2**32 - 1, every, KEYS))
-    frames = tuple(scanner_protocol.encode(frame(message, number)) for number, message in enumerate(messages))
-    return Parser(make, frames, scanner_protocol.MAX_PAYLOAD + scanner_protocol.OVERHEAD)
-
-
-def message_or_misfit(received: scanner_protocol.Frame) -> Any:
-    try:
-        return from_board(received, KEYS)
-    except MessageError as error:
-        return str(error)
-
-
 PARSERS = {
     "glove of 18": glove(18, status=False),
     "glove of 22 with status": glove(22, status=True),
-    "scanner frames": scanner(lambda received: received),
-    "scanner messages": scanner(message_or_misfit),
 }
 NAMES = st.sampled_from(sorted(PARSERS))
 

@@ -56,9 +56,11 @@ address = 0x21
 closed = "high"
 mux = {{ address = 0x70, channel = 2 }}
 pins = {{ P00 = "finger_3", P17 = "finger_4" }}
-[[scanner]]
+[[stream]]
 port = "/dev/ttyACM0"
-switches = ["finger_5", ""]
+switches = ["finger_5"]
+[stream.board]
+pins = {{ finger_5 = "2" }}
 [debounce]
 press_lockout_ms = 5
 release_ms = 10

@@ -118,6 +118,6 @@ def test_thousands_of_mutants_of_every_format_are_read_or_refused() -> None:
 def test_mutants_that_coverage_guides_are_read_or_refused() -> None:
     if importlib.util.find_spec("atheris") is None:
         (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)("atheris is missing")
-    formats = ("tables.bin", "glove.toml", "cyberglove", "scanner", "mcap")
+    formats = ("tables.bin", "glove.toml", "cyberglove", "lines", "mcap")
     told = run("--guided", "--mutants", "2000", "--formats", ",".join(formats))
     assert all(int(re.findall(rf"\b{re.escape(name)} (\d+)", told)[0]) > 50 for name in formats), told

@@ -28,8 +28,6 @@ from thenar.simulator.playing.performance import Performance, of_scene
 # From showing a frame until it is all that the devices have sent: 10 ms of debounce, 2 to 9 ms on the wires, and what
 # threads and processes of a busy computer need to be woken.
 SETTLE_US = 150_000
-# By so much more a frame of a scanner board may seem to be older than it is: the round trip of a PING.
-TRIP_US = 25_000
 LONG_S = 20.0
 # So many grasps of what is left show that the rest goes on.
 AGAIN = 10
@@ -114,8 +112,7 @@ class Truth:
     def check(self, grasps: Sequence[LiveGrasp], shown: Sequence[Shown]) -> int:
         """Hold every grasp against what was shown when its frames were read; return how many could be.
 
-        In the first SETTLE_US of a row there may be some of the row before. A scanner's age is the most that it may be:
-        a frame may be younger by TRIP_US.
+        In the first SETTLE_US of a row there may be some of the row before.
         """
         checked = 0
         for grasp in grasps:
@@ -126,7 +123,7 @@ class Truth:
             assert (grasp.health in ("ok", "changing")) == (not grasp.lost and not late), grasp
             ages = grasp.switch_age_us, grasp.glove_age_us
             rows = [
-                0 if set(names) <= set(grasp.lost) else _row_at(shown, grasp.time_us - (age or 0), grasp.time_us)
+                0 if set(names) <= set(grasp.lost) else _row_at(shown, grasp.time_us - (age or 0))
                 for names, age in zip((self.switch_names, self.joint_names), ages, strict=True)
             ]
             if rows[0] is not None and rows[1] is not None:
@@ -135,12 +132,10 @@ class Truth:
         return checked
 
 
-def _row_at(shown: Sequence[Shown], time_us: int, latest_us: int) -> int | None:
-    """Return the row that was being shown, None while it was new, and where it was over by TRIP_US or latest_us."""
+def _row_at(shown: Sequence[Shown], time_us: int) -> int | None:
+    """Return the row that was being shown, None while it was new."""
     number = bisect_right(shown, time_us, key=lambda one: one.begun_us) - 1
     if number < 0 or time_us < shown[number].done_us + SETTLE_US:
-        return None
-    if number + 1 < len(shown) and shown[number + 1].begun_us <= min(time_us + TRIP_US, latest_us):
         return None
     return shown[number].row
 
@@ -171,7 +166,7 @@ class Stage:
         shown = [Shown(start_us + row * period_us, time_us, row) for time_us, row in played]
         assert truth.check(grasps, shown) > 0
         settled = [grasp for grasp in grasps if grasp.health == "ok"]
-        rows = {_row_at(shown, oldest_us(grasp), grasp.time_us) for grasp in settled} - {None}
+        rows = {_row_at(shown, oldest_us(grasp)) for grasp in settled} - {None}
         return {row for row in rows if row is not None}
 
     def truth(self, inputs: str) -> Truth:
@@ -235,14 +230,20 @@ def _bus(kept: Sequence[str], others: Sequence[str]) -> str:
     return text
 
 
-def _scanner(kept: Sequence[str], others: Sequence[str]) -> str:
-    keys = [name for pair in zip(kept, ["", *others], strict=False) for name in pair]
-    return f'[[scanner]]\nport = "scanner"\nswitches = {list(map(str, keys))!r}\n'
+def _board(kept: Sequence[str], others: Sequence[str]) -> str:
+    """Return a board on whose I2C bus every second switch is one of the kept ones."""
+    names = [str(name) for pair in zip(kept, others, strict=False) for name in pair]
+    text = f'[[stream]]\nport = "board"\nbaud = 1000000\nrate_hz = 200\nswitches = {names!r}\n[stream.board]\n'
+    for number, first in enumerate(range(0, len(names), 16)):
+        text += f'[[stream.board.chip]]\nkind = "pca9555"\naddress = {0x20 + number}\n[stream.board.chip.pins]\n'
+        pins = enumerate(names[first : first + 16])
+        text += "".join(f'P{bit // 8}{bit % 8} = "{name}"\n' for bit, name in pins)
+    return text
 
 
 @pytest.fixture(scope="session")
 def harness_of(stage: Stage) -> Callable[..., Harness]:
-    """Return what makes a harness of "glove", "scanner" and "bus"; switches are shared between the latter two."""
+    """Return what makes a harness of "glove", "board" and "bus"; switches are shared between the latter two."""
 
     def make(inputs: str, *parts: str, glove: str = "") -> Harness:
         kept = stage.truth(inputs).switch_names
@@ -250,8 +251,8 @@ def harness_of(stage: Stage) -> Callable[..., Harness]:
         boards = kept[: len(kept) // 3] if "bus" in parts else kept
         text = 'name = "bench"\n'
         text += f'[cyberglove]\nport = "glove"\n{glove}\n' if "glove" in parts else ""
-        text += _scanner(boards, others) if "scanner" in parts else ""
-        text += _bus(kept[len(boards) :] if "scanner" in parts else kept, others[50:]) if "bus" in parts else ""
+        text += _board(boards, others) if "board" in parts else ""
+        text += _bus(kept[len(boards) :] if "board" in parts else kept, others[50:]) if "bus" in parts else ""
         return parse_harness(text, "glove.toml")
 
     return make

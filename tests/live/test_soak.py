@@ -48,7 +48,7 @@ def samples(
 ) -> Sequence[Sample]:
     folder, truth = tmp_path_factory.mktemp("soak"), stage.truth("both")
     (folder / "calibration.toml").write_text(stage.performance.calibration.to_toml())
-    harness = harness_of("both", "glove", "scanner", glove='calibration = "calibration.toml"')
+    harness = harness_of("both", "glove", "board", glove='calibration = "calibration.toml"')
     (folder / "glove.toml").write_text(harness_to_toml(harness))
     np.savez(folder / "rows.npz", bits=truth.bits, sensors=stage.performance.sensors)
     inputs = [stage.builds["both"], folder / "glove.toml", folder / "rows.npz", folder]

@@ -169,7 +169,7 @@ def test_what_only_some_effects_need_is_imported_for_these_alone(audits: dict[tu
     needed = {
         "thenar.simulator.pipeline.wire": (ONE, OTHER),
         "thenar.simulator.pipeline.parts": (ONE, OTHER),
-        "thenar.drivers.scanner_protocol": (ONE, OTHER),
+        "thenar.drivers.lines": (ONE, OTHER),
     }
     for module, scenes in needed.items():
         for listed, audit in {**audits, (): bare}.items():

@@ -17,7 +17,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.lines import BoardSender
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.simulator.playing.performance import Performance
 
@@ -28,8 +28,10 @@ GLOVE = """name = "bench"
 [cyberglove]
 port = "{folder}/glove"
 calibration = "{folder}/wearer.toml"
-[[scanner]]
-port = "{folder}/scanner"
+[[stream]]
+port = "{folder}/board"
+baud = 1000000
+rate_hz = 200
 switches = {switches}
 """
 
@@ -120,16 +122,16 @@ class Wearer:
         (folder / "wearer.toml").write_text(performance.calibration.to_toml())
         (folder / "glove.toml").write_text(GLOVE.format(folder=folder, switches=names))
         sensors = len(performance.calibration.sensors)
-        self.scanner_line = stack.enter_context(PtyLine(folder / "scanner", 1_000_000))
+        self.board_line = stack.enter_context(PtyLine(folder / "board", 1_000_000))
         self.glove_line = stack.enter_context(PtyLine(folder / "glove"))
-        self.scanner = stack.enter_context(EmulatedScanner(self.scanner_line, len(names)))
+        self.board = stack.enter_context(BoardSender(self.board_line.send, names, (), 200))
         self.glove = stack.enter_context(EmulatedCyberGlove(self.glove_line, sensors=sensors))
         self.show(0)
 
     def show(self, row: int) -> int:
         """Hold what a row of the performance holds; return how many switches are closed."""
         bits = self.performance.switches[row]
-        self.scanner.set(sum(1 << number for number, closed in enumerate(bits.tolist()) if closed))
+        self.board.show(dict(zip(self.performance.switch_names, bits.tolist(), strict=True)))
         self.glove.set(self.performance.sensors[row].tobytes())
         return int(bits.sum())
 

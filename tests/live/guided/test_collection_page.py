@@ -177,7 +177,7 @@ def test_the_countdown_waits_for_devices_that_are_lost(
     page = browser.see(going.url)
     page.until("ready")
     page.wait(lambda: page.text("stage") == "Enter starts the countdown" and page.offered()[0].startswith("start"))
-    wearer.scanner_line.unplug()
+    wearer.board_line.unplug()
     page.wait(lambda: page.text("stage").startswith("the countdown waits: ") and "start" not in page.offered()[0])
     lost = page.texts("#devices [data-is=bad]")
     assert len(lost) == 1
@@ -192,7 +192,7 @@ def test_the_countdown_waits_for_devices_that_are_lost(
     assert page.text("link").startswith("page: connected since ")
     assert page.axe() == []
     page.picture("collect-lost-1400-light")
-    wearer.scanner_line.replug()
+    wearer.board_line.replug()
     wearer.glove_line.replug()
     page.wait(lambda: page.text("stage") == "Enter starts the countdown" and page.offered()[0].startswith("start"))
     captured(page)
@@ -201,7 +201,7 @@ def test_the_countdown_waits_for_devices_that_are_lost(
 def test_without_devices_there_is_neither_a_page_nor_a_file(
     record: Callable[..., Command], wearer: Wearer, tmp_path: Path
 ) -> None:
-    wearer.scanner.close()
+    wearer.board.close()
     wearer.glove.close()
     (tmp_path / "glove.toml").write_text('name = "gone"\n[cyberglove]\nport = "nowhere"\n')
     going = record("--no-none")

@@ -102,7 +102,7 @@ def test_sda_that_a_few_transfers_clock_free_heals_by_itself(run: MakeRun) -> No
 
 
 def test_an_adapter_that_is_pulled_out_is_missed_and_found_again(run: MakeRun, outage: Outage) -> None:
-    running = run("both", "glove", "scanner", "bus")
+    running = run("both", "glove", "board", "bus")
     scene, client, i2c = running.scene, running.start(), running.bench.i2c
     scene.settled(0)
     held = client.held
@@ -113,13 +113,13 @@ def test_an_adapter_that_is_pulled_out_is_missed_and_found_again(run: MakeRun, o
     assert client.end() == 0
 
 
-@pytest.mark.parametrize("part", ["glove", "scanner"])
+@pytest.mark.parametrize("part", ["glove", "board"])
 def test_beside_a_bus_the_serial_devices_come_and_go_likewise(run: MakeRun, outage: Outage, part: str) -> None:
-    running = run("both", "glove", "scanner", "bus")
+    running = run("both", "glove", "board", "bus")
     scene, client = running.scene, running.start()
     scene.settled(0)
     held = client.held
-    number = ["glove", "scanner"].index(part)
+    number = ["glove", "board"].index(part)
     boards = set(scene.truth.switch_names) - everything_on_the_bus(running)
     lost = [set(scene.truth.joint_names), boards][number]
     cable = running.bench.lines[number]

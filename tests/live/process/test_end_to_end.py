@@ -27,7 +27,7 @@ PLAYED_US = 1_000_000
 
 @pytest.mark.parametrize(
     ("inputs", "parts"),
-    [("switches", ("bus",)), ("both", ("glove", "bus")), ("both", ("glove", "scanner", "bus"))],
+    [("switches", ("bus",)), ("both", ("glove", "bus")), ("both", ("glove", "board", "bus"))],
     ids=["bus", "glove and bus", "all"],
 )
 def test_what_is_recognised_is_the_offline_classification_frame_by_frame_and_replays_the_same(
@@ -93,7 +93,7 @@ class Played(msgspec.Struct):
 
 def test_emulate_plays_a_set_and_run_recognises_it_row_by_row(run: MakeRun, stage: Any, tmp_path: Path) -> None:
     """Two commands, as a user has them; default policy, so that only the candidate is of the frame alone."""
-    running = run("both", "glove", "scanner", "bus")
+    running = run("both", "glove", "board", "bus")
     scene, glove = running.scene, tmp_path / "glove.toml"
     own = tmp_path / "own"
     own.mkdir()

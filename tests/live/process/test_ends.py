@@ -29,7 +29,7 @@ SETTLE_US = 150_000
 def test_a_signal_ends_a_run_cleanly_with_its_recording_closed(
     run: MakeRun, tmp_path: Path, number: signal.Signals
 ) -> None:
-    running, path = run("both", "glove", "scanner"), tmp_path / "run.mcap"
+    running, path = run("both", "glove", "board"), tmp_path / "run.mcap"
     client = running.start("--record", path)
     running.scene.settled(0)
     assert client.end(number) == 0
@@ -43,7 +43,7 @@ def test_a_signal_ends_a_run_cleanly_with_its_recording_closed(
 
 
 def test_signals_end_a_run_whose_devices_are_all_gone(run: MakeRun) -> None:
-    running = run("both", "glove", "scanner", "bus")
+    running = run("both", "glove", "board", "bus")
     client = running.start()
     running.scene.settled(0)
     for line in running.bench.lines:
@@ -56,7 +56,7 @@ def test_signals_end_a_run_whose_devices_are_all_gone(run: MakeRun) -> None:
 
 
 def test_a_killed_run_leaves_its_recording_and_a_new_one_works_at_once(run: MakeRun, tmp_path: Path) -> None:
-    running, path = run("both", "glove", "scanner", "bus"), tmp_path / "run.mcap"
+    running, path = run("both", "glove", "board", "bus"), tmp_path / "run.mcap"
     scene = running.scene
     client = running.start("--record", path)
     for row in (0, 5, 9):
@@ -94,13 +94,13 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 
 
 def test_a_disk_that_fills_up_loses_what_comes_and_nothing_else(run: MakeRun, small_disk: Path) -> None:
-    running, path = run("both", "glove", "scanner"), small_disk / "run.mcap"
+    running, path = run("both", "glove", "board"), small_disk / "run.mcap"
     full_at(running, path, running.start("--record", path), "No space left on device")
 
 
 def test_a_file_that_may_not_grow_loses_what_comes_and_nothing_else(run: MakeRun, tmp_path: Path) -> None:
     """As a quota that is used up while recording."""
-    running, path = run("both", "glove", "scanner"), tmp_path / "run.mcap"
+    running, path = run("both", "glove", "board"), tmp_path / "run.mcap"
     client = running.start("--record", path)
     running.scene.settled(0)
     resource.prlimit(client.process.pid, resource.RLIMIT_FSIZE, (path.stat().st_size + 5000,) * 2)
@@ -129,7 +129,7 @@ def full_at(running: Any, path: Path, client: Any, reason: str) -> None:
 
 
 def test_a_reader_that_hangs_loses_lines_and_holds_nobody_up(run: MakeRun, tmp_path: Path) -> None:
-    running = run("both", "glove", "scanner")
+    running = run("both", "glove", "board")
     scene, path = running.scene, tmp_path / "grasps"
     client = running.start("--sink", f"unix:{path}")
     scene.settled(0)
@@ -155,7 +155,7 @@ def test_a_reader_that_hangs_loses_lines_and_holds_nobody_up(run: MakeRun, tmp_p
 
 
 def test_a_stdout_that_nobody_reads_holds_nothing_up(run: MakeRun, tmp_path: Path) -> None:
-    running, path = run("both", "glove", "scanner"), tmp_path / "run.mcap"
+    running, path = run("both", "glove", "board"), tmp_path / "run.mcap"
     glove = tmp_path / "glove.toml"
     command = [sys.executable, "-m", "thenar.cli", "run", str(running.build), "--glove", str(glove)]
     command += ["--record", str(path), "--frames", "1500"]
@@ -170,12 +170,12 @@ def test_a_stdout_that_nobody_reads_holds_nothing_up(run: MakeRun, tmp_path: Pat
 
 def test_a_killed_emulator_is_missed_and_its_successor_found(run: MakeRun, stage: Any, tmp_path: Path) -> None:
     """Both are commands here: the ports of the one that is killed stay behind as dead links."""
-    running = run("both", "glove", "scanner")
+    running = run("both", "glove", "board")
     running.bench.close()
     scene, glove = running.scene, tmp_path / "glove.toml"
     source = [str(stage.scene_file(tmp_path)), "--glove", str(glove), "--dir", str(tmp_path / "own")]
     command = [sys.executable, "-m", "thenar.cli", "emulate", *source, "--repeat", "--period-ms", "400"]
-    links = [tmp_path / "own" / name for name in ("cyberglove", "scanner0")]
+    links = [tmp_path / "own" / name for name in ("cyberglove", "stream0")]
     begun_us = running.now_us()
     first = subprocess.Popen(command, stderr=subprocess.DEVNULL)
     client = running.start(glove=tmp_path / "own" / "glove.toml", after=links[1])

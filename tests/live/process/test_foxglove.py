@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 def test_what_foxglove_reads_is_what_the_run_published_and_both_end_together(run: Callable[..., Any]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
-    running = run("both", "glove", "scanner")
+    running = run("both", "glove", "board")
     client = running.start("--sink", f"foxglove:127.0.0.1:{port}")
     scene, truth = running.scene, running.scene.truth
     scene.settled(0)

@@ -71,7 +71,7 @@ class Run:
 
     def damaged(self, line: int) -> int:
         """Return how many messages of a line were counted as none."""
-        kind, counted = [("cyberglove", ("wrong start", "wrong length")), ("scanner", ("damaged", "short"))][line]
+        kind, counted = [("cyberglove", ("wrong start", "wrong length")), ("stream", ("damaged", "misfits"))][line]
         counts = self.counts(kind)
         return sum(counts[name] for name in counted)
 

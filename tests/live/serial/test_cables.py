@@ -10,25 +10,25 @@ Outage = Callable[..., float]
 
 pytestmark = pytest.mark.slow
 
-# The periods of both serial devices are below this.
-PERIOD_US = 10_000
+# The periods of both serial devices are at most this.
+PERIOD_US = 20_000
 
 
-@pytest.mark.parametrize(("line", "lost"), [(0, "joint_names"), (1, "switch_names")], ids=["glove", "scanner"])
+@pytest.mark.parametrize(("line", "lost"), [(0, "joint_names"), (1, "switch_names")], ids=["glove", "board"])
 def test_an_unplugged_port_is_missed_and_found_again(run: MakeRun, outage: Outage, line: int, lost: str) -> None:
-    running = run("both", "glove", "scanner")
+    running = run("both", "glove", "board")
     assert max(running.periods_us()) <= PERIOD_US
     cable = running.bench.lines[line]
     for _ in range(2):
         names = set(getattr(running.scene.truth, lost))
         outage(running.scene, cable.unplug, cable.replug, lost=names, period_us=PERIOD_US)
-    kind = ("cyberglove", "scanner")[line]
+    kind = ("cyberglove", "stream")[line]
     assert running.device(kind).opened == 3
-    assert running.device({"cyberglove": "scanner", "scanner": "cyberglove"}[kind]).opened == 1
+    assert running.device({"cyberglove": "stream", "stream": "cyberglove"}[kind]).opened == 1
 
 
 def test_a_record_that_stays_away_is_late_for_the_grace_before_its_joints_are_lost(run: MakeRun) -> None:
-    running = run("both", "glove", "scanner")
+    running = run("both", "glove", "board")
     grasps, joints = running.scene.grasps, running.scene.truth.joint_names
     running.scene.well(0)
     gone_us = running.now_us()
@@ -36,20 +36,20 @@ def test_a_record_that_stays_away_is_late_for_the_grace_before_its_joints_are_lo
     lost = grasps.wait(lambda grasp: grasp.lost == joints, gone_us)
     late = [grasp for grasp in grasps.since(gone_us) if grasp.health == "degraded" and not grasp.lost]
     assert late
-    assert all(2 * PERIOD_US < grasp.glove_age_us <= 60_000 < lost.glove_age_us for grasp in late)
+    assert all(2 * running.periods_us()[0] < grasp.glove_age_us <= 60_000 < lost.glove_age_us for grasp in late)
 
 
 def test_without_any_port_nothing_is_claimed_and_both_come_back(run: MakeRun, outage: Outage) -> None:
-    running = run("both", "glove", "scanner")
-    glove, scanner = running.bench.lines
+    running = run("both", "glove", "board")
+    glove, board = running.bench.lines
     everything = {*running.scene.truth.switch_names, *running.scene.truth.joint_names}
 
     def unplug() -> None:
         glove.unplug()
-        scanner.unplug()
+        board.unplug()
 
     def replug() -> None:
-        scanner.replug()
+        board.replug()
         glove.replug()
 
     outage(running.scene, unplug, replug, lost=everything, period_us=PERIOD_US)
@@ -58,20 +58,20 @@ def test_without_any_port_nothing_is_claimed_and_both_come_back(run: MakeRun, ou
     assert all((grasp.health, grasp.grasp) == ("unknown", "unknown") for grasp in missed)
 
 
-@pytest.mark.parametrize(("line", "lost"), [(0, "joint_names"), (1, "switch_names")], ids=["glove", "scanner"])
+@pytest.mark.parametrize(("line", "lost"), [(0, "joint_names"), (1, "switch_names")], ids=["glove", "board"])
 def test_a_run_that_begins_without_a_device_finds_it_when_it_comes(run: MakeRun, line: int, lost: str) -> None:
-    running = run("both", "glove", "scanner", unplugged=line)
+    running = run("both", "glove", "board", unplugged=line)
     scene = running.scene
     missing = set(getattr(scene.truth, lost))
     scene.grasps.wait(lambda grasp: set(grasp.lost) == missing, 0)
     assert not any(grasp.health == "ok" for grasp in scene.grasps.all)
-    state = running.device(("cyberglove", "scanner")[line])
+    state = running.device(("cyberglove", "stream")[line])
     assert not state.connected
     assert "there is no such port" in state.error
     plugged_us = running.now_us()
     running.bench.lines[line].replug()
     scene.well(plugged_us)
-    state = running.device(("cyberglove", "scanner")[line])
+    state = running.device(("cyberglove", "stream")[line])
     assert (state.connected, state.error) == (True, "")
 
 
@@ -80,7 +80,7 @@ def test_a_glove_that_is_pulled_from_its_box_gives_no_answer_until_it_is_back(
     run: MakeRun, outage: Outage, mode: str
 ) -> None:
     """Its records go on, with 'eg' at their ends."""
-    running = run("both", "glove", "scanner", glove=f'mode = "{mode}"')
+    running = run("both", "glove", "board", glove=f'mode = "{mode}"')
     glove = running.bench.glove
     outage(
         running.scene,
@@ -94,17 +94,17 @@ def test_a_glove_that_is_pulled_from_its_box_gives_no_answer_until_it_is_back(
 
 
 def test_a_board_that_restarts_is_trusted_again(run: MakeRun) -> None:
-    running = run("both", "glove", "scanner")
+    running = run("both", "glove", "board")
     scene = running.scene
     scene.settled(0)
-    running.bench.scanners[0].reboot()
+    running.bench.streams[0].restart()
     scene.show(5)
     scene.settled(5)
     assert scene.check() > 0
 
 
 def test_a_silent_board_is_missed_though_its_port_is_there(run: MakeRun, outage: Outage) -> None:
-    running = run("both", "glove", "scanner")
+    running = run("both", "glove", "board")
     cable = running.bench.lines[1]
     outage(
         running.scene,
@@ -114,23 +114,3 @@ def test_a_silent_board_is_missed_though_its_port_is_there(run: MakeRun, outage:
         period_us=PERIOD_US,
     )
     assert running.device("cyberglove").opened == 1
-
-
-def test_a_line_that_delays_everything_makes_its_switches_old_and_never_ok(run: MakeRun) -> None:
-    """The delay shows in their age, and what is older than it may be is lost."""
-    running = run("both", "glove", "scanner")
-    scene, cable = running.scene, running.bench.lines[1]
-    scene.settled(0)
-    cable.delay_s = 0.4
-    delayed_us = running.now_us()
-    scene.show(5)
-    scene.grasps.wait(lambda grasp: grasp.time_us > delayed_us + 1_500_000, delayed_us)
-    since = scene.grasps.since(delayed_us + 100_000)
-    assert all(set(running.scene.truth.switch_names) <= set(grasp.lost) for grasp in since)
-    late = [grasp.switch_age_us for grasp in since if grasp.time_us > delayed_us + 500_000]
-    assert min(late) >= 400_000
-    cable.delay_s = 0.0
-    mended_us = running.now_us()
-    scene.well(mended_us)
-    scene.settled(5, mended_us)
-    assert scene.check() > 0

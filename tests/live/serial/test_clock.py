@@ -44,7 +44,7 @@ def test_a_date_that_steps_changes_no_answer_no_age_and_no_recording(
     run: MakeRun, step_date: SetDate, tmp_path: Path, step_s: float
 ) -> None:
     path = tmp_path / "run.mcap"
-    running = run("both", "glove", "scanner", record=path)
+    running = run("both", "glove", "board", record=path)
     scene = running.scene
     scene.settled(0)
     before = scene.grasps.all[-1]

@@ -17,8 +17,8 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize(
     ("inputs", "parts"),
-    [("joints", ("glove",)), ("switches", ("scanner",)), ("both", ("glove", "scanner"))],
-    ids=["glove", "scanner", "both"],
+    [("joints", ("glove",)), ("switches", ("board",)), ("both", ("glove", "board"))],
+    ids=["glove", "board", "both"],
 )
 def test_what_is_recognised_is_the_offline_classification_frame_by_frame(
     run: MakeRun, inputs: str, parts: tuple[str, ...]
@@ -35,12 +35,12 @@ def test_what_is_recognised_is_the_offline_classification_frame_by_frame(
 
 
 def test_a_grasp_that_rests_on_all_devices_comes_with_the_health_of_all(run: MakeRun) -> None:
-    health = run("both", "glove", "scanner").first_health
+    health = run("both", "glove", "board").first_health
     assert [device.connected for device in health.devices] == [True, True]
 
 
 def test_a_recorded_run_replays_to_the_same_grasps_to_the_last_bit(run: MakeRun, tmp_path: Path) -> None:
-    running = run("both", "glove", "scanner", record=tmp_path / "run.mcap")
+    running = run("both", "glove", "board", record=tmp_path / "run.mcap")
     for row in range(10):
         running.scene.show(row)
         running.scene.settled(row)
@@ -56,7 +56,7 @@ def test_a_recorded_run_replays_to_the_same_grasps_to_the_last_bit(run: MakeRun,
 
 def test_a_decision_with_hysteresis_follows_every_frame_that_lasts(run: MakeRun) -> None:
     """The usual policy: a change takes its dwell, and then stands."""
-    running = run("both", "glove", "scanner")
+    running = run("both", "glove", "board")
     recognizer, taken = replace(running.system, policy=Policy()).recognizer(), list[str]()
     running.end()
     for row in range(5):

@@ -12,7 +12,7 @@ Cable = Callable[[bytes], bytes]
 
 pytestmark = pytest.mark.slow
 
-GLOVE, SCANNER = 0, 1
+GLOVE, BOARD = 0, 1
 
 
 class Noise:
@@ -56,7 +56,7 @@ def drop(_random: Random, message: bytes) -> bytes:
     return b""
 
 
-@pytest.mark.parametrize("line", [GLOVE, SCANNER], ids=["glove", "scanner"])
+@pytest.mark.parametrize("line", [GLOVE, BOARD], ids=["glove", "board"])
 @pytest.mark.parametrize("damage", [cut, insert, flip, flood, drop])
 def test_damaged_bytes_give_no_wrong_answer_and_are_over_when_the_cable_is_mended(
     run: MakeRun, line: int, damage: Callable[[Random, bytes], bytes]
@@ -64,7 +64,7 @@ def test_damaged_bytes_give_no_wrong_answer_and_are_over_when_the_cable_is_mende
     """One message in three is damaged, while rows change; a flipped byte of the glove alone may go unnoticed, for its
     records have no checksum, and hold only while it is the newest.
     """
-    running = run("both", "glove", "scanner")
+    running = run("both", "glove", "board")
     scene, cable = running.scene, running.bench.lines[line]
     noise = Noise(damage, 3, 60)
     cable.damage = noise
@@ -83,9 +83,9 @@ def test_damaged_bytes_give_no_wrong_answer_and_are_over_when_the_cable_is_mende
     assert running.damaged(line) > 0 or damage in (drop, flood)
 
 
-@pytest.mark.parametrize("line", [GLOVE, SCANNER], ids=["glove", "scanner"])
+@pytest.mark.parametrize("line", [GLOVE, BOARD], ids=["glove", "board"])
 def test_a_flood_of_zeros_between_messages_holds_nothing_up(run: MakeRun, line: int) -> None:
-    running = run("both", "glove", "scanner")
+    running = run("both", "glove", "board")
     scene, cable = running.scene, running.bench.lines[line]
     for row in range(1, 4):
         for _ in range(20):
@@ -96,7 +96,7 @@ def test_a_flood_of_zeros_between_messages_holds_nothing_up(run: MakeRun, line: 
 
 
 def test_a_run_opens_its_devices_through_noise(run: MakeRun) -> None:
-    running = run("both", "glove", "scanner", damage=Noise(flip, 20, 1))
+    running = run("both", "glove", "board", damage=Noise(flip, 20, 1))
     for line in running.bench.lines:
         line.damage = None
     running.scene.show(3)
@@ -106,7 +106,7 @@ def test_a_run_opens_its_devices_through_noise(run: MakeRun) -> None:
 @pytest.mark.parametrize("mode", ["stream", "poll"])
 def test_a_glove_that_is_asked_for_too_much_is_well_at_the_rate_that_it_can(run: MakeRun, mode: str) -> None:
     """Its records end in 'es': they are measurements all the same, and none of them is taken for late."""
-    running = run("both", "glove", "scanner", glove=f'mode = "{mode}"\nrate_hz = 1000')
+    running = run("both", "glove", "board", glove=f'mode = "{mode}"\nrate_hz = 1000')
     scene = running.scene
     scene.settled(0)
     begin_us = running.now_us()

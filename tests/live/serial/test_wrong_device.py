@@ -1,22 +1,23 @@
 """A wrong device in a port, and then the right one."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from queue import Empty, Queue
 from threading import Event, Thread
 from time import monotonic
-from typing import Any, Protocol
+from typing import Protocol
 
 import pytest
 
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
+from thenar.drivers.emulated.lines import BoardSender
 from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring
+from thenar.drivers.line_reader import LineReader
+from thenar.runtime.harness.wiring import GloveWiring, Harness, StreamWiring
 from thenar.runtime.live.sources import Keeper
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources.cyberglove import GloveDevice
-from thenar.runtime.sources.scanner import ScannerDevice
+from thenar.runtime.sources.rows import RowSource
 
 pytestmark = pytest.mark.slow
 
@@ -61,8 +62,8 @@ class Listener:
         self._line.receive = None
 
 
-def board(line: PtyLine, number: int = 1, **settings: Any) -> EmulatedScanner:
-    return EmulatedScanner(line, len(NAMES), board=ScannerBoard(1, len(NAMES), board=number, **settings))
+def board(line: PtyLine, names: Sequence[str] = NAMES, rate_hz: float = 100.0) -> BoardSender:
+    return BoardSender(line.send, names, (), rate_hz)
 
 
 WRONG: dict[str, Callable[[PtyLine], Wrong]] = {
@@ -70,18 +71,19 @@ WRONG: dict[str, Callable[[PtyLine], Wrong]] = {
     "one that complains": lambda line: Listener(line, b"ERROR\r\n"),
     "one that talks": lambda line: Talker(line, 0.02),
     "one that talks slowly": lambda line: Talker(line, 0.12),
-    "another board": lambda line: board(line, number=7, heartbeat_us=100_000),
-    "a board that sends states": lambda line: board(line, number=7, state_us=1000),
+    "another board": lambda line: board(line, ("x", "y", "z")),
+    "a faster board": lambda line: board(line, ("x", "y", "z"), 1000.0),
     "a glove of 22 sensors": lambda line: EmulatedCyberGlove(line, sensors=22),
 }
-RIGHT: dict[str, Callable[[PtyLine], Wrong]] = {"glove": EmulatedCyberGlove, "scanner": board}
+RIGHT: dict[str, Callable[[PtyLine], Wrong]] = {"glove": EmulatedCyberGlove, "board": board}
 
 
-def device(kind: str, port: Path) -> GloveDevice | ScannerDevice:
+def device(kind: str, port: Path) -> GloveDevice | RowSource:
     if kind == "glove":
         return GloveDevice(GloveWiring(port=str(port)))
-    harness = Harness(name="wrong", scanners=(ScannerWiring(port=str(port), baud=115_200, switches=NAMES),))
-    return ScannerDevice(harness, 0, NAMES, whole_scan(harness, NAMES))
+    harness = Harness(name="wrong", streams=(StreamWiring(port=str(port), rate_hz=100.0, switches=NAMES),))
+    wired = harness.streams[0]
+    return RowSource(LineReader(wired.port, wired.baud), harness, 0, NAMES, whole_scan(harness, NAMES))
 
 
 def lead(link: Path, line: PtyLine) -> None:

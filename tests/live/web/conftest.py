@@ -131,12 +131,12 @@ class Run:
 
 @pytest.fixture
 def run(stage: Any, harness_of: Callable[..., Harness], make_scene: Any, tmp_path: Path) -> Iterator[Callable[[], Run]]:
-    """Return what starts a run of a glove and a scanner board, showing row 0: all is well when it returns."""
+    """Return what starts a run of a glove and a board, showing row 0: all is well when it returns."""
     with ExitStack() as stack:
 
         def start() -> Run:
             scene = make_scene(stage.truth("both"), None)
-            made = Run(stack, scene, harness_of("both", "glove", "scanner"), tmp_path, stage.builds["both"])
+            made = Run(stack, scene, harness_of("both", "glove", "board"), tmp_path, stage.builds["both"])
             scene.show(0)
             scene.well(now_us())
             return made

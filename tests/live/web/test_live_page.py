@@ -129,15 +129,15 @@ def test_what_is_lost_is_named_and_crossed_out(run: Callable[[], Any], browser: 
     browser.open(running.page.server.url)
     shown(browser, running.scene, 0)
     browser.wait(lambda: browser.script(_LOST) == 0)
-    scanner = running.bench.lines[1]
-    scanner.unplug()
+    board = running.bench.lines[1]
+    board.unplug()
     browser.wait(lambda: browser.text("health") == "degraded")
     browser.wait(lambda: browser.texts("#wrong li") == [f"{name}: lost" for name in names])
     browser.wait(lambda: browser.script(_LOST) == len(names))
     browser.wait(lambda: browser.text("hand-says") == f"0 of 0 readable switches closed; {len(names)} lost")
     browser.wait(lambda: " lost since " in browser.text("glove-state"))
     browser.wait(lambda: any("there is no such port" in text for text in browser.texts("#devices td:nth-child(2)")))
-    scanner.replug()
+    board.replug()
     browser.wait(lambda: browser.text("health") == "ok" and browser.script(_LOST) == 0)
     browser.wait(
         lambda: browser.texts("#wrong li") == ["nothing"] and browser.text("glove-state") == "glove: connected"

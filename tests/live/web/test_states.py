@@ -120,13 +120,13 @@ def test_devices_that_are_lost_are_named_and_only_what_is_read_is_counted(
     page: Callable[..., Run], browser: Any
 ) -> None:
     run = page()
-    run.health(("glove", True), ("scanner", True))
+    run.health(("glove", True), ("stream", True))
     run.until(lambda: browser.text("glove-state") == "glove: connected")
     assert browser.text("hand-says") == "2 of 3 switches closed: a, b"
-    run.health(("glove", True), ("scanner", False))
+    run.health(("glove", True), ("stream", False))
     lost = replace(GRASP, grasp="unknown", candidate="unknown", health="unknown", lost=("a", "b", "c"))
     run.until(lambda: browser.text("hand-says") == "0 of 0 readable switches closed; 3 lost", grasp=lost)
-    assert browser.text("glove-state").startswith("glove: scanner lost since ")
+    assert browser.text("glove-state").startswith("glove: stream lost since ")
     part = replace(GRASP, health="degraded", lost=("a",))
     run.until(lambda: browser.text("hand-says") == "1 of 2 readable switches closed; 1 lost: b", grasp=part)
     # Both are silent: moments go on, but what they rest on is old.

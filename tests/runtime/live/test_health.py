@@ -172,7 +172,7 @@ def test_a_report_counts_answers_and_carries_what_drivers_count(build: Build) ->
     for kind, times in (("ok", 3), ("changing", 4), ("degraded", 2), ("unknown", 1)):
         for _ in range(times):
             health.update(grasp(UNKNOWN, kind), None)
-    devices = [DeviceHealth("scanner", connected=False, error="gone", counts=(Count("crc", 4),))]
+    devices = [DeviceHealth("stream", connected=False, error="gone", counts=(Count("crc", 4),))]
     report = health.report(77, devices)
     assert (report.time_us, report.frames, report.changing, report.degraded, report.unknown) == (77, 10, 4, 2, 1)
     assert report.devices == tuple(devices)

@@ -17,10 +17,10 @@ from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine
 
 HARNESS = """
-[[scanner]]
+[[stream]]
 port = "/dev/ttyACM0"
 switches = ["a", "b"]
-taxels = ["pad", "heel"]
+taxels = { pad = [0, 1023], heel = [0, 1023] }
 """
 NEWTONS = Calibration(0, "pad", "N", 0, 0.0, 100, 1.0)
 LINE = TaxelLine("pad", 100, 900, 2.0)

@@ -141,8 +141,8 @@ def test_nothing_is_captured_of_devices_that_are_not_all_there(
 def test_no_countdown_starts_while_a_device_is_lost(guide: Guide, recorder: Recorder) -> None:
     guide.take(0, whole(0))
     assert Key.ACCEPT in guide.offered()
-    guide.take(1, [], ["bench scanner"])
-    assert guide.lost == "bench scanner not connected"
+    guide.take(1, [], ["bench board"])
+    assert guide.lost == "bench board not connected"
     guide.press(1, Key.ACCEPT)
     guide.press(1, Key.REDO)
     assert stage(guide) is Stage.READY
@@ -164,10 +164,10 @@ def test_no_countdown_starts_while_a_device_is_lost(guide: Guide, recorder: Reco
     guide.take(now, whole(now))
     assert stage(guide) is Stage.REVIEW
     # A trial that is kept does not begin the next countdown either; what was captured is still shown.
-    guide.take(now + 1, [], ["glove", "bench scanner"])
+    guide.take(now + 1, [], ["glove", "bench board"])
     assert guide.captured == tuple(whole(now))
     guide.press(now + 1, Key.ACCEPT)
-    assert (guide.stage, guide.done, guide.lost) == (Stage.READY, 1, "glove, bench scanner not connected")
+    assert (guide.stage, guide.done, guide.lost) == (Stage.READY, 1, "glove, bench board not connected")
 
 
 def test_a_frame_as_old_as_may_be_is_captured(guide: Guide) -> None:

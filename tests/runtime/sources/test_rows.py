@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.drivers.line_reader import RowReader
-from thenar.drivers.lines import LineCounts, LineParser, Row
+from thenar.drivers.lines import SEQUENCES, LineCounts, LineParser, Row, checked
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
@@ -68,10 +68,15 @@ Play = Callable[..., tuple[RowSource, Frames]]
 @pytest.fixture
 def play(monkeypatch: pytest.MonkeyPatch) -> Play:
     def played(
-        chunks: Sequence[tuple[int, bytes | Row]], text: str = GLOVE, names: Sequence[str] = NAMES
+        chunks: Sequence[tuple[int, bytes | Row]],
+        text: str = GLOVE,
+        names: Sequence[str] = NAMES,
+        only: Sequence[str] | None = None,
     ) -> tuple[RowSource, Frames]:
         harness = parse_harness(text, "glove.toml")
         source = RowSource(Script([chunk for _, chunk in chunks]), harness, 0, names, whole_scan(harness, names))
+        if only is not None:
+            source.read_only(only)
         source.open()
         frames: Frames = []
         for time_us, _ in chunks:
@@ -229,6 +234,82 @@ def test_more_rows_than_stated_are_said_unless_they_had_been_waiting(play: Play)
     assert source.trouble() == (
         "200 rows a second arrive, but glove.toml says 100: set rate_hz = 200, unless two programs send"
     )
+
+
+BOARD = """
+[debounce]
+enabled = false
+[[stream]]
+port = "x"
+rate_hz = 100
+switches = ["a", "b", "c", "d", "e"]
+joints = { i = [0, 254], k = [0, 254] }
+taxels = { t = [0, 1023], u = [0, 1023] }
+[stream.board]
+pins = { a = "2" }
+"""
+
+
+def board_line(*fields: str | int) -> bytes:
+    return checked(map(str, fields))
+
+
+@given(st.integers(0, SEQUENCES - 1), st.lists(st.integers(1, SEQUENCES - 1), max_size=20))
+def test_the_numbers_of_rows_say_exactly_how_many_are_lost(first: int, steps: list[int]) -> None:
+    watch, number = module.RowWatch(10_000), first
+    watch.row(0, 0.0, number)
+    for step in steps:
+        number = (number + step) % SEQUENCES
+        watch.row(7, 7.0, number)
+    assert (watch.counts.lost, watch.counts.gaps) == (sum(steps) - len(steps), sum(step > 1 for step in steps))
+    watch.begin()
+    watch.row(8, 8.0, (number + 9) % SEQUENCES)
+    assert watch.counts.lost == sum(steps) - len(steps)
+
+
+def test_rows_that_come_seldom_lose_nothing_and_damaged_ones_are_counted(play: Play) -> None:
+    head = board_line("columns", "a", "i")
+    sent = [board_line("row", n, 40_000 * n, n % 2, n) for n in range(9)]
+    sent[5] = sent[5].replace(b"5", b"6", 1)
+    chunks = [(40_000 * n + 500, head + line if n == 0 else line) for n, line in enumerate(sent)]
+    source, frames = play(chunks, BOARD, ("a",), ("i",))
+    assert counted(source) == {"rows": 8, "gaps": 1, "lost": 1, "damaged": 1}
+    assert [frame.time_us for frame in frames if isinstance(frame, GloveFrame)] == [
+        40_000 * n + 500 for n in range(9) if n != 5
+    ]
+    assert source.faults() == "gaps 1, lost 1, damaged 1"
+
+
+@pytest.mark.parametrize(("names", "only"), [(("b", "t>700"), ("k",)), (("t>9", "t>700"), ()), (("e",), ())])
+def test_a_board_may_print_the_kept_elements_only(play: Play, names: tuple[str, ...], only: tuple[str, ...]) -> None:
+    """What it prints is used; what the build does not need is not missed; the harness lists all."""
+    kept = dict.fromkeys(name.partition(">")[0] for name in (*names, *only))
+    switches = [name for name in "abcde" if name in kept]
+    readings = [name for name in "ikt" if name in kept]
+    lines = board_line("columns", *switches, *readings) + board_line(
+        "row", 0, 5, "1" if switches else "", *[800] * len(readings)
+    )
+    source, frames = play([(1_000_000, lines)], BOARD, names, only)
+    glove = [GloveFrame(1_000_000, bytes((0, 255)))] * len(only)
+    codes = (800 if "t" in kept else None, None)
+    assert frames == [SwitchFrame(1_000_000, (1 << len(names)) - 1, 0, (*glove, None)[0], codes), *glove]
+    clipped = {"out of range": 1} if only else {}
+    assert counted(source) == {"rows": 1} | clipped
+    assert source.trouble() == ""
+
+
+def test_a_board_that_lacks_needed_elements_is_told(play: Play) -> None:
+    lines = board_line("columns", "a", "t") + board_line("row", 0, 5, 1, 800)
+    names = ("a", "b", "t>700")
+    source, frames = play([(1_000_000, lines)], BOARD, names, ())
+    assert frames == [SwitchFrame(1_000_000, 0b101, 0b010, None, (800, None))]
+    assert source.trouble() == "its rows lack b: upload this build's sketch"
+    assert counted(source) == {"rows": 1, "missing": 1}
+    source, frames = play([(1_000_000, lines)], BOARD, ("a", "b", "c", "d"), ())
+    assert frames == []
+    assert counted(source) == {"wrong columns": 1}
+    source, _ = play([(1_000_000, lines)], BOARD, ("a",))  # no build: all joints and taxels
+    assert counted(source) == {"wrong columns": 1}
 
 
 def test_times_of_two_clocks_have_no_gap_between_them(play: Play) -> None:

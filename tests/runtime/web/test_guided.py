@@ -30,7 +30,7 @@ SESSION = Session(
     taxels=("p", "q"),
     taxel_calibration=TaxelCalibration(unit="N", taxels=(TaxelLine("p", 100, 900, 2.0),)),
 )
-DEVICES = (DeviceState("glove", True, "", 1), DeviceState("scanner", False, "is gone", 1))
+DEVICES = (DeviceState("glove", True, "", 1), DeviceState("stream", False, "is gone", 1))
 
 
 @pytest.fixture
@@ -78,7 +78,7 @@ def test_what_the_glove_sees(page: GuidePage, guide: Guide) -> None:
     guide.take(180_000, [GloveFrame(180_000, bytes((70, 100)), 3)])
     page.show(180_000, guide, DEVICES)
     assert told(page, "guide")["guide"]["joints"] == [70.0, 50.0]
-    assert seen["devices"][1] == {"name": "scanner", "connected": False, "error": "is gone"}
+    assert seen["devices"][1] == {"name": "stream", "connected": False, "error": "is gone"}
 
 
 def test_joints_of_an_old_record_are_not_told_as_measured(page: GuidePage, guide: Guide) -> None:

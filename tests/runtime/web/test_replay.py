@@ -22,7 +22,7 @@ from thenar.runtime.tables import tables_to_bytes
 from thenar.runtime.web.replay import ReplayPage
 
 NAMES = tuple(f"s{number}" for number in range(6))
-HARNESS = f'name = "mine"\n[[scanner]]\nport = "/dev/none"\nswitches = {list(NAMES)}\n'.replace("'", '"')
+HARNESS = f'name = "mine"\n[[stream]]\nport = "/dev/none"\nswitches = {list(NAMES)}\n'.replace("'", '"')
 HELD_US = 1_000_000
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers import scanner_protocol as scanner
+from thenar.drivers.lines import checked
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import Effect, Setting, Step
@@ -17,7 +17,8 @@ MakeBatch = Callable[..., Batch]
 MakeDraw = Callable[..., Draw]
 MakeSetting = Callable[..., Setting]
 
-FRAMES, STATE_BYTES, RECORD_BYTES = 5, 26, 20
+# $row, five digits, ten digits, a digit for every four of 160 switches, a checksum, and CR LF.
+FRAMES, ROW_BYTES, RECORD_BYTES = 5, 5 + 6 + 11 + 40 + 3 + 2, 20
 
 
 def prepared(effect: Effect, setting: Setting) -> Step:
@@ -76,27 +77,27 @@ def test_more_than_256_frames_still_match(make_sent: Callable, receive: Callable
     assert np.array_equal(batch.bits, bits)
 
 
-def test_bytes_take_ten_bits_each_at_115200_baud_and_wait_for_the_scan_and_the_glove(make_sent: Callable) -> None:
+def test_bytes_take_ten_bits_each_and_wait_for_the_scan_and_the_glove(make_sent: Callable) -> None:
     batch = make_sent(every_10_ms(1), delay_us=np.full(160, 1500))
     at_us = batch.traffic.at_us[0]
-    assert at_us.shape == (FRAMES, STATE_BYTES + RECORD_BYTES)
-    assert at_us[2, 0] == 20_000 + 1500 + 87
-    assert at_us[2, STATE_BYTES - 1] == 20_000 + 1500 + 2257
+    assert at_us.shape == (FRAMES, ROW_BYTES + RECORD_BYTES)
+    assert at_us[2, 0] == 20_000 + 1500 + 10
+    assert at_us[2, ROW_BYTES - 1] == 20_000 + 1500 + 670
     # 18 sensors, a quarter of a millisecond each, and 20 bytes.
     assert at_us[2, -1] == 20_000 + 4500 + 1737
 
 
 def test_a_frame_waits_until_the_line_is_free(make_sent: Callable) -> None:
     batch = make_sent(np.array([[0, 100, 200, 50_000, 50_001]]))
-    at_us = batch.traffic.at_us[0, :, :STATE_BYTES]
-    assert at_us[:, -1].tolist() == [2257, 2 * 2257, 3 * 2257, 52_257, 52_257 + 2257]
-    assert (np.diff(at_us.ravel()) >= 86).all()
+    at_us = batch.traffic.at_us[0, :, :ROW_BYTES]
+    assert at_us[:, -1].tolist() == [670, 2 * 670, 3 * 670, 50_670, 50_670 + 670]
+    assert (np.diff(at_us.ravel()) >= 10).all()
 
 
 def test_what_is_lost_leaves_the_frame_before_in_place(make_sent: Callable, receive: Callable) -> None:
     batch = make_sent(every_10_ms())
     bits, raw = batch.bits, batch.raw
-    lose(batch, (0, 2, 5), (1, 3, STATE_BYTES + 4))
+    lose(batch, (0, 2, 5), (1, 3, ROW_BYTES + 4))
     receive(batch)
     assert batch.lost is not None
     assert np.argwhere(batch.lost).tolist() == [[0, 2], [1, 3]]
@@ -109,22 +110,25 @@ def test_what_is_lost_leaves_the_frame_before_in_place(make_sent: Callable, rece
     assert batch.settled.all()
 
 
-def test_a_lost_end_costs_two_frames(make_sent: Callable, receive: Callable) -> None:
+@pytest.mark.parametrize("lost", [1, 2])
+def test_an_end_of_two_bytes_keeps_rows_apart_if_one_is_lost(make_sent: Callable, receive: Callable, lost: int) -> None:
     batch = make_sent(every_10_ms())
     bits = batch.bits
-    lose(batch, (0, 1, STATE_BYTES - 1))
+    lose(batch, *((0, 1, ROW_BYTES - byte) for byte in range(1, lost + 1)))
     receive(batch)
     assert batch.lost is not None
-    assert np.argwhere(batch.lost).tolist() == [[0, 1], [0, 2]]
-    assert np.array_equal(batch.bits[0, 1:3], bits[0, [0, 0]])
+    assert np.argwhere(batch.lost).tolist() == [[0, 1], [0, 2]][: 2 * (lost - 1)]
+    assert np.array_equal(batch.bits[0, 1:3], bits[0, [0, 0] if lost == 2 else [1, 2]])
 
 
-def test_only_the_states_of_switches_are_taken_for_such(make_sent: Callable, receive: Callable) -> None:
+@pytest.mark.parametrize(
+    "other", [checked(("rows", "1", *["0" * 27, "0" * 26])), checked(("row", "00003", "0000000000", "0" * 38, "5"))]
+)
+def test_only_rows_of_all_switches_are_taken_for_such(make_sent: Callable, receive: Callable, other: bytes) -> None:
     batch = make_sent(every_10_ms(1))
     bits = batch.bits
-    other = scanner.encode(scanner.Frame(scanner.STATE + 1, 3, bytes(20)))
     data = batch.traffic.data.copy()
-    data[0, 3, :STATE_BYTES] = np.frombuffer(other, dtype=np.uint8)
+    data[0, 3, :ROW_BYTES] = np.frombuffer(other, dtype=np.uint8)
     batch.traffic = replace(batch.traffic, data=data)
     receive(batch)
     assert batch.lost is not None
@@ -139,7 +143,7 @@ def test_a_record_in_which_the_glove_complains_is_not_taken(make_sent: Callable,
     data = batch.traffic.data.copy()
     data[0, 2, -3:-1] = list(b"es")
     batch.traffic = replace(batch.traffic, data=data)
-    lose(batch, (0, 1, -1), *((0, 2, place) for place in range(STATE_BYTES, STATE_BYTES + RECORD_BYTES - 3)))
+    lose(batch, (0, 1, -1), *((0, 2, place) for place in range(ROW_BYTES, ROW_BYTES + RECORD_BYTES - 3)))
     receive(batch)
     assert batch.lost is not None
     assert np.flatnonzero(batch.lost[0]).tolist() == [1, 2]
@@ -151,14 +155,14 @@ def test_before_the_first_frame_there_is_no_contact_and_the_first_joints_that_co
 ) -> None:
     batch = make_sent(every_10_ms(1))
     raw = batch.raw
-    lose(batch, (0, 0, 3), (0, 0, STATE_BYTES + 3), (0, 1, STATE_BYTES + 3))
+    lose(batch, (0, 0, 3), (0, 0, ROW_BYTES + 3), (0, 1, ROW_BYTES + 3))
     receive(batch)
     assert not batch.bits[0, 0].any()
     assert np.array_equal(batch.raw[0, :3], raw[0, [2, 2, 2]])
     assert batch.settled.all()
 
 
-@pytest.mark.parametrize("line", [slice(0, STATE_BYTES), slice(STATE_BYTES, None)])
+@pytest.mark.parametrize("line", [slice(0, ROW_BYTES), slice(ROW_BYTES, None)])
 def test_a_repetition_to_which_a_line_brings_nothing_is_not_settled(
     make_sent: Callable, receive: Callable, line: slice
 ) -> None:
@@ -176,6 +180,7 @@ def test_a_repetition_to_which_a_line_brings_nothing_is_not_settled(
 def test_whatever_arrives_is_a_frame_that_was_sent_and_never_a_later_one(
     make_sent: Callable, receive: Callable, seed: int
 ) -> None:
+    """Lost bytes that the checksum does not show are of the number or the clock: the switches have all digits."""
     batch, random = make_sent(every_10_ms()), np.random.default_rng(seed)
     bits = batch.bits
     batch.traffic = replace(batch.traffic, arrives=random.random(batch.traffic.data.shape) > random.random() / 20)
@@ -207,7 +212,7 @@ def test_bytes_are_counted(make_sent: Callable, make_draw: MakeDraw, make_settin
     batch = make_sent(every_10_ms(3))
     draw = make_draw("glove.send", batch)
     prepared(SEND, make_setting(timed=True))(batch, draw)
-    assert draw.draws.counts == {"bytes sent": 3 * FRAMES * (STATE_BYTES + RECORD_BYTES)}
+    assert draw.draws.counts == {"bytes sent": 3 * FRAMES * (ROW_BYTES + RECORD_BYTES)}
 
 
 def test_frames_faster_than_the_line_are_refused(make_setting: MakeSetting) -> None:
