@@ -17,8 +17,8 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from placementlines import CONSOLE, Data, bounded, measured, papers
-from placementtables import bounds, compared, saved
+from placementlines import CONSOLE, Data, measured, papers
+from placementtables import compared, saved
 
 from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.recordings.graspset import GraspSet
@@ -27,7 +27,7 @@ from thenar.compiler.workers import in_workers
 from thenar.simulator.running.simulation import simulate
 from thenar.simulator.scenes.decode import load_scene
 
-FEW, SEED = (2, 4, 8), 1
+SEED = 1
 
 
 def sets(paths: Sequence[Path]) -> dict[str, Callable[[], GraspSet]]:
@@ -69,7 +69,6 @@ def main() -> None:
         for joints in (False, True):
             CONSOLE.print(saved(lines, joints, paper[joints]))
             CONSOLE.print(compared(lines, joints))
-        CONSOLE.print(bounds(list(in_workers(bounded, [(alone, m) for m in FEW], options.jobs))))
         CONSOLE.print(f"{perf_counter() - began:.0f} s, {options.jobs} processes")
 
 

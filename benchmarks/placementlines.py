@@ -11,8 +11,7 @@ from rich.progress import track
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import Fold
-from thenar.compiler.placement.methods.base import BEST, METHODS, PAPERS, Chooser
-from thenar.compiler.placement.optimum import Pairs, Subset, best_subset
+from thenar.compiler.placement.methods.base import METHODS, PAPERS, Chooser
 from thenar.compiler.placement.ports import port_costs
 from thenar.compiler.samples import Columns, Samples
 from thenar.compiler.workers import in_workers
@@ -156,13 +155,6 @@ def measure(task: tuple[Data, str, float | None]) -> Line:
 def papers(data: Data) -> tuple[bool, Point]:
     """Return the result of the paper's placement, and whether it is with joints."""
     return data.joints, Ways(data, PAPERS).pruned()
-
-
-def bounded(task: tuple[Data, int]) -> tuple[int, int, Subset]:
-    """Return m, the pairs alike in the m switches kept by elimination on all rows, and the bounds of the search."""
-    data, m = task
-    columns = METHODS[BEST].chooser(data.learning)(m)
-    return m, Pairs(data.learning).alike(columns), best_subset(data.learning, m, starts=(columns,))
 
 
 def measured(alone: Data, with_joints: Data, paper: dict[bool, Point], jobs: int) -> list[Line]:

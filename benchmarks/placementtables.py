@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from placementlines import MOST, SHOWN, WITHIN, Line, Point
 from rich.table import Table
 
-from thenar.compiler.placement.methods.base import BEST, METHODS
-from thenar.compiler.placement.optimum import Subset
+from thenar.compiler.placement.methods.base import METHODS
 
 
 def saved(lines: Sequence[Line], joints: bool, paper: Point) -> Table:
@@ -49,14 +48,3 @@ def cell(point: Point, size: int) -> str:
 def kind(joints: bool) -> str:
     """Return the inputs, in words."""
     return "switches and joints" if joints else "switches only"
-
-
-def bounds(found: Sequence[tuple[int, int, Subset]]) -> Table:
-    """Return the table of the gap between elimination and the best subset of few switches, chosen on all rows."""
-    found_pairs = (f"{BEST}, %", "best found, %", "none below, %")
-    heads = ("switches", *found_pairs, "at most from the best, points", "programs")
-    table = Table(*heads, title="pairs of rows of different types that look alike, switches only")
-    for m, alike, best in sorted(found, key=lambda one: one[0]):
-        shares = [100 * count / best.pairs for count in (alike, best.alike, best.least)]
-        table.add_row(str(m), *(f"{share:.3f}" for share in shares), f"{shares[0] - shares[2]:.3f}", str(best.nodes))
-    return table

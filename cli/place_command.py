@@ -38,7 +38,7 @@ from .options import (
 if TYPE_CHECKING:
     from thenar.compiler.placement.constraints import Limits
     from thenar.compiler.placement.methods.base import Method
-    from thenar.compiler.placement.placement import Exactly, Placement
+    from thenar.compiler.placement.placement import Placement
     from thenar.compiler.placement.ports import PortCosts
     from thenar.compiler.placement.tree import Tree
     from thenar.compiler.recordings.graspset import GraspSet
@@ -53,7 +53,6 @@ class _Asked:
     method: str | None
     prune: int
     keep: int | None
-    exact: bool
     joints: bool
     levels: int | None
     keep_joints: int | None
@@ -142,7 +141,7 @@ class _Asked:
         from thenar.compiler.recordings.graspset import GraspSet
 
         grasp_set, method = GraspSet.load(self.grasps), self.chosen_by
-        with progress(f"choosing switches by {method.name}") as report:
+        with progress(f"choosing switches by {method.name}"):
             return place(
                 grasp_set,
                 float(self.prune if self.keep is None else self.keep),
@@ -151,8 +150,6 @@ class _Asked:
                 ports=self.ports(grasp_set) if method.uses_ports or self.budget_us is not None else None,
                 limits=self.limits(grasp_set),
                 robust=self.robust,
-                exact=self.exact,
-                on_round=report,
                 levels=self.levels,
                 keep_joints=self.keep_joints,
             )
@@ -173,7 +170,6 @@ class _Asked:
     type=existing_file,
     help="A glove.toml: the costs of its ports, for methods that weigh them.  [default: MCP23017]",
 )
-@click.option("--exact", is_flag=True, help="Also print the gap between the placement and the best of the same size.")
 @click.option("--tree", "show_tree", is_flag=True, help="Also print ID3's tree.")
 @click.option("--draw", type=picture_file, help="Also draw ID3's tree: an .svg or .png file.")
 @click.option("-o", "--output", type=OutputFile(".json"), help="Also store the placement as JSON.")
@@ -190,7 +186,7 @@ def command(**options: Any) -> None:
     Example:
         thenar place set.grasps
         thenar place set.grasps --prune 13 --draw tree.svg -o placement.json
-        thenar place set.grasps --method elimination --keep 16 --exact
+        thenar place set.grasps --method elimination --keep 16
         thenar place set.grasps --method id3-cost --keep 16 --glove glove.toml
         thenar place set.grasps --method elimination --keep 16 --keep-these thumb_distal_5 --apart-mm 8
     """
@@ -240,8 +236,6 @@ def _sentences(placement: "Placement") -> Iterator[str]:
         yield f"{kept}{', in addition to the joints' if placement.joints else ''}. {placement.how}"
     if placement.kept_joints:
         yield f"the kept joints, in addition: {', '.join(placement.kept_joints)}"
-    if placement.exact is not None:
-        yield from _of_exact(placement.exact, len(placement.switches), "elements" if placement.n_taxels else "switches")
 
 
 def _of_tree(placement: "Placement", tree: "Tree") -> Iterator[str]:
@@ -251,23 +245,3 @@ def _of_tree(placement: "Placement", tree: "Tree") -> Iterator[str]:
     elif placement.rows < tree.min_samples:
         yield f"no decision was made: the {placement.rows} rows are fewer than S = {tree.min_samples}"
     yield from tree.remarks("switch")
-
-
-def _of_exact(exact: "Exactly", m: int, elements: str) -> Iterator[str]:
-    if not exact.pairs:
-        yield "all rows are of one grasp type: there is nothing to distinguish"
-        return
-    yield (
-        f"of {exact.pairs:,} pairs of rows of different grasp types, {exact.alike / exact.pairs:.3%} look alike in "
-        f"these {m} {elements}: no classifier distinguishes them"
-    )
-    best = f"the best {m} {elements}"
-    if exact.proved:
-        yield f"{best} leave {exact.best_found / exact.pairs:.3%}, which is proved optimal"
-    else:
-        yield (
-            f"{best} found leave {exact.best_found / exact.pairs:.3%}; no {m} {elements} leave less than "
-            f"{exact.least / exact.pairs:.3%}"
-        )
-    yield f"so this placement is at most {100 * (exact.alike - exact.least) / exact.pairs:.3f} points from the best"
-    yield f"the best found: {', '.join(kept.name for kept in exact.best)}"

@@ -182,44 +182,6 @@ class Bound:
         """Nanoseconds of each port, as integers, so that sums are exact."""
         return [_ns(us) for us in self.ports.us] if self.ports is not None else []
 
-    def holds(self, kept: Sequence[int]) -> bool:
-        """Return whether these elements meet all constraints when added in this order."""
-        return self.whole(kept) and all(self.addable(kept[:place])[one] for place, one in enumerate(kept))
-
-    def whole(self, kept: Sequence[int]) -> bool:
-        """Return whether all elements that must be kept are among these."""
-        return all(not set(group).isdisjoint(kept) for group in self.groups)
-
-    def rows(self, among: NDArray[np.intp]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the constraints as rows (r, v + extra) and bounds (r,) of an integer program: rows @ (x, y) <= bounds.
-
-        x says which of the v elements `among` are kept; y which taxels are kept and which ports are read.
-        """
-        v, (at, place) = len(among), ({int(one): at for at, one in enumerate(among)}, self.taxel[among])
-        taxels = np.unique(place[place >= 0]) if self.limits.taxels is not None else np.zeros(0, np.intp)
-        us = np.array(self._times if self.limits.budget_us is not None else [], np.float64) / 1000
-        width, found = v + len(taxels) + len(us), list[tuple[dict[int, float], float]]()
-        found += [({at: 1.0}, 0.0) for at in np.flatnonzero(self.never[among]).tolist()]
-        found += [({at[one]: -1.0 for one in group}, -1.0) for group in self.groups]
-        one_, other = np.nonzero(np.triu(self.near[np.ix_(among, among)]))
-        found += [({first: 1.0, second: 1.0}, 1.0) for first, second in zip(one_.tolist(), other.tolist(), strict=True)]
-        found += [
-            ({level: 1.0, v + number: -1.0}, 0.0)
-            for number, taxel in enumerate(taxels.tolist())
-            for level in np.flatnonzero(place == taxel).tolist()
-        ]
-        if self.limits.taxels is not None:
-            found.append(({v + number: 1.0 for number in range(len(taxels))}, self.limits.taxels))
-        if self.limits.budget_us is not None and self.ports is not None:
-            first = v + len(taxels)
-            on = [self.ports.port_of[one] for one in among.tolist()]
-            found += [({element: 1.0, first + port: -1.0}, 0.0) for element, port in enumerate(on)]
-            found.append(({first + port: float(each) for port, each in enumerate(us)}, self.limits.budget_us))
-        rows = np.zeros((len(found), width))
-        for number, (row, _) in enumerate(found):
-            rows[number, list(row)] = list(row.values())
-        return rows, np.array([most for _, most in found])
-
     def check(self) -> None:
         """Raise PlacementError if the elements that must be kept break a constraint."""
         limits, kept = self.limits, self.required(())

@@ -24,7 +24,6 @@ from .id3 import grow_id3
 from .inputs import PlacementError
 from .joints import kept_joints
 from .methods.base import METHODS, PAPERS, Method
-from .optimum import Pairs, best_subset
 from .ports import PortCosts
 from .robust import most_robust
 from .tree import Tree
@@ -107,19 +106,6 @@ class Kept(msgspec.Struct, frozen=True, omit_defaults=True):
     above: int | None = None
 
 
-class Exactly(msgspec.Struct, frozen=True):
-    """Pairs of rows of different grasp types that look alike: in the placement, in the best subset of equal size that
-    was found, and a lower bound for all such subsets. proved: the best found is optimal.
-    """
-
-    pairs: int
-    alike: int
-    best_found: int
-    least: int
-    best: tuple[Kept, ...]
-    proved: bool
-
-
 @dataclass(frozen=True, slots=True)
 class Placement:
     """The kept switches of a set, and how they were found.
@@ -129,7 +115,7 @@ class Placement:
     n_switches, n_taxels, n_joints  the numbers of those in the set
     all_names  the names of all elements: switches, and levels of taxels; grasps: the types that occur, which the
                tree's classes index
-    tree       of the paper's ID3; exact: the gap to the optimum, if requested
+    tree       of the paper's ID3
     """
 
     method: str
@@ -141,7 +127,6 @@ class Placement:
     all_names: tuple[str, ...]
     grasps: tuple[str, ...]
     tree: Tree | None = None
-    exact: Exactly | None = None
     kept_joints: tuple[str, ...] = ()
     n_switches: int = 0
     n_taxels: int = 0
@@ -194,7 +179,6 @@ class Placement:
             "sensors": self.sensors,
             "rows": self.rows,
             "fingerprint": self.fingerprint,
-            "exact": self.exact,
         }
         if self.kept_joints:
             found["kept_joints"] = self.kept_joints
@@ -219,8 +203,6 @@ def place(
     method: str = PAPERS,
     joints: bool = False,
     ports: PortCosts | None = None,
-    exact: bool = False,
-    on_round: Progress | None = None,
     levels: int | None = None,
     keep_joints: int | None = None,
     limits: Limits | None = None,
@@ -242,10 +224,6 @@ def place(
         Choose the switches that help most in addition to the joints. Only elimination uses the joints.
     ports : PortCosts or None
         Costs of reading each switch and taxel, for methods that use them; None: all cost the same.
-    exact : bool
-        Also search for the best subset of as many switches.
-    on_round : callable or None
-        Called with (done, all) after every round of that search.
     levels : int, optional
         How many levels of a taxel there are to choose from, at most.
     keep_joints : int, optional
@@ -285,7 +263,6 @@ def place(
         grasps=samples.grasps,
         tree=chosen.tree,
         kept_joints=() if keep_joints is None else _joints_kept(grasp_set, read, chosen.columns, keep_joints, limits),
-        exact=_exactly(samples, chosen.columns, bound, name, on_round) if exact else None,
     )
 
 
@@ -343,15 +320,3 @@ def _joints_kept(
     if not grasp_set.joints:
         raise PlacementError("the set has no joints to choose from: leave --keep-joints out")
     return tuple(grasp_set.joint_names[joint] for joint in kept_joints(samples.keeping(columns), most, limits))
-
-
-def _exactly(
-    samples: Samples,
-    columns: Columns,
-    limits: Bound | None,
-    kept: Callable[[Columns], tuple[Kept, ...]],
-    on_round: Progress | None,
-) -> Exactly:
-    best = best_subset(samples, len(columns), starts=(columns,), on_round=on_round, limits=limits)
-    alike = Pairs(samples).alike(columns)
-    return Exactly(best.pairs, alike, best.alike, best.least, kept(best.columns), best.proved)
