@@ -193,9 +193,8 @@ class PtyLine(Closing):
     paced  False: bytes take no time
 
     `receive` is called from the line's own thread with the client's bytes; `damage` maps every outgoing message to the
-    one after a bad cable, which may be empty; `delay_s` delays outgoing messages. All may be set at any time. Of the
-    messages that wait for the line, or for a client that does not read, the newest 4096 bytes are kept; older messages
-    are dropped whole.
+    one after a bad cable, which may be empty. Both may be set at any time. Of the messages that wait for the line, or
+    for a client that does not read, the newest 4096 bytes are kept; older messages are dropped whole.
 
     Raises DeviceError if the link cannot be created or the system has no pty left.
     """
@@ -204,7 +203,6 @@ class PtyLine(Closing):
         self.link, self.baud = link, baud
         self.receive: Callable[[bytes], None] | None = None
         self.sent_bytes = 0
-        self.delay_s = 0.0
         self._outgoing = Outgoing(BITS_A_BYTE / baud if paced else 0.0, _MOST_WAITING)
         self._unplugged = 0
         self._lock = Lock()
@@ -236,7 +234,7 @@ class PtyLine(Closing):
         if wire is None:
             self._unplugged += 1
             return
-        self._outgoing.put(monotonic() + self.delay_s, data)
+        self._outgoing.put(monotonic(), data)
         wire.wake()
 
     def unplug(self) -> None:

@@ -24,7 +24,7 @@ class Source(ABC):
     Attributes
     ----------
     name : str
-        Its name in messages, with its port: "stream from /dev/ttyACM0".
+        Its name in messages, with its port: "cyberglove at /dev/ttyUSB0".
     owned : int
         The switches that it reads, as bits of the frames; 0 for a source of joints.
     period_us : int
@@ -77,7 +77,7 @@ class SourceKind:
     Attributes
     ----------
     name : str
-        Its name for users: "stream".
+        Its name for users: "cyberglove".
     help : str
         A sentence on the devices that it reads.
     reads : {"switches", "joints"}

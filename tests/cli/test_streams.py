@@ -18,7 +18,8 @@ import pytest
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.graspset import Joint
-from thenar.drivers.emulated.lines import DatagramLines, LineSender, SocketLines
+from thenar.drivers.emulated.lines import BoardSender, DatagramLines, LineSender, SocketLines
+from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime import Build
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.live.replay import replayed
@@ -340,6 +341,35 @@ def test_an_emulated_sender_is_recognised_by_every_way_and_replays_alike(
     assert done.returncode == 0, done.stderr
     assert right(log, out) >= 0.9
     again = list(replayed(Build.load(build_folder), recording))
+    assert [now for _, now in again] == [then for then, _ in again]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("inputs", ["both", "switches", "joints"])
+def test_a_board_that_prints_the_kept_elements_is_recognised_and_recorded_beside_a_harness_of_all(
+    thenar: Thenar, small_set: GraspSet, tmp_path: Path, inputs: str
+) -> None:
+    folder = compile_build(small_set, tmp_path / "build", rounds=5, folds=0, inputs=inputs).folder
+    build = Build.load(folder)
+    switches = tuple(switch.name for switch in build.manifest.switches)
+    joints = tuple(joint.name for joint in build.manifest.joints)
+    port, recording = tmp_path / "port", tmp_path / "run.mcap"
+    (tmp_path / "glove.toml").write_text(
+        f'[[stream]]\nport = "{port}"\nrate_hz = 100\nswitches = {[f"s{number}" for number in range(30)]}\n'
+        f"joints = {{ {', '.join(f'j{number} = [0, 127]' for number in range(9))} }}\n"
+        "taxels = { p0 = [0, 1023] }\n[stream.board]\n"
+    )
+    with PtyLine(port) as line, BoardSender(line.send, switches, joints, 100) as board:
+        board.show(dict.fromkeys(joints, 64.0))
+        run = ("run", folder, "--glove", tmp_path / "glove.toml", "--frames", 300, "--record", recording)
+        done = thenar(*run, "--status")
+    assert done.returncode == 0, done.stderr
+    found = [line for line in map(json.loads, done.stdout.splitlines()) if line["kind"] == "grasp"]
+    # Its columns are named once a second.
+    assert sum(grasp["health"] in ("ok", "changing") for grasp in found) > 150
+    assert not any(grasp["lost"] for grasp in found[-100:])
+    assert "rows lack" not in done.stderr
+    again = list(replayed(build, recording))
     assert [now for _, now in again] == [then for then, _ in again]
 
 

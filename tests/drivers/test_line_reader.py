@@ -61,7 +61,7 @@ def test_a_board_is_emulated_with_names_numbers_and_its_clock(way: tuple[str, Se
         sender.show({"b": 1, "i": 511.6})
         rows = heard(reader, 250)
         assert {row.names for row in rows} == {("a", "b", "i")}
-        assert rows[-1].values == (0, 1, 512)
+        assert list(rows[-1].values) == [0, 1, 512]
         first, times = rows[0].sequence or 0, [row.time_s or 0.0 for row in rows]
         assert [row.sequence for row in rows] == list(range(first, first + 250))
         assert all(earlier < later for earlier, later in pairwise(times))
