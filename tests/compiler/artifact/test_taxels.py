@@ -138,13 +138,6 @@ def test_joints_alone_need_no_thresholds_and_estimators_take_none(padded: GraspS
         compile_estimator(LogitBoostClassifier(), padded, tmp_path / "estimator")
 
 
-def test_pads_are_placed_like_switches(make_set: Make, tmp_path: Path) -> None:
-    with_pads(make_set(subjects=8), 1).save(tmp_path / "set.grasps")
-    assert run(["place", str(tmp_path / "set.grasps"), "-o", str(tmp_path / "placement.json")]) == 0
-    names = {switch["name"] for switch in json.loads((tmp_path / "placement.json").read_bytes())["switches"]}
-    assert {name.partition(">")[0] for name in names} & {pad.name for pad in PADS}
-
-
 def test_the_best_joints_are_chosen_inside_each_fold_and_read_alone(make_set: Make, tmp_path: Path) -> None:
     """A build reads the kept joints, by name; rates are those of builds of the training rows, which keep others."""
     recorded = make_set(subjects=2, joints=3)
