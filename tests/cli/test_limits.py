@@ -30,16 +30,14 @@ def layout(folder: Path) -> Path:
     return folder / "layout.toml"
 
 
-def test_a_placement_obeys_and_its_bound_is_of_those_that_do(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+def test_a_placement_obeys_its_limits(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
     asked = ["--method", "cmim", "--keep", 4, "--keep-these", "s4", "--never", "s2,s5", "--apart-mm", 6]
-    done = thenar("place", set_file, *asked, "--layout", layout(tmp_path), "--exact", "--json")
+    done = thenar("place", set_file, *asked, "--layout", layout(tmp_path), "--json")
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     names = {each["name"] for each in found["switches"]}
     assert "s4" in names
     assert names in ({"s4", "s0"}, {"s4", "s1"})
-    assert found["exact"]["proved"]
-    assert {each["name"] for each in found["exact"]["best"]} in ({"s4", "s0"}, {"s4", "s1"})
 
 
 def test_what_contradicts_or_is_not_known_is_refused(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:

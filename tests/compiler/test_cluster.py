@@ -56,10 +56,6 @@ def test_more_tasks_than_are_handed_out_ahead_are_all_answered(scheduler: str) -
     assert sorted(in_cluster(operator.neg, iter(range(150)), scheduler)) == sorted(-n for n in range(150))
 
 
-def test_no_work_has_no_answers(scheduler: str) -> None:
-    assert list(in_cluster(operator.neg, [], scheduler)) == []
-
-
 def test_both_workers_work_and_this_process_does_not(scheduler: str) -> None:
     assert 1 <= len({*in_cluster(where, range(40), scheduler)} - {os.getpid()}) <= 2
     assert os.getpid() not in {*in_cluster(where, range(4), scheduler)}

@@ -103,37 +103,6 @@ def test_an_additive_logit_becomes_a_build_of_the_columns_that_it_gets(
     assert found.recognised[0].ensemble == np.count_nonzero(pipeline.predict(X) == grasp_set.grasps)
 
 
-Steps = Callable[[int], object]
-
-
-@pytest.mark.parametrize(
-    "step",
-    [
-        lambda s: SelectKBest(k=4),
-        lambda s: VarianceThreshold(0.24),
-        lambda s: ColumnTransformer(
-            [("codes", "passthrough", slice(s, None)), ("switches", SelectKBest(k=2), slice(s))]
-        ),
-    ],
-    ids=["best", "varying", "joints first, then the best switches"],
-)
-def test_a_pipeline_that_selects_columns_becomes_a_build_of_those(
-    step: Steps, grasp_set: GraspSet, X: np.ndarray, tmp_path: Path
-) -> None:
-    s = len(grasp_set.switch_names)
-    pipeline = make_pipeline(step(s), LogitBoostClassifier(rounds=4)).fit(X, grasp_set.labels)
-    made = compile(pipeline, grasp_set, tmp_path / "build", folds=2)
-    inputs = [
-        *(switch.column for switch in made.manifest.switches),
-        *(s + joint.column for joint in made.manifest.joints),
-    ]
-    assert len(inputs) == pipeline[-1].n_features_in_ < X.shape[1]
-    assert inputs == sorted(inputs)
-    found = verify(tmp_path / "build", grasp_set)
-    assert found.holds
-    assert found.recognised[0].ensemble == np.count_nonzero(pipeline.predict(X) == grasp_set.labels)
-
-
 @pytest.mark.parametrize("subjects", [1, 3])
 def test_the_papers_recipe_is_the_same_from_a_pipeline_and_from_compile_build(
     make_set: Callable[..., GraspSet], tmp_path: Path, subjects: int

@@ -165,18 +165,6 @@ def test_files_and_links_by_such_a_name_and_the_boxes_of_others_stay(folder: Pat
     assert names(tmp_path) == before
 
 
-def test_a_ctrl_c_leaves_the_old_folder_and_nothing_beside_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(_box: Path, _target: Path) -> None:
-        raise KeyboardInterrupt
-
-    before = content(folder)
-    monkeypatch.setattr(publication, "_put", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        publish(NEW, folder)
-    assert content(folder) == before
-    assert names(folder.parent) == ["folder"]
-
-
 def test_a_ctrl_c_between_two_renames_brings_the_old_folder_back(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rename = Path.rename
 

@@ -70,8 +70,3 @@ def test_everything_else_stays_as_it_is(text: str) -> None:
 def test_every_text_comes_back_from_its_cell_and_no_cell_is_a_formula(text: str) -> None:
     assert text_of(cell(text)) == text
     assert not cell(text).startswith(("=", "+", "-", "@", "\t", "\r"))
-
-
-@given(TEXTS, TEXTS)
-def test_two_texts_have_two_cells(one: str, other: str) -> None:
-    assert (cell(one) == cell(other)) == (one == other)

@@ -2,7 +2,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 import warnings
 from collections.abc import Generator
@@ -12,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from joblib.externals.loky.process_executor import _ExecutorManagerThread as Manager
 
 from thenar.compiler.workers import MOST_JOBS, Aside, in_workers, workers_of
 
@@ -32,10 +30,6 @@ def test_one_job_is_done_in_this_process_and_several_in_others() -> None:
     assert os.getpid() not in {process for _, process in in_workers(squared_where, range(3), 2)}
 
 
-def test_no_work_has_no_answers() -> None:
-    assert list(in_workers(squared_where, [], 2)) == []
-
-
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_what_is_wrong_in_a_worker_is_raised_here(jobs: int) -> None:
     with pytest.raises(ZeroDivisionError):
@@ -50,33 +44,6 @@ def test_a_worker_that_is_killed_is_an_error_and_the_next_work_has_new_ones() ->
     with pytest.raises(BrokenExecutor, match="ended before its work was done"):
         list(in_workers(killed, range(3), 2))
     assert len(list(in_workers(squared_where, range(3), 2))) == 3
-
-
-def test_an_end_before_the_last_answer_is_quiet_though_loky_looks_for_what_it_cancelled(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def as_if_work_had_just_been_put_in_line(manager: Any, cancel: Any = Manager.flag_executor_shutting_down) -> None:
-        cancel(manager)
-        manager.work_ids_queue.put(-1)
-
-    def hand_out(manager: Any, looks_for_it: Any = Manager.add_call_item_to_queue) -> None:
-        try:
-            looks_for_it(manager)
-        except KeyError:
-            stumbled.append(True)
-            raise
-
-    stumbled: list[bool] = []
-    complaints: list[object] = []
-    monkeypatch.setattr(threading, "excepthook", complaints.append)
-    monkeypatch.setattr(Manager, "flag_executor_shutting_down", as_if_work_had_just_been_put_in_line)
-    monkeypatch.setattr(Manager, "add_call_item_to_queue", hand_out)
-    answers = in_workers(squared_where, count(), 2)
-    assert isinstance(answers, Generator)
-    next(answers)
-    with pytest.raises(KeyboardInterrupt):
-        answers.throw(KeyboardInterrupt)
-    assert (stumbled, complaints) == ([True], [])
 
 
 def test_an_end_before_the_last_answer_warns_of_nothing() -> None:

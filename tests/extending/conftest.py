@@ -6,8 +6,14 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+
+from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.recordings.graspset import Joint
+from thenar.compiler.recordings.taxonomy import own
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "extending"
 
@@ -33,6 +39,57 @@ class Installed:
 
 
 Install = Callable[..., Installed]
+SCENE = """
+seed = 3
+taxonomy = "kamakura14"
+objects = "kamakura14"
+repetitions = {repetitions}
+
+[recording]
+hold_ms = 20
+
+[[subjects]]
+name = "A"
+hand_length_mm = 188
+hand_breadth_mm = 84
+"""
+
+
+@pytest.fixture(scope="session")
+def scene() -> Callable[[int], str]:
+    """Return what makes the scene of one subject and so many repetitions, to which tables may be added."""
+    return lambda repetitions: SCENE.format(repetitions=repetitions)
+
+
+def _sixty(switches: Any, codes: Any = ((),) * 60, joints: tuple[str, ...] = (), names: Any = "") -> GraspSet:
+    labels, names = np.arange(60) % 3, np.array(names or ["cup", "pen", "rod"])
+    return GraspSet(
+        switches=np.asarray(switches, bool),
+        switch_names=tuple(f"s{number}" for number in range(np.shape(switches)[1])),
+        codes=np.asarray(codes, np.uint16),
+        joints=tuple(Joint(name, "deg", 0, 0.0, 255, 127.5) for name in joints),
+        grasps=names[labels],
+        taxonomy=own(names.tolist()),
+        subjects=np.full(60, "A"),
+        objects=np.full(60, "thing"),
+        trials=np.arange(60),
+    )
+
+
+@pytest.fixture(scope="session")
+def sixty() -> Callable[..., GraspSet]:
+    """Return what makes sixty trials of three types in turn from their switches, codes and names of joints."""
+    return _sixty
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with `set.grasps`, in which each type closes a switch of its own, and with `build`, made of it."""
+    folder = tmp_path_factory.mktemp("recorded")
+    grasp_set = _sixty(np.eye(3)[np.arange(60) % 3])
+    grasp_set.save(folder / "set.grasps")
+    compile_build(grasp_set, folder / "build", rounds=10, folds=0, inputs="switches")
+    return folder
 
 
 @pytest.fixture

@@ -9,32 +9,15 @@ from typing import Any
 
 import pytest
 
-SCENE = """
-seed = 3
-taxonomy = "kamakura14"
-objects = "kamakura14"
-repetitions = 3
-
-[recording]
-hold_ms = 20
-
-[[subjects]]
-name = "A"
-hand_length_mm = 188
-hand_breadth_mm = 84
-
-[effects.contact.quasistatic]
-"""
-
 
 @pytest.mark.slow
 def test_a_chip_of_another_package_is_proposed_specified_emulated_and_read(
-    install: Callable[[str, str], Any], tmp_path: Path
+    install: Callable[[str, str], Any], scene: Callable[[int], str], tmp_path: Path
 ) -> None:
     """One file of somebody else's: the chip is offered, wired, listed to buy, and answers on the emulated bus."""
     package = install("chip.py", "thenar.chips")
     grasps, build, glove, spec = (str(tmp_path / name) for name in ("set.grasps", "build", "glove.toml", "spec"))
-    (tmp_path / "scene.toml").write_text(SCENE)
+    (tmp_path / "scene.toml").write_text(scene(3) + "[effects.contact.quasistatic]\n")
     package.thenar("simulate", str(tmp_path / "scene.toml"), "-o", grasps)
     chosen = ("--inputs", "switches", "--prune", "5", "--no-report")
     assert "tca6424a, tca9534; board" in " ".join(package.thenar("compile", "--help").split())

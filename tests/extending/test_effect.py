@@ -9,20 +9,7 @@ import pytest
 
 from thenar.compiler import GraspSet
 
-SCENE = """
-seed = 3
-taxonomy = "kamakura14"
-objects = "kamakura14"
-repetitions = 2
-
-[recording]
-hold_ms = 20
-
-[[subjects]]
-name = "A"
-hand_length_mm = 188
-hand_breadth_mm = 84
-
+SECOND = """
 [[subjects]]
 name = "B"
 hand_length_mm = 181
@@ -31,14 +18,21 @@ hand_breadth_mm = 81
 LISTED = "[effects.joint.offset]\nsd_deg = 6\n"
 
 
+@pytest.fixture
+def scenes(scene: Callable[[int], str], tmp_path: Path) -> tuple[Path, Path]:
+    """Files of two scenes, of which the second lists the effect."""
+    plain, off = tmp_path / "plain.toml", tmp_path / "off.toml"
+    plain.write_text(scene(2) + SECOND)
+    off.write_text(plain.read_text() + LISTED)
+    return plain, off
+
+
 @pytest.mark.slow
 def test_an_effect_of_another_package_is_explained_and_acts_where_a_scene_lists_it(
-    install: Callable[..., Any], tmp_path: Path
+    install: Callable[..., Any], scenes: tuple[Path, Path]
 ) -> None:
     package = install("effect.py", "thenar.effects", "joint.offset")
-    plain, off = tmp_path / "plain.toml", tmp_path / "off.toml"
-    plain.write_text(SCENE)
-    off.write_text(SCENE + LISTED)
+    plain, off = scenes
     assert "joint.offset: joint sensors are off" in package.thenar("simulate", str(off), "--explain")
 
     one, other = (GraspSet.load(simulated(package, scene)) for scene in (plain, off))
@@ -56,13 +50,11 @@ def simulated(package: Any, scene: Path) -> Path:
 
 
 def test_one_that_cannot_be_loaded_disturbs_only_scenes_that_list_it(
-    install: Callable[..., Any], tmp_path: Path
+    install: Callable[..., Any], scenes: tuple[Path, Path]
 ) -> None:
     package = install("effect.py", "thenar.effects", "joint.offset")
     (package.folder / "somebody_elses_effect.py").write_text("raise RuntimeError('no such glove')\n")
-    plain, off = tmp_path / "plain.toml", tmp_path / "off.toml"
-    plain.write_text(SCENE)
-    off.write_text(SCENE + LISTED)
+    plain, off = scenes
     assert "joint.offset" not in package.thenar("simulate", str(plain), "--explain")
     said = package.thenar("simulate", str(off), "--explain", code=2)
     assert "the effect 'joint.offset' (somebody_elses_effect:MEMBER) of another package cannot be loaded" in said

@@ -5,11 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-
-from thenar.compiler import GraspSet, compile_build
-from thenar.compiler.recordings.taxonomy import own
 
 Install = Callable[..., Any]
 SINK = """
@@ -38,24 +34,10 @@ switches = ["s0", "s1", "s2"]
 
 
 @pytest.fixture(scope="module")
-def material(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a set of grasps, a build of it, and a glove that nobody wears."""
-    folder, labels = tmp_path_factory.mktemp("material"), np.arange(60) % 3
-    grasp_set = GraspSet(
-        switches=np.eye(3, dtype=bool)[labels],
-        switch_names=("s0", "s1", "s2"),
-        codes=np.zeros((60, 0), np.uint16),
-        joints=(),
-        grasps=np.array(["cup", "pen", "rod"])[labels],
-        taxonomy=own(["cup", "pen", "rod"]),
-        subjects=np.full(60, "A"),
-        objects=np.full(60, "thing"),
-        trials=np.arange(60),
-    )
-    grasp_set.save(folder / "set.grasps")
-    compile_build(grasp_set, folder / "build", rounds=10, folds=0, inputs="switches")
-    (folder / "glove.toml").write_text(GLOVE)
-    return folder
+def material(recorded: Path) -> Path:
+    """The folder of recordings and a build, with a glove that nobody wears."""
+    (recorded / "glove.toml").write_text(GLOVE)
+    return recorded
 
 
 @pytest.fixture

@@ -10,28 +10,15 @@ import pytest
 from sklearn.feature_selection import chi2
 
 from thenar.compiler import GraspSet
-from thenar.compiler.recordings.taxonomy import own
 
 pytestmark = pytest.mark.slow
 Install = Callable[[str, str], Any]
 
 
 @pytest.fixture(scope="module")
-def small_set() -> GraspSet:
-    random = np.random.default_rng(4)
-    labels = np.arange(60) % 3
+def small_set(sixty: Callable[..., GraspSet]) -> GraspSet:
     patterns = np.array([[0, 0, 1, 1, 0, 1], [0, 1, 0, 1, 1, 0], [1, 0, 0, 1, 1, 1]], bool)
-    return GraspSet(
-        switches=patterns[labels] ^ (random.random((60, 6)) < 0.1),
-        switch_names=tuple(f"s{number}" for number in range(6)),
-        codes=np.zeros((60, 0), np.uint16),
-        joints=(),
-        grasps=np.array(["cup", "pen", "rod"])[labels],
-        taxonomy=own(["cup", "pen", "rod"]),
-        subjects=np.full(60, "A"),
-        objects=np.full(60, "thing"),
-        trials=np.arange(60),
-    )
+    return sixty(patterns[np.arange(60) % 3] ^ (np.random.default_rng(4).random((60, 6)) < 0.1))
 
 
 def test_a_method_of_another_package_is_listed_chosen_by_and_compared(
@@ -89,10 +76,3 @@ def test_a_fault_of_a_method_names_its_package(install: Install, small_set: Gras
         )
         said = there.thenar(*asked, code=2)
         assert f"method 'chi2' chose the columns ({columns[1:-1]}) of 6: each may be chosen once" in said
-
-
-def test_a_wrong_name_lists_it(install: Install, small_set: GraspSet, tmp_path: Path) -> None:
-    file = tmp_path / "set.grasps"
-    small_set.save(file)
-    said = install("method.py", "thenar.methods").thenar("place", str(file), "--method", "chi", "--keep", "4", code=2)
-    assert "there is no method 'chi' (did you mean 'chi2' or 'cmim'?)" in said

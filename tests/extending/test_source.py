@@ -2,6 +2,7 @@ import json
 import socket
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
@@ -11,27 +12,19 @@ import pytest
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.graspset import Joint
-from thenar.compiler.recordings.taxonomy import own
 
-ROWS, HIGH = 60, {"cup": (200, 30), "pen": (30, 200), "rod": (200, 200)}
+HIGH = {"cup": (200, 30), "pen": (30, 200), "rod": (200, 200)}
 
 
 def test_a_source_of_joints_of_ones_own_recognises_live(
-    install: Callable[[str, str], Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    install: Callable[[str, str], Any],
+    sixty: Callable[..., GraspSet],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    names = list(HIGH)
-    labels = np.arange(ROWS) % 3
-    grasp_set = GraspSet(
-        switches=np.zeros((ROWS, 0), bool),
-        switch_names=(),
-        codes=np.array([HIGH[name] for name in names])[labels].astype(np.uint16),
-        joints=tuple(Joint(f"flex_{number}", "raw", 1, 1.0, 255, 255.0) for number in (1, 2)),
-        grasps=np.array(names)[labels],
-        taxonomy=own(names),
-        subjects=np.full(ROWS, "A"),
-        objects=np.full(ROWS, "thing"),
-        trials=np.arange(ROWS),
-    )
+    switches, codes = np.zeros((60, 0)), np.array(list(HIGH.values()))[np.arange(60) % 3]
+    joints = tuple(Joint(f"flex_{number}", "raw", 1, 1.0, 255, 255.0) for number in (1, 2))
+    grasp_set = replace(sixty(switches, codes, ("flex_1", "flex_2")), joints=joints)
     build = compile_build(grasp_set, tmp_path / "build", rounds=10, folds=0, inputs="joints").folder
     (tmp_path / "mine.toml").write_text('name = "mine"\n')
     package, done = install("source.py", "thenar.sources"), Event()

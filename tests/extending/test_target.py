@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
-from thenar.compiler import compile_build
-from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.taxonomy import own
+from thenar.compiler import GraspSet, compile_build
 from thenar.runtime.build import Build
 
 TYPES = ("cup", "pen", "plate")
@@ -36,28 +35,19 @@ int main()
 STRICT = ("-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined")
 
 
-def small_build(folder: Path) -> Build:
+@pytest.fixture
+def build(sixty: Callable[..., GraspSet], tmp_path: Path) -> Build:
     random, labels = np.random.default_rng(3), np.arange(60) % len(TYPES)
-    closed = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 0]], bool)
-    made = GraspSet(
-        switches=closed[labels] ^ (random.random((60, 4)) < 0.1),
-        switch_names=("a", "b", "c", "d"),
-        codes=(60 * labels[:, None] + random.integers(30, 90, (60, 1))).astype(np.uint16),
-        joints=(Joint("thumb", "deg", 0, 0.0, 255, 127.5),),
-        grasps=np.array(TYPES)[labels],
-        taxonomy=own(TYPES),
-        subjects=np.full(60, "A"),
-        objects=np.full(60, "thing"),
-        trials=np.arange(60),
-    )
-    return Build.load(compile_build(made, folder, rounds=10, folds=0).folder)
+    closed = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 0]], bool)[labels] ^ (random.random((60, 4)) < 0.1)
+    made = sixty(closed, 60 * labels[:, None] + random.integers(30, 90, (60, 1)), ("thumb",), TYPES)
+    return Build.load(compile_build(made, tmp_path / "build", rounds=10, folds=0).folder)
 
 
 def test_a_target_of_another_package_is_listed_and_its_firmware_answers_as_python_does(
-    install: Callable[[str, str], Any], tool: Callable[[str], str], tmp_path: Path
+    install: Callable[[str, str], Any], tool: Callable[[str], str], build: Build, tmp_path: Path
 ) -> None:
     compiler = tool("g++")
-    build, made = small_build(tmp_path / "build"), tmp_path / "made"
+    made = tmp_path / "made"
     installed = install("target.py", "thenar.targets")
     assert "one header for C++17" in installed.thenar("firmware", "--help")
     told = installed.thenar("firmware", str(tmp_path / "build"), "--target", "cpp", "-o", str(made))
@@ -76,8 +66,8 @@ def test_a_target_of_another_package_is_listed_and_its_firmware_answers_as_pytho
         assert line.split() == [build.classify(bits, [code]), *map(str, build.scores(bits, [code]))]
 
 
+@pytest.mark.usefixtures("build")
 def test_what_nothing_runs_is_neither_verified_nor_timed(install: Callable[[str, str], Any], tmp_path: Path) -> None:
-    small_build(tmp_path / "build")
     installed = install("target.py", "thenar.targets")
     refused = installed.thenar("firmware", str(tmp_path / "build"), "--target", "cpp", "--measure", code=2)
     assert "firmware for cpp cannot be measured here: thenar has no simulator of a cpp" in refused

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.taxonomy import own
+from thenar.compiler import GraspSet
 
 pytestmark = pytest.mark.slow
 
@@ -18,22 +17,11 @@ TYPES = ("cup", "pen", "plate")
 
 
 @pytest.fixture
-def recordings(tmp_path: Path) -> Path:
-    random, rows = np.random.default_rng(5), 60
-    labels = np.arange(rows) % len(TYPES)
-    closed = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 0]], bool)
-    grasp_set = GraspSet(
-        switches=closed[labels] ^ (random.random((rows, 4)) < 0.1),
-        switch_names=("a", "b", "c", "d"),
-        codes=np.clip(60 * labels[:, None] + random.normal(60, 15, (rows, 2)), 0, 255).astype(np.uint16),
-        joints=tuple(Joint(name, "deg", 0, 0.0, 255, 127.5) for name in ("thumb", "index")),
-        grasps=np.array(TYPES)[labels],
-        taxonomy=own(TYPES),
-        subjects=np.full(rows, "A"),
-        objects=np.full(rows, "thing"),
-        trials=np.arange(rows),
-    )
-    grasp_set.save(tmp_path / "set.grasps")
+def recordings(sixty: Callable[..., GraspSet], tmp_path: Path) -> Path:
+    random, labels = np.random.default_rng(5), np.arange(60) % len(TYPES)
+    closed = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 0]], bool)[labels] ^ (random.random((60, 4)) < 0.1)
+    codes = np.clip(60 * labels[:, None] + random.normal(60, 15, (60, 2)), 0, 255)
+    sixty(closed, codes, ("thumb", "index"), TYPES).save(tmp_path / "set.grasps")
     return tmp_path / "set.grasps"
 
 

@@ -1,6 +1,9 @@
-"""The mutators lie beside the tests that use them, and are found as `run.py` finds them."""
+"""The mutators lie beside the tests that use them, with the made-up frontier, and are found as `run.py` finds them.
+
+Before all else: a package that documentation is made with is called as a module here.
+"""
 
 import sys
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).parent))
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "compiler" / "frontier")]

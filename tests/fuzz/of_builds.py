@@ -12,16 +12,16 @@ from random import Random
 
 import msgspec
 import numpy as np
+from example_frontier import example_frontier
 from material import GRASPS, SWITCHES, Format, build_files, grasp_set, harness, make_folder
 from mutating import Mutate, altered, json_file, npz_file, sealed
 
 from thenar.cli.draw_command import kept_names
 from thenar.compiler.artifact.verify import verify
-from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.firmware.generate import Firmware, sums, write_folder
-from thenar.compiler.frontier import points
 from thenar.compiler.frontier.cache import Store
 from thenar.compiler.frontier.picked import picked
+from thenar.compiler.frontier.points import frontier_to_bytes
 from thenar.compiler.frontier.words import csv_bytes
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.placement.placement import place
@@ -168,66 +168,14 @@ def _folder(data: bytes, folder: Path) -> None:
 
 
 def _frontier() -> list[bytes]:
-    rate = Rate("new subject", "trials", (9,), 10, 2, 0.9, 0.85, 0.95)
-    us = points.Time(12.5, "wire")
-    ways = (
-        points.PlacementChoice("elimination", 4.0),
-        points.PlacementChoice("id3", 2.0),
-        points.PlacementChoice("elimination", 3.0),
+    """Return the made-up frontier with three of its points, of as many wirings, over the switches here."""
+    made, replace = example_frontier(), msgspec.structs.replace
+    points = tuple(
+        replace(made.point(known), number=number, switches=SWITCHES[: number + 1])
+        for number, known in enumerate((1, 9, 10), 1)
     )
-    wirings = (("mcp23017", 400_000), ("as wired", 400_000), ("board", 1_000_000))
-    settings = [
-        points.Recipe(way, "both", 4, 8, "", "single", wiring, clock_hz, 16, None)
-        for way, (wiring, clock_hz) in zip(ways, wirings, strict=True)
-    ]
-    found = points.Frontier(
-        schema=points.SCHEMA,
-        thenar="0.1.0",
-        source="set.grasps",
-        fingerprint=grasp_set().fingerprint(),
-        rows=36,
-        trials=36,
-        subjects=2,
-        by="new subject",
-        n_switches=len(SWITCHES),
-        n_joints=3,
-        grasps=GRASPS,
-        target="host",
-        machine="AMD EPYC, Python 3.11",
-        folds=2,
-        repeats=1,
-        combinations=40,
-        points=tuple(
-            points.Point(
-                number=number,
-                setting=setting,
-                switches=SWITCHES[: number + 1],
-                rate=rate,
-                luck=0.01,
-                frames=rate,
-                other_rate=rate,
-                scan=us,
-                transfer=us,
-                classify=us,
-                frame=us,
-                latency=points.Latency(50.0, 90.0, 0.1, 0.02),
-                flash=900,
-                ram=20,
-                ports=2,
-                chips=1,
-                compile_s=0.5,
-                fronts=("frame", "switches"),
-            )
-            for number, setting in enumerate(settings, 1)
-        ),
-        tried=(points.Tried(ways[0], "both", 4, 4, rate, 25.0),),
-        curves=(points.Curve("elimination", "by tables", True, (1.0, 2.0), (rate, rate)),),
-        marks=(points.Mark("all switches", 6, rate, 40.0, 80.0),),
-        skipped=("no AVR was simulated",),
-        picked=1,
-        wanted="a frame within 20 us",
-    )
-    return [points.frontier_to_bytes(found)]
+    few = {"points": points, "tried": made.tried[:1], "curves": made.curves[:1], "marks": made.marks[:1], "picked": 1}
+    return [frontier_to_bytes(replace(made, fingerprint=grasp_set().fingerprint(), **few))]
 
 
 def _compile_from(data: bytes, folder: Path) -> None:

@@ -31,7 +31,7 @@ Message = tuple[int, int, bytes]
 
 
 @cache
-def _build() -> Build:
+def loaded_build() -> Build:
     with TemporaryDirectory() as folder:
         return Build.load(make_folder(build_files(), Path(folder)))
 
@@ -86,9 +86,9 @@ def _frames(time_us: int) -> Iterator[Message]:
     yield layout.SWITCHES, time_us + 1, encode_bytes(switch_bytes(frame, len(SWITCHES), 18))
 
 
-def _recognised() -> bytes:
+def recognised() -> bytes:
     """Return a run of the build, with what it recognised."""
-    build = _build()
+    build = loaded_build()
     names = tuple(switch.name for switch in build.manifest.switches)
     session = Session(
         thenar="0.1.0",
@@ -117,7 +117,7 @@ def _use(data: bytes, folder: Path) -> None:
     path = folder / "anna.mcap"
     path.write_bytes(data)
     refusals = []
-    for step in (_imported, _streamed, _resumed, _replayed, _played):
+    for step in STEPS:
         try:
             step(path)
         except (ThenarError, OSError) as refusal:
@@ -141,7 +141,7 @@ def _resumed(path: Path) -> None:
 
 
 def _replayed(path: Path) -> None:
-    for _ in replayed(_build(), path):
+    for _ in replayed(loaded_build(), path):
         pass
 
 
@@ -149,4 +149,6 @@ def _played(path: Path) -> None:
     of_recording(path, 10_000)
 
 
-FORMATS = (Format("mcap", lambda: [_collected(), _recognised()], mcap_file, _use),)
+# What is done with a recording.
+STEPS = (_imported, _streamed, _resumed, _replayed, _played)
+FORMATS = (Format("mcap", lambda: [_collected(), recognised()], mcap_file, _use),)

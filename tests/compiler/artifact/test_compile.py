@@ -11,15 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from msgspec import structs
 
 from thenar.compiler import TRAINERS, GraspSet, compile_build, grow_id3
-from thenar.compiler.artifact import CompileError, training
-from thenar.compiler.artifact.training import cuts_of, scores_of
+from thenar.compiler.artifact import CompileError
+from thenar.compiler.artifact.training import cuts_of
 from thenar.compiler.artifact.verify import verify
-from thenar.compiler.evaluation.choosing import choose_training
 from thenar.compiler.evaluation.folds import EvaluationError
-from thenar.compiler.samples import Samples
 from thenar.drivers.errors import ThenarError
 from thenar.runtime import Build
 from thenar.runtime.manifest import Inputs, Options
@@ -115,13 +112,6 @@ def test_frames_of_a_trial_are_one_piece_of_evidence(make_set: Make, tmp_path: P
         assert (trials.correct, trials.total) == (single.correct, single.total)
         assert (frames.correct, frames.total) == (5 * single.correct, 5 * single.total)
     assert (five[3].high or 0) - (five[3].low or 0) > 0.6 * ((five[2].high or 0) - (five[2].low or 0))
-
-
-def test_a_claim_of_independent_rows_is_carried_into_the_build(make_set: Make, tmp_path: Path) -> None:
-    claimed = replace(make_set(frames=2), independent=True)
-    manifest = compile_build(claimed, tmp_path / "build", rounds=2).manifest
-    assert manifest.source.independent
-    assert [(rate.unit, rate.total) for rate in manifest.rates] == [("trials", 192)] * 2
 
 
 def test_frames_that_are_numbered_as_trials_are_refused_before_any_work(make_set: Make, tmp_path: Path) -> None:
@@ -233,12 +223,6 @@ def test_either_kind_of_input_will_do(
     assert Build.load(tmp_path / "build").tables.n_joints == 3 * joints
 
 
-@pytest.mark.parametrize("lacking", [{"switches": 0}, {"joints": 0}])
-def test_recordings_of_one_kind_need_no_option(make_set: Make, tmp_path: Path, lacking: dict[str, int]) -> None:
-    compile_build(make_set(**lacking), tmp_path / "build", rounds=2)
-    assert Build.load(tmp_path / "build").grasps
-
-
 @pytest.mark.parametrize(
     ("shape", "options", "reason"),
     [
@@ -261,12 +245,6 @@ def test_what_makes_no_build_is_refused_and_nothing_written(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_progress_rises_to_the_end(grasp_set: GraspSet, tmp_path: Path) -> None:
-    seen: list[tuple[int, int]] = []
-    compile_build(grasp_set, tmp_path / "build", rounds=3, folds=2, progress=lambda *step: seen.append(step))
-    assert seen == [(1, 9), (2, 9), (3, 9), (6, 9), (9, 9)]
-
-
 def test_an_interrupt_leaves_the_old_build_and_no_litter(grasp_set: GraspSet, tmp_path: Path) -> None:
     def interrupt(done: int, _total: int) -> None:
         if done == 4:
@@ -278,18 +256,6 @@ def test_an_interrupt_leaves_the_old_build_and_no_litter(grasp_set: GraspSet, tm
         compile_build(grasp_set, tmp_path / "build", rounds=5, folds=0, progress=interrupt)
     assert _bytes(tmp_path / "build") == before
     assert [path.name for path in tmp_path.iterdir()] == ["build"]
-
-
-def test_same_recordings_and_options_give_the_same_bytes(make_set: Make, tmp_path: Path) -> None:
-    for name in ("one", "two"):
-        compile_build(make_set(), tmp_path / name, rounds=ROUNDS)
-    assert _bytes(tmp_path / "one") == _bytes(tmp_path / "two")
-
-
-def test_a_whole_number_is_the_same_option_as_its_double(grasp_set: GraspSet, tmp_path: Path) -> None:
-    compile_build(grasp_set, tmp_path / "whole", rounds=1, folds=0, shrinkage=1, tolerance=0)
-    compile_build(grasp_set, tmp_path / "double", rounds=1, folds=0, shrinkage=1.0, tolerance=0.0)
-    assert _bytes(tmp_path / "whole") == _bytes(tmp_path / "double")
 
 
 @pytest.mark.parametrize("environment", [("1", "0"), ("2", "77")])
@@ -326,25 +292,6 @@ def test_tables_for_narrow_entries_are_coarser_say_so_and_hold(grasp_set: GraspS
     assert (found.covered, len(found.changed)) == (narrow.proof.covered, narrow.proof.changed)
 
 
-def test_joints_of_few_bins_make_small_tables_that_hold(grasp_set: GraspSet, tmp_path: Path) -> None:
-    every = compile_build(grasp_set, tmp_path / "every", rounds=ROUNDS, folds=0)
-    few = compile_build(grasp_set, tmp_path / "few", rounds=ROUNDS, folds=0, max_bins=3)
-    assert few.manifest.options.max_bins == 3
-    assert max(map(len, Build.load(tmp_path / "every").tables.thresholds)) > 2
-    assert max(map(len, Build.load(tmp_path / "few").tables.thresholds)) <= 2
-    assert few.tables_bytes < every.tables_bytes
-    assert verify(tmp_path / "few", grasp_set).holds
-
-
-def test_wide_tables_are_what_a_build_has_unless_told_and_build_json_is_as_it_was(
-    grasp_set: GraspSet, tmp_path: Path
-) -> None:
-    compile_build(grasp_set, tmp_path / "told", rounds=2, folds=0, table_bits=16)
-    compile_build(grasp_set, tmp_path / "untold", rounds=2, folds=0)
-    assert _bytes(tmp_path / "told") == _bytes(tmp_path / "untold")
-    assert b"table_bits" not in (tmp_path / "told" / "build.json").read_bytes()
-
-
 def test_a_file_in_the_way_is_refused_before_any_work(grasp_set: GraspSet, tmp_path: Path) -> None:
     (tmp_path / "notes").mkdir()
     (tmp_path / "notes" / "mine.txt").write_text("keep me")
@@ -370,33 +317,3 @@ def test_a_fold_that_keeps_no_switch_is_named(grasp_set: GraspSet, tmp_path: Pat
     assert compile_build(grasp_set, tmp_path / "build", folds=0, **options).manifest.switches
     with pytest.raises(CompileError, match="in fold 1: no switch is worth keeping"):
         compile_build(grasp_set, tmp_path / "build", folds=4, **options)
-
-
-def test_decisions_without_a_gain_are_in_the_build_and_none_are_left_out(grasp_set: GraspSet, tmp_path: Path) -> None:
-    bits = np.array([[0, 0], [0, 1], [1, 0], [1, 1]], bool)
-    rows = grasp_set.rows([0, 1, 1, 0])
-    exclusive_or = replace(rows, switches=bits, switch_names=("a", "b"))
-    assert compile_build(exclusive_or, tmp_path / "xor", rounds=2, folds=0).manifest.zero_gain_nodes == 1
-    assert '"zero_gain_nodes": 1' in (tmp_path / "xor" / "build.json").read_text()
-    assert compile_build(grasp_set, tmp_path / "other", rounds=2, folds=0).manifest.zero_gain_nodes == 0
-    assert "zero_gain_nodes" not in (tmp_path / "other" / "build.json").read_text()
-
-
-def test_an_outer_fold_chooses_by_the_subjects_of_its_training_rows(
-    make_set: Callable[..., GraspSet], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    grasp_set, options = make_set(subjects=4), Options(trainer="logit")
-    seen: list[tuple[np.ndarray, str]] = []
-
-    def chosen(*args: Any, groups: np.ndarray, of: Any, **named: Any) -> Any:
-        seen.append((groups, of))
-        return choose_training(args[0], args[1][:1], groups=groups, of=of, **named)
-
-    monkeypatch.setattr(training, "choose_training", chosen)
-    (cut, *_) = cuts_of(grasp_set, structs.replace(options, by="subject"))
-    for fold in cut.folds:
-        scores_of(Samples.of(grasp_set), options, None, cut.groups, None, fold)
-    for (groups, of), fold in zip(seen, cut.folds, strict=True):
-        assert of == "new subject"
-        assert np.array_equal(groups, grasp_set.subjects[fold.train])
-        assert not set(groups) & set(grasp_set.subjects[fold.test])

@@ -54,16 +54,6 @@ def test_documents_come_and_go_with_the_builds_they_are_of(gloved: GraspSet, tmp
     assert not (build / "spec").exists()
 
 
-def test_the_same_recordings_give_the_same_documents(gloved: GraspSet, tmp_path: Path) -> None:
-    seen = []
-    for name in ("a", "b"):
-        _compile(gloved, tmp_path / name, folds=2)
-        files = (tmp_path / name).rglob("*")
-        seen.append({path.relative_to(tmp_path / name): path.read_bytes() for path in files if path.is_file()})
-    assert seen[0] == seen[1]
-    assert {"report.html", "spec/glove.toml", "spec/cutting.svg"} <= set(map(Path.as_posix, seen[0]))
-
-
 def test_switches_of_nobody_knows_which_glove_have_a_spec_without_a_pattern(
     grasp_set: GraspSet, tmp_path: Path
 ) -> None:

@@ -54,27 +54,6 @@ def test_a_users_files_are_never_deleted(tmp_path: Path, files: dict[str, bytes]
         check_target(tmp_path / "build")
 
 
-def test_a_file_is_no_folder(tmp_path: Path) -> None:
-    (tmp_path / "build").write_bytes(b"")
-    with pytest.raises(CompileError, match="is a file"):
-        check_target(tmp_path / "build")
-
-
-def test_a_parent_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(CompileError, match=r"nowhere is no folder: make it first"):
-        check_target(tmp_path / "nowhere" / "build")
-
-
-def test_files_put_into_the_folder_during_the_training_stay(tmp_path: Path) -> None:
-    _fill(tmp_path / "build", OLD)
-    target = check_target(tmp_path / "build")
-    (target / "notes.txt").write_bytes(b"mine")
-    with pytest.raises(CompileError, match=r"holds notes\.txt"):
-        publish(NEW, target)
-    assert _content(target) == {**OLD, "notes.txt": b"mine"}
-    assert [path.name for path in tmp_path.iterdir()] == ["build"]
-
-
 def test_a_folder_by_the_name_of_a_file_of_a_build_is_not_of_a_build(tmp_path: Path) -> None:
     _fill(tmp_path / "build", {"build.json": b"old"})
     _fill(tmp_path / "build" / "tables.bin", {"notes.txt": b"mine"})

@@ -22,7 +22,6 @@ from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.segmenting.model import SegmentModel
 
-MakeSet = Callable[..., GraspSet]
 Tool = Callable[[str], str]
 
 TOOLS: dict[str, tuple[str, ...]] = {
@@ -67,30 +66,29 @@ def few_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(verify_firmware_module, "RANDOM_FRAMES", 400)
 
 
+LINEAR = {"trainer": "logit", "penalty": 1.0, "smoothness": 1.0, "max_bins": 8, "linear": 1}
+
+
 @pytest.mark.usefixtures("few_frames")
-@pytest.mark.parametrize("table_bits", [8, 16])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {**LINEAR, "table_bits": 8},
+        {**LINEAR, "table_bits": 16},
+        {"rounds": 5, "inputs": "switches"},
+        {"rounds": 5, "inputs": "joints"},
+    ],
+    ids=["linear, a byte", "linear", "switches", "joints"],
+)
 @pytest.mark.parametrize("kind", ["host", "avr"])
-def test_builds_with_linear_joints_are_pythons_too(
-    grasp_set: GraspSet, tool: Tool, tmp_path: Path, table_bits: int, kind: str
+def test_builds_of_linear_joints_and_of_one_kind_of_input_are_pythons_too(
+    grasp_set: GraspSet, tool: Tool, tmp_path: Path, options: dict[str, Any], kind: str
 ) -> None:
     for name in TOOLS[kind]:
         tool(name)
-    given: dict[str, Any] = {"penalty": 1.0, "smoothness": 1.0, "max_bins": 8, "linear": 1}
-    made = compile_build(grasp_set, tmp_path / "build", trainer="logit", folds=0, table_bits=table_bits, **given)
-    assert made.tables.slopes
+    made = compile_build(grasp_set, tmp_path / "build", folds=0, **options)
+    assert bool(made.tables.slopes) == ("linear" in options)
     assert verify_firmware(made.folder, grasp_set, (kind,)).holds
-
-
-@pytest.mark.usefixtures("few_frames")
-@pytest.mark.parametrize("inputs", ["switches", "joints"])
-@pytest.mark.parametrize("kind", ["host", "avr"])
-def test_builds_without_joints_or_without_switches_are_pythons_too(
-    grasp_set: GraspSet, tool: Tool, tmp_path: Path, inputs: str, kind: str
-) -> None:
-    for name in TOOLS[kind]:
-        tool(name)
-    folder = compile_build(grasp_set, tmp_path / "build", rounds=5, folds=0, inputs=inputs).folder
-    assert verify_firmware(folder, grasp_set, (kind,)).holds
 
 
 @pytest.mark.usefixtures("few_frames")
@@ -292,13 +290,3 @@ def test_without_the_tools_it_says_what_to_install(
     monkeypatch.setenv("PATH", "/nowhere")
     with pytest.raises(FirmwareError, match=f"firmware for {PARTS[kind][0]} cannot be run here: .*apt-get install"):
         verify_firmware(build, grasp_set, (kind,))
-
-
-@pytest.mark.usefixtures("few_frames")
-def test_its_progress_ends_before_the_last_run_and_never_goes_back(
-    build: Path, grasp_set: GraspSet, tool: Tool
-) -> None:
-    tool("gcc")
-    told: list[tuple[int, int]] = []
-    verify_firmware(build, grasp_set, ("host",), lambda done, total: told.append((done, total)))
-    assert told == [(done, 4) for done in range(4)]

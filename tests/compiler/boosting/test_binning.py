@@ -65,40 +65,6 @@ def test_columns_of_two_values_that_share_cells_are_summed_apart(rows: int, colu
     check_all_sums(X.astype(np.float64))
 
 
-def test_bits_and_codes_need_no_floats() -> None:
-    bits = np.array([[True, False], [False, False], [True, True]])
-    assert [group.columns.tolist() for group in bin_columns(bits).groups] == [[0, 1]]
-
-
-@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=2, max_size=8, unique=True))
-def test_a_threshold_parts_its_neighbours_however_close_or_large(values: list[float]) -> None:
-    ordered = np.unique(np.array(values))
-    edges = midpoints(ordered)
-    assert np.isfinite(edges).all()
-    assert (ordered[:-1] <= edges).all()
-    assert (edges < ordered[1:]).all()
-
-
-@pytest.mark.parametrize("elements", [1, 47, 48, 49, 200, 10_000])
-def test_batches_are_the_largest_that_fit_and_of_one_column_at_least(
-    monkeypatch: pytest.MonkeyPatch, elements: int
-) -> None:
-    monkeypatch.setattr(binning, "_BATCH_ELEMENTS", elements)
-    values = [3, 3, 5, 3, 9, 3, 3, 4]  # so many in each column
-    X = np.column_stack([np.arange(40) % count for count in values]).astype(np.float64)
-    (group,) = bin_columns(X).groups
-    summands = np.ones((40, 4))
-    expected: list[list[int]] = []
-    for column in range(len(values)):
-        batch = [*expected[-1], column] if expected else []
-        # A histogram has a bin for every value of its widest column, and one for missing rows.
-        if batch and len(batch) * (max(values[c] for c in batch) + 1) * 4 <= elements:
-            expected[-1] = batch
-        else:
-            expected.append([column])
-    assert [sums.columns.tolist() for sums in group.sums(summands)] == expected
-
-
 DOUBLES = st.floats(allow_nan=False, allow_infinity=False)
 LARGE, SMALL = st.floats(1e308, 1.7e308), st.integers(-9, 9).map(lambda units: units * 5e-324)
 
@@ -110,11 +76,6 @@ def test_a_threshold_is_the_midpoint_correctly_rounded_below_the_upper(pair: tup
         return
     middle = float((Fraction(lower) + Fraction(upper)) / 2)
     assert midpoints(np.array([lower, upper]))[0] == (middle if middle < upper else lower)
-
-
-@pytest.mark.parametrize("lower", [1.0, -1.0, 5e-324, 1e300])
-def test_between_neighbouring_doubles_the_lower_is_the_threshold(lower: float) -> None:
-    assert midpoints(np.array([lower, np.nextafter(lower, np.inf)])).tolist() == [lower]
 
 
 @given(MATRICES, st.integers(2, 6))

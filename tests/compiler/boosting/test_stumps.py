@@ -13,25 +13,8 @@ def test_scores_exactly_a_billionth_apart_are_still_a_tie() -> None:
     assert winners(np.array([[-TIE, 0.0], [np.nextafter(-TIE, -1.0), 0.0]])).tolist() == [0, 1]
 
 
-def test_the_first_rounds_score_as_the_whole_ensemble_did_after_them() -> None:
-    random = np.random.default_rng(4)
-    thresholds, values = random.random((5, 3)), random.normal(0, 1, (5, 3, 3))
-    stumps = Stumps(4, random.integers(0, 4, (5, 3)).astype(np.int32), thresholds, values, 0.5)
-    X = random.random((20, 4))
-    for rounds, scores in enumerate(stumps.staged_scores(X), start=1):
-        assert stumps.first(rounds).scores(X).tobytes() == scores.tobytes()
-    assert not stumps.first(0).scores(X).any()
-
-
 @pytest.mark.parametrize("shape", [(5, 3), (5, 5), (4,), (5, 4, 1)])
 def test_inputs_of_another_shape_are_not_scored(shape: tuple[int, ...]) -> None:
     stumps = Stumps(4, np.zeros((1, 2), np.int32), np.zeros((1, 2)), np.zeros((1, 2, 3)), 1.0)
     with pytest.raises(ValueError, match="the ensemble expects"):
         stumps.scores(np.zeros(shape))
-
-
-@pytest.mark.parametrize("thresholds", [1, 3])
-def test_arrays_of_rounds_that_do_not_agree_are_not_scored(thresholds: int) -> None:
-    stumps = Stumps(4, np.zeros((2, 2), np.int32), np.zeros((thresholds, 2)), np.zeros((2, 2, 3)), 1.0)
-    with pytest.raises(ValueError, match="zip"):
-        stumps.scores(np.zeros((5, 4)))

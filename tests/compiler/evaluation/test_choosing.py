@@ -1,7 +1,6 @@
 """The fit is chosen inside the training rows: folds that part nothing, the rule, and what options leave open."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -11,10 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler import TRAINERS, GraspSet, Options, Samples, ScoreTables, Setting, Trainer
-from thenar.compiler.evaluation import choosing as module
 from thenar.compiler.evaluation.choosing import choose_training, inner_folds
-from thenar.compiler.tables.collapse import Line, model_scores
-from thenar.compiler.trainers.base import TrainerError, Training, changed
+from thenar.compiler.tables.collapse import model_scores
+from thenar.compiler.trainers.base import Training, changed
 from thenar.runtime.manifest import fit_name
 
 
@@ -74,23 +72,6 @@ def test_inner_folds_part_no_trial_and_no_group(data: st.DataObject, n_groups: i
             assert len(fold.train)
             assert not set(trials[fold.train]) & set(trials[fold.test])
             assert named is None or n_groups < 3 or not set(groups[fold.train]) & set(groups[fold.test])
-
-
-@given(st.lists(st.integers(-1, 1), min_size=2, max_size=30))
-def test_the_error_of_independent_trials_is_that_of_a_mean(values: list[int]) -> None:
-    gains = np.array(values)
-    expected = gains.std(ddof=1) / np.sqrt(len(gains))
-    assert module._error(gains, np.arange(len(gains))) == pytest.approx(expected, abs=1e-12)
-    # A cluster's trials that are all alike are one piece of evidence.
-    assert module._error(np.repeat(gains, 5), np.repeat(np.arange(len(gains)), 5)) == pytest.approx(expected, abs=1e-12)
-
-
-def test_of_one_candidate_no_fold_is_made(grasp_set: GraspSet, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "inner_folds", lambda *_: pytest.fail("worked in vain"))
-    candidates = Training.candidates(Options(rounds=3))
-    fitting = choose_training(Samples.of(grasp_set), candidates)
-    assert (fitting.trainer, fitting.compared) == ("logitboost", ())
-    assert (Training.chosen(fitting),) == candidates
 
 
 @pytest.mark.parametrize("by", [None, "subject"])
@@ -186,14 +167,6 @@ def test_what_holds_for_the_known_people_alone_is_not_chosen_for_new_ones(monkey
     assert fitting.compared[-1].behind_error == pytest.approx(fitting.compared[-1].behind, abs=1e-6)
 
 
-def test_tables_are_counted_by_their_rows_in_use() -> None:
-    idle, bins = np.zeros((1, 2)), np.array([9, 20], np.uint16)
-    joints = (np.ones((3, 2)), idle, idle)
-    none = np.array([], np.uint16)
-    tables = ScoreTables(np.ones(2), np.eye(4, 2), (bins, none, none), joints, (Line(2, 0, 9, np.ones(2)),))
-    assert module._table_rows(tables) == 2 + 3 + 1
-
-
 @pytest.mark.parametrize(
     ("changes", "trainers"),
     [
@@ -222,42 +195,3 @@ def test_settings_that_are_given_are_fixed_and_name_the_trainer_that_takes_them(
 )
 def test_where_all_that_is_compared_is_given_one_candidate_is_left(changes: dict[str, Any]) -> None:
     assert len(Training.candidates(changed(Options(), changes))) == 1
-
-
-@pytest.mark.parametrize(
-    ("changes", "because"),
-    [
-        ({"round": 3}, "no trainer has the setting 'round'"),
-        ({"tolerance": 0.1, "round": 3}, "no trainer has the setting 'round'"),
-        ({"trainer": "logit", "ties": 1.0}, "trainer 'logit' has no setting 'ties'"),
-        ({"penalty": -1.0}, "penalty=-1.0 must be at least"),
-    ],
-)
-def test_what_no_trainer_takes_is_refused(changes: dict[str, Any], because: str) -> None:
-    with pytest.raises(TrainerError, match=because):
-        Training.candidates(changed(Options(), changes))
-
-
-@pytest.mark.parametrize(("frames", "compared"), [(1, 240), (7, 238), (24, 80)])
-def test_of_trials_of_many_frames_some_are_compared_and_no_trial_is_left_out(
-    monkeypatch: pytest.MonkeyPatch, frames: int, compared: int
-) -> None:
-    monkeypatch.setattr(module, "_COMPARED", 100)
-    seen = list[int]()
-    monkeypatch.setattr(
-        Pointer, "train", lambda self, samples, settings, report=None: _counting(samples, seen, settings)
-    )
-    trainings = _pointing(monkeypatch, {"switch": 0}, {"switch": 1})
-    whole = _samples([], [0], n=240 // frames, idle=0)
-    samples = replace(whole.rows(np.repeat(np.arange(240 // frames), frames)), movements=np.empty(0, np.intp))
-    fitting = choose_training(samples, trainings)
-    assert {found.total for found in fitting.compared} == {240 // frames}
-    # Both ways, in folds whose training rows make up the set but for one.
-    assert sum(seen) == 2 * (fitting.folds - 1) * compared
-
-
-def _counting(samples: Samples, seen: list[int], settings: Mapping[str, Any]) -> ScoreTables:
-    seen.append(len(samples.labels))
-    rows = np.zeros((samples.n_switches, 2))
-    rows[settings["switch"], 1] = 2.0
-    return ScoreTables(np.array([1.0, 0.0]), rows, (), ())

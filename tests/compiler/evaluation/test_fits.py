@@ -6,7 +6,7 @@ import pytest
 
 from thenar.compiler import LogitBoostClassifier
 from thenar.compiler.evaluation.folds import Fold, weka_folds
-from thenar.compiler.evaluation.plan import Data, FoldFit, is_blind, predictions, run_fits
+from thenar.compiler.evaluation.plan import Data, FoldFit, is_blind, predictions
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import Training
@@ -49,26 +49,6 @@ def test_without_inputs_the_most_frequent_training_label_is_answered(make_grasps
     fold = Fold(rows, np.arange(6), "1")
     found = predictions(Data.of(grasps), FoldFit(fold, (), (), (0, 1, 2, 3)), QUICK)
     assert found.tolist() == [2] * 6
-
-
-def test_equal_fits_are_done_once_and_progress_counts_each(fits: tuple[GraspSet, list[FoldFit]]) -> None:
-    grasps, todo = fits
-    seen: list[tuple[int, int]] = []
-    run_fits(Data.of(grasps), todo + todo, QUICK, 1, lambda done, total: seen.append((done, total)))
-    assert seen == [(done, len(todo)) for done in range(1, len(todo) + 1)]
-
-
-def test_any_number_of_workers_gives_the_same(fits: tuple[GraspSet, list[FoldFit]]) -> None:
-    grasps, todo = fits
-    alone = run_fits(Data.of(grasps), todo, QUICK, jobs=1)
-    together = run_fits(Data.of(grasps), todo, QUICK, jobs=2)
-    assert alone.keys() == together.keys()
-    assert all(np.array_equal(alone[fit], together[fit]) for fit in todo)
-
-
-def test_nothing_to_do_is_done_at_once(make_grasps: Make) -> None:
-    grasps = make_grasps()
-    assert run_fits(Data.of(grasps), [], QUICK, jobs=2) == {}
 
 
 def test_where_no_input_varies_the_most_frequent_training_label_is_answered(make_grasps: Make) -> None:

@@ -29,25 +29,6 @@ def test_the_first_32_bits_of_seed_0_are_javas() -> None:
     assert JavaRandom(0).next_bits(32) - (1 << 32) == -1155484576
 
 
-@given(seeds, st.integers(1, 2**31 - 1))
-def test_every_number_is_below_its_bound(seed: int, bound: int) -> None:
-    assert 0 <= JavaRandom(seed).next_int(bound) < bound
-
-
-@given(seeds, st.integers(0, 30))
-def test_a_power_of_two_takes_the_high_bits(seed: int, exponent: int) -> None:
-    assert JavaRandom(seed).next_int(1 << exponent) == JavaRandom(seed).next_bits(31) >> (31 - exponent)
-
-
-@given(seeds, st.integers(0, 50))
-def test_a_shuffle_keeps_every_item_and_is_repeatable(seed: int, size: int) -> None:
-    first, second = list(range(size)), list(range(size))
-    JavaRandom(seed).shuffle(first)
-    JavaRandom(seed).shuffle(second)
-    assert first == second
-    assert sorted(first) == list(range(size))
-
-
 def test_a_draw_from_the_incomplete_last_run_is_thrown_away() -> None:
     # With this bound nearly half of all draws fall into the incomplete run; the accepted ones are the draws themselves.
     bound = (1 << 30) + 1
@@ -108,25 +89,6 @@ def test_every_row_is_tested_once_and_never_where_it_was_trained(labels: list[in
     assert np.array_equal(np.sort(np.concatenate([fold.test for fold in folds])), everything)
     for fold in folds:
         assert np.array_equal(np.sort(np.concatenate([fold.train, fold.test])), everything)
-
-
-@given(labelled, st.data())
-def test_every_class_is_spread_evenly(labels: list[int], data: st.DataObject) -> None:
-    n_folds = data.draw(st.integers(2, len(labels)))
-    folds = weka_folds(labels, n_folds, seed=data.draw(st.integers(0, 1000)))
-    counts = np.array([np.bincount(np.asarray(labels)[fold.test], minlength=6) for fold in folds])
-    assert (np.ptp(counts, axis=0) <= 1).all()
-
-
-def test_another_seed_cuts_otherwise() -> None:
-    labels = np.repeat([0, 1], 20)
-    assert not np.array_equal(weka_folds(labels, 4, 1)[0].train, weka_folds(labels, 4, 2)[0].train)
-
-
-def test_a_fold_of_a_part_speaks_of_the_rows_of_the_whole() -> None:
-    part = np.array([3, 5, 8, 13])
-    fold = weka_folds([0, 0, 1, 1], 2, 1)[0].of(part)
-    assert sorted([*fold.train, *fold.test]) == [3, 5, 8, 13]
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,4 @@
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,15 +16,6 @@ def test_every_composition_and_protocol_has_its_picture(make_grasps: Callable[..
     names = [f"confusion-{protocol}-{name}.png" for protocol in ("paper", "nested") for name in ("V", "VI", "VII")]
     assert [path.name for path in drawn] == names
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in drawn)
-
-
-def test_a_dollar_in_a_name_is_a_dollar(make_grasps: Callable[..., GraspSet], tmp_path: Path) -> None:
-    options = Options(rounds=2, repeats=1, tables=("compositions",), protocols=("nested",))
-    study = evaluate(make_grasps(n_switches=0), options, jobs=1)
-    named = replace(study, grasps=(r"$\left{$", *study.grasps[1:]))
-    (first,), (second,) = (draw(named, tmp_path / name) for name in ("one", "two"))
-    assert first.read_bytes() == second.read_bytes()
-    assert list(first.parent.iterdir()) == [first]
 
 
 def test_numbers_and_colours_are_shares_of_the_true_types_rows() -> None:

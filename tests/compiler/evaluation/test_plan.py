@@ -3,8 +3,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from thenar.compiler import grow_id3
 from thenar.compiler.evaluation.plan import (
@@ -13,11 +11,10 @@ from thenar.compiler.evaluation.plan import (
     Composition,
     Planner,
     RowPlan,
-    TableName,
     available,
 )
 from thenar.compiler.evaluation.populations import NESTED, PAPER, Protocol, populations
-from thenar.compiler.placement.elements import Element, Elements, columns_of
+from thenar.compiler.placement.elements import Element, columns_of
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
@@ -31,7 +28,7 @@ OF_THE_PAPER = {
     "VI": ("Sel-Co", False, (1, 3)),
     "VII": ("NoSel-Co", False, (0, 2)),
 }
-FOUR, TWENTY = tuple(map(Element, range(4))), tuple(map(Element, range(20)))
+FOUR = tuple(map(Element, range(4)))
 
 
 @pytest.mark.parametrize("composition", COMPOSITIONS, ids=lambda c: c.name)
@@ -41,29 +38,12 @@ def test_compositions_are_the_papers(composition: Composition) -> None:
     assert (composition.what, composition.angle, found) == OF_THE_PAPER[composition.name]
 
 
-def test_they_stand_in_the_papers_order() -> None:
-    assert [composition.name for composition in COMPOSITIONS] == list(OF_THE_PAPER)
-
-
-@given(st.sets(st.sampled_from(TWENTY)))
-def test_selected_and_others_together_are_all(placement: set[Element]) -> None:
-    by_name = {c.name: set(c.elements(tuple(placement), TWENTY)) for c in COMPOSITIONS}
-    assert by_name["VI"] | by_name["VII"] == by_name["V"] == set(TWENTY)
-    assert not by_name["VI"] & by_name["VII"]
-    assert by_name["II"] | by_name["III"] == by_name["I"]
-    assert by_name["II"] & by_name["III"] == by_name["IV"]
-
-
 @pytest.mark.parametrize(
     ("n_switches", "n_joints", "names"),
     [(0, 6, ["IV"]), (60, 0, ["V", "VI", "VII"]), (60, 9, list(OF_THE_PAPER))],
 )
 def test_a_set_gets_the_compositions_it_has_inputs_for(n_switches: int, n_joints: int, names: list[str]) -> None:
     assert [composition.name for composition in available(n_switches, n_joints)] == names
-
-
-def test_only_compositions_that_part_the_switches_need_a_placement() -> None:
-    assert [c.name for c in COMPOSITIONS if c.needs_placement] == ["II", "III", "VI", "VII"]
 
 
 Make = Callable[..., GraspSet]
@@ -92,12 +72,6 @@ def test_every_cell_tests_each_row_of_its_subject_once_a_repeat(planner: Planner
             for cell in line.cells:
                 for run in cell.runs:
                     assert np.array_equal(np.sort(np.concatenate([fit.fold.test for fit in run])), cell.part.rows)
-
-
-def test_what_needs_no_placement_is_the_same_work_under_both_protocols(planner: Planner) -> None:
-    paper, nested = (planner.table("compositions", protocol) for protocol in (PAPER, NESTED))
-    shared = {line.name for line in paper if line.cells == row(nested, line.name).cells}
-    assert shared == {"I", "IV", "V"}
 
 
 def test_the_papers_placement_is_one_a_subject_and_the_nested_one_differs_by_fold(planner: Planner) -> None:
@@ -163,25 +137,6 @@ def test_baselines_choose_from_the_rows_that_id3_may_choose_from(planner: Planne
                 assert fit.elements == tuple(sorted(planner.chosen(method, seen, len(fit.elements))))
 
 
-def test_pruning_by_s_makes_the_placements_of_all_tables_smaller(make_grasps: Make) -> None:
-    grasps = make_grasps(noise=0.25)
-    lines: dict[TableName, str] = {"compositions": "VI", "generality": "A", "baselines": "CMIM"}
-    for name, line in lines.items():
-        full, pruned = (
-            len(row(planner_of(grasps, prune).table(name, PAPER), line).cells[0].fits[0].elements) for prune in (0, 20)
-        )
-        assert pruned < full
-
-
-def test_random_draws_differ_and_follow_the_seed(planner: Planner) -> None:
-    def drawn(seed: int) -> list[Elements]:
-        cell = row(replace(planner, seed=seed).table("baselines", PAPER), "random").cells[0]
-        return [run[0].elements for run in cell.runs[:: len(cell.part.repeats)]]
-
-    assert len(set(drawn(1))) > 1
-    assert drawn(1) == drawn(1) != drawn(100)
-
-
 def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps: Make) -> None:
     grasps, rows = make_grasps(noise=0.3), np.arange(5, 40)
     used, fresh = planner_of(grasps), planner_of(grasps)
@@ -197,7 +152,3 @@ def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps:
 def test_any_method_can_be_a_baseline(make_grasps: Make) -> None:
     table = replace(planner_of(make_grasps()), baselines=("mrmr",)).table("baselines", NESTED)
     assert [line.name for line in table] == ["ID3", "mrmr", "random"]
-
-
-def test_a_set_without_switches_has_an_empty_placement(make_grasps: Make) -> None:
-    assert planner_of(make_grasps(n_switches=0)).chosen("id3", np.arange(5, 40), 0) == ()

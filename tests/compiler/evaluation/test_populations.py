@@ -110,11 +110,6 @@ def test_a_grasp_type_with_fewer_rows_than_folds_is_named(make_grasps: Make) -> 
     assert text.startswith("subject A has 3 trial(s) of tip: fewer than the 4 folds")
 
 
-def test_as_many_rows_as_folds_are_enough(make_grasps: Make) -> None:
-    grasps = keep_some(make_grasps(subjects="A"), "tip", 4)
-    assert concerns(grasps, populations(grasps, "trial", 4, 1, 1), "trial", 4) == ()
-
-
 def test_a_single_row_can_never_be_recognised_and_that_is_said(make_grasps: Make) -> None:
     grasps = keep_some(make_grasps(subjects="A"), "tip", 1)
     texts = concerns(grasps, populations(grasps, "trial", 4, 1, 1), "trial", 4)

@@ -10,8 +10,7 @@ from mpmath import mpf
 from scipy.special import stdtrit
 from scipy.stats import binomtest, t
 
-from thenar.compiler.evaluation.rates import Paired, Rate, clustered, rated
-from thenar.compiler.samples import decided
+from thenar.compiler.evaluation.rates import Paired, Rate, rated
 from thenar.stability.reference.intervals import student_quantile
 from thenar.stability.reference.numbers import ulps
 
@@ -57,14 +56,6 @@ def test_it_is_never_narrower_than_students_t_over_the_repeats(case: tuple[tuple
     rate = counted(correct, total)
     assert rate.low <= max(0, expected[0]) + 1e-12
     assert rate.high >= min(1, expected[1]) - 1e-12
-
-
-@given(totals, st.integers(2, 5))
-def test_repeats_that_all_recognise_everything_still_leave_doubt(total: int, repeats: int) -> None:
-    rate = counted((total,) * repeats, total)
-    assert rate.high == 1
-    assert rate.low == pytest.approx(counted((total,), total).low)
-    assert rate.low < 1
 
 
 def test_repeats_that_differ_widely_widen_the_interval() -> None:
@@ -141,24 +132,6 @@ def test_the_order_of_rows_and_the_names_of_trials_say_nothing(
     )
 
 
-def test_a_single_row_a_trial_has_the_interval_of_its_counts() -> None:
-    predicted, labels = np.array([[1, 1, 2, 2, 2], [1, 2, 2, 2, 1]]), np.array([1, 1, 1, 2, 2])
-    (rate, frames) = rated(predicted, labels, np.arange(5), of="pooled")
-    assert frames is None
-    assert rate == Rate.counted((4, 2), 5, of="pooled")
-
-
-def test_copies_of_each_frame_add_no_certainty() -> None:
-    random = np.random.default_rng(5)
-    hits = random.random(200) < 0.8
-    once = Rate.counted((int(hits.sum()),), 200, of="pooled")
-    copied = Rate.predicted(
-        np.repeat(hits, 10), np.ones(2000), np.repeat(np.arange(200), 10), of="pooled", unit="frames"
-    )
-    assert copied.mean == once.mean
-    assert (copied.low, copied.high) == pytest.approx((once.low, once.high), abs=0.002)
-
-
 def test_a_new_subjects_rate_is_over_subjects_and_one_subjects_alone_over_trials() -> None:
     # Seven people, 172 trials each, of whom 31 to 98 % are recognised: no sample of people says much of the next.
     shares = [0.31, 0.98, 0.72, 0.55, 0.90, 0.84, 0.76]
@@ -176,14 +149,6 @@ def test_a_new_subjects_rate_is_over_subjects_and_one_subjects_alone_over_trials
 
 def test_a_rate_says_in_words_what_it_is_of() -> None:
     assert str(Rate.counted((731,), 1000, of="new object")) == "73.1 [70.3, 75.8] % new object, trials"
-
-
-def test_one_cluster_says_as_much_as_one_unit() -> None:
-    assert clustered([30], [30], "frames") == clustered([1], [1], "frames")
-
-
-def test_a_majority_of_equals_is_the_lowest_label() -> None:
-    assert decided(np.array([[9, 4, 4, 9, 7]]), np.array([0, 0, 0, 0, 1])).tolist() == [[4, 7]]
 
 
 @pytest.mark.parametrize("freedom", range(1, 51))

@@ -106,16 +106,6 @@ def test_every_table_comes_under_both_protocols_in_the_papers_layout(study: Stud
     assert [r.name for r in table(study, "pruning").rows] == ["all", "0", "10"]
 
 
-def test_every_rate_has_a_repeat_for_each_seed_over_all_rows_of_the_subject(study: Study) -> None:
-    for each in study.tables:
-        for line in each.rows:
-            for cell in line.cells:
-                assert cell.rate.total == 48
-                repeats = 1 if each.name == "trainers" else 2
-                assert len(cell.rate.correct) == repeats * (5 if line.name == "random" else 1)
-                assert cell.rate.low <= cell.rate.mean <= cell.rate.high
-
-
 def test_confusion_matrices_count_every_row_in_every_repeat_and_agree_with_the_rates(study: Study) -> None:
     assert study.grasps == ("hook", "pinch", "power", "tip")
     for protocol in ("paper", "nested"):
@@ -124,22 +114,6 @@ def test_confusion_matrices_count_every_row_in_every_repeat_and_agree_with_the_r
                 counts = np.array(cell.confusion)
                 assert counts.sum(axis=1).tolist() == [24, 24, 24, 24]
                 assert np.trace(counts) == sum(cell.rate.correct)
-
-
-def test_the_number_of_switches_of_each_composition_adds_up(study: Study) -> None:
-    lines = {line.name: line.switches.mean for line in table(study, "compositions").rows}
-    assert lines["I"] == lines["V"] == 12
-    assert lines["IV"] == 0
-    assert lines["II"] == lines["VI"]
-    assert lines["VI"] + lines["VII"] == pytest.approx(12)
-
-
-def test_draws_of_random_placements_show_their_range(study: Study) -> None:
-    for cell in row(table(study, "baselines"), "random").cells:
-        assert cell.draws is not None
-        assert cell.draws.least <= cell.draws.mean <= cell.draws.most
-        assert cell.draws.mean == pytest.approx(cell.rate.mean)
-    assert all(cell.draws is None for cell in row(table(study, "baselines"), "ID3").cells)
 
 
 def test_the_same_set_and_options_give_the_same_result_on_any_number_of_workers(
@@ -168,12 +142,6 @@ def test_choosing_from_test_rows_flatters_where_there_is_nothing_to_learn(make_g
     assert nested.low <= 0.25 <= nested.high
 
 
-def test_a_perfect_switch_for_each_grasp_is_found_and_enough(make_grasps: Make) -> None:
-    grasps = make_grasps(noise=0.0, n_joints=0)
-    study = evaluate(grasps, replace(QUICK, tables=("compositions",)), jobs=1)
-    assert row(table(study, "compositions"), "VI").rate.mean == 1
-
-
 def test_without_switches_there_are_the_joints_and_no_placements(make_grasps: Make) -> None:
     study = evaluate(make_grasps(n_switches=0), QUICK, jobs=1)
     tables = [("compositions", "paper"), ("compositions", "nested"), ("trainers", "nested")]
@@ -182,11 +150,6 @@ def test_without_switches_there_are_the_joints_and_no_placements(make_grasps: Ma
         (name, "a placement needs switches, and the set has none") for name in ("generality", "pruning", "baselines")
     ]
     assert [line.name for line in study.tables[0].rows] == ["IV"]
-
-
-def test_without_joints_there_are_the_switches(make_grasps: Make) -> None:
-    study = evaluate(make_grasps(n_joints=0), replace(QUICK, tables=("compositions",)), jobs=1)
-    assert [line.name for line in study.tables[0].rows] == ["V", "VI", "VII"]
 
 
 def test_a_composition_left_without_inputs_shows_the_rate_of_the_most_frequent_grasp(make_grasps: Make) -> None:

@@ -1,7 +1,6 @@
 """What a store keeps through kills, damage and full disks; and that what it keeps is not found again."""
 
 import math
-import random
 import signal
 import sqlite3
 import subprocess
@@ -43,29 +42,12 @@ def kept(path: Path, count: int = 3) -> list[int]:
     return [number for number, answer in answers.items() if answer is not None]
 
 
-def test_what_was_put_is_there_at_once_and_after_opening_again(tmp_path: Path) -> None:
-    with Store(tmp_path / "store", "set") as store:
-        store.put(question(1), Answer((0.1, 1 / 3), "Zylinder\n\u2028"))
-        at_once = store.get(question(1), Answer)
-    with Store(tmp_path / "store", "set") as store:
-        assert store.get(question(1), Answer) == at_once == Answer((0.1, 1 / 3), "Zylinder\n\u2028")
-        assert len(store) == 1
-
-
 def test_another_scope_of_question_is_another_question(tmp_path: Path) -> None:
     filled(tmp_path / "store", 1)
     with Store(tmp_path / "store", "other set") as store:
         assert store.get(question(0), Answer) is None
         store.put(question(0), Answer((9.0,)))
     assert kept(tmp_path / "store", 1) == [0]
-
-
-def test_the_newest_answer_to_a_question_counts(tmp_path: Path) -> None:
-    filled(tmp_path / "store", 1)
-    with Store(tmp_path / "store", "set") as store:
-        store.put(question(0), Answer((7.0,)))
-    with Store(tmp_path / "store", "set") as store:
-        assert store.get(question(0), Answer) == Answer((7.0,))
 
 
 def test_an_answer_that_no_longer_reads_as_asked_is_to_be_found_again(tmp_path: Path) -> None:
@@ -112,37 +94,6 @@ def test_two_runs_do_not_have_it_at_once(tmp_path: Path) -> None:
     with Store(path, "set"), pytest.raises(StoreError, match="in use by another run"):
         Store(path, "set")
     assert kept(path) == [0, 1, 2]
-
-
-OTHER_RUN = """
-import sys
-from pathlib import Path
-from thenar.compiler.frontier.cache import Store
-store = Store(Path(sys.argv[1]), "set")
-print("open", flush=True)
-sys.stdin.read()
-"""
-
-
-def test_another_process_that_is_killed_lets_it_go(tmp_path: Path) -> None:
-    path = filled(tmp_path / "store")
-    command = [sys.executable, "-c", OTHER_RUN, str(path)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == b"open\n"
-        with pytest.raises(StoreError, match="in use by another run"):
-            Store(path, "set")
-        process.kill()
-        process.wait()
-    assert kept(path) == [0, 1, 2]
-
-
-def test_closing_twice_is_closing_and_nothing_is_put_after_it(tmp_path: Path) -> None:
-    store = Store(tmp_path / "store", "set")
-    store.close()
-    store.close()
-    with pytest.raises(StoreError, match="closed"):
-        store.put(question(1), Answer(()))
 
 
 FULL_DISK = """
@@ -235,15 +186,6 @@ def test_what_is_stored_is_not_done_again_and_reads_as_what_was_found(tmp_path: 
     again = asked(tmp_path / "store", calls_in(tmp_path, range(7)))
     assert done_in(tmp_path) == list(range(7))
     assert again[:5] == first
-
-
-def test_the_order_of_calls_and_of_interruptions_changes_no_answer(tmp_path: Path) -> None:
-    numbers = list(range(12))
-    shuffled = random.Random(7)
-    for _ in range(4):
-        asked(tmp_path / "parts", calls_in(tmp_path, shuffled.sample(numbers, 5)))
-    shuffled.shuffle(numbers)
-    assert asked(tmp_path / "parts", calls_in(tmp_path, numbers)) == found_of(numbers)
 
 
 def test_what_was_found_before_an_error_is_kept(tmp_path: Path) -> None:

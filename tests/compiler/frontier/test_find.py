@@ -9,13 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from distributed import LocalCluster
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.cluster import dask_cluster
 from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.picked import picked
@@ -84,12 +82,6 @@ def test_rows_in_which_nothing_is_held_change_no_rate(
     found = found_of(first[0] | {"grasp_set": more, "output": tmp_path / "out"})
     assert found.fingerprint == more.fingerprint()
     assert [(one.placement, one.rate) for one in found.tried] == [(one.placement, one.rate) for one in first[1].tried]
-
-
-def test_points_are_numbered_from_the_fastest_frame_on(first: tuple[Request, Frontier]) -> None:
-    points = first[1].points
-    assert [point.number for point in points] == list(range(1, len(points) + 1))
-    assert [point.frame.us for point in points] == sorted(point.frame.us for point in points)
 
 
 def test_every_point_is_on_a_front_and_none_beats_those_of_its_own(first: tuple[Request, Frontier]) -> None:
@@ -169,20 +161,6 @@ def test_frames_of_a_trial_are_on_one_side_of_every_fold(tmp_path: Path, make_se
         assert point.rate.mean < 1
 
 
-def test_no_placement_without_switches_is_tried_but_the_joints_alone(first: tuple[Request, Frontier]) -> None:
-    assert all((each.n_switches == 0) == (each.inputs == "joints") for each in first[1].tried)
-
-
-def test_what_was_screened_says_with_how_many_rounds(first: tuple[Request, Frontier]) -> None:
-    assert {each.rounds for each in first[1].tried} == {1, 2, 3, 5, 6}
-
-
-def test_the_papers_placement_and_all_switches_are_marked(first: tuple[Request, Frontier]) -> None:
-    names = [mark.name for mark in first[1].marks]
-    assert "paper, S = 62" in names
-    assert "all of 14" in names
-
-
 def test_it_is_written_as_it_is_returned(first: tuple[Request, Frontier]) -> None:
     request, found = first
     assert frontier_from_bytes((request["output"] / "frontier.json").read_bytes()) == found
@@ -245,19 +223,6 @@ def test_a_set_may_lack_switches_or_joints(
         assert "paper, S = 62" in [mark.name for mark in found.marks]
 
 
-def test_two_rows_of_a_type_are_enough(tmp_path: Path, make_set: Make) -> None:
-    assert found_of(asked(tmp_path, make_set(rows=8))).points
-
-
-def test_a_glove_of_fewer_switches_serves_the_placements_within_it(tmp_path: Path, make_set: Make) -> None:
-    glove = propose_harness([f"s{number}" for number in range(10)])
-    methods = ("elimination-cost", "id3-cost")
-    found = found_of(asked(tmp_path, make_set(), harness=glove, methods=methods))
-    wired = [point for point in found.points if point.setting.wiring == "as wired"]
-    assert all(set(point.switches) <= {f"s{number}" for number in range(10)} for point in wired)
-    assert found.points
-
-
 def test_what_ports_cost_is_part_of_the_question(tmp_path: Path, make_set: Make) -> None:
     methods = ("id3-cost",)
     request = asked(tmp_path, make_set(), methods=methods, baselines=())
@@ -270,16 +235,6 @@ def test_what_ports_cost_is_part_of_the_question(tmp_path: Path, make_set: Make)
         (each.placement, each.n_switches, each.rate) for each in alone.tried
     ]
     assert len(keys_in(tmp_path / "out" / "store.sqlite")) > len(keys_in(tmp_path / "alone" / "store.sqlite"))
-
-
-def test_another_stream_is_another_question(tmp_path: Path, make_set: Make) -> None:
-    request = asked(tmp_path, make_set(), methods=("id3",), baselines=())
-    found_of(request)
-    before = keys_in(request["output"] / "store.sqlite")
-    found_of({**request, "stream": make_set(seed=7)})
-    found_of({**request, "stream": make_set(seed=8)})
-    after = keys_in(request["output"] / "store.sqlite")
-    assert len(after) >= len(before) + 2
 
 
 def test_recordings_that_are_trained_on_are_no_stream(tmp_path: Path, make_set: Make) -> None:
@@ -316,27 +271,6 @@ def test_an_unknown_baseline_is_told(tmp_path: Path, make_set: Make) -> None:
         found_of(asked(tmp_path, make_set(), baselines=("nonsense",)))
 
 
-def test_two_workers_of_a_cluster_find_the_same(tmp_path: Path, make_set: Make) -> None:
-    grasp_set = make_set(subjects=2)
-    few = {"methods": ("id3",), "baselines": (), "target": "avr328p"}
-    here = found_of(asked(tmp_path / "here", grasp_set, **few))
-    with (
-        LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0") as cluster,
-        dask_cluster(cluster.scheduler_address),
-    ):
-        there = found_of(asked(tmp_path / "there", grasp_set, **few))
-    assert _timeless(there) == _timeless(here)
-
-
-def _timeless(found: Frontier) -> tuple[object, ...]:
-    points = [
-        (each.setting, each.switches, each.rate, each.luck, each.other_rate, each.frame, each.latency)
-        for each in found.points
-    ]
-    rest = (found.tried, found.curves, found.marks, found.combinations, found.picked)
-    return (points, *rest)
-
-
 def test_every_trainer_is_on_one_picture_and_what_compile_makes_of_a_point_is_what_the_point_says(
     tmp_path: Path, make_set: Make
 ) -> None:
@@ -366,14 +300,6 @@ def test_every_trainer_is_on_one_picture_and_what_compile_makes_of_a_point_is_wh
             given = {own: value for own, value in fit.settings.items() if value is not None}
             assert point.setting.settings.items() <= given.items()
             assert made.tables.n_switches == len(point.switches)
-
-
-def test_a_trainer_may_be_forced(tmp_path: Path, make_set: Make) -> None:
-    found = found_of(
-        asked(tmp_path, make_set(), methods=("id3",), baselines=(), trainer="logit", settings={"penalty": 1.0})
-    )
-    assert found.trainers == ("logit",)
-    assert {point.setting.trainer for point in found.points} == {"logit"}
 
 
 def test_settings_are_chosen_inside_the_training_rows(make_set: Make) -> None:

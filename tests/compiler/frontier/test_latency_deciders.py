@@ -65,14 +65,6 @@ def test_decisions_of_all_frames_are_those_of_the_runtime(frames: Stretches, pol
     assert found.at(np.arange(frames.first[-1])).tolist() == frame_by_frame(frames, policy)
 
 
-@given(runs(), policies())
-def test_decisions_are_told_only_where_they_change(frames: Stretches, policy: Policy) -> None:
-    found = decisions(bare_tables(), frames, policy)
-    assert found.frames[0] == 0
-    assert (np.diff(found.frames) > 0).all()
-    assert (found.types[1:] != found.types[:-1]).all()
-
-
 @given(
     st.lists(st.tuples(st.integers(0, 50), st.integers(0, 2)), min_size=1, max_size=20),
     st.integers(0, 1000),
@@ -89,8 +81,3 @@ def test_every_frame_sees_the_state_that_began_last(
     seen = scores[np.searchsorted(at_us, due, side="right") - 1]
     assert frames.first[-1] == len(due)
     assert np.repeat(frames.scores, np.diff(frames.first), axis=0).tolist() == seen.tolist()
-
-
-def test_neighbouring_states_of_equal_scores_are_one_stretch() -> None:
-    frames = stretches(np.array([[1, 0], [1, 0], [2, 0], [2, 0]], np.int32), np.array([0, 10, 20, 30]), 5)
-    assert frames.first.tolist() == [0, 4, 6]

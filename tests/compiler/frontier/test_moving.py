@@ -2,17 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.latency import Pace, latencies, latency
 from thenar.compiler.frontier.moving import Moving
 from thenar.compiler.frontier.price import Tabled
-from thenar.compiler.frontier.search import Search, Shape
+from thenar.compiler.frontier.search import Shape
 from thenar.compiler.frontier.stream import stream_of
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
@@ -108,23 +106,3 @@ def test_segments_alone_are_decided_at_learnt_costs_and_with_a_class_of_nothing_
     assert segments != usual
     assert segments.missed == 0
     assert segments.wrong == 0
-
-
-@pytest.mark.slow
-def test_a_frontier_learns_segments_from_the_training_rows_of_the_fold_that_is_played(
-    tmp_path: Path, make_set: Make, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    grasp_set, seen = movements(make_set), list[set[int]]()
-    taught = Moving.segmenting
-
-    def watched(moving: Moving, *args: Any) -> Any:
-        seen.append(set(moving.samples.subjects.tolist()))
-        return taught(moving, *args)
-
-    monkeypatch.setattr(Moving, "segmenting", watched)
-    search = Search(methods=("id3",), baselines=(), rounds=5, trainer="logitboost", repeats=1, finalists=1)
-    found = find_frontier(grasp_set, tmp_path / "out", search=search, jobs=1)
-    assert "segments" in {point.setting.decision for point in found.points}
-    # The first fold tests subject 0.
-    assert seen
-    assert all(subjects == {1} for subjects in seen)

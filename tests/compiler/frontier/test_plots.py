@@ -1,20 +1,14 @@
-"""The pictures: the same every time, every point named, no words on other words, names as they are."""
+"""The pictures: the same every time, every point named, names as they are."""
 
-import itertools
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
 from typing import Any
 
 import msgspec
-import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.text import Text
-from msgspec.structs import replace
 
 from thenar.compiler.frontier.plots import PICTURES, POINT_ID, pictures
-from thenar.compiler.frontier.points import Frontier, Latency, Mark, Point, Time
+from thenar.compiler.frontier.points import Frontier, Mark, Point, Time
 from thenar.compiler.pictures import PictureError, painting
 
 NASTY = r"$\left{<&> -- ü = ]]> 'x'"
@@ -29,20 +23,6 @@ def _texts(figure: Figure) -> list[str]:
     return [text.get_text() for text in figure.axes[0].texts]
 
 
-def _boxes(figure: Figure) -> Iterator[tuple[str, Any]]:
-    renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
-    for text in figure.findobj(Text):
-        assert isinstance(text, Text)
-        if text.get_text() and text.get_visible():
-            yield text.get_text(), Text.get_window_extent(text, renderer)  # without the line that leads to it
-
-
-def _overlaps(figure: Figure) -> list[tuple[str, str]]:
-    figure.canvas.draw()
-    pairs = itertools.combinations(_boxes(figure), 2)
-    return [(a, b) for (a, box), (b, other) in pairs if box.overlaps(other) and box.width and other.width]
-
-
 def _is_shown(point: Point, name: str) -> bool:
     """Return whether a picture has anything to say of a point."""
     return {
@@ -50,20 +30,6 @@ def _is_shown(point: Point, name: str) -> bool:
         "switches": bool(point.switches),
         "latency": "latency" in point.fronts,
     }[name]
-
-
-def _crowded(frontier: Frontier, several: int) -> Frontier:
-    """Return a frontier with every point several times, each a little slower than the one before."""
-    points = [
-        msgspec.structs.replace(
-            point,
-            number=several * place + turn + 1,
-            frame=msgspec.structs.replace(point.frame, us=point.frame.us * (1 + 0.03 * turn)),
-        )
-        for place, point in enumerate(frontier.points)
-        for turn in range(several)
-    ]
-    return msgspec.structs.replace(frontier, points=tuple(points))
 
 
 @pytest.mark.slow
@@ -84,97 +50,6 @@ def test_every_point_and_mark_is_named(examples: Any, name: str) -> None:
             assert len(own) == 1, (point.number, written)
     for mark in frontier.marks:
         assert sum(text.startswith(mark.name) for text in written) == 1
-
-
-def test_every_way_to_choose_switches_is_named_once(examples: Any) -> None:
-    frontier = examples.example_frontier()
-    written = _texts(_drawn(frontier, "switches"))
-    assert all(written.count(curve.method) == 1 for curve in frontier.curves)
-
-
-@pytest.mark.parametrize("name", list(PICTURES))
-def test_no_words_stand_on_others(examples: Any, name: str) -> None:
-    assert _overlaps(_drawn(examples.example_frontier(), name)) == []
-
-
-@pytest.mark.parametrize("name", list(PICTURES))
-def test_levels_of_taxels_are_named_and_no_words_stand_on_others(examples: Any, name: str) -> None:
-    frontier = _pressed(examples.example_frontier())
-    figure = _drawn(frontier, name)
-    assert _overlaps(figure) == []
-    axes = figure.axes[0]
-    assert axes.get_xlabel().startswith("levels kept" if name == "switches" else "time")
-    if name == "frontier":
-        assert any("levels of" in text for text in _texts(figure))
-
-
-def _pressed(frontier: Frontier) -> Frontier:
-    """Return the frontier as one of 54 taxels, three levels of each, in place of switches."""
-
-    def of_taxels(point: Point) -> Point:
-        levels = tuple(f"pad{number // 3}>{40 * (number % 3 + 1)}" for number in range(len(point.switches)))
-        setting = point.setting if point.setting.inputs == "joints" else replace(point.setting, levels=3)
-        return replace(point, switches=levels, setting=setting)
-
-    points = tuple(map(of_taxels, frontier.points))
-    return replace(frontier, points=points, n_switches=0, n_taxels=54, n_levels=162)
-
-
-@pytest.mark.parametrize("name", ["frontier", "latency"])
-def test_many_points_close_together_are_named_and_readable(examples: Any, name: str) -> None:
-    frontier = _crowded(examples.example_frontier(), 4)
-    figure = _drawn(frontier, name)
-    assert _overlaps(figure) == []
-    shown = [point for point in frontier.points if _is_shown(point, name)]
-    assert len(_texts(figure)) == len(shown) + len(frontier.marks)
-
-
-@pytest.mark.parametrize("name", list(PICTURES))
-def test_all_words_are_on_the_sheet(examples: Any, name: str) -> None:
-    machine = "Raspberry Pi, a guess: 4 times Intel Core i7-8550U, Python 3.11"
-    figure = _drawn(examples.example_frontier(machine=machine), name)
-    figure.canvas.draw()
-    assert any("a guess" in text.get_text() for text in figure.texts) == (name != "switches")
-    for text, box in _boxes(figure):
-        assert box.x0 >= 0, text
-        assert box.y0 >= 0, text
-        assert box.x1 <= figure.bbox.width, text
-        assert box.y1 <= figure.bbox.height, text
-
-
-def test_the_picked_point_says_what_it_is(examples: Any) -> None:
-    assert "point 5: 33 switches\n440 us, 92.9 %" in _texts(_drawn(examples.example_frontier(), "frontier"))
-
-
-def test_times_on_the_axis_are_times(examples: Any) -> None:
-    axes = _drawn(examples.example_frontier(), "frontier").axes[0]
-    assert axes.get_xscale() == "log"
-    words = [label.get_text() for label in axes.get_xticklabels()]
-    assert words == ["100 us", "200 us", "500 us", "1 ms", "2 ms", "5 ms"]
-
-
-def test_the_line_of_the_best_is_a_step_at_each_of_them(examples: Any) -> None:
-    frontier = examples.example_frontier()
-    (line,) = [
-        line for line in _drawn(frontier, "frontier").axes[0].lines if line.get_label() == "the best for its time"
-    ]
-    best = sorted((point.frame.us, point.rate.mean) for point in frontier.points if "frame" in point.fronts)
-    assert line.get_drawstyle() == "steps-post"
-    places = np.asarray(line.get_data(), np.float64).T.tolist()
-    assert [tuple(place) for place in places][:-1] == best
-
-
-def test_the_line_of_the_best_never_falls_where_points_are_best_of_their_kind_alone(examples: Any) -> None:
-    found = examples.example_frontier()
-    frontier = msgspec.structs.replace(
-        found, points=tuple(msgspec.structs.replace(point, fronts=("latency",)) for point in found.points)
-    )
-    (line,) = [
-        line for line in _drawn(frontier, "latency").axes[0].lines if line.get_label() == "the best for its latency"
-    ]
-    rates = np.asarray(line.get_ydata(), np.float64).tolist()
-    assert rates == sorted(rates)
-    assert len(rates) - 1 < len(found.points)
 
 
 def test_names_are_no_formulas_and_no_markup(examples: Any) -> None:
@@ -237,20 +112,6 @@ def test_other_kinds_of_files_are_refused(examples: Any) -> None:
     kind: Any = "gif"
     with pytest.raises(PictureError, match="gif"):
         pictures(examples.example_frontier(), kind)
-
-
-def test_the_axis_of_latencies_ends_where_they_do(examples: Any) -> None:
-    found, replace = examples.example_frontier(), msgspec.structs.replace
-    never = Latency(1e9, 1e9, 1.0)
-    points = [point for point in found.points if "latency" in point.fronts]
-    late = {points[1].number: never}
-    changed = [replace(point, latency=late.get(point.number, point.latency)) for point in found.points]
-    figure = _drawn(replace(found, points=tuple(changed), picked=points[-1].number), "latency")
-    low, high = figure.axes[0].get_xlim()
-    shown = [point for point in changed if "latency" in point.fronts and point.latency.missed < 1]
-    least = min(point.latency.mean_us for point in shown)
-    assert least / 2 < low <= least
-    assert high < 2 * max(*(point.latency.p99_us for point in shown), *(mark.latency_us or 0 for mark in found.marks))
 
 
 def test_a_frontier_whose_joints_take_an_unknown_time_says_so_on_the_axis(examples: Any) -> None:

@@ -11,7 +11,6 @@ from thenar.compiler.frontier.search import (
     Candidate,
     Search,
     Shape,
-    available_inputs,
     curve_placements,
     tried_placements,
 )
@@ -42,17 +41,6 @@ def test_elimination_is_tried_at_every_size_up_to_all_switches() -> None:
     assert [choice.parameter for choice in tried_placements("elimination", 8)] == [1.0, 2.0, 3.0, 4.0, 6.0, 8.0]
     assert [choice.parameter for choice in tried_placements("elimination", 1)] == [1.0]
     assert max(choice.parameter for choice in curve_placements("rfe", 20)) == 16.0
-
-
-def test_inputs_are_those_that_a_set_has() -> None:
-    assert available_inputs(5, 2) == ("both", "switches", "joints")
-    assert available_inputs(5, 0) == ("switches",)
-    assert available_inputs(0, 2) == ("joints",)
-
-
-def test_nothing_is_screened_with_more_rounds_than_are_trained() -> None:
-    assert Search(rounds=10).screened == 10
-    assert Search(rounds=300).screened == Search(rounds=300).screening
 
 
 def test_the_papers_placements_are_marked_with_all_inputs_that_there_are() -> None:

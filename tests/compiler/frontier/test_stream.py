@@ -1,6 +1,5 @@
 """Streams of recorded movements, streams composed of single trials, and which of them a set gets."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -225,18 +224,6 @@ def test_every_trial_is_held_before_any_is_held_again(seed: int) -> None:
     held = {row.tobytes() for row in stream.bits[stream.arrivals]}
     # Where the rest of a round is all of one type, the next round begins before it.
     assert len(held) >= 17
-
-
-@pytest.mark.parametrize("make", [lambda: single_trials(3), lambda: whole_movements([0, 1, 2])])
-def test_a_stream_depends_on_its_arguments_alone(make: Callable[[], GraspSet]) -> None:
-    grasp_set = make()
-    assert same(*(stream_of(grasp_set, grasp_set.labels, seed=4) for _ in range(2)))
-
-
-def test_another_seed_composes_another_stream() -> None:
-    trials = single_trials(3)
-    streams = [stream_of(trials, trials.labels, seed=seed) for seed in (1, 2)]
-    assert not same(*streams)
 
 
 def test_trials_of_one_type_make_no_stream() -> None:

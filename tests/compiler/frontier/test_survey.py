@@ -10,7 +10,7 @@ import pytest
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import EvaluationError
-from thenar.compiler.frontier.search import SHAPES, Search, Shape
+from thenar.compiler.frontier.search import SHAPES, Search
 from thenar.compiler.frontier.survey import Cuts, Tally, choose_path, fit_stages
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.ports import PortCosts
@@ -99,14 +99,6 @@ def test_folds_and_costs_of_ports_are_told_apart(samples: Samples, cuts: Cuts) -
     assert len(asked) == len(costs) + len(folds)
 
 
-def test_the_same_set_is_cut_alike(make_set: Callable[..., GraspSet]) -> None:
-    first, again = cuts_of(make_set(rows=97)), cuts_of(make_set(rows=97))
-    assert first.subjects == ()
-    for one, other in zip((*first.screening, *first.others), (*again.screening, *again.others), strict=True):
-        assert np.array_equal(one.train, other.train)
-        assert np.array_equal(one.test, other.test)
-
-
 def frames_of(grasp_set: GraspSet, each: int) -> GraspSet:
     """Return the set with every row `each` times, the frames of one trial; in another order."""
     rows = np.random.default_rng(5).permutation(np.repeat(np.arange(len(grasp_set)), each))
@@ -180,8 +172,3 @@ def test_a_rate_is_of_the_repeats_that_were_fitted(make_set: Callable[..., Grasp
     assert (cuts.judged("pooled", wrong).rate.mean, cuts.judged("pooled", wrong).repeats) == (0.0, 1)
     both = cuts.judged("pooled", wrong | right)
     assert (both.rate.correct, both.repeats, set(both.hits.tolist())) == ((0, 96), 2, {1})
-
-
-def test_a_shape_names_width_and_entries() -> None:
-    assert Shape(16) == Shape(16, 16)
-    assert {shape.width for shape in SHAPES} >= {4, 16}

@@ -151,7 +151,3 @@ def test_one_subject_has_no_rate_of_new_ones(examples: Any) -> None:
         examples.example_frontier(points=(msgspec.structs.replace(points[0], other_rate=None),), picked=None)
     )
     assert (row["other_rate_of"], row["other_rate"], row["other_rate_low"], row["other_rate_high"]) == ("",) * 4
-
-
-def test_equal_frontiers_give_equal_tables(examples: Any) -> None:
-    assert csv_bytes(examples.example_frontier()) == csv_bytes(examples.example_frontier())

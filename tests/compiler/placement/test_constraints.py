@@ -13,7 +13,6 @@ from thenar.compiler.placement.elements import Element, Elements
 from thenar.compiler.placement.inputs import PlacementError
 from thenar.compiler.placement.joints import kept_joints
 from thenar.compiler.placement.methods.base import METHODS
-from thenar.compiler.placement.optimum import Pairs, best_subset
 from thenar.compiler.placement.placement import choose
 from thenar.compiler.placement.ports import PortCosts, record_times_us
 from thenar.compiler.samples import Columns, Samples
@@ -71,22 +70,6 @@ def bound_limits(draw: st.DrawFn) -> tuple[Limits, Bound]:
     except PlacementError:
         assume(False)
         raise
-
-
-@settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.filter_too_much])
-@given(found=bound_limits(), seed=st.integers(0, 2**32 - 1), m=st.integers(1, 5))
-def test_the_bound_and_the_best_subset_hold_against_all_subsets(found: tuple[Limits, Bound], seed: int, m: int) -> None:
-    limits, bound = found
-    assume(len(limits.keep) <= m)
-    samples = samples_of(seed)
-    pairs = Pairs(samples)
-    allowed = [s for size in range(m + 1) for s in combinations(range(len(ELEMENTS)), size) if obeys(limits, s)]
-    least = min(pairs.alike(subset) for subset in allowed)
-    best = best_subset(samples, m, limits=bound)
-    assert best.least <= least <= best.alike == pairs.alike(best.columns)
-    assert not best.proved or best.alike == least
-    # What tells no pairs apart may be left out of the best, but for what must be kept and varies.
-    assert obeys(limits, tuple(dict.fromkeys((*best.columns, *bound.required(best.columns)))))
 
 
 @settings(deadline=None, max_examples=15, suppress_health_check=[HealthCheck.filter_too_much])

@@ -39,25 +39,6 @@ def test_many_rows_are_counted_as_few_are(n: int) -> None:
     check_counts(random_inputs(1, n, [2, 2, 3, 7, 16, 40, 2]), np.arange(n), 2)
 
 
-@given(st.integers(0, 99), st.integers(1, 40), st.integers(1, 30))
-def test_bits_packed_before_are_the_same_digits(seed: int, n: int, d: int) -> None:
-    X = np.random.default_rng(seed).random((n, d)) < 0.5
-    ours = Digits.from_matrix(X)
-    given_packed = Digits.from_packed_bits(np.packbits(X, axis=1, bitorder="little"), d)
-    assert np.array_equal(ours.packed, given_packed.packed)
-    assert ours.places == given_packed.places
-
-
 def test_packed_bits_of_another_width_are_refused() -> None:
     with pytest.raises(PlacementError, match=r"9 bits a row are \(n, 2\) uint8, not \(4, 1\)"):
         Digits.from_packed_bits(np.zeros((4, 1), np.uint8), 9)
-
-
-def test_eight_bits_and_five_three_valued_inputs_fill_a_byte_each() -> None:
-    X = random_inputs(0, 200, [2] * 8 + [3] * 5)
-    assert len(Digits.from_matrix(X).packed) == 2
-
-
-def test_constant_inputs_take_no_place() -> None:
-    X = random_inputs(0, 200, [1, 3, 1, 4])
-    assert Digits.from_matrix(X).columns.tolist() == [1, 3]

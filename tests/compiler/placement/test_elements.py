@@ -1,6 +1,6 @@
 """Levels of taxels: splits of most information, held against scikit-learn and against every split there is."""
 
-from itertools import combinations, pairwise
+from itertools import pairwise
 from math import log2
 
 import hypothesis.strategies as st
@@ -11,7 +11,6 @@ from sklearn.tree import DecisionTreeClassifier
 
 from thenar.compiler.placement.elements import Element, bits_of, elements_of, ports_of, taxel_levels
 from thenar.compiler.placement.methods.base import METHODS
-from thenar.compiler.placement.optimum import Pairs, best_subset
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.samples import Samples, SamplesError
 
@@ -165,18 +164,3 @@ def test_every_method_chooses_levels_and_a_taxel_pays_once() -> None:
     for name in ("id3-cost", "elimination-cost"):
         kept = [elements[place] for place in METHODS[name].chooser(bits, ports)(2)]
         assert {element.column for element in kept} == {1}, name
-
-
-def test_exactly_best_levels_are_those_of_every_subset() -> None:
-    random = np.random.default_rng(3)
-    labels = random.integers(0, 3, 40)
-    taxels = (300 * labels[:, None] * random.random((40, 3)) + random.integers(0, 200, (40, 3))).astype(np.uint16)
-    none = np.zeros((40, 0))
-    whole = Samples(none.astype(bool), none.astype(np.uint16), labels, tuple("012"), taxels=taxels)
-    bits = bits_of(whole, elements_of(whole, 3))
-    pairs = Pairs(bits)
-    for m in (1, 2, 3):
-        best = best_subset(bits, m)
-        brute = min(pairs.alike(columns) for columns in combinations(range(bits.n_switches), m))
-        assert best.least <= brute <= best.alike
-        assert not best.proved or best.alike == brute

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.placement.exact import compare, first_best, n_log_n, sign_of_f_sum, sign_of_log_sum
+from thenar.compiler.placement.exact import compare, first_best, n_log_n, sign_of_log_sum
 from thenar.stability.reference import information
 
 multiples = st.dictionaries(st.integers(1, 60), st.integers(-8, 8), max_size=8)
@@ -44,12 +44,6 @@ def test_a_difference_below_forty_digits_takes_more_digits() -> None:
     for n in range(10**30, 3 * 10**31, 10**30):
         assert sign_of_log_sum({n**2: 1, n - 1: -1, n + 1: -1}) == 1
         assert sign_of_log_sum({n**2: -1, n - 1: 1, n + 1: 1}) == -1
-
-
-def test_no_count_and_counts_of_one_add_nothing() -> None:
-    assert sign_of_f_sum({0: 5, 1: -7}) == 0
-    assert sign_of_f_sum({4: 1, 2: -4}) == 0
-    assert sign_of_f_sum({4: 1, 2: -3}) == 1
 
 
 def test_zero_and_one_count_nothing_and_others_their_logarithm() -> None:

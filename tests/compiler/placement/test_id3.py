@@ -15,7 +15,6 @@ from sklearn.tree import DecisionTreeClassifier
 
 from thenar.compiler import grow_id3
 from thenar.compiler.placement.counts import Digits
-from thenar.compiler.placement.gain import entropy_bits
 from thenar.compiler.placement.tree import Tree
 
 Rows = list[tuple[tuple[int, ...], int]]
@@ -72,68 +71,12 @@ def test_the_tree_is_the_papers_steps_written_out(drawn: Data, min_samples: int)
     assert as_grown(grow_id3(X, y, min_samples)) == written_out(rows, sorted(set(y.tolist())), min_samples)
 
 
-@given(data(), st.randoms(use_true_random=False))
-def test_the_order_of_the_rows_does_not_matter(drawn: Data, random: Any) -> None:
-    X, y = drawn
-    order = random.sample(range(len(y)), len(y))
-    assert grow_id3(X[order], y[order]).to_json() == grow_id3(X, y).to_json()
-
-
-@given(data(), st.integers(2, 4))
-def test_a_set_taken_several_times_makes_the_same_tree(drawn: Data, times: int) -> None:
-    X, y = drawn
-    once, repeated = grow_id3(X, y), grow_id3(np.tile(X, (times, 1)), np.tile(y, times))
-    assert [(n.input, n.values) for n in repeated.nodes] == [(n.input, n.values) for n in once.nodes]
-    assert [n.gain for n in repeated.nodes] == pytest.approx([n.gain for n in once.nodes], abs=1e-14)
-
-
-@given(data(), st.permutations(range(4)))
-def test_other_names_of_the_classes_make_the_same_decisions(drawn: Data, names: list[int]) -> None:
-    X, y = drawn
-    tree, renamed = grow_id3(X, y), grow_id3(X, np.array(["pen", "cup", "rod", "key"])[np.array(names)[y]])
-    assert [(n.input, n.values, n.gain) for n in renamed.nodes] == [(n.input, n.values, n.gain) for n in tree.nodes]
-
-
-@given(data(), st.integers(0, 6), st.integers(0, 500))
-def test_a_constant_input_changes_nothing_but_numbers(drawn: Data, at: int, value: int) -> None:
-    X, y = drawn
-    at = min(at, X.shape[1])
-    with_constant = grow_id3(np.insert(X, at, value, axis=1), y)
-    assert at not in with_constant.inputs
-    assert with_constant.inputs == tuple(i + (i >= at) for i in grow_id3(X, y).inputs)
-
-
 @given(data(most_values=2))
 def test_bits_are_the_same_as_bool_as_numbers_and_as_packed_bytes(drawn: Data) -> None:
     X, y = drawn
     packed = np.packbits(X.astype(bool), axis=1, bitorder="little")
     assert grow_id3(X.astype(bool), y) == grow_id3(X, y)
     assert grow_id3(Digits.from_packed_bits(packed, X.shape[1]), y) == grow_id3(X, y)
-
-
-@given(data(), st.lists(st.integers(1, 999), min_size=4, max_size=4, unique=True))
-def test_only_the_order_of_an_inputs_values_matters(drawn: Data, values: list[int]) -> None:
-    X, y = drawn
-    spread = np.array(sorted(values))[X]
-    assert [n.input for n in grow_id3(spread, y).nodes] == [n.input for n in grow_id3(X, y).nodes]
-
-
-@given(data())
-def test_the_gains_add_up_to_the_entropy_that_the_leaves_do_not_have(drawn: Data) -> None:
-    tree = grow_id3(*drawn)
-    n = tree.nodes[0].size
-    left = sum(node.size / n * entropy_bits(list(node.counts)) for node in tree.nodes if node.input is None)
-    assert sum(tree.gains) == pytest.approx(entropy_bits(list(tree.nodes[0].counts)) - left, abs=1e-12)
-
-
-@given(data())
-def test_without_pruning_only_rows_alike_in_every_input_share_a_mixed_leaf(drawn: Data) -> None:
-    X, y = drawn
-    wrong = grow_id3(X, y).predict(X) != y
-    for row in np.flatnonzero(wrong):
-        alike = y[(X[row] == X).all(axis=1)]
-        assert np.sum(alike == y[row]) <= np.bincount(alike).max()
-        assert len(set(alike.tolist())) > 1
 
 
 def grasps(n: int, seed: int) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.intp]]:
@@ -177,24 +120,6 @@ def test_a_mixed_leaf_answers_with_the_majority_and_a_tie_with_the_lowest_class(
     X = np.array([[0]] * 3 + [[1]] * 4)
     tree = grow_id3(X, ["b", "a", "b", "c", "b", "b", "c"])
     assert tree.predict([[0], [1]]).tolist() == ["b", "b"]
-
-
-@pytest.mark.parametrize(("min_samples", "nodes"), [(0, 7), (4, 7), (5, 3), (8, 3), (9, 1)])
-def test_a_node_of_fewer_than_s_rows_is_terminal(min_samples: int, nodes: int) -> None:
-    X = [[0, 0], [0, 0], [0, 1], [0, 1], [1, 0], [1, 0], [1, 1], [1, 1]]
-    assert len(grow_id3(X, [0, 0, 1, 1, 2, 2, 3, 3], min_samples).nodes) == nodes
-
-
-@pytest.mark.parametrize("X", [np.zeros((3, 0)), np.ones((3, 4)), np.zeros((3, 2), bool)])
-def test_inputs_that_do_not_vary_leave_one_leaf(X: npt.NDArray[Any]) -> None:
-    tree = grow_id3(X, ["b", "a", "a"])
-    assert len(tree.nodes) == 1
-    assert tree.inputs == ()
-    assert tree.predict(X).tolist() == ["a", "a", "a"]
-
-
-def test_one_class_leaves_one_leaf() -> None:
-    assert len(grow_id3([[0], [1]], [7, 7]).nodes) == 1
 
 
 def test_a_tree_deeper_than_pythons_recursion_grows_is_stored_and_printed() -> None:

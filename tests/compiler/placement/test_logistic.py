@@ -52,16 +52,6 @@ def test_without_columns_it_goes_on_to_the_fit_of_the_rest() -> None:
     assert fit.rows.shape == (13, 4)
 
 
-def test_every_step_makes_the_loss_smaller() -> None:
-    fit = Logistic(*grasps(6), 4)
-    losses = [fit.loss]
-    for _ in range(20):
-        fit.improve(1)
-        losses.append(fit.loss)
-    assert losses == sorted(losses, reverse=True)
-    assert losses[-1] < losses[0] / 2
-
-
 def test_the_order_of_the_rows_changes_no_bit() -> None:
     bits, labels = grasps(7)
     order = np.random.default_rng(1).permutation(len(labels))
@@ -70,12 +60,6 @@ def test_the_order_of_the_rows_changes_no_bit() -> None:
         fit.improve(40)
     assert np.array_equal(one.rows, other.rows)
     assert np.array_equal(one.without([3]).rows, other.without([3]).rows)
-
-
-def test_a_single_class_needs_no_rows() -> None:
-    fit = Logistic(np.array([[True, False, True]]), np.zeros(3, np.intp), 1)
-    fit.improve(5)
-    assert not fit.rows.any()
 
 
 @given(NUMBERS, st.randoms(use_true_random=False))

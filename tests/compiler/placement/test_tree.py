@@ -40,10 +40,6 @@ def test_a_value_never_met_gets_the_nodes_majority(tree: Tree) -> None:
     assert tree.predict([[1, 0], [0, 1], [0, 99], [3, 99]]).tolist() == ["rod", "pen", "pen", "rod"]
 
 
-def test_no_rows_are_predicted_as_no_rows(tree: Tree) -> None:
-    assert tree.predict(np.zeros((0, 2), int)).tolist() == []
-
-
 def test_rows_of_another_width_are_refused(tree: Tree) -> None:
     with pytest.raises(PlacementError, match="X has 3 inputs, the tree was grown on 2"):
         tree.predict([[0, 0, 0]])
@@ -88,12 +84,6 @@ def test_a_stored_tree_that_is_not_sound_is_refused(tree: Tree, number: int, nod
 def test_a_document_that_is_no_tree_is_refused(document: bytes) -> None:
     with pytest.raises(PlacementError, match="this is no stored tree"):
         Tree.from_json(document)
-
-
-def test_a_decision_without_a_gain_says_so_where_it_stands() -> None:
-    lines = grow_id3([[0, 0], [0, 1], [1, 0], [1, 1]], ["even", "odd", "odd", "even"]).text().splitlines()
-    assert lines[0] == "x0?  4 rows, no input gains anything alone"
-    assert lines[-1].endswith("at 1 node no input gains anything alone, the lowest-numbered varying one was taken")
 
 
 def test_leaves_that_no_input_parts_are_counted_and_said_and_pruned_ones_are_not() -> None:

@@ -1,9 +1,6 @@
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from thenar.compiler.recordings.columns import Calibration, Columns, JointColumns, read_columns, select
 from thenar.compiler.recordings.errors import ColumnsError
@@ -162,14 +159,6 @@ def test_globs_that_would_take_long_are_refused_at_once_and_in_few_words(
 def test_columns_by_their_names_may_be_as_many_as_there_are() -> None:
     names = [f"s{number}" for number in range(50_000)]
     assert select(Columns("g", switches=tuple(names)), ["g", *names]).switches == tuple(names)
-
-
-@given(text=st.text('label=[]{}"#\n.*0'))
-@settings(deadline=None)
-def test_any_text_is_a_columns_file_or_refused(text: str, tmp_path_factory: pytest.TempPathFactory) -> None:
-    folder = tmp_path_factory.getbasetemp()
-    with suppress(ColumnsError):
-        assert isinstance(read(text, folder), Columns)
 
 
 def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:

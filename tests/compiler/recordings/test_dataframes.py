@@ -101,12 +101,6 @@ def test_what_the_columns_are_is_found_as_an_import_finds_it() -> None:
         from_dataframe(frame.drop(columns="trial").assign(subject="a"))
 
 
-def test_parquet_keeps_what_a_frame_says(small: GraspSet, tmp_path: Path) -> None:
-    pytest.importorskip("pyarrow")
-    to_dataframe(small).to_parquet(tmp_path / "table.parquet")
-    assert from_dataframe(pd.read_parquet(tmp_path / "table.parquet")).fingerprint() == small.fingerprint()
-
-
 @pytest.mark.parametrize("gone", [np.nan, None, pd.NA])
 def test_missing_values_are_missing_whatever_pandas_calls_them(small: GraspSet, gone: object) -> None:
     frame = to_dataframe(small)
@@ -137,12 +131,3 @@ def test_what_cannot_be_read_is_one_sentence(
     with pytest.raises(error) as caught:
         from_dataframe(spoil(to_dataframe(small)))  # type: ignore[operator]
     assert sentence in str(caught.value)
-
-
-def test_a_notebook_shows_rows_and_trials_of_each_type(small: GraspSet) -> None:
-    odd = replace(small, trials=np.array([0, 1, 1, 0, 1, 1]), simulated="a <b>")
-    shown = odd._repr_html_()
-    assert "GraspSet: 5 trials of 6 frames, 3 grasp types (kamakura14), 4 switches" in shown
-    assert "<br>simulated: a &lt;b&gt;" in shown
-    for name, trials, rows in (("PoS", 2, 2), ("PoH", 1, 2), ("Tip", 2, 2), ("Add", 0, 0)):
-        assert f"<tr><td>{name}</td><td>{trials}</td><td>{rows}</td></tr>" in shown

@@ -85,17 +85,7 @@ def test_an_arff_with_meta_begins_with_subject_object_and_trial(small: GraspSet)
 
 def test_what_arff_would_misread_is_quoted(small: GraspSet) -> None:
     joints = (replace(small.joints[0], name="50 % {a}"), replace(small.joints[1], name="it's \\"))
-    grasp_set = GraspSet(
-        small.switches,
-        small.switch_names,
-        small.codes,
-        joints,
-        small.grasps,
-        small.taxonomy,
-        small.subjects,
-        small.objects,
-        small.trials,
-    )
+    grasp_set = replace(small, joints=joints)
     assert "@attribute '50 \\% {a}' numeric" in to_arff(grasp_set)
     assert "@attribute 'it\\'s \\\\' numeric" in to_arff(grasp_set)
 

@@ -55,24 +55,18 @@ def refusal(data: bytes, folder: Path) -> str:
     return str(refused.value)
 
 
-def test_a_truncated_file_is_refused_with_the_reason(good: bytes, tmp_path: Path) -> None:
-    assert "is truncated" in refusal(good[:-1], tmp_path)
-    assert "is truncated" in refusal(good[:20], tmp_path)
-
-
-def test_an_altered_file_is_refused_with_the_reason(good: bytes, tmp_path: Path) -> None:
-    assert "is altered" in refusal(good[:-1] + bytes([good[-1] ^ 1]), tmp_path)
-    assert "is altered" in refusal(good + b"x", tmp_path)
-
-
-def test_a_foreign_file_is_refused_with_the_reason(tmp_path: Path) -> None:
-    assert "is not a thenar THNRGRSP file" in refusal(b"PK\x03\x04 something else", tmp_path)
-    assert "is not a thenar THNRGRSP file" in refusal(b"", tmp_path)
-
-
-def test_a_newer_file_is_refused_with_the_reason(good: bytes, tmp_path: Path) -> None:
+def test_a_file_that_is_cut_altered_foreign_or_newer_is_refused_with_the_reason(good: bytes, tmp_path: Path) -> None:
     payload = unseal(good, KIND, VERSION, "good")[1]
-    assert "update thenar" in refusal(seal(KIND, VERSION + 1, payload), tmp_path)
+    for data, reason in (
+        (good[:-1], "is truncated"),
+        (good[:20], "is truncated"),
+        (good[:-1] + bytes([good[-1] ^ 1]), "is altered"),
+        (good + b"x", "is altered"),
+        (b"PK\x03\x04 something else", "is not a thenar THNRGRSP file"),
+        (b"", "is not a thenar THNRGRSP file"),
+        (seal(KIND, VERSION + 1, payload), "update thenar"),
+    ):
+        assert reason in refusal(data, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -114,39 +108,3 @@ def test_sealed_arrays_that_contradict_the_header_are_refused(
 ) -> None:
     header, arrays = unpack(unseal(good, KIND, VERSION, "good")[1])
     assert reason in refusal(seal(KIND, VERSION, pack(header, arrays | changes)), tmp_path)
-
-
-@given(data=st.data())
-@settings(deadline=None)
-def test_sealed_mutations_are_read_or_refused_and_never_crash(
-    data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet], folder: Path
-) -> None:
-    path = folder / "mutated.grasps"
-    data.draw(grasp_sets).save(path)
-    payload = bytearray(unseal(path.read_bytes(), KIND, VERSION, "good")[1])
-    for _ in range(data.draw(st.integers(1, 5))):
-        payload[data.draw(st.integers(0, len(payload) - 1))] = data.draw(st.integers(0, 255))
-    path.write_bytes(seal(KIND, VERSION, bytes(payload)))
-    try:
-        loaded = GraspSet.load(path)
-    except SealError:
-        return
-    assert len(loaded.labels) == len(loaded)
-
-
-@given(data=st.data())
-@settings(deadline=None)
-def test_mutated_headers_with_a_right_seal_are_read_or_refused(
-    data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet], folder: Path
-) -> None:
-    path = folder / "header.grasps"
-    data.draw(grasp_sets).save(path)
-    header, arrays = unpack(unseal(path.read_bytes(), KIND, VERSION, "good")[1])
-    mutated = bytearray(header)
-    mutated[data.draw(st.integers(0, len(mutated) - 1))] = data.draw(st.integers(0, 255))
-    path.write_bytes(seal(KIND, VERSION, pack(bytes(mutated), arrays)))
-    try:
-        loaded = GraspSet.load(path)
-    except SealError:
-        return
-    assert len(loaded.labels) == len(loaded)

@@ -33,26 +33,6 @@ def test_every_oddity_is_counted_and_named(small: GraspSet) -> None:
     assert len(found) == 6
 
 
-def test_a_set_without_oddities_has_none(small: GraspSet) -> None:
-    assert (
-        find_oddities(
-            GraspSet(
-                small.switches[[0, 4]][:, 1:2],
-                ("thumb",),
-                small.codes[[0, 4]][:, :1],
-                small.joints[:1],
-                small.grasps[[0, 0]],
-                small.taxonomy,
-                small.subjects[[0, 0]],
-                small.objects[[0, 4]],
-                small.trials[[0, 4]],
-            ),
-            np.arange(2),
-        )
-        == ()
-    )
-
-
 @given(data=st.data())
 @settings(deadline=None)
 def test_frames_have_one_number_exactly_where_they_are_equal(

@@ -3,7 +3,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import pytest
 
@@ -13,8 +12,6 @@ from thenar.compiler.recordings.frames import check_trials, looks_like_frames
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.recordings.taxonomy import own
-from thenar.simulator.running.simulation import simulate
-from thenar.simulator.scenes.decode import load_scene
 
 Measure = Callable[[Callable[[], object]], int]
 
@@ -138,16 +135,6 @@ def test_the_public_sets_of_one_row_a_trial_are_not_taken_for_frames(icub_table:
     # The iCub's touches have 230 single grasps; AML's rows are medians of a recording each, as their READMEs say.
     assert looks_like_frames(import_file(icub_table, COLUMNS / "icub.toml")[0]) is None
     assert looks_like_frames(import_file(aml_table, COLUMNS / "aml.toml")[0]) is None
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["quick", "kamakura", "cutkosky", "faulty-glove", "continuous"])
-def test_no_shipped_scene_is_taken_for_frames_but_where_its_frames_are_numbered_as_trials(name: str) -> None:
-    scene = load_scene(name)
-    made = simulate(msgspec.structs.replace(scene, repetitions=min(scene.repetitions, 12))).grasp_set
-    assert looks_like_frames(made) is None
-    several = len(made) > made.trial_ids.max() + 1
-    assert (looks_like_frames(misnamed(made, "row")) is not None) == several
 
 
 @pytest.fixture(scope="module")

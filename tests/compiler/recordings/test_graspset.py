@@ -91,14 +91,6 @@ def test_a_set_that_contradicts_itself_is_refused(small: GraspSet, change: dict[
         GraspSet(**fields(small) | change)
 
 
-def test_sets_of_switches_alone_and_of_joints_alone_are_sets(small: GraspSet) -> None:
-    assert GraspSet(**fields(small) | {"joints": (), "codes": np.zeros((6, 0))}).joint_names == ()
-    assert GraspSet(**fields(small) | {"switch_names": (), "switches": np.zeros((6, 0))}).joint_names == (
-        "index",
-        "wrist",
-    )
-
-
 def test_the_fingerprint_sees_every_field_and_nothing_else(small: GraspSet) -> None:
     assert GraspSet(**fields(small)).fingerprint() == small.fingerprint()
     changes: list[dict[str, Any]] = [
@@ -111,15 +103,6 @@ def test_the_fingerprint_sees_every_field_and_nothing_else(small: GraspSet) -> N
     changes += [{"joints": (replace(small.joints[0], value_a=-11.0), small.joints[1])}]
     prints = {GraspSet(**fields(small) | change).fingerprint() for change in changes}
     assert len(prints | {small.fingerprint()}) == len(changes) + 1
-
-
-@pytest.mark.parametrize("change", [{}, {"taxels": PADS, "taxel_columns": (PAD,)}], ids=["plain", "taxels"])
-def test_load_is_the_inverse_of_save(small: GraspSet, tmp_path: Path, change: dict[str, Any]) -> None:
-    grasp_set = GraspSet(**fields(small) | change)
-    grasp_set.save(tmp_path / "set.grasps")
-    loaded = GraspSet.load(str(tmp_path / "set.grasps"))
-    assert loaded.fingerprint() == grasp_set.fingerprint()
-    assert loaded.taxels.tolist() == grasp_set.taxels.tolist()
 
 
 def test_taxels_are_columns_beside_the_switches(small: GraspSet) -> None:
@@ -169,14 +152,6 @@ def test_a_joint_reads_codes_as_values_by_its_two_points() -> None:
     assert joint.value([117, 167, 217]).tolist() == [0.0, -45.0, -90.0]
 
 
-@given(data=st.data())
-@settings(deadline=None)
-def test_code_is_the_inverse_of_value(data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]) -> None:
-    for joint in data.draw(grasp_sets).joints:
-        codes = np.array([0, 1, 2, 999, 65534, 65535])
-        assert joint.code(joint.value(codes)).tolist() == codes.tolist()
-
-
 @pytest.mark.parametrize(
     ("points", "reason"),
     [
@@ -195,22 +170,6 @@ def test_code_is_the_inverse_of_value(data: st.DataObject, grasp_sets: st.Search
 def test_a_calibration_that_is_no_line_is_refused(points: tuple[int, float, int, float], reason: str) -> None:
     with pytest.raises(RecordingError, match=reason):
         Joint("index", "deg", *points)
-
-
-def test_a_simulated_set_says_so_and_is_another_set_than_the_same_recorded(small: GraspSet, tmp_path: Path) -> None:
-    simulated = GraspSet(**fields(small) | {"simulated": "scene quick, seed 1"})
-    simulated.save(tmp_path / "set.grasps")
-    assert GraspSet.load(tmp_path / "set.grasps").simulated == "scene quick, seed 1"
-    assert simulated.rows([0]).simulated == simulated.simulated
-    assert simulated.fingerprint() != small.fingerprint()
-
-
-def test_a_set_prints_in_two_lines_what_it_is(small: GraspSet) -> None:
-    assert repr(small).startswith(f"GraspSet: {small.size}, ")
-    simulated = replace(small, simulated="scene quick, seed 1" * 9)
-    lines = repr(simulated).splitlines()
-    assert len(lines) == 2
-    assert max(map(len, lines)) < 200
 
 
 def test_the_example_of_the_docstring_is_true() -> None:

@@ -197,11 +197,6 @@ def test_an_unknown_taxonomy_is_refused() -> None:
         import_table(table("a", "b"), Columns("g", joints=JOINTS, taxonomy="feix"))
 
 
-def test_an_alias_that_no_row_needs_is_a_warning() -> None:
-    _, report = import_table(table("a", "b"), Columns("g", joints=JOINTS, labels={"c": "a"}))
-    assert [(finding.kind, finding.count) for finding in report.warnings] == [("unused aliases", 1)]
-
-
 def test_oddities_are_warnings_with_the_users_rows() -> None:
     columns = Columns("g", subject="who", switches=("s",))
     rows = {"g": ["a", "b", "a", "b"], "who": ["x", "x", "y", "y"], "s": ["0", "1", "0", "1"]}
@@ -225,29 +220,6 @@ def test_the_icub_recordings_are_read_as_their_readme_describes_them(icub_table:
     coarse, constant = report.warnings
     assert (coarse.kind, coarse.columns) == ("coarse grids", ("enc8",))
     assert (constant.kind, constant.count) == ("constant switches", 11)
-
-
-def test_the_aml_recordings_are_read_as_their_readme_describes_them(aml_table: Path) -> None:
-    grasp_set, report = imported(aml_table, "aml.toml")
-    assert grasp_set.codes.shape == (699, 6)
-    assert grasp_set.switches.shape == (699, 0)
-    assert (report.taxonomy, report.grasp_types, report.subjects, report.objects) == ("feix33", 8, 2, 13)
-    assert grasp_set.grasps[0] == "Adduction Grip"
-    assert [cost.largest_error for cost in report.coding] == [0.0] * 6
-    assert [joint.value(code) for joint, code in zip(grasp_set.joints, grasp_set.codes[0], strict=True)] == [
-        150,
-        201,
-        125,
-        158,
-        77,
-        157,
-    ]
-
-
-def test_a_value_beyond_the_codes_is_named_by_the_users_row() -> None:
-    rows = {"g": ["a", "b"], "j": ["0", "1e6"]}
-    with pytest.raises(TableError, match="joint 'j': row 9 would get codes outside"):
-        import_table(Table("t.csv", rows, np.array([7, 9])), Columns("g", joints=JOINTS))
 
 
 def test_counts_of_a_converter_keep_its_range_and_their_calibration(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -32,7 +31,6 @@ COLLECTION = Collection(
 )
 SESSION = Session(thenar="1", switches=("s1", "s2", "s3"), sensors=SENSORS, collection=COLLECTION)
 
-Trial = tuple[str, int, int, bytes]
 Write = Callable[..., Path]
 
 
@@ -247,14 +245,6 @@ def test_a_cut_recording_is_imported_up_to_its_last_whole_message_and_told(write
     assert size > end
 
 
-def test_an_altered_recording_is_told(write: Write) -> None:
-    path = write()
-    data = path.read_bytes()
-    path.write_bytes(data.replace(b'"time_us":3,"event":"captured"', b'"time_us":4,"event":"captured"'))
-    _, report = import_recordings([path])
-    assert "altered recordings" in [warning.kind for warning in report.warnings]
-
-
 def test_what_is_passed_over_is_told_with_its_place(write: Write) -> None:
     path = write()
     data = bytearray(path.read_bytes())
@@ -288,11 +278,6 @@ def test_what_is_no_recording_is_named(tmp_path: Path) -> None:
     path.write_bytes(b"cbuiltins\neval\n")
     with pytest.raises(McapError, match=r"a\.mcap does not begin like"):
         import_recordings([path])
-
-
-def test_codes_are_16_bit_numbers(write: Write) -> None:
-    grasp_set, _ = import_recordings([write()])
-    assert grasp_set.codes.dtype == np.uint16
 
 
 PADS = TaxelCalibration(unit="N", taxels=(TaxelLine("p", 100, 900, 2.0), TaxelLine("q", 900, 100)))

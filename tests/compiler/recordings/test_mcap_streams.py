@@ -7,7 +7,6 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.compiler.recordings.errors import ColumnsError
-from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.mcap_recording import import_files, import_recordings
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14, MOVEMENTS, collected
 from thenar.runtime.errors import McapError
@@ -212,9 +211,3 @@ def test_the_empty_hand_is_collected_where_it_is_asked_for(tmp_path: Path) -> No
     assert types.types == ("cup", "pen")
     assert tasks == (Task("cup", ("mug",)), Task("pen", ("biro",)), Task("none", ("wave",)))
     assert collected("own", objects)[1] == tasks[:2]
-
-
-def test_rows_as_a_set_keep_times_and_none_on_disk(recorded: tuple[Path, Wearer], tmp_path: Path) -> None:
-    grasp_set, _ = import_recordings([recorded[0]], stream=True)
-    grasp_set.save(tmp_path / "a.grasps")
-    assert GraspSet.load(tmp_path / "a.grasps").fingerprint() == grasp_set.fingerprint()

@@ -1,43 +1,19 @@
-import re
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from thenar.compiler.recordings import picture as module
 from thenar.compiler.recordings.errors import RecordingError
-from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.picture import draw
 
 
-def replace_inputs(
-    grasp_set: GraspSet,
-    switches: NDArray[np.bool_],
-    switch_names: tuple[str, ...],
-    codes: NDArray[np.integer],
-    joints: tuple[Joint, ...],
-) -> GraspSet:
-    return GraspSet(
-        switches,
-        switch_names,
-        codes.astype(np.uint16),
-        joints,
-        grasp_set.grasps,
-        grasp_set.taxonomy,
-        grasp_set.subjects,
-        grasp_set.objects,
-        grasp_set.trials,
-    )
-
-
 def parts(grasp_set: GraspSet, switches: int, joints: int) -> GraspSet:
-    return replace_inputs(
+    return replace(
         grasp_set,
-        grasp_set.switches[:, :switches],
-        grasp_set.switch_names[:switches],
-        grasp_set.codes[:, :joints],
-        grasp_set.joints[:joints],
+        switches=grasp_set.switches[:, :switches],
+        switch_names=grasp_set.switch_names[:switches],
+        codes=grasp_set.codes[:, :joints],
+        joints=grasp_set.joints[:joints],
     )
 
 
@@ -53,17 +29,6 @@ def test_an_svg_names_grasp_types_and_joints_and_is_the_same_every_time(small: G
         assert f"<!-- {words} -->".encode() in picture
 
 
-def test_rows_in_which_nothing_is_held_are_drawn_last(small: GraspSet) -> None:
-    drawn = draw(replace(small, grasps=np.array(["none", *small.grasps[1:]])), "svg").decode()
-    assert "1 rest) of 6 frames" in drawn
-    assert [name for name in re.findall(r"<!-- (\w+) -->", drawn) if name in ("PoS", "PoH", "Tip", "none")][:4] == [
-        "PoS",
-        "PoH",
-        "Tip",
-        "none",
-    ]
-
-
 def test_a_set_without_rows_cannot_be_drawn(small: GraspSet) -> None:
     with pytest.raises(RecordingError, match="without rows"):
         draw(small.rows([]), "png")
@@ -72,23 +37,6 @@ def test_a_set_without_rows_cannot_be_drawn(small: GraspSet) -> None:
 def test_names_are_drawn_as_they_are_and_cut_when_they_are_long(small: GraspSet) -> None:
     joints = (replace(small.joints[0], name="$x^$ [/b]", unit="$"), replace(small.joints[1], name="w" * 200))
     names = ("親指", "s" * 200, *small.switch_names[2:])
-    picture = draw(replace_inputs(small, small.switches, names, small.codes, joints), "svg")
+    picture = draw(replace(small, switch_names=names, joints=joints), "svg")
     for words in ("$x^$ [/b]", "w" * 29 + "…", "s" * 29 + "…"):
         assert f"<!-- {words} -->".encode() in picture
-
-
-def test_of_very_many_joints_the_first_are_drawn_and_the_rest_counted(
-    small: GraspSet, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, "_DRAWN_JOINTS", 1)
-    picture = draw(small, "svg")
-    assert b"joint values of the first 1 of 2 joints" in picture
-    assert b"<!-- index -->" in picture
-    assert b"<!-- wrist -->" not in picture
-
-
-@pytest.mark.slow
-def test_a_picture_is_no_taller_than_can_be_opened(small: GraspSet, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_TALLEST", 300)
-    picture = draw(small, "png")
-    assert int.from_bytes(picture[20:24], "big") == 300

@@ -24,16 +24,6 @@ ALL = Columns("g", subject="who", trial="n", switches=("s",), joints=(JointColum
 DROP = Columns("g", subject="who", trial="n", switches=("s",), joints=(JointColumns(("j",)),), missing="drop")
 
 
-def test_cells_become_arrays() -> None:
-    readings, _, found, _ = read(ALL)
-    assert readings.labels.tolist() == ["a", "b", "c"]
-    assert readings.subjects.tolist() == ["x", "y", "y"]
-    assert readings.trials.tolist() == [1, 2, 3]
-    assert readings.switches.tolist() == [[False], [True], [True]]
-    assert readings.joints.tolist() == [[1.5], [2.0], [3.0]]
-    assert found == []
-
-
 def test_columns_that_are_not_named_are_one_of_each() -> None:
     readings = read(Columns("g", switches=("s",))).readings
     assert readings.subjects.tolist() == readings.objects.tolist() == ["1", "1", "1"]
@@ -63,17 +53,6 @@ def test_missing_cells_are_an_error_unless_their_rows_may_be_dropped() -> None:
         read(ALL, j=["", "2", "3"], who=["x", "y", "?"])
 
 
-def test_dropped_rows_are_counted_and_named() -> None:
-    readings, _, (finding,), _ = read(DROP, j=["", "2", "3"], who=["x", "y", "?"])
-    assert readings.rows.tolist() == [3]
-    assert readings.labels.tolist() == ["b"]
-    assert (finding.kind, finding.count, finding.rows, finding.columns) == ("dropped rows", 2, (2, 5), ("who", "j"))
-    assert finding.message == (
-        "2 rows with missing values were left out: rows 2, 5 (columns who, j); "
-        "so 2 of 3 trials and grasp types a, c are lost"
-    )
-
-
 def test_a_wrong_cell_is_an_error_even_in_a_row_that_would_be_dropped() -> None:
     with pytest.raises(TableError, match="not 0 or 1"):
         read(DROP, s=["2", "1", "1"], j=["", "2", "3"])
@@ -87,11 +66,6 @@ def test_a_table_of_which_nothing_is_left_is_refused() -> None:
 def test_a_row_that_misses_a_label_is_found_among_numbers_too() -> None:
     with pytest.raises(TableError, match=r"missing .*: 1 cell, row 3 'g' \('nan'\)"):
         read(Columns("g", switches=("s",)), g=np.array([1.0, np.nan, 2.0]))
-
-
-def test_a_label_that_cannot_be_printed_is_named_by_its_row() -> None:
-    with pytest.raises(TableError, match=r"t\.csv: not names that can be printed: 1 cell, row 3 'g' \('b\\x07'\)"):
-        read(ALL, g=["a", "b\x07", "c"])
 
 
 def test_of_many_wrong_cells_the_first_rows_are_named_and_the_rest_counted() -> None:

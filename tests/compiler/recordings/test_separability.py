@@ -48,10 +48,6 @@ def test_the_ceiling_is_the_rate_of_the_best_memory(
         assert line.ceiling == sum(max(counts.values()) for counts in memory.values()) / len(grasp_set)
 
 
-def test_a_set_is_judged_by_what_it_has(small: GraspSet) -> None:
-    assert [line.inputs for line in separabilities(small)] == ["switches", "joints", "both"]
-
-
 def test_types_that_lie_apart_are_told_apart_and_equal_ones_are_not() -> None:
     apart = {line.inputs: line.neighbour_rate for line in separabilities(blobs(200, 1000))}
     assert apart["joints"] == apart["both"] == 1.0
@@ -75,10 +71,6 @@ def test_a_large_set_is_sampled_and_says_so() -> None:
     lines = separabilities(blobs(NEIGHBOUR_ROWS + 1, 1000))
     assert {line.neighbour_rows for line in lines} == {NEIGHBOUR_ROWS}
     assert lines == separabilities(blobs(NEIGHBOUR_ROWS + 1, 1000))
-
-
-def test_one_row_has_no_neighbour() -> None:
-    assert {line.neighbour_rate for line in separabilities(blobs(1, 0))} == {None}
 
 
 @pytest.mark.parametrize("frames", [2, 7])

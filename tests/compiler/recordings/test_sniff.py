@@ -65,12 +65,6 @@ def test_a_header_is_told_from_a_row(rows: list[list[str]], header: bool, tmp_pa
         assert table.rows.tolist() == [1, 2, 3]
 
 
-def test_points_are_no_thousands_and_commas_none_where_points_are(tmp_path: Path) -> None:
-    path = tmp_path / "t.csv"
-    path.write_bytes(b"g;a;b\nx;1.5;1,234\ny;2.5;2,345\n")
-    assert sniff(path)[0].decimal == "."
-
-
 def test_a_letter_far_down_decides_on_the_encoding(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
     path.write_bytes(b"g,s\n" + b"mug,1\n" * 300_000 + "Größe,0\n".encode("latin-1"))

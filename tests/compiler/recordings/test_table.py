@@ -148,21 +148,6 @@ def test_what_is_no_npz_is_refused(content: bytes, reason: str, tmp_path: Path) 
         read_table(tmp_path / "t.npz")
 
 
-@given(st.lists(st.tuples(st.integers(0), st.integers(0, 255)), min_size=1, max_size=5), st.booleans())
-@settings(deadline=None)
-def test_a_mutated_npz_is_a_table_or_refused_and_never_crashes(
-    folder: Path, changes: list[tuple[int, int]], deflated: bool
-) -> None:
-    members = {"a.npy": _npy(np.array(["x", "y"])), "X.npy": _npy(np.eye(2))}
-    content = bytearray(_zip(members, zipfile.ZIP_DEFLATED if deflated else zipfile.ZIP_STORED))
-    for place, byte in changes:
-        content[place % len(content)] = byte
-    (folder / "mutated.npz").write_bytes(content)
-    with suppress(TableError):
-        table = read_table(folder / "mutated.npz")
-        assert {len(column) for column in table.columns.values()} == {len(table.rows)}
-
-
 def test_another_suffix_is_refused_naming_those_that_are_read(tmp_path: Path) -> None:
     with pytest.raises(TableError, match=r"table\.doc: a table ends in \.csv, .* or \.mat"):
         read_table(tmp_path / "table.doc")

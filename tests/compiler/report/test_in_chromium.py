@@ -139,16 +139,6 @@ def test_the_mouse_over_a_point_tells_what_it_is_and_marks_its_row(opened: Reade
     opened.wait(lambda: not opened.driver.find_elements(By.CSS_SELECTOR, ".near"))
 
 
-def test_a_chart_can_be_made_larger(opened: Reader) -> None:
-    chart = opened.driver.find_element(By.ID, "by-frontier")
-    drawing, larger = chart.find_element(By.TAG_NAME, "svg"), chart.find_element(By.CLASS_NAME, "larger")
-    before = drawing.size["width"]
-    larger.click()
-    assert drawing.size["width"] > 1.8 * before
-    larger.click()
-    assert drawing.size["width"] == before
-
-
 def test_a_click_on_the_icicle_opens_the_list_at_the_node(opened: Reader) -> None:
     links = opened.driver.find_elements(By.CSS_SELECTOR, ".icicle a")
     number = len(links) - 1

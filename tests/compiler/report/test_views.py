@@ -1,6 +1,5 @@
 """What the sections are made of."""
 
-import re
 from dataclasses import replace
 
 import msgspec
@@ -11,12 +10,11 @@ from hypothesis.extra.numpy import arrays
 
 from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.hand import HandShape
-from thenar.compiler.pictures import PALETTE
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.report.content import ReportContent
 from thenar.compiler.report.frontier import frontier_view
 from thenar.compiler.report.hand import hand_picture
-from thenar.compiler.report.results import WIDEST, confusion_view
+from thenar.compiler.report.results import confusion_view
 from thenar.compiler.report.sections import kept_table, no_tree, placement_sentences, scan_sentences, scan_table
 from thenar.compiler.report.tree import MOST_NODES, tree_view
 from thenar.compiler.text import DASH
@@ -38,13 +36,6 @@ def test_the_commonest_mistakes_are_named_first_and_hits_never(counts: np.ndarra
     said = confusion_view("title", ("a", "b", "c", "d"), counts).mistaken
     wrong = sorted((count for place, count in np.ndenumerate(counts) if place[0] != place[1] and count), reverse=True)
     assert [int(sentence.split(": ")[1].split()[0]) for sentence in said] == wrong[:5]
-
-
-def test_a_matrix_that_nobody_could_read_is_left_out_but_not_its_mistakes() -> None:
-    size = WIDEST + 1
-    view = confusion_view("title", tuple(map(str, range(size))), np.ones((size, size), np.intp))
-    assert view.rows == ()
-    assert len(view.mistaken) == 5
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(2, 7), st.integers(1, 400))
@@ -84,13 +75,6 @@ def test_switches_stand_on_the_picture_where_they_lie_on_the_hand(hand: HandShap
     places = np.array([[float(x), -float(y)] for _, x, y, _ in picture.dots])
     assert np.abs(places - hand.places).max() <= 0.05 + 1e-9
     assert {name: order for name, _, _, order in picture.dots if order} == {kept[0]: "1", kept[1]: "2", kept[2]: "3"}
-
-
-def test_all_that_is_drawn_lies_in_the_view(hand: HandShape) -> None:
-    left, top, width, height = map(float, hand_picture(hand, (), "i", "t", "s").view_box.split())
-    points = np.concatenate([hand.outline, *hand.strips, hand.places, hand.labels]) * (1, -1)
-    assert (points > (left, top)).all()
-    assert (points < (left + width, top + height)).all()
 
 
 def test_the_share_of_all_switches_together_is_what_the_tree_tells(bare: ReportContent) -> None:
@@ -168,16 +152,3 @@ def test_every_kept_switch_is_read_in_one_transaction(bare: ReportContent) -> No
     read = [name for row in table.rows for name in row[table.columns.index("Switches")].split(", ")]
     assert sorted(read) == sorted(bare.switch_names)
     assert any("CyberGlove" in sentence for sentence in scan_sentences(bare))
-
-
-def test_a_picture_takes_the_pages_colours_and_ids_of_its_own(frontier: Frontier) -> None:
-    charts = frontier_view(frontier, frontier.fingerprint, None).charts
-    page = "".join(chart.drawing for chart in charts)
-    ids = re.findall(r' id="([^"]+)"', page)
-    assert ids
-    assert len(set(ids)) == len(ids)
-    assert set(re.findall(r'(?:href="|url\()#([^")]+)', page)) == set(ids)
-    assert not re.search(r"#[0-9a-f]{6}", page)
-    assert set(re.findall(r"var\(--([\w-]+)\)", page)) <= set(PALETTE)
-    assert "<style" not in page
-    assert "metadata" not in page

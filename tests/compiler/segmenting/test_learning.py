@@ -7,7 +7,7 @@ import pytest
 
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.segmenting.learning import Counts, learnt, live_states, model_of
-from thenar.compiler.segmenting.scores import Score, score
+from thenar.compiler.segmenting.scores import score
 from thenar.compiler.segmenting.streams import streams_of
 from thenar.runtime.segmenting.decoder import decode, emissions
 from thenar.runtime.segmenting.model import STEPS
@@ -73,7 +73,3 @@ def test_live_states_are_one_a_tick_and_at_last_the_offline_ones(make_movements:
     assert len(states) == len(lanes)
     offline = decode(model, emissions(lanes, model))
     assert states.tolist() == offline.tolist() if lag == 10_000 else states[-1] == offline[-1]
-
-
-def test_scores_of_no_stream_add_up_to_nothing() -> None:
-    assert Score.total([]).f1(2) == 1

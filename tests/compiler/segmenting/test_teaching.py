@@ -51,11 +51,6 @@ def test_two_sequences_are_aligned_at_their_edit_distance(one: str, other: str) 
     assert differ == levenshtein(list(map(ord, one)), list(map(ord, other)))
 
 
-@given(st.text("abcd", min_size=1, max_size=6), st.integers(2, 5))
-def test_equal_sequences_have_a_column_for_each_item(string: str, count: int) -> None:
-    assert aligned([string] * count) == [(at,) * count for at in range(len(string))]
-
-
 def test_what_most_show_is_a_step_whatever_the_order_of_the_demonstrations(build: Path) -> None:
     shown = [demo("1", "pfh"), demo("2", "pfph"), demo("3", "fh"), demo("4", "phfh"), demo("5", "pfh")]
     for order in permutations(shown):

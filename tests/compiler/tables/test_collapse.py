@@ -2,7 +2,6 @@ import tracemalloc
 from collections.abc import Callable
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -47,13 +46,6 @@ def _one_stump(column: int, threshold: float) -> Stumps:
     return Stumps(2, columns, np.array([[threshold, 0.5]]), values, 1.0)
 
 
-def test_a_switch_becomes_a_constant_and_a_row() -> None:
-    tables = collapse(_one_stump(0, 0.5), 1)
-    # A round adds (K-1)/K * (g - mean g): of -8 in one of two classes, -2 and +2.
-    assert tables.bias.tolist() == [-2.0, 2.0]
-    assert tables.switch_rows.tolist() == [[3.0, -3.0]]
-
-
 def test_a_code_at_the_threshold_goes_left() -> None:
     tables = collapse(_one_stump(1, 7.0), 1)
     assert tables.thresholds[0].tolist() == [7]
@@ -82,13 +74,6 @@ def test_a_threshold_that_no_code_passes_makes_no_bin() -> None:
         assert tables.joint_rows[0].tolist() == [[score, -score]]
 
 
-def test_an_ensemble_without_rounds_is_all_zeros(make_stumps: MakeStumps) -> None:
-    tables = collapse(make_stumps(rounds=0), 6)
-    assert not tables.bias.any()
-    assert not tables.switch_rows.any()
-    assert [rows.tolist() for rows in tables.joint_rows] == [[[0.0] * 4]] * 3
-
-
 def test_scores_are_added_row_after_row_and_not_as_the_machine_likes(make_stumps: MakeStumps) -> None:
     tables = collapse(make_stumps(3, rounds=200, switches=90, joints=0), 90)
     bits = np.random.default_rng(3).random((50, 90)) < 0.5
@@ -97,19 +82,6 @@ def test_scores_are_added_row_after_row_and_not_as_the_machine_likes(make_stumps
         for row in tables.switch_rows[frame]:
             expected = expected + row
         assert scores.tobytes() == expected.tobytes()
-
-
-@pytest.mark.parametrize(("switches", "joints"), [(5, 3), (7, 3), (6, 2), (6, 4)])
-def test_frames_of_other_inputs_are_not_scored(
-    make_stumps: MakeStumps, make_rows: MakeRows, switches: int, joints: int
-) -> None:
-    tables = collapse(make_stumps(), 6)
-    with pytest.raises(ValueError, match="zip"):
-        tables.scores(*make_rows(switches=switches, joints=joints))
-
-
-def test_thresholds_are_codes(make_stumps: MakeStumps) -> None:
-    assert [steps.dtype for steps in collapse(make_stumps(), 6).thresholds] == [np.uint16] * 3
 
 
 def test_contributions_at_one_threshold_are_added_in_the_order_of_the_rounds() -> None:

@@ -51,14 +51,6 @@ def test_without_gaps_it_is_the_furthest_of_all_whole_frames(tables: IntegerTabl
     assert abs(found.total) == furthest_of_all
 
 
-def test_a_missing_input_is_named_where_only_its_mean_gets_there() -> None:
-    silent = whole_numbers(0, 2, 1, (2,), 0)
-    far = replace(silent, switch_means=np.array([[7, 0]], np.int16), joint_means=np.array([[9, 0]], np.int16))
-    found = furthest(far)
-    assert (found.total, found.lost_switches.tolist(), found.lost_joints.tolist()) == (16, [True], [True])
-    assert furthest(far, missing=False).total == 0
-
-
 def test_a_bin_that_no_code_falls_into_is_in_no_frame() -> None:
     silent = whole_numbers(0, 2, 0, (2,), 0)
     rows = np.array([[3, 0], [9, 0]], np.int16)
@@ -73,9 +65,3 @@ def test_a_bin_is_shown_by_its_lowest_code_up_to_the_highest_there_is() -> None:
         rows[bin_] = 5, 0
         found = furthest(replace(silent, thresholds=(np.array([9, 65534], np.uint16),), joint_rows=(rows,)))
         assert (found.total, found.codes.tolist()) == (5, [code])
-
-
-def test_it_is_told_in_the_numbers_that_the_runtime_takes() -> None:
-    found = furthest(whole_numbers(0, 2, 1, (2,), 10))
-    told = (found.terms, found.bits, found.codes, found.lost_switches, found.lost_joints)
-    assert [array.dtype for array in told] == [np.int16, np.bool_, np.uint16, np.bool_, np.bool_]

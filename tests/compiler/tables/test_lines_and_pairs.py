@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from thenar.compiler.tables.collapse import Line, ScoreTables
 from thenar.compiler.tables.compare import compare, worst_case
 from thenar.compiler.tables.furthest import furthest
-from thenar.compiler.tables.quantise import as_deployed, balance, integer_scores, quantise, reach
+from thenar.compiler.tables.quantise import as_deployed, balance, integer_scores, quantise
 from thenar.compiler.tables.worstcase import Rounding
 from thenar.runtime.errors import BuildError
 from thenar.runtime.scores import LANE_OFFSET, LiveScores, Scorer
@@ -164,19 +164,6 @@ def test_the_runtime_adds_up_what_arrays_add_up_and_nothing_of_what_is_lost(seed
         assert (left == scores[row]).all()
 
 
-@settings(deadline=None)
-@given(seed=seeds, entry_bits=entries)
-def test_a_frame_and_an_order_reach_the_bound(seed: int, entry_bits: int) -> None:
-    tables, bits, codes = with_lines(seed)
-    integers = quantise(tables, bits, codes, entry_bits=entry_bits)
-    found = furthest(integers, missing=False)
-    reached = found.terms[found.order][: found.n_terms].astype(int).sum(axis=0)[found.grasp]
-    assert reached == found.total
-    whole = found.terms.astype(int).sum(axis=0)
-    assert (whole == integer_scores(integers, found.bits[np.newaxis], found.codes[np.newaxis])[0]).all()
-    assert abs(furthest(integers).total) == integers.bound >= abs(found.total)
-
-
 @settings(deadline=None, max_examples=25)
 @given(seed=seeds, entry_bits=entries)
 def test_no_partial_sum_of_any_code_leaves_the_bound(seed: int, entry_bits: int) -> None:
@@ -233,17 +220,6 @@ def test_a_line_of_few_codes_and_much_weight_takes_a_gain() -> None:
     scores = integer_scores(integers, bits, codes)
     assert (np.diff(scores, axis=0) == np.diff(scores, axis=0)[0]).all()
     assert scores[:, 0].tolist() == (-scores[:, 1]).tolist()
-
-
-@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
-def test_the_unit_of_scores_does_not_matter(factor: float) -> None:
-    tables, bits, codes = with_lines(7)
-    lines = tuple(Line(line.joint, line.low, line.high, line.row * factor) for line in tables.lines)
-    rows = tuple(rows * factor for rows in tables.joint_rows)
-    other = ScoreTables(tables.bias * factor, tables.switch_rows * factor, tables.thresholds, rows, lines)
-    assert reach(other, 1.0, rounded=False) == pytest.approx(factor * reach(tables, 1.0, rounded=False))
-    one, two = (quantise(each, bits, codes) for each in (tables, other))
-    assert two.scale == pytest.approx(one.scale / factor, rel=1e-2)
 
 
 JOINTS = 5

@@ -38,18 +38,6 @@ def test_balancing_changes_no_score_and_never_coarsens(
     assert reach(balanced, 1.0, rounded=False) <= reach(tables, 1.0, rounded=False) * (1 + 1e-12)
 
 
-@given(seed=st.integers(0, 10_000))
-def test_with_the_bias_gone_partial_sums_reach_no_further_than_scores(make_stumps: MakeStumps, seed: int) -> None:
-    tables = collapse(make_stumps(seed, rounds=60), 6)
-    balanced = balance(tables)
-    gone = np.abs(balanced.bias) < 1e-12
-    highest = balanced.bias + np.maximum(balanced.switch_rows, 0).sum(axis=0)
-    highest += sum(rows.max(axis=0) for rows in balanced.joint_rows)
-    reached = np.maximum(balanced.switch_rows, 0).sum(axis=0)
-    reached += sum(np.maximum(rows.max(axis=0), 0) for rows in balanced.joint_rows)
-    assert np.allclose(highest[gone], reached[gone], rtol=0, atol=1e-10)
-
-
 def test_a_bias_that_the_joints_have_room_for_is_gone() -> None:
     rows = np.array([[-4.0, 1.0], [6.0, 5.0]])
     tables = ScoreTables(np.array([3.0, -2.0]), np.zeros((0, 2)), (np.array([9], np.uint16),), (rows,))
@@ -133,25 +121,6 @@ def test_the_guarantee_is_the_same_in_coarser_steps(make_stumps: MakeStumps, mak
     assert Rounding(tables, integers).worst_of_all().loss <= found.safe_margin + 2 * found.slack
 
 
-@given(seed=seeds, shape=shapes, width=st.sampled_from([4, 16]))
-def test_entries_of_16_bits_limit_nothing(
-    make_stumps: MakeStumps, make_rows: MakeRows, seed: int, shape: tuple[int, int], width: int
-) -> None:
-    switches, joints = shape
-    tables = collapse(make_stumps(seed, switches=switches, joints=joints), switches)
-    rows = make_rows(seed, switches=switches, joints=joints)
-    assert tables_to_bytes(quantise(tables, *rows, width)) == tables_to_bytes(quantise(tables, *rows, width, 32))
-
-
-@given(seed=seeds, shape=shapes, scale=st.floats(0.01, 1e4), factor=st.floats(1.0, 3.0))
-def test_the_span_never_falls_as_the_scale_grows(
-    make_stumps: MakeStumps, seed: int, shape: tuple[int, int], scale: float, factor: float
-) -> None:
-    switches, joints = shape
-    tables = balance(collapse(make_stumps(seed, switches=switches, joints=joints), switches))
-    assert span(tables, scale) <= span(tables, scale * factor)
-
-
 @pytest.mark.parametrize(("apart", "together"), [(1, 2), (4, 2), (5, 1), (50, 1)])
 def test_switches_count_together_only_within_five(apart: int, together: int) -> None:
     rows = np.zeros((60, 2))
@@ -180,15 +149,6 @@ FLOATS = 8 * 32767 * 2.0**-53  # eight roundings, at most, of numbers within int
 
 
 @given(seed=st.integers(0, 10_000), width=widths)
-def test_the_scale_is_the_finest_that_fits(make_stumps: MakeStumps, make_rows: MakeRows, seed: int, width: int) -> None:
-    tables = collapse(make_stumps(seed), 6)
-    integers = quantise(tables, *make_rows(seed), width)
-    limit = 2 ** (width - 1) - 1
-    assert integers.bound <= limit
-    assert reach(balance(tables), float(np.nextafter(integers.scale, np.inf))) > limit
-
-
-@given(seed=st.integers(0, 10_000), width=widths)
 def test_no_score_is_off_by_more_than_the_guarantee(
     make_stumps: MakeStumps, make_rows: MakeRows, seed: int, width: int
 ) -> None:
@@ -199,42 +159,11 @@ def test_no_score_is_off_by_more_than_the_guarantee(
     assert found.holds
 
 
-@given(seed=st.integers(0, 10_000))
-def test_rows_beyond_the_safe_margin_keep_their_class_and_some_others_do_not(
-    make_stumps: MakeStumps, make_rows: MakeRows, seed: int
-) -> None:
-    stumps, (bits, codes) = make_stumps(seed), make_rows(seed, n=200)
-    found = compare(stumps, quantise(collapse(stumps, 6), bits, codes, 6), bits, codes)
-    assert not np.isin(found.changed, np.flatnonzero(found.covered)).any()
-    assert np.array_equal(found.covered, found.margins > found.safe_margin + 2 * found.slack)
-
-
-def test_coarse_integers_do_change_classes(make_stumps: MakeStumps, make_rows: MakeRows) -> None:
-    stumps, (bits, codes) = make_stumps(1), make_rows(1, n=200)
-    found = compare(stumps, quantise(collapse(stumps, 6), bits, codes, 4), bits, codes)
-    assert len(found.changed) > 0
-    assert found.holds
-
-
 def test_a_broken_table_does_not_hold(make_stumps: MakeStumps, make_rows: MakeRows) -> None:
     stumps, (bits, codes) = make_stumps(1), make_rows(1)
     integers = quantise(collapse(stumps, 6), bits, codes, 12)
     integers.bias[0] += 20
     assert not compare(stumps, integers, bits, codes).holds
-
-
-def test_tables_of_zeros_stay_zeros(make_stumps: MakeStumps, make_rows: MakeRows) -> None:
-    integers = quantise(collapse(make_stumps(rounds=0), 6), *make_rows())
-    assert integers.scale == 1.0
-    assert integers.bound == 0
-
-
-def test_a_threshold_that_rounding_makes_meaningless_is_dropped(make_rows: MakeRows) -> None:
-    rows = np.array([[0.0, 0.0], [1e-9, -1e-9], [1.0, -1.0]])
-    tables = ScoreTables(np.zeros(2), np.zeros((6, 2)), (np.array([3, 9], np.uint16),), (rows,))
-    integers = quantise(tables, *make_rows(joints=1))
-    assert integers.thresholds[0].tolist() == [9]
-    assert len(integers.joint_rows[0]) == 2
 
 
 def test_a_nearly_empty_ensemble_has_a_finite_scale(make_rows: MakeRows) -> None:
@@ -282,12 +211,6 @@ def test_scores_next_to_the_ensembles_ties_do_not_break_the_guarantee(
     assert found.holds
 
 
-@pytest.mark.parametrize("joints", [2, 4])
-def test_rows_of_other_joints_have_no_means(make_stumps: MakeStumps, make_rows: MakeRows, joints: int) -> None:
-    with pytest.raises(ValueError, match="zip"):
-        quantise(collapse(make_stumps(), 6), *make_rows(joints=joints))
-
-
 @pytest.mark.parametrize(("rows", "kept"), [("aab", [9]), ("abb", [3]), ("aba", [3, 9]), ("abc", [3, 9]), ("aaa", [])])
 def test_a_threshold_is_dropped_only_between_equal_rows(make_rows: MakeRows, rows: str, kept: list[int]) -> None:
     values = {"a": [-1.0, 1.0], "b": [1.0, -1.0], "c": [0.5, 0.25]}
@@ -310,8 +233,3 @@ def test_a_mean_of_equal_rows_is_that_row_though_floating_point_rounds_it_past_t
         assert integers.joint_means.tolist() == integers.joint_rows[0][1:].tolist()
         tried += 1
     assert tried > 20
-
-
-def test_reach_before_rounding_grows_with_the_scale(make_stumps: MakeStumps) -> None:
-    tables = collapse(make_stumps(), 6)
-    assert reach(tables, 4.0, rounded=False) == 4.0 * reach(tables, 1.0, rounded=False)

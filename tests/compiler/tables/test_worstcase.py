@@ -100,14 +100,6 @@ def _switches(bias: list[float], rows: list[list[float]], steps: list[int], whol
     )
 
 
-def test_the_switch_is_closed_where_that_costs_the_lead() -> None:
-    rounding = _switches([0.0, 0.0], [[0.2, 0.0], [-0.2, 0.0]], [0, 0], [[0, 0], [0, 0]])
-    worst = rounding.worst(0, 1)
-    assert worst.bits.tolist() == [True, False]
-    assert worst.loss == Fraction(0.2) * 2
-    assert rounding.worst(1, 0).bits.tolist() == [False, True]
-
-
 @pytest.mark.parametrize(("leader", "safe"), [(0, "0"), (1, "3/4")])
 def test_a_competitor_of_the_lower_number_wins_ties_and_the_other_must_be_better_by_a_step(
     leader: int, safe: str
@@ -148,12 +140,6 @@ def test_scores_down_to_the_smallest_doubles_are_compared_exactly() -> None:
     assert rounding.safe_margin() == 0
 
 
-def test_a_frame_is_told_in_the_numbers_that_the_runtime_takes(make_stumps: MakeStumps, make_rows: MakeRows) -> None:
-    tables = collapse(make_stumps(), 6)
-    worst = Rounding(tables, quantise(tables, *make_rows())).worst_of_all()
-    assert [array.dtype for array in (worst.bits, worst.codes)] == [np.bool_, np.uint16]
-
-
 @pytest.mark.parametrize(("bin_", "code"), [(0, 0), (1, 1), (2, 65535)])
 def test_the_first_code_and_the_last_may_have_a_bin_of_their_own(bin_: int, code: int) -> None:
     rows = np.zeros((3, 2))
@@ -163,15 +149,6 @@ def test_the_first_code_and_the_last_may_have_a_bin_of_their_own(bin_: int, code
     integers = IntegerTables(np.zeros(2, np.int16), none, steps, whole, none, np.zeros((1, 2), np.int16), 1.0)
     worst = Rounding(ScoreTables(np.zeros(2), np.zeros((0, 2)), steps, (rows,)), integers).worst(0, 1)
     assert (worst.codes.tolist(), worst.loss) == ([code], Fraction(1, 4))
-
-
-@pytest.mark.parametrize(("switches", "joints"), [(5, 3), (7, 3), (6, 2), (6, 4)])
-def test_integers_of_other_inputs_are_not_compared(
-    make_stumps: MakeStumps, make_rows: MakeRows, switches: int, joints: int
-) -> None:
-    others = collapse(make_stumps(switches=switches, joints=joints), switches)
-    with pytest.raises(ValueError, match="other inputs"):
-        Rounding(collapse(make_stumps(), 6), quantise(others, *make_rows(switches=switches, joints=joints)))
 
 
 _long = st.integers(-(2**200), 2**200)

@@ -20,7 +20,6 @@ from thenar.compiler import (
 from thenar.compiler.boosting.boost import SMALLEST_SHRINKAGE
 from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.trainers.base import Training, changed
-from thenar.drivers.members import MemberError
 from thenar.runtime.errors import ThenarError
 
 
@@ -85,11 +84,6 @@ def test_a_trainer_that_makes_a_model_of_something_else_is_at_fault(
         compile_build(grasp_set, tmp_path / "build", trainer="constant", excess=1, folds=0)
     manifest = compile_build(grasp_set, tmp_path / "build", trainer="constant", folds=0).manifest
     assert manifest.options.settings == {"excess": 0.0}
-
-
-def test_an_unknown_trainer_is_no_trainer() -> None:
-    with pytest.raises(MemberError):
-        Training.of(Options(trainer="oracle"))
 
 
 def test_logitboost_is_the_classifier(grasp_set: GraspSet) -> None:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.body.hand import CAPSULES, DOF, Hand, Size
+from thenar.simulator.body.hand import CAPSULES, Hand, Size
 from thenar.simulator.body.layout import STANDS_OUT_MM, Switches, murakami160
 
 LAYOUT = murakami160()
@@ -20,11 +20,6 @@ def own_axes(hand: Hand) -> tuple[np.ndarray, np.ndarray]:
     """Return the tops of all switches on the axes of their capsules: (s, 3), and the capsules (s,)."""
     switches = Switches(hand, LAYOUT)
     return switches.places, switches.capsules
-
-
-def test_there_are_160_switches_of_different_names() -> None:
-    assert len(LAYOUT) == 160
-    assert len({patch.name for patch in LAYOUT}) == 160
 
 
 def test_thumb_and_thenar_and_each_finger_have_26_the_palm_has_30() -> None:
@@ -82,14 +77,6 @@ def test_switches_go_with_the_capsules_they_sit_on(joint: int, angle: float) -> 
     assert own == pytest.approx(switches.places, abs=1e-11)
 
 
-def test_on_a_flat_hand_all_finger_and_palm_contacts_look_to_the_palm() -> None:
-    hand = Hand(Size(185.0, 83.0))
-    tops = Switches(hand, LAYOUT).tops(hand.skeleton(FLAT))[..., 0]
-    for patch, top in zip(LAYOUT, tops, strict=True):
-        if patch.capsule >= 3 and abs(patch.around_deg) < 60.0:
-            assert top[2] < 0.0, patch.name
-
-
 def test_radial_switches_lie_on_the_radial_side() -> None:
     hand = Hand(Size(185.0, 83.0))
     skeleton = hand.skeleton(FLAT)
@@ -99,13 +86,3 @@ def test_radial_switches_lie_on_the_radial_side() -> None:
             middle = skeleton.origins[patch.capsule, :, 0]
             across = skeleton.frames[patch.capsule, :, 1, 0] @ (top - middle)
             assert np.sign(across) == np.sign(patch.around_deg), patch.name
-
-
-@pytest.mark.parametrize("n", [1, 2, 7, 64])
-def test_switches_lie_in_the_same_place_alone_and_in_company(n: int) -> None:
-    hand = Hand(Size(185.0, 83.0))
-    switches = Switches(hand, LAYOUT)
-    angles = np.random.default_rng(n).uniform(-0.3, 1.2, (len(DOF), n))
-    together = switches.tops(hand.skeleton(angles))
-    for one in range(n):
-        assert np.array_equal(switches.tops(hand.skeleton(angles[:, [one]]))[..., 0], together[..., one])

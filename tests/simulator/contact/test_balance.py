@@ -15,7 +15,6 @@ from thenar.simulator.contact.balance import (
     LIMIT_NMM_PER_RAD,
     Balance,
     Case,
-    Pace,
     Skin,
     command,
 )
@@ -119,21 +118,3 @@ def test_skin_off_the_object_forgets_what_it_stuck_to(balance: Balance) -> None:
 def test_without_friction_skin_only_presses(balance: Balance) -> None:
     slippery = Balance(balance.command, replace(balance.skin, friction=0.0), balance.angles, balance.pose)
     assert slippery.forces == pytest.approx(slippery.presses[:, None] * slippery.normal, abs=1e-9)
-
-
-def test_rest_is_where_nothing_is_left_over(balance: Balance) -> None:
-    force, moment = (np.linalg.norm(part, axis=0) for part in (balance.on_object[:3], balance.on_object[3:]))
-    assert not balance.at_rest(Pace()).any()
-    assert balance.unrest == pytest.approx(
-        np.maximum(np.maximum(force, moment / 30.0), np.abs(balance.on_joints).max(axis=0) / 30.0)
-    )
-
-
-def test_forces_are_the_same_alone_and_in_company(balance: Balance) -> None:
-    for one in range(4):
-        index = np.array([one])
-        pose = Pose(balance.pose.position[:, index], balance.pose.rotation[..., index])
-        alone = Balance(balance.command.rows(index), balance.skin, balance.angles[:, index], pose)
-        for field in ("presses", "forces", "on_object", "on_joints", "residual_n", "unrest", "jacobian"):
-            assert np.array_equal(getattr(alone, field)[..., 0], getattr(balance, field)[..., one]), field
-        assert np.array_equal(alone.slipped()[..., 0], balance.slipped()[..., one])

@@ -31,18 +31,6 @@ def test_the_stiffness_of_skin_is_the_derivative_of_its_force(skin: Skin, sunk: 
     )
 
 
-@given(SKINS)
-def test_force_and_stiffness_of_skin_begin_at_nothing_and_have_no_jump(skin: Skin) -> None:
-    sunk = np.linspace(-1.0, 2.0 * skin.soft_mm, 3001)
-    force, stiffness = skin.press(sunk)
-    assert not force[sunk <= 0.0].any()
-    assert not stiffness[sunk <= 0.0].any()
-    step = (1.0 + 2.0 * skin.soft_mm) / 3000
-    assert np.abs(np.diff(stiffness)).max() <= 1.001 * step * skin.press_n_per_mm / skin.soft_mm
-    assert np.abs(np.diff(force)).max() <= 1.001 * step * skin.press_n_per_mm
-    assert (np.diff(force) >= 0.0).all()
-
-
 @given(SKINS, st.floats(0.0, 10.0))
 def test_deep_skin_is_a_plain_spring_that_begins_half_way_through_the_soft(skin: Skin, deeper: float) -> None:
     force, stiffness = skin.press(np.array([skin.soft_mm + deeper]))
@@ -70,14 +58,3 @@ def test_torque_is_that_of_the_grip(by_grasp: dict[str, Condition], make_case: C
     case = make_case(by_grasp["Tip"], 4)
     unit = torques(case.condition, case.condition.hand.skeleton(case.angles), Pose.of(case.numbers))
     assert command([case]).torque == pytest.approx(unit * case.grip_n)
-
-
-def test_cases_stand_one_after_the_other(by_grasp: dict[str, Condition], make_case: Callable[..., Case]) -> None:
-    cases = [make_case(by_grasp[grasp], n) for grasp, n in (("PoS", 2), ("Tip", 1), ("Lat", 3))]
-    together = command(cases)
-    for number, (case, first) in enumerate(zip(cases, (0, 2, 3), strict=True)):
-        alone, part = command([case]), together.rows(np.arange(first, first + len(case.grip_n)))
-        for field in ("angles", "torque", "weight", "skin_points", "object_points"):
-            assert np.array_equal(getattr(alone, field), getattr(part, field)), (number, field)
-        assert np.array_equal(alone.pose.position, part.pose.position)
-        assert np.array_equal(alone.pose.rotation, part.pose.rotation)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.contact.settle import backward, cholesky, forward, solve_arrow
+from thenar.simulator.contact.settle import solve_arrow
 
 SEEDS = st.integers(0, 10_000)
 SCALES = st.floats(-3.0, 4.0).map(lambda power: 10.0**power)
@@ -44,32 +44,3 @@ def test_arrow_systems_are_solved_as_numpy_solves_them(seed: int, n: int, scale:
     known = np.linalg.solve(whole, right.T[..., None])[..., 0].T
     condition = np.linalg.cond(whole).max()
     assert found == pytest.approx(known, rel=1e-14 * condition, abs=1e-14 * condition * np.abs(known).max())
-
-
-@given(SEEDS, st.integers(1, 7))
-def test_cholesky_factors_multiply_back(seed: int, size: int) -> None:
-    rows = np.random.default_rng(seed).normal(size=(size + 3, size, 4))
-    matrix = np.einsum("rin,rjn->ijn", rows, rows)
-    lower = cholesky(matrix)
-    assert np.array_equal(lower, np.where(np.tri(size)[..., None] > 0, lower, 0.0))
-    assert np.einsum("ikn,jkn->ijn", lower, lower) == pytest.approx(matrix, abs=1e-12 * np.abs(matrix).max())
-
-
-@given(SEEDS, st.integers(1, 7), st.integers(1, 3))
-def test_forward_and_backward_undo_the_factors(seed: int, size: int, sides: int) -> None:
-    draw = np.random.default_rng(seed)
-    lower = np.tri(size)[..., None] * draw.uniform(-0.5, 0.5, (size, size, 4))
-    lower[np.arange(size), np.arange(size)] = draw.uniform(1.0, 2.0, (size, 4))
-    wanted = draw.normal(size=(size, sides, 4))
-    spread = lower[:, :, None]
-    assert forward(spread, np.einsum("ikn,krn->irn", lower, wanted)) == pytest.approx(wanted, abs=1e-9)
-    assert backward(spread, np.einsum("kin,krn->irn", lower, wanted)) == pytest.approx(wanted, abs=1e-9)
-
-
-@pytest.mark.parametrize("n", [1, 2, 7, 64])
-def test_a_system_is_solved_to_the_same_bits_alone_and_in_company(n: int) -> None:
-    parts = arrow(n, n)
-    together = solve_arrow(*parts)
-    for one in range(n):
-        alone = solve_arrow(*(np.ascontiguousarray(part[..., [one]]) for part in parts))
-        assert np.array_equal(alone[:, 0], together[:, one])

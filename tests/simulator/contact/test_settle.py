@@ -29,15 +29,6 @@ def pads_n(rest: Rest, condition: Condition) -> np.ndarray:
     return total
 
 
-def below_n(rest: Rest, condition: Condition) -> np.ndarray:
-    """Return what presses from below (n,): on the lower side of the object, where it looks down."""
-    centres = condition.hand.spheres(condition.hand.skeleton(rest.angles))
-    normal = rest.pose.distance(condition.thing.shape, centres)[1]
-    looks_down = np.einsum("mxn,x->mn", normal, condition.held.down) > 0.4
-    total: np.ndarray = np.where(looks_down, rest.presses, 0.0).sum(axis=0)
-    return total
-
-
 def assert_same(one: Rest, other: Rest, place: int, first: int = 0) -> None:
     """Assert that repetition `first` of one is repetition `place` of the other, bit for bit."""
     for field in ("angles", "presses", "residual_n", "residual_nmm", "settled", "steps"):
@@ -70,13 +61,6 @@ def test_skin_and_weight_balance_but_for_a_small_share_of_the_load(every: list[t
     assert found.max() < 0.10
 
 
-def test_what_is_left_is_what_the_soft_spring_carries(every: list[tuple[Case, Rest]]) -> None:
-    for case, rest in every:
-        shift = np.linalg.norm(rest.pose.position - case.numbers[:3], axis=0)
-        within = np.abs(rest.residual_n - HOLD_N_PER_MM * shift)[rest.settled]
-        assert (within < 0.05 + 1e-9).all()  # what at rest may still be out of balance
-
-
 def test_pads_get_most_of_the_grip_in_pinches(by_grasp: dict[str, Condition], make_case: Cases, skin: Skin) -> None:
     for grasp in ("Tip", "PMF", "CMF", "PE"):
         case = make_case(by_grasp[grasp], 16)
@@ -84,16 +68,6 @@ def test_pads_get_most_of_the_grip_in_pinches(by_grasp: dict[str, Condition], ma
         share = (pads_n(rest, case.condition) / case.grip_n)[rest.settled]
         assert share.mean() > 0.6, grasp
         assert share.max() < 1.4, grasp
-
-
-def test_without_friction_a_tip_grasp_is_under_pressed(
-    by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
-) -> None:
-    case = make_case(by_grasp["Tip"], 16)
-    (sticking,) = close([case], skin, MOST_STEPS)
-    (slipping,) = close([case], replace(skin, friction=0.0), MOST_STEPS)
-    held, lost = (pads_n(rest, case.condition) for rest in (sticking, slipping))
-    assert held.mean() > 3.0 * lost.mean()
 
 
 def test_friction_carries_the_weight(by_grasp: dict[str, Condition], make_case: Cases, skin: Skin) -> None:
@@ -109,27 +83,6 @@ def test_friction_carries_the_weight(by_grasp: dict[str, Condition], make_case: 
         assert sinks[0].max() < sinks[1].min(), grasp
 
 
-@pytest.mark.parametrize("grasp", ["PoH", "PMF", "CMF"])
-def test_a_heavier_object_presses_harder_on_what_is_below_it(
-    grasp: str, by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
-) -> None:
-    below = []
-    for mass in (0.2, 0.5, 1.0):
-        condition = heavier(by_grasp[grasp], mass)
-        (rest,) = close([make_case(condition, 4, share=0.0)], skin, MOST_STEPS)
-        assert rest.settled.all()
-        below.append(below_n(rest, condition).mean())
-    assert np.diff(below).min() > 0.0
-
-
-def test_a_stronger_grip_presses_harder(by_grasp: dict[str, Condition], make_case: Cases, skin: Skin) -> None:
-    for grasp in ("PoS", "CMF", "Tip"):
-        case = make_case(by_grasp[grasp], 4, share=0.0)
-        levels = [replace(case, grip_n=case.grip_n * level) for level in (0.5, 1.0, 1.5)]
-        pressed = [pads_n(rest, case.condition).mean() for rest in close(levels, skin, MOST_STEPS)]
-        assert np.diff(pressed).min() > 0.0, grasp
-
-
 def test_a_hand_that_meets_nothing_and_presses_nothing_stays_as_told(
     by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
 ) -> None:
@@ -142,16 +95,6 @@ def test_a_hand_that_meets_nothing_and_presses_nothing_stays_as_told(
     assert np.array_equal(rest.pose.position, clear.numbers[:3])
     assert not rest.presses.any()
     assert not rest.residual_n.any()
-
-
-def test_a_hand_that_presses_nothing_rests_on_a_weightless_object_as_its_joints_let_it(
-    by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
-) -> None:
-    ball = replace(by_grasp["CMF"], thing=replace(by_grasp["CMF"].thing, shape=Sphere(1.0), mass_kg=0.0))
-    case = make_case(ball, 2, share=0.0)
-    (rest,) = close([replace(case, grip_n=np.zeros(2))], skin, MOST_STEPS)
-    assert rest.settled.all()
-    assert rest.angles == pytest.approx(case.angles, abs=0.05)
 
 
 def test_a_hand_that_is_not_given_the_steps_is_marked(every: list[tuple[Case, Rest]], skin: Skin) -> None:
@@ -213,14 +156,3 @@ def test_a_case_comes_out_the_same_in_any_company_and_order(every: list[tuple[Ca
         for number, rest in zip(order, close([some[k][0] for k in order], skin, MOST_STEPS), strict=True):
             for repetition in range(4):
                 assert_same(some[number][1], rest, repetition, repetition)
-
-
-def test_slow_company_does_not_change_who_is_at_rest(
-    by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
-) -> None:
-    easy = make_case(by_grasp["CMF"], 2)
-    hard = make_case(by_grasp["Tip"], 2, share=6.0)
-    (alone,) = close([easy], skin, MOST_STEPS)
-    beside = close([hard, easy], skin, MOST_STEPS)[1]
-    for repetition in range(2):
-        assert_same(alone, beside, repetition, repetition)

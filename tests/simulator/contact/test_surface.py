@@ -1,7 +1,6 @@
 """The surfaces of many objects at once are those of each alone."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -49,19 +48,3 @@ def test_bars_are_told_from_what_bends_both_ways(asked: list[tuple[Shape, int]])
     found = surfaces([shape for shape, _ in asked], [count for _, count in asked]).bars()
     whose = [shape for shape, count in asked for _ in range(count)]
     assert found.tolist() == [float(isinstance(shape, Cylinder)) for shape in whose]
-
-
-def test_neighbours_of_one_shape_are_asked_together() -> None:
-    found = surfaces([SHAPES[0], SHAPES[0], SHAPES[1]], [2, 1, 4])
-    assert found.shapes == SHAPES[:2]
-    assert found.whose.tolist() == [0, 0, 0, 1, 1, 1, 1]
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_normals_come_in_the_axes_of_the_hand(shape: Shape) -> None:
-    pose, points = scattered(4)
-    distance, normal, _ = surfaces([shape], [4]).at(pose, points)
-    assert np.linalg.norm(normal, axis=1) == pytest.approx(1.0, abs=1e-9)
-    further = surfaces([shape], [4]).at(pose, points + normal * 1e-3)[0]
-    outside = distance > 0.1
-    assert (further - distance)[outside] == pytest.approx(1e-3, abs=1e-6)

@@ -5,7 +5,7 @@ import pytest
 
 from thenar.simulator.effects.bus_latency import Parameters, prepare
 from thenar.simulator.errors import SceneError
-from thenar.simulator.pipeline.effect import frame_times, hold_frame
+from thenar.simulator.pipeline.effect import frame_times
 
 
 @pytest.fixture
@@ -57,13 +57,3 @@ def test_a_scan_that_lasts_longer_than_a_frame_is_refused(parameters: Parameters
         SceneError, match=r"effects\.bus\.latency: 10 ports take 1010 us .* period of frames is 1009 us"
     ):
         prepare(parameters, make_setting(timed=True, period_us=1009))
-
-
-def test_a_repetition_alone_and_a_longer_lead_leave_the_frame_that_is_read_as_it_is(
-    delay: Callable, make_setting: Callable
-) -> None:
-    parameters = Parameters(jitter_us=20.0)
-    many, _ = delay(parameters, range(6))
-    alone, _ = delay(parameters, range(4, 5), first_us=-200_000, release_us=0)
-    short, long = hold_frame(make_setting(timed=True)), hold_frame(make_setting(timed=True, first_us=-200_000))
-    assert np.array_equal(many[4, short], alone[0, long])

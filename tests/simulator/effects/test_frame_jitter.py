@@ -6,7 +6,7 @@ import pytest
 
 from thenar.simulator.effects.frame_jitter import Parameters, prepare
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting, frame_times, hold_frame
+from thenar.simulator.pipeline.effect import Setting, frame_times
 
 MakeBatch = Callable[..., Batch]
 
@@ -31,15 +31,6 @@ def test_frames_stray_as_much_as_said(make_batch: MakeBatch, make_draw: Callable
     late = jittered(make_batch, make_draw, setting, 300.0, range(400)) - frame_times(setting)
     assert abs(late.mean()) < 10.0
     assert abs(late.std() - 300.0) < 10.0
-
-
-def test_a_repetition_alone_and_a_longer_lead_leave_the_frame_that_is_read_as_it_is(
-    make_batch: MakeBatch, make_draw: Callable, make_setting: Callable
-) -> None:
-    short, long = make_setting(timed=True), make_setting(timed=True, first_us=-200_000, release_us=0)
-    many = jittered(make_batch, make_draw, short, 100.0, range(6))
-    alone = jittered(make_batch, make_draw, long, 100.0, range(4, 5))
-    assert many[4, hold_frame(short)] == alone[0, hold_frame(long)]
 
 
 @pytest.mark.parametrize("sd_us", [0.0, -1.0, 2e6])

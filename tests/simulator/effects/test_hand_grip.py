@@ -21,12 +21,3 @@ def test_grip_is_lognormal_about_what_was_planned(
     assert abs(logs.mean()) < 4 * 0.004
     assert abs(logs.std() - 0.25) < 4 * 0.0028
     assert (batch.grip_n > 0.0).all()
-
-
-def test_no_spread_leaves_every_grip_as_it_was(
-    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., Setting]
-) -> None:
-    batch = make_batch()
-    batch.grip_n = np.array([1.0, 2.0, 3.0, 40.0])
-    prepare(Parameters(log_sd=0.0), make_setting())(batch, make_draw(MEMBER.name, batch))
-    assert batch.grip_n.tolist() == [1.0, 2.0, 3.0, 40.0]

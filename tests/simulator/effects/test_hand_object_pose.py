@@ -39,11 +39,6 @@ def test_it_holds_next_to_no_rotation_and_about_half_a_turn(length: float) -> No
     assert np.all((got * truth.inv()).magnitude() < (turn**2).sum())
 
 
-def test_no_turn_changes_nothing() -> None:
-    vectors = np.array([[0.0, 0.0, 0.0], [0.1, 2.0, -1.0], [0.0, 0.0, np.pi]])
-    np.testing.assert_array_equal(turned(vectors, np.zeros((3, 3))), vectors)
-
-
 def test_places_and_turns_vary_as_much_as_is_asked(
     make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., Setting]
 ) -> None:

@@ -93,14 +93,6 @@ def test_sensors_move_before_contact_and_only_then(
     assert (batch.sensors_deg[0, 2] != settled[0, 2]).any()
 
 
-def test_a_repetition_moves_the_same_alone(make_batch: MakeBatch, make_draw: Callable, make_setting: Callable) -> None:
-    setting = make_setting(timed=True, first_us=-30_000)
-    frame_us = np.array([[-30_000, -20_000, -10_000], [-30_000, 10, 20], [-29_000, -20_000, 7]])
-    many, _ = moved(make_batch, make_draw, setting, frame_us, range(3))
-    alone, _ = moved(make_batch, make_draw, setting, frame_us[1:2], range(1, 2))
-    assert np.array_equal(many.sensors_deg[1], alone.sensors_deg[0])
-
-
 def test_a_scene_without_time_before_contact_is_refused(make_setting: Callable) -> None:
     with pytest.raises(SceneError, match=r"hand\.transition: there is no frame before contact.*lead_ms"):
         prepare(Parameters(), make_setting(timed=True, first_us=0))

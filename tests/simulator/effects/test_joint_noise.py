@@ -7,7 +7,7 @@ import pytest
 
 from thenar.simulator.effects.joint_noise import MEMBER, Parameters, prepare
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting, frame_times, hold_frame
+from thenar.simulator.pipeline.effect import Setting, frame_times
 from thenar.simulator.streams import Draw
 
 Noise = Callable[..., np.ndarray]
@@ -41,19 +41,3 @@ def test_a_repetitions_offset_is_the_same_in_all_its_frames(noise: Noise) -> Non
     added = noise(200, True, sd_deg=0.0, trial_sd_deg=5.0)
     np.testing.assert_array_equal(added, np.repeat(added[:, :1], added.shape[1], axis=1))
     assert abs(added[:, 0].std() - 5.0) < 4 * 5.0 / (2 * added[:, 0].size) ** 0.5
-
-
-def test_the_two_add_up(noise: Noise) -> None:
-    both, frames, offsets = (
-        noise(3, True, sd_deg=2.0, trial_sd_deg=5.0),
-        noise(3, True, sd_deg=2.0, trial_sd_deg=0.0),
-        noise(3, True, sd_deg=0.0, trial_sd_deg=5.0),
-    )
-    np.testing.assert_allclose(both, frames + offsets, atol=1e-12)
-
-
-def test_the_frame_that_is_read_out_is_as_noisy_whether_or_not_there_are_others(
-    noise: Noise, make_setting: Callable[..., Setting]
-) -> None:
-    alone, among = (noise(5, timed, sd_deg=2.0, trial_sd_deg=5.0) for timed in (False, True))
-    np.testing.assert_array_equal(alone[:, 0], among[:, hold_frame(make_setting(timed=True))])

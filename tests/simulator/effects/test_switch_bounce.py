@@ -91,8 +91,3 @@ def test_switches_bounce_when_they_are_read_not_when_the_frame_begins(bounced: C
     early = bounced(at - 500, delay_us=np.full(4, 500))
     assert np.array_equal(early, bounced(at))
     assert np.array_equal(bounced(at - 500, delay_us=np.full((*at.shape, 4), 500)), early)
-
-
-def test_a_repetition_bounces_the_same_alone(bounced: Callable) -> None:
-    at = finely(ON_US, ON_US + 3000, n=5)
-    assert np.array_equal(bounced(at)[1][3], bounced(at[3:4], first=3)[1][0])

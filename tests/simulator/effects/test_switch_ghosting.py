@@ -35,34 +35,6 @@ def test_the_matrix_reads_what_a_walk_through_it_finds(switches: int, seed: int,
     assert np.array_equal(joined(bits), [searched(one) for one in bits])
 
 
-def test_the_fourth_corner_of_a_rectangle_closes() -> None:
-    bits = np.zeros(160, dtype=np.bool_)
-    bits[[16 * 1 + 2, 16 * 1 + 7, 16 * 5 + 2]] = True
-    assert np.flatnonzero(joined(bits) & ~bits).tolist() == [16 * 5 + 7]
-
-
-def test_a_chain_through_all_rows_joins_them_whatever_their_order() -> None:
-    """Row after row shares one column with the next, in a random order of rows: all become one net."""
-    order = np.random.default_rng(1).permutation(10)
-    bits = np.zeros((10, 16), dtype=np.bool_)
-    bits[order, np.arange(10)] = bits[order, np.arange(1, 11)] = True
-    assert np.array_equal(joined(bits.ravel()).reshape(10, 16), np.tile(np.arange(16) < 11, (10, 1)))
-
-
-@given(st.sets(st.integers(0, 159), max_size=2))
-def test_two_closed_switches_are_always_right(closed: set[int]) -> None:
-    bits = np.isin(np.arange(160), list(closed))
-    assert np.array_equal(joined(bits), bits)
-
-
-@given(st.integers(0, 2**32))
-def test_nothing_opens_and_twice_is_once(seed: int) -> None:
-    bits = np.random.default_rng(seed).random((3, 160)) < 0.08
-    reads = joined(bits)
-    assert (reads >= bits).all()
-    assert np.array_equal(joined(reads), reads)
-
-
 @pytest.mark.parametrize("shape", [(2, 3, 160), (1, 1, 5)])
 def test_every_frame_is_a_matrix_of_its_own(
     make_batch: Callable, make_draw: Callable, make_setting: Callable, shape: tuple[int, ...]

@@ -49,7 +49,3 @@ def test_everybody_wears_the_same_glove(thresholds: Thresholds) -> None:
 @given(sd_n=st.floats(0.0, 5.0))
 def test_no_switch_closes_by_itself(thresholds: Thresholds, sd_n: float) -> None:
     assert thresholds("A", sd_n).min() >= LEAST_N
-
-
-def test_no_spread_leaves_the_gloves_threshold(thresholds: Thresholds) -> None:
-    assert set(thresholds("A", 0.0).tolist()) == {1.0}

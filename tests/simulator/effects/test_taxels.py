@@ -81,14 +81,6 @@ def test_a_reading_stays_until_the_force_has_fallen_by_the_share(acted: Acted) -
     np.testing.assert_allclose(acted("taxel.hysteresis", newtons, share=0.1)[0, :, 0], [0, 1.1, 1.1, 0.55, 0])
 
 
-def test_creep_follows_the_logarithm_of_time(acted: Acted) -> None:
-    times_us = np.array([0, 50_000, 500_000, 5_000_000])
-    found = acted("taxel.creep", np.full((1, 4, 1), 2.0), times_us=times_us, per_decade=0.05)[0, :, 0]
-    assert found[0] == 2.0
-    # 5 % of 2 N for each tenfold time, to a quarter of it.
-    np.testing.assert_allclose(np.diff(found[1:]), 0.1, atol=0.025)
-
-
 def test_creep_is_that_of_its_differential_equations(acted: Acted) -> None:
     """The relaxations' closed form, one frame or many, before contact and after release."""
     tau = np.array([0.1, 1.0, 10.0])

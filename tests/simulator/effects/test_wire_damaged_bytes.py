@@ -1,14 +1,8 @@
-from collections.abc import Callable
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.effects.wire_damaged_bytes import Parameters, damaged, prepare
-from thenar.simulator.pipeline.batch import Batch, Traffic
-from thenar.simulator.pipeline.effect import Setting
-
-MakeBatch = Callable[..., Batch]
+from thenar.simulator.effects.wire_damaged_bytes import damaged
 
 
 @given(st.binary(min_size=1, max_size=50), st.integers(0, 2**32), st.floats(1e-9, 0.999))
@@ -25,19 +19,3 @@ def test_every_bit_turns_as_often() -> None:
     values, counts = np.unique(turned, return_counts=True)
     assert values.tolist() == [1, 2, 4, 8, 16, 32, 64, 128]
     assert counts.tolist() == [1000] * 8
-
-
-def test_one_number_a_byte_whatever_else_happens_to_the_frame_that_is_read(
-    make_batch: MakeBatch, make_draw: Callable, make_setting: Callable
-) -> None:
-    def arriving(setting: Setting, frames: int, rows: range) -> np.ndarray:
-        batch = make_batch(rows)
-        zeros = np.zeros((len(batch), frames, 46), dtype=np.uint8)
-        batch.traffic = Traffic(zeros, zeros.astype(np.int64), np.ones(zeros.shape, dtype=np.bool_), 26)
-        prepare(Parameters(rate=0.3), setting)(batch, make_draw("wire.damaged_bytes", batch))
-        assert not zeros.any()
-        return batch.traffic.data
-
-    alone, many = arriving(make_setting(), 1, range(4, 5)), arriving(make_setting(timed=True), 33, range(6))
-    assert np.array_equal(many[4, 28], alone[0, 0])
-    assert 0.2 < (many != 0).mean() < 0.4

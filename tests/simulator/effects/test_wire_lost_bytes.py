@@ -35,15 +35,6 @@ def test_the_share_that_is_lost_is_the_rate(make_batch: MakeBatch, make_draw: Ca
     assert abs(1.0 - came.mean() - 0.2) < 0.01
 
 
-def test_one_number_a_byte_whatever_else_happens_to_the_frame_that_is_read(
-    make_batch: MakeBatch, make_draw: Callable, make_setting: Callable
-) -> None:
-    alone = through(make_batch, make_draw, make_setting(), (1, 46), range(4, 5))
-    timed = make_setting(timed=True)
-    many = through(make_batch, make_draw, timed, (33, 46), range(6))
-    assert np.array_equal(many[4, 28], alone[0, 0])
-
-
 def test_what_was_lost_before_stays_lost(make_batch: MakeBatch, make_draw: Callable, make_setting: Callable) -> None:
     batch = make_batch(range(2))
     data = np.zeros((2, 1, 46), dtype=np.uint8)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from thenar.compiler.hand import MapError
-from thenar.compiler.pictures import PictureError, painting
+from thenar.compiler.pictures import PictureError
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14, own
-from thenar.simulator.handmaps.draw import Dot, Panel, Picture, all_switches, colour, contacts, draw, kept
+from thenar.simulator.handmaps.draw import Dot, Panel, Picture, all_switches, contacts, draw, kept
 from thenar.simulator.handmaps.handmap import hand_map
 
 HAND = hand_map()
@@ -63,23 +63,11 @@ def test_every_switch_is_drawn_once_and_named_on_hovering() -> None:
     assert titles(svg) == {number: f"{number} {name}" for number, name in enumerate(NAMES)}
 
 
-def test_numbers_are_written_into_the_circles_on_demand() -> None:
-    assert {dot.mark for dot in all_switches(HAND, numbered=False).panels[0].dots} == {""}
-    assert [dot.mark for dot in all_switches(HAND, numbered=True).panels[0].dots] == list(map(str, range(160)))
-    assert b'id="mark-0-159"' in draw(all_switches(HAND, numbered=True), "svg")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["svg", "png"])
 def test_the_same_picture_gives_the_same_bytes(kind: str, two_types: GraspSet) -> None:
     assert draw(contacts(HAND, two_types, per_grasp=True), kind) == draw(
         contacts(HAND, two_types, per_grasp=True), kind
-    )
-
-
-def test_other_contacts_give_other_bytes(two_types: GraspSet) -> None:
-    assert draw(contacts(HAND, two_types, False), "png") != draw(
-        contacts(HAND, two_types.rows([0, 1, 2]), False), "png"
     )
 
 
@@ -148,21 +136,6 @@ def test_sets_that_are_not_of_this_glove_are_refused() -> None:
 def test_only_svg_and_png_are_drawn() -> None:
     with pytest.raises(PictureError, match=r"not in \.pdf"):
         draw(all_switches(HAND, numbered=False), "pdf")
-
-
-def test_shades_darken_steadily_in_grey_and_begin_darker_than_hollow() -> None:
-    with painting(7):
-        colours = [colour(Dot("", shade), graded=True) for shade in np.linspace(0.0, 1.0, 21).tolist()]
-        assert colour(Dot(""), graded=True) == "white"
-    grey = [np.dot([int(c[i : i + 2], 16) for i in (1, 3, 5)], [0.299, 0.587, 0.114]) for c in colours]
-    assert (np.diff([255.0, *grey]) < -5).all()
-
-
-@pytest.mark.parametrize("hands", [1, 3])
-def test_any_number_of_hands_shares_a_page(hands: int) -> None:
-    picture = Picture(HAND, all_switches(HAND, False).panels * hands, "", "switch")
-    svg = draw(picture, "svg")
-    assert all(len(titles(svg, hand)) == 160 for hand in range(hands))
 
 
 def test_taxels_are_drawn_by_how_often_they_were_pressed(pads: GraspSet) -> None:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from thenar.simulator.body.condition import Thing
-from thenar.simulator.body.hand import LIMITS_DEG, Hand, Size
+from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
 from thenar.simulator.errors import PlanError
 from thenar.simulator.planning.plan import shipped_prehensions
@@ -34,12 +34,6 @@ def test_the_pads_of_a_pinch_touch_from_two_sides_and_nothing_else_does(pinched:
     assert (pinched.gap_mm, pinched.sunk_mm) == pytest.approx((gaps[pads].max(), -gaps.min()))
     first, second = centres[pads] - held.pose[:3]
     assert first @ second / np.linalg.norm(first) / np.linalg.norm(second) < -0.95
-
-
-def test_a_posture_stays_within_the_joints_ranges(pinched: Plan) -> None:
-    low, high = LIMITS_DEG.T
-    assert (pinched.held.posture_deg >= low).all()
-    assert (pinched.held.posture_deg <= high).all()
 
 
 def test_shares_grip_and_down_belong_to_the_type(pinched: Plan) -> None:
@@ -76,11 +70,6 @@ def test_a_near_posture_that_leads_nowhere_is_not_all_that_is_tried() -> None:
 )
 def test_a_plan_holds_up_to_the_bounds(pinched: Plan, faults: tuple[float, float, float], held: bool) -> None:
     assert Plan(pinched.held, 0.0, *faults).holds() is held
-
-
-def test_friction_bears_what_lies_within_its_cone() -> None:
-    # Friction 0.8: pads may point 38.66 degrees past each other.
-    assert np.degrees(np.arcsin(BORNE)) == pytest.approx(np.degrees(np.arctan(0.8)))
 
 
 # Balls and bars too thick, plates thicker than the hand opens.

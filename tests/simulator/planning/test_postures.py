@@ -51,11 +51,6 @@ def test_between_two_lengths_it_lies_between_theirs_by_plain_arithmetic(entry: E
     assert numbers(held(entry, length)).tolist() == [a * (1.0 - part) + b * part for a, b in between]
 
 
-@given(st.sampled_from(ENTRIES), st.floats(150.0, 224.999))
-def test_hands_of_nearly_the_same_length_hold_a_thing_nearly_alike(entry: Entry, length: float) -> None:
-    assert np.abs(numbers(held(entry, length + 0.001)) - numbers(held(entry, length))).max() < 0.01
-
-
 @given(
     st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda axis: np.linalg.norm(axis) > 0.1),
     st.floats(-0.01, 0.01),

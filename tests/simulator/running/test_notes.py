@@ -44,12 +44,6 @@ def test_residuals_that_are_no_numbers_are_of_no_settled_repetition(make_batch: 
     assert "nan N" in found.unsettled[0].why
 
 
-def test_a_batch_of_which_nothing_settled_has_no_residual(make_batch: Callable[..., Batch]) -> None:
-    batch = went_through(make_batch())
-    batch.settled = np.zeros(4, dtype=bool)
-    assert (notes_of(batch).residual_n, len(notes_of(batch).unsettled)) == (0.0, 4)
-
-
 def test_frames_that_did_not_arrive_are_counted_and_repetitions_of_which_none_did_are_told(
     make_batch: Callable[..., Batch],
 ) -> None:

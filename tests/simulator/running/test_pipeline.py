@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import EFFECTS, STAGES
+from thenar.simulator.pipeline.effect import EFFECTS, STAGES, hold_frame
 from thenar.simulator.running.pipeline import Ledger, compile_pipeline
-from thenar.simulator.scenes.scene import Scene
+from thenar.simulator.scenes.scene import Recording, Scene
 
 NAMES = tuple(EFFECTS)
 
@@ -158,12 +158,6 @@ def test_leaving_an_effect_out_is_the_scene_without_it(make_scene: SceneMaker, n
     assert left.setting == never.setting
 
 
-def test_leaving_out_the_only_effect_in_time_leaves_one_frame(make_scene: SceneMaker) -> None:
-    scene = make_scene(["hand.grip", "frame.jitter"])
-    assert compile_pipeline(scene).setting.timed
-    assert not compile_pipeline(scene, without="frame.jitter").setting.timed
-
-
 @pytest.mark.parametrize(
     ("without", "words"),
     [
@@ -187,11 +181,6 @@ def test_after_puts_an_effect_behind_one_that_follows_it_in_the_registry(make_sc
     assert [name for name in order(turned) if name.startswith("joint.")] == ["joint.drift", "joint.noise"]
     # What the scene said of an effect that is left out is not said any more.
     assert "joint.drift" not in order(turned, without="joint.drift")
-
-
-def test_after_an_effect_of_an_earlier_stage_changes_nothing(make_scene: SceneMaker) -> None:
-    said = make_scene(["hand.grip", listed_with("joint.noise", after=("hand.grip",))])
-    assert order(said) == order(make_scene(["hand.grip", "joint.noise"]))
 
 
 @pytest.mark.parametrize(
@@ -255,6 +244,23 @@ def test_a_repetition_comes_out_the_same_in_any_batch_and_beside_any_other(
     pipeline.run([alone], Ledger())
     pipeline.run([beside, together], Ledger())
     assert outcome(alone, 0) == outcome(together, row)
+
+
+def test_a_longer_lead_and_no_release_leave_the_frame_that_is_read_as_it_is(
+    make_scene: SceneMaker, make_batch: BatchMaker
+) -> None:
+    """Of every effect: what is drawn for a frame hangs on its time, not on how many come before and after it."""
+    found = []
+    for lead_ms, release_ms in ((30.0, 40.0), (200.0, 0.0)):
+        recording = Recording(lead_ms=lead_ms, hold_ms=250.0, release_ms=release_ms)
+        pipeline = compile_pipeline(make_scene(light(), recording=recording))
+        batch, held = make_batch(range(2)), hold_frame(pipeline.setting)
+        pipeline.run([batch], Ledger())
+        assert batch.lost is not None
+        read = (batch.bits, batch.sensors_deg, batch.raw, batch.taxels, batch.lost, batch.frame_us)
+        found.append([each[:, held] for each in read])
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_a_run_enters_every_step_with_its_batches(make_scene: SceneMaker, make_batch: BatchMaker) -> None:

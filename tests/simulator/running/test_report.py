@@ -48,11 +48,6 @@ def test_only_rows_that_are_read_out_tell_of_switches() -> None:
     assert (found.rows, found.switches_mean, found.patterns, found.no_contact) == (3, 1.0, 1, 0)
 
 
-def test_a_grasp_type_of_which_nothing_settled_is_reported_all_the_same() -> None:
-    (found,) = grasp_reports(rows_with([]), np.zeros(0, dtype=np.intp), ("Tip",), [notes("Tip", 1, ONE)])
-    assert found == GraspReport("Tip", 1, 0, 1, 0.0, 0, 0, 0, 0, 0.0, 0.0, 0.0)
-
-
 def test_steps_are_reported_in_their_order_with_their_share_of_the_time() -> None:
     ledger = Ledger()
     ledger.enter("glove.recall", True, 1, 10, 1_000_000, Draws())

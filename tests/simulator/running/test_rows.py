@@ -122,13 +122,6 @@ def test_one_row_a_repetition_is_the_frame_that_is_read_out(
     np.testing.assert_array_equal(made.codes[12:], codes[order, HELD])
 
 
-def test_of_every_frame_the_one_that_is_read_out_is_marked(recorded: list[Recorded], make: MakeSetting) -> None:
-    _, batch, codes = recorded[0]
-    rows = rows_of(batch, np.array([1, 4]), 0, codes, make(every_frame=True))
-    assert rows.read_out.tolist() == [False, False, True, False] * 2
-    assert rows.trial.tolist() == np.repeat(batch.trials[[1, 4]], FRAMES).tolist()
-
-
 def test_a_clock_never_goes_back_and_begins_at_nought(
     recorded: list[Recorded], make_batch: Callable[..., Batch], make: MakeSetting
 ) -> None:

@@ -1,5 +1,4 @@
 from collections.abc import Callable
-from itertools import pairwise
 
 import msgspec
 import numpy as np
@@ -9,6 +8,7 @@ from hypothesis import strategies as st
 
 from thenar.simulator.errors import SceneError
 from thenar.simulator.planning.postures import Postures
+from thenar.simulator.running.explain import middle_session, sample
 from thenar.simulator.running.simulation import Session, sessions
 from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import Scene
@@ -62,17 +62,6 @@ def test_an_object_that_gets_no_repetition_is_no_condition() -> None:
         assert len(session.conditions) == 14
 
 
-def test_subjects_and_seeds_have_orders_of_their_own() -> None:
-    orders = [course(session) for seed in (1, 2) for session in sessions(quick(seed=seed), POSTURES)]
-    assert all(orders[i] != orders[j] for i in range(4) for j in range(i))
-
-
-def test_grasp_types_are_mixed_and_not_made_one_after_the_other() -> None:
-    for session in sessions(QUICK, POSTURES):
-        repeats = sum(a[0] == b[0] for a, b in pairwise(course(session)))
-        assert repeats < len(course(session)) / 4
-
-
 @settings(max_examples=20, deadline=None)
 @given(st.sets(st.integers(0, 27), min_size=1))
 def test_leaving_objects_out_leaves_the_others_in_their_order(kept: set[int]) -> None:
@@ -82,11 +71,6 @@ def test_leaving_objects_out_leaves_the_others_in_their_order(kept: set[int]) ->
         common = set(course(whole)) & set(course(some))
         assert common
         assert [each for each in course(whole) if each in common] == [each for each in course(some) if each in common]
-
-
-def test_leaving_a_subject_out_changes_nobody_elses_session() -> None:
-    alone = quick(subjects=QUICK.subjects[1:])
-    assert course(sessions(alone, POSTURES)[0]) == course(sessions(QUICK, POSTURES)[1])
 
 
 def test_the_hand_comes_from_the_posture_planned_for_the_trial_before() -> None:
@@ -99,14 +83,6 @@ def test_the_hand_comes_from_the_posture_planned_for_the_trial_before() -> None:
             before = order[max(int(trial) - 1, 0)]
             np.testing.assert_array_equal(previous, planned[before[:2]])
         assert batch.condition is condition
-
-
-def test_one_repetition_alone_is_as_in_a_batch_of_many() -> None:
-    session = sessions(QUICK, POSTURES)[0]
-    many = session.batch(3, np.arange(6))
-    one = session.batch(3, np.array([4]))
-    np.testing.assert_array_equal(one.trials, many.trials[4:5])
-    np.testing.assert_array_equal(one.previous_deg, many.previous_deg[4:5])
 
 
 def test_an_object_without_a_planned_posture_is_named_with_its_grasp_type(make_scene: Callable[..., Scene]) -> None:
@@ -122,3 +98,12 @@ def test_fresh_repetitions_have_trials_beyond_the_session() -> None:
         assert np.sort(np.concatenate([batch.trials for batch in batches])).tolist() == list(range(14 * 12, 14 * 15))
         for batch, trials in zip(batches, old.trials, strict=True):
             assert batch.repetitions.tolist() == list(range(len(trials), len(trials) + len(batch)))
+
+
+def test_samples_are_the_first_repetitions_of_all_conditions_of_the_middle_subject() -> None:
+    session = middle_session(QUICK)
+    found = sample(session, 84)
+    assert [batch.condition for batch in found] == list(session.conditions)
+    assert {batch.condition.subject for batch in found} == {QUICK.subjects[1].name}
+    assert all(batch.repetitions.tolist() == [0, 1, 2] for batch in found)
+    assert [len(sample(session, most)[0]) for most in (1, 100_000)] == [1, 6]

@@ -1,5 +1,3 @@
-import subprocess
-import sys
 import tracemalloc
 from dataclasses import replace
 from pathlib import Path
@@ -12,9 +10,7 @@ from thenar.simulator import load_scene, simulate
 from thenar.simulator.effects import wire_lost_bytes
 from thenar.simulator.effects.contact_quasistatic import Parameters
 from thenar.simulator.errors import SceneError
-from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.running.explain import explain
 from thenar.simulator.running.pipeline import Ledger, compile_pipeline
 from thenar.simulator.running.report import Report
 from thenar.simulator.running.simulation import Simulated, sessions
@@ -90,14 +86,6 @@ def test_a_subject_alone_is_as_in_the_whole_scene(quick: Simulated) -> None:
     assert alone.fingerprint() == rows.fingerprint()
 
 
-def test_the_order_of_subjects_changes_nothing_but_the_order_of_rows(quick: Simulated) -> None:
-    turned = simulate(msgspec.structs.replace(QUICK, subjects=QUICK.subjects[::-1]), jobs=1, keep_unsettled=True)
-    made = turned.grasp_set
-    back = np.concatenate([np.flatnonzero(made.subjects == subject.name) for subject in QUICK.subjects])
-    assert made.subjects[0] == QUICK.subjects[1].name
-    assert made.rows(back).fingerprint() == quick.grasp_set.fingerprint()
-
-
 def grasps_of(found: Simulated) -> list[tuple[str, str, str, bytes, bytes]]:
     made = found.grasp_set
     names = zip(made.subjects.tolist(), made.grasps.tolist(), made.objects.tolist(), strict=True)
@@ -125,23 +113,6 @@ def test_fresh_grasps_are_another_thing_than_another_seed_which_has_other_habits
     assert not {*grasps_of(seed)} & {*grasps_of(first)}
 
 
-def test_another_seed_makes_another_set(quick: Simulated) -> None:
-    other = simulate(msgspec.structs.replace(QUICK, seed=QUICK.seed + 1), jobs=1, keep_unsettled=True).grasp_set
-    assert (other.switches != quick.grasp_set.switches).any()
-    assert (other.codes != quick.grasp_set.codes).any()
-
-
-def test_the_more_frames_the_fewer_repetitions_are_simulated_at_a_time() -> None:
-    """10 001 frames each: four at a time, or the two batches of three that make at least four."""
-    jitter = Listed("frame.jitter", EFFECTS["frame.jitter"].parameters())
-    recording = msgspec.structs.replace(QUICK.recording, rate_hz=10_000.0, hold_ms=1000.0)
-    scene = msgspec.structs.replace(QUICK, recording=recording, effects=(jitter,), subjects=QUICK.subjects[:1])
-    seen: list[int] = []
-    simulate(scene, jobs=1, keep_unsettled=True, progress=lambda done, total: seen.append(done))
-    assert seen == [6, 12, 18]
-    assert explain(scene, jobs=1).measured == 6
-
-
 # The most that is kept of a repetition: a row is 61 bytes packed and some 300 unpacked with its labels; a repetition on
 # its way through the pipeline takes more than 30 000.
 KEPT_BYTES = 2000
@@ -166,16 +137,6 @@ def test_memory_grows_by_what_is_kept_of_a_repetition_and_no_more(name: str) -> 
     simulate(few, jobs=1, block=8)  # what is loaded and cached once
     # Two subjects: 96 repetitions more.
     assert peak_bytes(many) - peak_bytes(few) < 96 * KEPT_BYTES
-
-
-def test_the_set_is_labelled_with_everything_that_a_recording_has(quick: Simulated) -> None:
-    made = quick.grasp_set
-    assert (len(made), len(made.switch_names), len(made.joint_names)) == (36, 160, 16)
-    assert made.taxonomy.name == "kamakura14"
-    assert made.subjects.tolist() == ["A"] * 18 + ["C"] * 18
-    assert made.trials.tolist() == list(range(18)) * 2
-    assert {*made.grasps.tolist()} == {"PoS", "Tpd", "Tip"}
-    assert len({*made.objects.tolist()}) == 6
 
 
 def test_codes_are_on_one_scale_for_all_or_the_bare_bytes(quick: Simulated) -> None:
@@ -270,24 +231,8 @@ def test_the_report_says_what_came_out_and_that_it_is_simulated(quick: Simulated
             assert (one.rows, one.repetitions) == (0, 0)
 
 
-def test_the_cost_of_every_step_is_reported_and_the_shares_make_a_whole(quick: Simulated) -> None:
-    steps = quick.report.steps
-    assert [step.name for step in steps] == [stop.effect.name for stop in compile_pipeline(QUICK).stops]
-    assert all(step.grasps == 36 for step in steps)
-    assert sum(step.share for step in steps) == pytest.approx(1.0)
-    assert {step.name for step in steps if not step.own} == {listed.name for listed in QUICK.effects}
-    assert {step.name for step in steps if step.draws} == {listed.name for listed in QUICK.effects}
-
-
 def test_reports_of_several_processes_are_added_up(quick: Simulated) -> None:
     assert without_times(simulate(QUICK, jobs=2, keep_unsettled=True).report) == without_times(quick.report)
-
-
-def test_an_effect_can_be_left_out() -> None:
-    less = msgspec.structs.replace(QUICK, effects=tuple(each for each in QUICK.effects if each.name != "hand.grip"))
-    one, other = simulate(QUICK, jobs=1, without="hand.grip"), simulate(less, jobs=1)
-    assert one.grasp_set.fingerprint() == other.grasp_set.fingerprint()
-    assert one.grasp_set.fingerprint() != simulate(QUICK, jobs=1).grasp_set.fingerprint()
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -296,29 +241,3 @@ def test_progress_counts_repetitions_up_to_all_of_them(jobs: int) -> None:
     simulate(QUICK, jobs=jobs, block=2, progress=lambda done, total: seen.append((done, total)))
     assert seen == sorted(seen)
     assert seen[-1] == (36, 36)
-
-
-@pytest.mark.slow
-def test_two_hundred_hands_take_less_than_two_gibibytes_in_all() -> None:
-    # A quarter of the hands, with every object once; and before, three hands with all of their repetitions, which a
-    # worker takes a hand at a time. Of the repetitions that are left out only what is kept of each would add up.
-    program = (
-        "import resource\n"
-        "import msgspec\n"
-        "from joblib.externals.loky import get_reusable_executor\n"
-        "from thenar.simulator import load_scene, simulate\n"
-        "crowd = load_scene('crowd')\n"
-        "simulate(msgspec.structs.replace(crowd, subjects=crowd.subjects[:3]), jobs=2)\n"
-        "made = simulate(msgspec.structs.replace(crowd, subjects=crowd.subjects[:50], repetitions=2), jobs=2)\n"
-        "get_reusable_executor().shutdown(wait=True)\n"
-        "who = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)\n"
-        "own, child = (resource.getrusage(each).ru_maxrss for each in who)\n"
-        "print(len(made.grasp_set) + len(made.report.unsettled), own, child)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    repetitions, own_kib, child_kib = map(int, done.stdout.split())
-    assert repetitions == 50 * 14 * 2
-    left_out_kib = (200 * 20 - 50 * 2) * 14 * KEPT_BYTES / 1024
-    # RUSAGE_CHILDREN tells of the largest child that has ended: there were two workers, and Python's helper of theirs.
-    assert child_kib > 0
-    assert own_kib + left_out_kib + 3 * child_kib < 2 * 1024 * 1024

@@ -106,8 +106,3 @@ def test_objects_that_are_no_tables_are_refused(tmp_path: Path, objects: str) ->
     assert "mine.toml, line 2: objects: must be " in complaint(
         tmp_path, f'taxonomy = "kamakura14"\nobjects = {objects}\n'
     )
-
-
-def test_a_catalogue_that_is_not_shipped_is_told_the_nearest() -> None:
-    with pytest.raises(SceneError, match=r"no catalogue of objects is called 'kamakura' \(did you mean 'kamakura14'"):
-        load_catalogue("kamakura")

@@ -202,12 +202,6 @@ def test_a_grasp_type_without_an_object_is_named(complaint: Callable[[str], str]
     assert "mine.toml, line 9: objects: no object for PoS, PoH, PoI, PoE, PoD and 8 more" in message
 
 
-def test_a_taxonomy_without_shipped_postures_may_be_named(complaint: Callable[[str], str]) -> None:
-    assert "is for taxonomy 'kamakura14', not 'feix33'" in complaint(
-        LEAST.replace('taxonomy = "kamakura14"', 'taxonomy = "feix33"')
-    )
-
-
 def test_a_scene_that_is_not_shipped_is_told_the_nearest() -> None:
     with pytest.raises(SceneError, match=r"no shipped scene is called 'kamakra' \(did you mean 'kamakura'"):
         load_scene("kamakra")

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from thenar.simulator.body.shapes import Sphere
 from thenar.simulator.pipeline.effect import EFFECTS
-from thenar.simulator.scenes.scene import Recording, Scene, SceneObject, Subject
+from thenar.simulator.scenes.scene import Recording, Scene, SceneObject
 
 MakeScene = Callable[..., Scene]
 
@@ -79,24 +79,3 @@ def test_frames_and_bytes_are_there_if_the_rows_or_an_effect_want_them(
 ) -> None:
     setting = make_scene(recording=Recording(rows=rows)).setting(EFFECTS[name] for name in effects)  # type: ignore[arg-type]
     assert (setting.timed, setting.on_wire) == (timed, on_wire)
-
-
-def test_equal_scenes_have_equal_hashes(make_scene: MakeScene) -> None:
-    one, other = (make_scene(["joint.noise", "port.dead"]) for _ in range(2))
-    assert one == other
-    assert hash(one) == hash(other)
-
-
-def test_an_object_is_a_thing_with_its_mass_in_kilograms() -> None:
-    thing = objects(["Tip"])[0].thing()
-    assert (thing.name, thing.shape, thing.mass_kg) == ("ball 0", Sphere(diameter_mm=50.0), 0.08)
-
-
-def test_a_subject_has_a_hand_of_their_size() -> None:
-    size = Subject(name="A", hand_length_mm=188.0, hand_breadth_mm=84.0).hand().size
-    assert (size.length_mm, size.breadth_mm) == (188.0, 84.0)
-
-
-def test_what_is_broader_than_every_hand_on_all_sides_is_no_object() -> None:
-    with pytest.raises(ValueError, match="no hand holds an object of more than 200 mm"):
-        SceneObject(name="globe", grasp="CMF", shape=Sphere(diameter_mm=300.0), mass_g=500.0)

@@ -61,11 +61,6 @@ def test_as_many_switches_as_asked_for_at_most_and_only_those_that_vary(name: st
     assert choose(-1) == ()
 
 
-@pytest.mark.parametrize("name", OURS)
-def test_asked_again_a_method_answers_the_same(name: str) -> None:
-    assert METHODS[name].chooser(learning())(6) == METHODS[name].chooser(learning())(6)
-
-
 @pytest.mark.parametrize("name", [name for name in BY_NUMBER if "cost" not in name])
 def test_methods_that_do_not_heed_time_are_not_swayed_by_it(name: str) -> None:
     ports = PortCosts(tuple(range(14)), tuple(float(i) for i in range(14)))

@@ -60,12 +60,6 @@ def test_every_switch_that_varies_is_in_the_order_once() -> None:
     assert sorted(order) == [column for column in range(22) if column not in (3, 9)]
 
 
-def test_the_order_of_the_rows_does_not_matter() -> None:
-    learning = planted(2)
-    shuffled = learning.rows(np.random.default_rng(0).permutation(240))
-    assert elimination_order(shuffled) == elimination_order(learning)
-
-
 def test_of_two_equal_switches_one_goes_before_any_that_is_needed_and_it_is_the_lower_number() -> None:
     labels = np.arange(120) % 4
     low, high = (labels & 1).astype(bool), (labels >> 1).astype(bool)
@@ -153,23 +147,6 @@ def test_what_goes_is_what_raises_the_loss_least_when_its_mean_takes_its_place(
     assert boosted_elimination_order(learning) == plainly(learning)
 
 
-def test_boosted_what_tells_the_classes_apart_stays_longest() -> None:
-    random = np.random.default_rng(5)
-    labels = np.arange(240) % 8
-    switches = random.random((240, 22)) < 0.5
-    for bit, column in enumerate((7, 13, 20)):
-        switches[:, column] = (labels >> bit & 1).astype(bool) ^ (random.random(240) < 0.03)
-    assert set(boosted_elimination_order(learning_of(switches, labels))[:3]) == {7, 13, 20}
-
-
-def test_boosted_every_switch_that_varies_is_in_the_order_once() -> None:
-    learning = noisy(4, 0)
-    switches = learning.switches.copy()
-    switches[:, [3, 9]] = True, False
-    order = boosted_elimination_order(learning_of(switches, learning.labels))
-    assert sorted(order) == [column for column in range(11) if column not in (3, 9)]
-
-
 def test_switches_that_boosting_never_asks_for_go_by_their_numbers() -> None:
     labels = np.arange(120) % 4
     low, high = (labels & 1).astype(bool), (labels >> 1).astype(bool)
@@ -185,19 +162,6 @@ def test_boosted_what_the_joints_tell_no_switch_needs_to() -> None:
     switches = np.stack([low ^ (random.random(240) < 0.05), high ^ (random.random(240) < 0.1)], axis=1)
     assert boosted_elimination_order(learning_of(switches, labels)) == (0, 1)
     assert boosted_elimination_order(learning_of(switches, labels, codes)) == (1, 0)
-
-
-def test_more_go_at_once_only_while_many_are_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    sizes: list[int] = []
-    costs = elimination._boosted_costs
-
-    def counted(learning: Samples, left: npt.NDArray[np.intp]) -> Floats:
-        sizes.append(len(left))
-        return costs(learning, left)
-
-    monkeypatch.setattr(elimination, "_boosted_costs", counted)
-    boosted_elimination_order(noisy(6, 0, 40))
-    assert sizes == [40, 36, 32, 29, 26, 23, 21, 19, 17, *range(15, 1, -1)]
 
 
 @pytest.mark.parametrize("columns", [0, 1])
@@ -223,10 +187,6 @@ def test_bins_hold_rows_as_evenly_as_can_be() -> None:
     assert np.diff(bits.sum(axis=1)).tolist() == [-10] * (BINS - 2)
 
 
-def test_no_joints_give_no_bits() -> None:
-    assert thermometer(np.zeros((5, 0), np.uint16)).shape == (0, 5)
-
-
 def test_a_sample_keeps_the_shares_of_the_classes_and_the_order() -> None:
     labels = np.array([0] * 100 + [1] * 200)[np.random.default_rng(0).permutation(300)]
     codes = np.arange(300, dtype=np.uint16)[:, np.newaxis]
@@ -234,11 +194,6 @@ def test_a_sample_keeps_the_shares_of_the_classes_and_the_order() -> None:
     assert np.bincount(few.labels).tolist() == [10, 20]
     assert (np.diff(few.codes[:, 0].astype(int)) > 0).all()
     assert (labels[few.codes[:, 0]] == few.labels).all()
-
-
-def test_a_small_set_is_taken_whole() -> None:
-    learning = Samples(np.zeros((3, 1), np.bool_), np.zeros((3, 0), np.uint16), np.zeros(3, np.intp), tuple("0"))
-    assert sampled(learning) is learning
 
 
 def loss(scores: Floats, labels: npt.NDArray[np.intp]) -> float:

@@ -37,13 +37,6 @@ def test_one_tree_answers_for_every_s_as_the_papers_pruned_tree_does(samples: Sa
     assert METHODS["id3"].chooser(samples)(s) == grow_id3(samples.switches, samples.labels, min_samples=s).inputs
 
 
-@given(learnings(), st.integers(0, 11))
-def test_no_more_switches_are_kept_than_asked_for(samples: Samples, most: int) -> None:
-    for name in ("id3-ccp", "id3-rep", "id3-cost"):
-        kept = METHODS[name].chooser(samples)(most)
-        assert len(set(kept)) == len(kept) <= most
-
-
 @given(learnings())
 def test_links_that_bring_nothing_cost_no_input_unless_asked_to(samples: Samples) -> None:
     assert METHODS["id3-ccp"].chooser(samples)(10) == grow_id3(samples.switches, samples.labels).inputs
@@ -128,21 +121,3 @@ def test_where_all_cost_alike_every_s_of_the_papers_tree_is_a_beginning(drawn: t
     order = order_of(X, y, PortCosts((0,) * X.shape[1], (0.0,)))
     pruned = grow_id3(X, y, min_samples=s).inputs
     assert set(order[: len(pruned)]) == set(pruned)
-
-
-def test_a_switch_on_a_port_that_is_read_anyway_is_preferred() -> None:
-    y = np.repeat(np.arange(4), 6)
-    whole = np.isin(y, [0, 1])
-    best, nearly = np.isin(y, [0, 2]), np.isin(y, [0, 2])
-    nearly[0] = False
-    X = np.stack([whole, best, nearly], axis=1)
-    assert order_of(X, y, PortCosts((0, 1, 0), (0.0, 0.0)))[:2] == (0, 1)
-    assert order_of(X, y, PortCosts((0, 1, 0), (40.0, 40.0)))[:2] == (0, 2)
-
-
-def test_half_the_gain_at_half_the_cost_is_as_good_and_the_cheaper_wins() -> None:
-    y = np.repeat(np.arange(4), 2)
-    one_bit, half_a_bit = y < 2, np.array([0, 0, 1, 1, 0, 1, 0, 1], bool)
-    X = np.stack([one_bit, half_a_bit], axis=1)
-    assert order_of(X, y, PortCosts((0, 1), (5.0, 1.0)))[0] == 1
-    assert order_of(X, y, PortCosts((0, 1), (4.999, 1.0)))[0] == 0

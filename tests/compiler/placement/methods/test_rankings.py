@@ -55,12 +55,6 @@ def test_where_nothing_varies_or_one_type_is_left_nothing_is_chosen(name: str, l
     assert METHODS[name].chooser(still)(2) == METHODS[name].chooser(alike)(2) == ()
 
 
-def test_joints_are_not_looked_at(learning: Samples) -> None:
-    telling = learning.labels[:, None].astype(np.uint16)
-    beside = Samples(learning.switches, telling, learning.labels, tuple(map(str, range(learning.n_classes))))
-    assert METHODS["forest"].chooser(beside)(10) == METHODS["forest"].chooser(learning)(10)
-
-
 def information(a: npt.NDArray[np.intp], b: npt.NDArray[np.intp]) -> float:
     joint = np.histogram2d(a, b, bins=(int(a.max()) + 1, int(b.max()) + 1))[0] / len(a)
     apart = np.outer(joint.sum(axis=1), joint.sum(axis=0))
