@@ -86,9 +86,13 @@ def command(
     harness = load_harness(glove)
     check_devices(harness, glove)
     loaded = None if build is None else Build.load(build)
-    scan = whole_scan(harness, harness.switches, every_taxel=True) if loaded is None else System.map_of(loaded, harness)
-    sensors = () if loaded is None else [joint.name for joint in loaded.manifest.joints]
-    looks, found = list(check_up(harness, scan, sensors)), list(_calibration(harness, loaded))
+    if loaded is None:
+        scan = whole_scan(harness, harness.switches, every_taxel=True)
+        looks = list(check_up(harness, scan, harness.switches))
+    else:
+        names, joints = ([each.name for each in some] for some in (loaded.manifest.switches, loaded.manifest.joints))
+        looks = list(check_up(harness, System.map_of(loaded, harness), names, joints))
+    found = list(_calibration(harness, loaded))
     with progress("looking") as report:
         for number, look in enumerate(looks):
             found += look()

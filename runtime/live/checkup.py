@@ -12,7 +12,6 @@ from thenar.drivers.errors import ThenarError
 from ..frames import SwitchFrame
 from ..harness.wiring import GloveWiring, Harness
 from ..names import list_names
-from ..scanning.ports import whole_scan
 from ..scanning.scanmap import ScanMap
 from ..scanning.timing import ChipTime, glove_us, scan_us
 from ..sources.base import SOURCES
@@ -55,17 +54,17 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 def check_up(
-    harness: Harness, scan: ScanMap, sensors: Sequence[str] = ()
+    harness: Harness, scan: ScanMap, names: Sequence[str], sensors: Sequence[str] | None = None
 ) -> Iterator[Callable[[], tuple[Finding, ...]]]:
-    """Yield a finding on each device of `harness`, of its chips only those that `scan` reads, of a CyberGlove also on
-    records of these sensors only; a finding takes a second or a few.
+    """Yield a finding on each device of `harness`, of its chips and streams only what `scan` reads: the switches
+    `names`, and of the joints only `sensors`, if not all are read. A finding takes a second or a few.
 
     It does not raise for a device that is not there: that is a finding.
     """
     if (glove := harness.cyberglove) is not None:
-        yield lambda: _glove(glove, sensors)
+        yield lambda: _glove(glove, sensors or ())
     for number in range(len(harness.streams)):
-        yield lambda number=number: _stream(harness, number)  # type: ignore[misc]
+        yield lambda number=number: _stream(harness, number, scan, names, sensors)  # type: ignore[misc]
     for bus in sorted({port.bus for port in scan.ports}):
         look = _bus if bus < len(harness.buses) else _spi
         yield lambda bus=bus, look=look: look(harness, bus, scan)  # type: ignore[misc]
@@ -109,11 +108,14 @@ def _record(wiring: GloveWiring, read: Sequence[str]) -> Finding:
     return Finding(device.name, part, True, predicted, measured, (said,))
 
 
-def _stream(harness: Harness, number: int) -> tuple[Finding, ...]:
-    scan = whole_scan(harness, harness.switches, every_taxel=True)
-    made = (source for kind in SOURCES.values() for source in kind.sources(harness, harness.switches, scan))
+def _stream(
+    harness: Harness, number: int, scan: ScanMap, names: Sequence[str], sensors: Sequence[str] | None
+) -> tuple[Finding, ...]:
+    made = (source for kind in SOURCES.values() for source in kind.sources(harness, names, scan))
     streams = (source for source in made if isinstance(source, RowSource))
     device = next(source for source in streams if source.wiring is harness.streams[number])
+    if sensors is not None:
+        device.read_only(sensors)
     predicted, frames, rows = float(device.wiring.period_us), list[SwitchFrame](), 0
     end = monotonic() + max(_ROWS_S, 5 * predicted / 1e6) + _STARTS_S
     try:
@@ -125,7 +127,7 @@ def _stream(harness: Harness, number: int) -> tuple[Finding, ...]:
                 rows += 1
         measured = None if device.watch.hz is None else 1e6 / device.watch.hz
         wrong = (device.trouble(), f"counted: {faults}" if (faults := device.faults()) else "")
-        remarks = (*filter(None, wrong), *_wrong(harness.switches, frames))
+        remarks = (*filter(None, wrong), *_wrong(names, frames))
     except ThenarError as error:
         return (Finding(device.name, "", False, predicted, None, (str(error),)),)
     finally:

@@ -28,8 +28,8 @@ from .timing import row_us
 CLOCK_HZ = 400_000
 # The converter for taxels: the most channels on a bus, converted within the transfer that reads them.
 CONVERTER = "ads7828"
-# Of a board: the range of its converter, its fastest rows, and an Uno's analog pins and LED.
-_CONVERTER_RANGE, _FASTEST_HZ, _ANALOG_PINS, _LED = (0.0, 1023.0), 1000, 6, 13
+# Of a board: the range of its converter, its rows a second, and an Uno's analog pins and LED.
+_CONVERTER_RANGE, _ROWS_HZ, _ANALOG_PINS, _LED = (0.0, 1023.0), 200, 6, 13
 
 
 def propose_harness(
@@ -99,11 +99,11 @@ def propose_board(
     *,
     name: str = "proposed",
     port: str = "/dev/ttyACM0",
-    baud: int = 115_200,
+    baud: int = 1_000_000,
     cyberglove: GloveWiring | None = None,
 ) -> Harness:
     """Return a harness with all switches on the pins of one board that prints rows, and the taxels whose levels are
-    among the names on its converter of 10 bits; rows come as fast as the line allows, at most 1000 a second.
+    among the names on its converter of 10 bits; 200 rows come in a second, or as many as the line allows.
 
     Pins are numbered as on Arduino's boards: 0 and 1 (the serial port) and 13 (the LED) stay free.
 
@@ -116,7 +116,7 @@ def propose_board(
     board = StreamWiring(
         port=port,
         baud=baud,
-        rate_hz=float(min(_FASTEST_HZ, int(1e6 / row_us(len(switches), len(taxels), baud)))),
+        rate_hz=float(min(_ROWS_HZ, int(1e6 / row_us(len(switches), len(taxels), baud)))),
         switches=tuple(switches),
         taxels=dict.fromkeys(taxels, _CONVERTER_RANGE),
         board=_pins(switches, taxels),

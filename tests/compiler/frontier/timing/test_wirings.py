@@ -81,7 +81,7 @@ def test_the_given_harness_comes_first_and_stays_as_it_is() -> None:
 
 
 def test_the_clock_of_a_given_board_is_its_baud() -> None:
-    assert wirings(propose_board(names_of(5)))[0].clock_hz == 115_200
+    assert wirings(propose_board(names_of(5)))[0].clock_hz == 1_000_000
 
 
 @pytest.mark.parametrize(
