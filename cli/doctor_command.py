@@ -90,8 +90,9 @@ def command(
         scan = whole_scan(harness, harness.switches, every_taxel=True)
         looks = list(check_up(harness, scan, harness.switches))
     else:
-        names, joints = ([each.name for each in some] for some in (loaded.manifest.switches, loaded.manifest.joints))
-        looks = list(check_up(harness, System.map_of(loaded, harness), names, joints))
+        switches = [switch.name for switch in loaded.manifest.switches]
+        joints = [joint.name for joint in loaded.manifest.joints]
+        looks = list(check_up(harness, System.map_of(loaded, harness), switches, joints))
     found = list(_calibration(harness, loaded))
     with progress("looking") as report:
         for number, look in enumerate(looks):

@@ -137,7 +137,6 @@ LONGEST = (
     "mutants/test_named_faults.py",
     "runtime/recording/test_reader.py",
     "cli/test_narrow.py",
-    "live/firmware/test_chain.py",
     "compiler/firmware/test_cppcheck.py",
     "cli/test_compile_documents.py",
     "simulator/running/test_simulation.py",

@@ -120,7 +120,7 @@ def test_frames_hold_the_bytes_of_ports_then_codes(make_tables: MakeTables) -> N
 
 def test_ports_of_a_harness_are_the_bytes_that_show_a_kept_switch_streams_first() -> None:
     ports, streams = (Port(0, 1, "GPIO", ((17, 3), (1, 2)), True),), (StreamRead(((9, 0), (40, 1)), ()),)
-    scan = ScanMap(1, "0" * 64, ports, (), streams=streams)
+    scan = ScanMap(1, "0" * 64, ports, streams)
     none = NO_SWITCH
     assert ports_of_scan(scan) == (
         (none, 0, *[none] * 6),
