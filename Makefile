@@ -94,13 +94,9 @@ $(VENV)/bench: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --group bench
 	touch $@
 
-$(VENV)/mutants: $(VENV)/installed
-	$(BIN)/python -m pip install --quiet --group mutants
-	touch $@
-
-mutants: $(VENV)/mutants  ## 200 small deliberate faults, drawn over all rooms: how many do the quick tests catch?
+mutants: $(VENV)/installed  ## 200 small deliberate faults, drawn over all rooms: how many do the quick tests catch?
 	rm -rf .mutants
-	env -u THENAR_REQUIRE_ALL $(BIN)/python tests/mutants/mutants.py .mutants --workers $(WORKERS)
+	env -u THENAR_REQUIRE_ALL $(BIN)/python tests/mutants/mutants.py .mutants
 
 bench: $(VENV)/bench  ## the benchmarks, as ratios against a peer or a bound in the same run
 	@$(BIN)/python -c "from thenar.compiler.frontier.timing.machine import machine_name; print(machine_name())"

@@ -1,10 +1,12 @@
 """Draw small faults in all rooms, and count those that the tests catch.
 
     python tests/mutants/mutants.py FOLDER [--number 200] [--seed 1]
+    python tests/mutants/mutants.py FOLDER --again OTHER/mutants.json
 
-First the quick tests run once, with a record of the lines that each of them runs (coverage's contexts). Then each fault
-is put into a copy of thenar in FOLDER, and the tests that run its line judge it, the quickest first. Prints a table by
-room, and the survivors; the list of all is FOLDER/mutants.json.
+Each fault is put into a copy of thenar in FOLDER, and the quick tests that are nearest to it judge it: those that
+import its module, then those that import a module that does, and so on. Prints a table by room, and the survivors; the
+list of all is FOLDER/mutants.json. With --again, the faults of that list are judged, as far as their lines are the same
+here: to compare the tests of two commits.
 """
 
 import argparse
@@ -13,23 +15,21 @@ import json
 import os
 import random
 import shutil
+import signal
 import subprocess
 import sys
-import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from queue import SimpleQueue
 
-import coverage
-
 ROOT = Path(__file__).resolve().parents[2]
 ROOMS = ("cli", "compiler", "drivers", "firmware_templates", "runtime", "simulator", "stability")
-# The tests of a fault take no longer than this together, as measured without a fault; a fault that makes them five
-# times as slow is caught.
-_LONGEST_S, _START_S, _SLOWER = 60.0, 30.0, 5.0
+# A fault is caught within this time, or counts as a survivor; and by at most so many files of tests.
+_LONGEST_S, _MOST_FILES = 60.0, 12
 _JUDGES = 2
 _OTHER = {
     **{ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq},
@@ -47,9 +47,9 @@ class Mutant:
     path: str
     line: int
     node: int
+    text: str
     change: str
     caught: bool | None = None
-    tests: int = 0
 
 
 def nodes_of(tree: ast.Module) -> Iterator[ast.AST]:
@@ -96,11 +96,14 @@ def changed(node: ast.AST) -> ast.AST | None:
 
 def sites(path: Path) -> Iterator[Mutant]:
     """Yield all faults of a file."""
-    for number, node in enumerate(nodes_of(ast.parse(path.read_text(encoding="utf-8")))):
+    source = path.read_text(encoding="utf-8")
+    lines = source.splitlines()
+    for number, node in enumerate(nodes_of(ast.parse(source))):
         other = changed(node)
         if other is not None:
             now, then = (ast.unparse(each).partition("\n")[0] for each in (node, other))
-            yield Mutant(str(path.relative_to(ROOT)), getattr(node, "lineno", 1), number, f"{now} -> {then}")
+            line = getattr(node, "lineno", 1)
+            yield Mutant(str(path.relative_to(ROOT)), line, number, lines[line - 1].strip(), f"{now} -> {then}")
 
 
 def drawn(number: int, seed: int) -> list[Mutant]:
@@ -108,6 +111,21 @@ def drawn(number: int, seed: int) -> list[Mutant]:
     files = sorted(file for room in ROOMS for file in (ROOT / room).rglob("*.py"))
     found = [site for file in files for site in sites(file)]
     return sorted(random.Random(seed).sample(found, number), key=lambda mutant: (mutant.path, mutant.node))
+
+
+def again(listed: Path) -> list[Mutant]:
+    """Return the faults of a list that are possible here: in the same file, a line of the same text."""
+    found = []
+    for old in json.loads(listed.read_text(encoding="utf-8")):
+        path = ROOT / old["path"]
+        same = (
+            [one for one in sites(path) if (one.text, one.change) == (old["text"], old["change"])]
+            if path.exists()
+            else []
+        )
+        if same:
+            found.append(min(same, key=lambda one: abs(one.line - old["line"])))
+    return found
 
 
 class _Change(ast.NodeTransformer):
@@ -125,77 +143,86 @@ def faulty(mutant: Mutant) -> str:
     return ast.unparse(ast.fix_missing_locations(_Change(node).visit(tree)))
 
 
-def watched(folder: Path, workers: str) -> None:
-    """Run the quick tests once, and record their lines and times in `folder`."""
-    options = ["-m", "not slow", "-n", workers, "-q", "--cov=thenar", "--cov-context=test", "--cov-report="]
-    command = [sys.executable, "-m", "pytest", *options, f"--junitxml={folder / 'times.xml'}"]
-    subprocess.run(command, cwd=ROOT, env=os.environ | {"COVERAGE_FILE": str(folder / "lines")}, check=False)
+class Nearest:
+    """The files of tests by their distance from a module, in imports."""
+
+    def __init__(self) -> None:
+        self._importers: dict[str, set[str]] = {}
+        self._tests: dict[str, set[str]] = {}
+        for room in ROOMS:
+            for file in (ROOT / room).rglob("*.py"):
+                for name in _imported(file, _module(file)):
+                    self._importers.setdefault(name, set()).add(_module(file))
+        for file in (ROOT / "tests").rglob("test_*.py"):
+            for name in _imported(file, ""):
+                self._tests.setdefault(name, set()).add(str(file.relative_to(ROOT)))
+
+    def tests_of(self, path: str) -> list[str]:
+        """Return the files of tests that are nearest to the module at `path`; of equally near ones, those named like it
+        first, then those with the fewest bytes.
+        """
+        stem = Path(path).stem
+        chosen, seen = dict[str, None](), {_module(ROOT / path)}
+        ring = set(seen)
+        while ring and len(chosen) < _MOST_FILES:
+            tests = {test for module in ring for test in self._tests.get(module, ())}
+            chosen |= dict.fromkeys(
+                sorted(tests, key=lambda test: (stem not in test, (ROOT / test).stat().st_size, test))
+            )
+            ring = {name for module in ring for name in self._importers.get(module, ())} - seen
+            seen |= ring
+        return list(chosen)[:_MOST_FILES]
 
 
-class Judge:
-    """The tests by the lines that they run, and their times."""
-
-    def __init__(self, folder: Path) -> None:
-        self._data = coverage.CoverageData(str(folder / "lines"))
-        self._data.read()
-        self._files = {str(Path(file).resolve().relative_to(ROOT)): file for file in self._data.measured_files()}
-        cases = ET.parse(folder / "times.xml").getroot().iter("testcase")
-        self._times: dict[tuple[str, str], float] = {
-            (str(case.get("classname")), str(case.get("name"))): float(case.get("time") or 0) for case in cases
-        }
-
-    def tests_of(self, mutant: Mutant) -> tuple[list[str], float]:
-        """Return the tests that judge a fault, the quickest first, and their time together."""
-        if mutant.path not in self._files:
-            return [], 0.0
-        by_line = self._data.contexts_by_lineno(self._files[mutant.path])
-        tests = {context.partition("|")[0] for context in by_line.get(mutant.line, [])} - {""}
-        if not tests:  # run on import
-            tests = {context.partition("|")[0] for contexts in by_line.values() for context in contexts} - {""}
-        chosen, together = [], 0.0
-        for seconds, test in sorted((self._time_of(test), test) for test in tests):
-            together += seconds
-            if together > _LONGEST_S and chosen:
-                break
-            chosen.append(test)
-        return chosen, together
-
-    def _time_of(self, test: str) -> float:
-        path, _, name = test.partition("::")
-        return self._times.get((path.removesuffix(".py").replace("/", "."), name), 1.0)
-
-    def judge(self, mutant: Mutant, copy: Path) -> Mutant:
-        """Set whether the tests catch the fault, in a copy of thenar."""
-        tests, seconds = self.tests_of(mutant)
-        place = copy / "thenar" / mutant.path
-        place.write_text(faulty(mutant), encoding="utf-8")
-        mutant.tests = len(tests)
-        try:
-            mutant.caught = bool(tests) and _fails(tests, copy, _START_S + _SLOWER * seconds)
-        finally:
-            shutil.copy(ROOT / mutant.path, place)
-        return mutant
+def _module(file: Path) -> str:
+    parts = file.relative_to(ROOT).with_suffix("").parts
+    return ".".join(("thenar", *(parts[:-1] if parts[-1] == "__init__" else parts)))
 
 
-def _fails(tests: Sequence[str], copy: Path, longest_s: float) -> bool:
-    options = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-o", "addopts=--import-mode=importlib"]
+def _imported(file: Path, module: str) -> Iterator[str]:
+    """Yield the modules of thenar that a file imports, late imports included."""
+    package = module if file.name == "__init__.py" else module.rpartition(".")[0]
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name.startswith("thenar"))
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            name = ".".join([*above, *([node.module] if node.module else [])])
+            if name.startswith("thenar"):
+                yield name
+                yield from (f"{name}.{alias.name}" for alias in node.names)
+
+
+def judge(mutant: Mutant, copy: Path, nearest: Nearest) -> Mutant:
+    """Set whether the nearest tests catch the fault, in a copy of thenar."""
+    place = copy / "thenar" / mutant.path
+    place.write_text(faulty(mutant), encoding="utf-8")
+    try:
+        tests = nearest.tests_of(mutant.path)
+        mutant.caught = bool(tests) and _fails(tests, copy)
+    finally:
+        shutil.copy(ROOT / mutant.path, place)
+    return mutant
+
+
+def _fails(tests: Sequence[str], copy: Path) -> bool:
+    options = ["-x", "-q", "-m", "not slow", "-p", "no:cacheprovider", "-p", "no:xdist"]
     environment = os.environ | {"PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-m", "pytest", *options, *tests]
-    try:
-        with subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                              start_new_session=True) as process:  # fmt: skip
-            try:
-                return process.wait(longest_s) != 0
-            except subprocess.TimeoutExpired:
-                os.killpg(process.pid, 9)
-                return True
-    except ProcessLookupError:
-        return True
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "stdin": subprocess.DEVNULL}
+    with subprocess.Popen(command, cwd=ROOT, env=environment, start_new_session=True, **quiet) as process:
+        try:
+            return process.wait(_LONGEST_S) != 0
+        except subprocess.TimeoutExpired:
+            return False
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
 
 
 def judged(mutants: Sequence[Mutant], folder: Path) -> list[Mutant]:
     """Judge all faults, two at a time; each as soon as it is judged stands in mutants.json."""
-    judge, copies = Judge(folder), SimpleQueue[Path]()
+    nearest, copies = Nearest(), SimpleQueue[Path]()
     for number in range(_JUDGES):
         copy = folder / f"copy{number}"
         shutil.rmtree(copy, ignore_errors=True)
@@ -205,7 +232,7 @@ def judged(mutants: Sequence[Mutant], folder: Path) -> list[Mutant]:
     def in_a_copy(mutant: Mutant) -> Mutant:
         copy = copies.get()
         try:
-            return judge.judge(mutant, copy)
+            return judge(mutant, copy, nearest)
         finally:
             copies.put(copy)
             (folder / "mutants.json").write_text(json.dumps([asdict(each) for each in mutants], indent=1))
@@ -227,7 +254,7 @@ def report(mutants: Sequence[Mutant]) -> None:
         print(f"{room:<20}{several[0]:>7}{several[1]:>8}")
     for mutant in mutants:
         if not mutant.caught:
-            print(f"{mutant.path}:{mutant.line}: {mutant.change} ({mutant.tests} tests)")
+            print(f"{mutant.path}:{mutant.line}: {mutant.change}")
 
 
 def main() -> None:
@@ -236,13 +263,11 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--number", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--workers", default="2", help="processes of the run without faults")
+    parser.add_argument("--again", type=Path, metavar="LIST", help="judge the faults of this list")
     given = parser.parse_args()
     folder = given.folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    if not (folder / "lines").exists():
-        watched(folder, given.workers)
-    report(judged(drawn(given.number, given.seed), folder))
+    report(judged(again(given.again) if given.again else drawn(given.number, given.seed), folder))
 
 
 if __name__ == "__main__":
