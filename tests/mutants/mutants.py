@@ -154,22 +154,26 @@ class Nearest:
                 for name in _imported(file, _module(file)):
                     self._importers.setdefault(name, set()).add(_module(file))
         for file in (ROOT / "tests").rglob("test_*.py"):
-            for name in _imported(file, ""):
-                self._tests.setdefault(name, set()).add(str(file.relative_to(ROOT)))
+            for source in (file, file.with_name("conftest.py")):
+                for name in _imported(source, "") if source.exists() else ():
+                    self._tests.setdefault(name, set()).add(str(file.relative_to(ROOT)))
 
     def tests_of(self, path: str) -> list[str]:
         """Return the files of tests that are nearest to the module at `path`; of equally near ones, those named like it
         first, then those with the fewest bytes.
         """
         stem = Path(path).stem
-        chosen, seen = dict[str, None](), {_module(ROOT / path)}
+        module = _module(ROOT / path)
+        chosen, seen = dict[str, None](), {module}
         ring = set(seen)
         while ring and len(chosen) < _MOST_FILES:
-            tests = {test for module in ring for test in self._tests.get(module, ())}
+            tests = {test for each in ring for test in self._tests.get(each, ())}
             chosen |= dict.fromkeys(
                 sorted(tests, key=lambda test: (stem not in test, (ROOT / test).stat().st_size, test))
             )
-            ring = {name for module in ring for name in self._importers.get(module, ())} - seen
+            # Registries and commands import their members by name: by their package.
+            ring = {name for each in ring for name in self._importers.get(each, ())} - seen
+            ring |= {module.rpartition(".")[0]} - seen
             seen |= ring
         return list(chosen)[:_MOST_FILES]
 
