@@ -51,13 +51,3 @@ def test_a_number_has_the_same_bits_in_any_company_and_the_sine_is_odd(x: np.nda
     turned = sincos(-x)
     np.testing.assert_array_equal(turned[0], -sine)
     np.testing.assert_array_equal(turned[1], cosine)
-
-
-def test_their_bits_are_those_of_every_machine() -> None:
-    sine, cosine = sincos(np.array([0.5, 2.0, 100.0, -999.0]))
-    assert [value.hex() for value in sine.tolist()] == GOLDEN_SINES
-    assert [value.hex() for value in cosine.tolist()] == GOLDEN_COSINES
-
-
-GOLDEN_SINES = ["0x1.eaee8744b05f0p-2", "0x1.d18f6ead1b445p-1", "-0x1.03425b78c4db8p-1", "0x1.b18870e886e35p-6"]
-GOLDEN_COSINES = ["0x1.c1528065b7d50p-1", "-0x1.aa22657537205p-2", "0x1.b981dbf665fdfp-1", "0x1.ffd21b0401f9ap-1"]

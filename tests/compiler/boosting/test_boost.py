@@ -222,8 +222,3 @@ def test_fewer_rounds_of_spread_ties_are_the_first_of_more() -> None:
     long, short = (boost(X, labels, 4, rounds=rounds, ties="least-used")[0] for rounds in (20, 7))
     assert long.first(7).columns.tobytes() == short.columns.tobytes()
     assert len(np.unique(long.columns)) > len(np.unique(boost(X, labels, 4, rounds=20)[0].columns))
-
-
-def test_ties_have_two_names() -> None:
-    with pytest.raises(BoostingError, match="ties='last' must be one of first, least-used"):
-        boost(np.eye(2), np.arange(2), 2, ties="last")

@@ -18,3 +18,10 @@ def test_inputs_of_another_shape_are_not_scored(shape: tuple[int, ...]) -> None:
     stumps = Stumps(4, np.zeros((1, 2), np.int32), np.zeros((1, 2)), np.zeros((1, 2, 3)), 1.0)
     with pytest.raises(ValueError, match="the ensemble expects"):
         stumps.scores(np.zeros(shape))
+
+
+@pytest.mark.parametrize("thresholds", [1, 3])
+def test_arrays_of_rounds_that_do_not_agree_are_not_scored(thresholds: int) -> None:
+    stumps = Stumps(4, np.zeros((2, 2), np.int32), np.zeros((thresholds, 2)), np.zeros((2, 2, 3)), 1.0)
+    with pytest.raises(ValueError, match="zip"):
+        stumps.scores(np.zeros((5, 4)))

@@ -1,6 +1,7 @@
 """The fit is chosen inside the training rows: folds that part nothing, the rule, and what options leave open."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler import TRAINERS, GraspSet, Options, Samples, ScoreTables, Setting, Trainer
+from thenar.compiler.evaluation import choosing as module
 from thenar.compiler.evaluation.choosing import choose_training, inner_folds
 from thenar.compiler.tables.collapse import model_scores
 from thenar.compiler.trainers.base import Training, changed
@@ -195,3 +197,23 @@ def test_settings_that_are_given_are_fixed_and_name_the_trainer_that_takes_them(
 )
 def test_where_all_that_is_compared_is_given_one_candidate_is_left(changes: dict[str, Any]) -> None:
     assert len(Training.candidates(changed(Options(), changes))) == 1
+
+
+@pytest.mark.parametrize(("frames", "compared"), [(1, 240), (7, 238), (24, 80)])
+def test_of_trials_of_many_frames_some_are_compared_and_no_trial_is_left_out(
+    monkeypatch: pytest.MonkeyPatch, frames: int, compared: int
+) -> None:
+    seen, train = list[int](), Pointer.train
+
+    def counting(self: Pointer, samples: Samples, settings: Mapping[str, Any], report: Any = None) -> ScoreTables:
+        seen.append(len(samples.labels))
+        return train(self, samples, settings)
+
+    monkeypatch.setattr(module, "_COMPARED", 100)
+    monkeypatch.setattr(Pointer, "train", counting)
+    whole = _samples([], [0], n=240 // frames, idle=0)
+    samples = replace(whole.rows(np.repeat(np.arange(240 // frames), frames)), movements=np.empty(0, np.intp))
+    fitting = choose_training(samples, _pointing(monkeypatch, {"switch": 0}, {"switch": 1}))
+    assert {found.total for found in fitting.compared} == {240 // frames}
+    # Both ways, in folds whose training rows make up the set but for one.
+    assert sum(seen) == 2 * (fitting.folds - 1) * compared

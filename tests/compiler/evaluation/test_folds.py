@@ -136,13 +136,6 @@ def test_a_block_is_named_by_its_trials() -> None:
     assert [fold.name for fold in block_folds(np.array([1, 2, 3, 1]), 2)] == ["trials 1-2", "trial 3"]
 
 
-def test_a_single_group_cannot_be_left_out() -> None:
-    with pytest.raises(
-        EvaluationError, match="leaving one object out needs two or more; all 3 rows are of object 'cup'"
-    ):
-        leave_one_out(np.array(["cup"] * 3), "object")
-
-
 def test_rows_of_one_trial_number_have_no_blocks() -> None:
     with pytest.raises(EvaluationError, match="all 5 rows have trial number 7"):
         block_folds(np.full(5, 7), 2)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from thenar.compiler.frontier.plots import PICTURES, POINT_ID, pictures
 from thenar.compiler.frontier.points import Frontier, Mark, Point, Time
-from thenar.compiler.pictures import PictureError, painting
+from thenar.compiler.pictures import painting
 
 NASTY = r"$\left{<&> -- ü = ]]> 'x'"
 
@@ -106,12 +106,6 @@ def test_every_point_that_is_shown_has_a_marker_with_its_number(examples: Any) -
         ids = {element.get("id", "") for element in ElementTree.fromstring(svg).iter()}
         shown = {f"{POINT_ID}{point.number}" for point in frontier.points if _is_shown(point, name)}
         assert {one for one in ids if one.startswith(POINT_ID)} == shown
-
-
-def test_other_kinds_of_files_are_refused(examples: Any) -> None:
-    kind: Any = "gif"
-    with pytest.raises(PictureError, match="gif"):
-        pictures(examples.example_frontier(), kind)
 
 
 def test_a_frontier_whose_joints_take_an_unknown_time_says_so_on_the_axis(examples: Any) -> None:

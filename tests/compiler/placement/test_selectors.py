@@ -1,6 +1,5 @@
 """Selectors, as scikit-learn checks them and as its users join them to other estimators."""
 
-import doctest
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -14,7 +13,6 @@ from sklearn.pipeline import make_pipeline
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from thenar.compiler import GraspSet, grow_id3
-from thenar.compiler.placement import selectors
 from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.placement.placement import place
 from thenar.compiler.placement.ports import PortCosts
@@ -102,10 +100,6 @@ def test_what_cannot_be_chosen_is_said(data: tuple[Any, Any]) -> None:
             ID3Selector(number).fit(*data)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="2 switches, the set has 9"):
         SwitchSelector("id3-cost", 3, ports=PortCosts((0, 0), (1.0,))).fit(*data)
-
-
-def test_the_examples_run() -> None:
-    assert doctest.testmod(selectors).failed == 0
 
 
 @pytest.mark.parametrize("method", ["cmim", "elimination", "id3"])

@@ -15,7 +15,7 @@ from scipy.io import savemat
 
 from thenar.compiler.recordings import foreign
 from thenar.compiler.recordings.errors import TableError
-from thenar.compiler.recordings.table import Table, read_table
+from thenar.compiler.recordings.table import read_table
 
 GRASPS = ["Größe", "hook", "pin"]
 JOINTS = [1.5, float("nan"), -2e-7]
@@ -199,12 +199,3 @@ def test_a_killed_import_leaves_no_reader_and_no_folder(tmp_path: Path) -> None:
     with suppress(ProcessLookupError):
         assert select.select([os.pidfd_open(number)], [], [], 60)[0], "the reader lives on"
     assert not list((tmp_path / "import").iterdir())
-
-
-def test_what_is_read_is_the_same_table_in_every_format(frame: pd.DataFrame, tmp_path: Path) -> None:
-    frame.to_csv(tmp_path / "t.csv", index=False)
-    frame.to_excel(tmp_path / "t.xlsx", index=False)
-    tables: list[Table] = [read_table(tmp_path / name) for name in ("t.csv", "t.xlsx")]
-    assert [list(table.columns) for table in tables] == [list(frame)] * 2
-    assert [float(cell) for cell in tables[0].columns["pads.1"]] == list(tables[1].columns["pads.1"])
-    assert tables[0].rows.tolist() == tables[1].rows.tolist()

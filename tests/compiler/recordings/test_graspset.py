@@ -1,4 +1,3 @@
-import doctest
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 
 from thenar.compiler import GraspSet
-from thenar.compiler.recordings import graspset
 from thenar.compiler.recordings.errors import RecordingError
 from thenar.compiler.recordings.graspset import Joint
 
@@ -170,9 +168,3 @@ def test_a_joint_reads_codes_as_values_by_its_two_points() -> None:
 def test_a_calibration_that_is_no_line_is_refused(points: tuple[int, float, int, float], reason: str) -> None:
     with pytest.raises(RecordingError, match=reason):
         Joint("index", "deg", *points)
-
-
-def test_the_example_of_the_docstring_is_true() -> None:
-    failed, tried = doctest.testmod(graspset)
-    assert failed == 0
-    assert tried > 0

@@ -80,19 +80,6 @@ def frames(**cells: Any) -> tuple[GraspSet, ImportReport]:
     return import_table(Table("t.csv", rows | cells, np.arange(2, 8)), columns)
 
 
-def test_frames_that_are_counted_as_trials_are_refused_with_both_remedies() -> None:
-    chance = np.random.default_rng(1)
-    bends = np.repeat(chance.integers(0, 1000, 40), 10) + chance.integers(0, 3, 400)
-    rows: dict[str, Column] = {"g": ["a"] * 200 + ["b"] * 200, "n": np.arange(400), "j": bends}
-    rows["hold"] = np.arange(400) // 10
-    columns = Columns("g", trial="n", joints=(JointColumns(("j",), codes=True),))
-    with pytest.raises(ColumnsError, match=r"look like frames .*trial = .*frames = \"independent\""):
-        import_table(Table("t.csv", rows, np.arange(400)), columns)
-    assert import_table(Table("t.csv", rows, np.arange(400)), replace(columns, trial="hold"))[1].trials == 40
-    stated = replace(columns, trial=None, frames="independent")
-    assert import_table(Table("t.csv", rows, np.arange(400)), stated)[0].independent
-
-
 def test_text_trials_are_numbered_in_natural_order_and_it_is_said() -> None:
     grasp_set, report = frames(rep=["T10", "T10", "001 - Copy", "T2", "T2", "T10"])
     assert grasp_set.trials.tolist() == [3, 3, 1, 2, 2, 3]

@@ -13,7 +13,6 @@ from thenar.compiler.recordings.mcap_recording import _Grasp, _Part, _taxel, imp
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.calibration import CodeTables
-from thenar.runtime.errors import McapError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.manifest import Calibration, Threshold
 from thenar.runtime.recording.guide import read_journal
@@ -271,13 +270,6 @@ def test_a_calibration_that_lacks_a_sensor_is_named(write: Write) -> None:
     lacking = GloveCalibration(sensors=CALIBRATION.sensors[:1])
     with pytest.raises(TableError, match=r"a\.mcap: its calibration has no sensor 'index_mpj'"):
         import_recordings([write(session=replace(SESSION, calibration=lacking))])
-
-
-def test_what_is_no_recording_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    path.write_bytes(b"cbuiltins\neval\n")
-    with pytest.raises(McapError, match=r"a\.mcap does not begin like"):
-        import_recordings([path])
 
 
 PADS = TaxelCalibration(unit="N", taxels=(TaxelLine("p", 100, 900, 2.0), TaxelLine("q", 900, 100)))

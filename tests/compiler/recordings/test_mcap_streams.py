@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.recordings.errors import ColumnsError
 from thenar.compiler.recordings.mcap_recording import import_files, import_recordings
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14, MOVEMENTS, collected
 from thenar.runtime.errors import McapError
@@ -186,11 +185,6 @@ def test_a_recording_whose_clock_jumps_makes_no_rows_of_the_gap(tmp_path: Path) 
         recorder.glove(GloveFrame(2**50, b"1234"))
     grasp_set, _ = import_recordings([recorder.path], stream=True)
     assert len(grasp_set) < 5000
-
-
-def test_a_table_is_no_stream_of_recordings(tmp_path: Path) -> None:
-    with pytest.raises(ColumnsError, match="--stream is for recordings"):
-        import_files([tmp_path / "t.csv"], stream=True)
 
 
 def test_a_stream_longer_than_its_file_can_have_recorded_is_refused(

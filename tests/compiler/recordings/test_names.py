@@ -1,7 +1,6 @@
-import numpy as np
 import pytest
 
-from thenar.compiler.recordings.errors import RecordingError, check_names, list_rows
+from thenar.compiler.recordings.errors import RecordingError, check_names
 
 
 @pytest.mark.parametrize(
@@ -20,8 +19,3 @@ def test_ordinary_names_of_any_language_pass() -> None:
 def test_equal_names_are_refused() -> None:
     with pytest.raises(RecordingError, match="switch 'a' occurs twice"):
         check_names("switch", ["a", "b", "a"])
-
-
-def test_rows_are_counted_like_names() -> None:
-    assert list_rows(np.array([4])) == "row 4"
-    assert list_rows(np.array([4, 9])) == "rows 4, 9"

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import pytest
 
+from thenar.compiler.recordings import picture as module
 from thenar.compiler.recordings.errors import RecordingError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.picture import draw
@@ -40,3 +41,13 @@ def test_names_are_drawn_as_they_are_and_cut_when_they_are_long(small: GraspSet)
     picture = draw(replace(small, switch_names=names, joints=joints), "svg")
     for words in ("$x^$ [/b]", "w" * 29 + "…", "s" * 29 + "…"):
         assert f"<!-- {words} -->".encode() in picture
+
+
+def test_of_very_many_joints_the_first_are_drawn_and_the_rest_counted(
+    small: GraspSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "_DRAWN_JOINTS", 1)
+    picture = draw(small, "svg")
+    assert b"joint values of the first 1 of 2 joints" in picture
+    assert b"<!-- index -->" in picture
+    assert b"<!-- wrist -->" not in picture

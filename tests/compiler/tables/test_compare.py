@@ -96,3 +96,10 @@ def test_a_margin_within_the_slack_is_not_covered(make_rows: MakeRows) -> None:
     assert found.slack > 1
     assert ((2 * (found.integer_bound - found.slack) < found.margins) & (found.margins <= edge)).any()
     assert np.array_equal(found.covered, found.margins > edge)
+
+
+def test_progress_is_told_every_thousand_rows(make_stumps: MakeStumps, make_rows: MakeRows) -> None:
+    stumps, (bits, codes) = make_stumps(2), make_rows(2, n=2001)
+    told: list[tuple[int, int]] = []
+    compare(stumps, quantise(collapse(stumps, 6), bits, codes), bits, codes, lambda *done: told.append(done))
+    assert told == [(1000, 2001), (2000, 2001)]

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from thenar.compiler.hand import MapError
-from thenar.compiler.pictures import PictureError
+from thenar.compiler.pictures import PictureError, painting
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14, own
-from thenar.simulator.handmaps.draw import Dot, Panel, Picture, all_switches, contacts, draw, kept
+from thenar.simulator.handmaps.draw import Dot, Panel, Picture, all_switches, colour, contacts, draw, kept
 from thenar.simulator.handmaps.handmap import hand_map
 
 HAND = hand_map()
@@ -157,3 +157,11 @@ def test_levels_mark_their_taxel_which_bears_the_number_of_the_first() -> None:
     assert dots[9].hint == f"{NAMES[9]}: kept, number 2 (counts >400), number 3 (counts >90)"
     with pytest.raises(MapError, match="no switch of the glove"):
         kept(HAND, [("A", (NAMES[3], "pad>400"))])
+
+
+def test_shades_darken_steadily_in_grey_and_begin_darker_than_hollow() -> None:
+    with painting(7):
+        colours = [colour(Dot("", shade), graded=True) for shade in np.linspace(0.0, 1.0, 21).tolist()]
+        assert colour(Dot(""), graded=True) == "white"
+    grey = [np.dot([int(c[i : i + 2], 16) for i in (1, 3, 5)], [0.299, 0.587, 0.114]) for c in colours]
+    assert (np.diff([255.0, *grey]) < -5).all()

@@ -202,11 +202,6 @@ def test_a_grasp_type_without_an_object_is_named(complaint: Callable[[str], str]
     assert "mine.toml, line 9: objects: no object for PoS, PoH, PoI, PoE, PoD and 8 more" in message
 
 
-def test_a_scene_that_is_not_shipped_is_told_the_nearest() -> None:
-    with pytest.raises(SceneError, match=r"no shipped scene is called 'kamakra' \(did you mean 'kamakura'"):
-        load_scene("kamakra")
-
-
 def test_a_missing_file_is_told_the_names_of_the_shipped_scenes(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"there is no file .*quick\.toml; shipped scenes have the names .*quick"):
         load_scene(tmp_path / "quick.toml")

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from thenar.simulator.body.shapes import Sphere
 from thenar.simulator.pipeline.effect import EFFECTS
-from thenar.simulator.scenes.scene import Recording, Scene, SceneObject
+from thenar.simulator.scenes.scene import Recording, Scene, SceneObject, Subject
 
 MakeScene = Callable[..., Scene]
 
@@ -79,3 +79,10 @@ def test_frames_and_bytes_are_there_if_the_rows_or_an_effect_want_them(
 ) -> None:
     setting = make_scene(recording=Recording(rows=rows)).setting(EFFECTS[name] for name in effects)  # type: ignore[arg-type]
     assert (setting.timed, setting.on_wire) == (timed, on_wire)
+
+
+def test_a_hand_has_the_size_of_its_subject_and_a_thing_the_mass_of_its_object_in_kilograms() -> None:
+    size = Subject(name="A", hand_length_mm=188.0, hand_breadth_mm=84.0).hand().size
+    assert (size.length_mm, size.breadth_mm) == (188.0, 84.0)
+    thing = objects(["Tip"])[0].thing()
+    assert (thing.name, thing.shape, thing.mass_kg) == ("ball 0", Sphere(diameter_mm=50.0), 0.08)
