@@ -6,6 +6,7 @@ silently with click's exit code 1.
 
 import errno
 import os
+import re
 import sys
 import tempfile
 import traceback
@@ -32,6 +33,7 @@ GROUPS = {
 }
 COMMANDS = tuple(name for names in GROUPS.values() for name in names)
 
+_PARAMETER = re.compile("``([a-z_]+)``")
 _WHOLE = 1000  # letters: longer than any first sentence
 
 
@@ -109,13 +111,18 @@ def _is_broken_pipe(fault: BaseException) -> bool:
     return isinstance(fault, SystemExit) and isinstance(reason, OSError) and reason.errno == errno.EPIPE
 
 
+def with_options(sentence: str) -> str:
+    """Return a sentence of the library with its parameters, ``keep_these``, as the options of commands."""
+    return _PARAMETER.sub(lambda found: f"--{found[1].replace('_', '-')}", sentence)
+
+
 def _sentence(fault: BaseException, arguments: Sequence[str]) -> str:
     """Return the sentence that reports an error."""
     match fault:
         case click.ClickException():
             return fault.format_message()
         case ThenarError() | BrokenExecutor():
-            return str(fault)
+            return with_options(str(fault))
         case OSError():
             reason = fault.strerror or str(fault)
             return f"{fault.filename}: {reason}" if fault.filename else reason

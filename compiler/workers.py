@@ -64,7 +64,7 @@ def in_workers(
                 yield from (result for result in results)
         except (BrokenExecutor, BrokenPipeError) as reason:
             raise BrokenExecutor(
-                "a worker process ended before its work was done, perhaps for lack of memory: --jobs 1 needs none"
+                "a worker process ended before its work was done, perhaps for lack of memory: ``jobs`` 1 needs none"
             ) from reason
 
 

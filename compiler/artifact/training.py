@@ -98,7 +98,7 @@ def samples_of(grasp_set: GraspSet, options: Options) -> Samples:
     samples = Samples.of(grasp_set, wanted)
     found = samples.n_classes
     if options.keep_joints is not None and not samples.codes.shape[1]:
-        raise CompileError("the recordings have no joints to choose from: leave keep_joints (--keep-joints) out")
+        raise CompileError("the recordings have no joints to choose from: leave ``keep_joints`` out")
     there = samples.codes.shape[1]
     joints = min(options.keep_joints or there, there)
     check_types(found, CompileError)
@@ -143,7 +143,7 @@ def train(
     chosen = choose(held, method, float(parameter), own, bound, robust=options.robust)
     columns = chosen.columns
     if not columns and not held.codes.shape[1]:
-        raise CompileError("no switch is worth keeping: lower --prune, or record switches that differ between grasps")
+        raise CompileError("no switch is worth keeping: lower ``prune``, or record switches that differ between grasps")
     joints = kept_joints(held.keeping(columns), options.keep_joints, limits)
     kept = bits_of(samples.rows(rows), elements).keeping(columns).with_joints(joints)
     check_inputs(len(samples.grasps), len(columns), len(joints), CompileError)

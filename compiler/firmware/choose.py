@@ -72,14 +72,14 @@ def fit_for(target: Target, tables: IntegerTables, flash: int | None = None, por
     if target.avr and rows > _LARGEST_ARRAY:
         raise FirmwareError(
             f"the rows need {rows} bytes, but an array of an AVR has at most {_LARGEST_ARRAY}: compile with "
-            "--linear 0 --max-bins 16, or with fewer --rounds"
+            "``linear`` 0 ``max_bins`` 16, or with fewer ``rounds``"
         )
     allowed, cost = largest_classifier(target) if flash is None else flash, target.formula.cost(layout)
     if cost.flash > allowed or cost.ram > target.ram:
         raise FirmwareError(
             f"the classifier takes about {cost.flash} bytes of flash and {cost.ram} of RAM on {target.named}, but "
-            f"{allowed} and {target.ram} are allowed: compile with a higher --prune, fewer --rounds or --table-bits 8, "
-            "or use a larger part"
+            f"{allowed} and {target.ram} are allowed: compile with a higher ``prune``, fewer ``rounds`` or "
+            "``table_bits`` 8, or use a larger part"
         )
     return Fit(target, layout, cost)
 

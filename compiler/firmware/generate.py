@@ -86,7 +86,7 @@ def write_folder(files: Mapping[str, str], folder: Path, *, overwrite: bool = Fa
     """
     target, _ = check_folder(folder, _users_files, FirmwareError)
     if not overwrite and target.exists() and any(target.iterdir()):
-        raise FirmwareError(f"{folder} already holds firmware: name another folder, or add --overwrite")
+        raise FirmwareError(f"{folder} already holds firmware: name another folder, or add ``overwrite``")
     content = {path: text.encode() for path, text in {**files, SUMS: sums(files)}.items()}
     return publish_folder(content, folder, _users_files, FirmwareError)
 

@@ -283,7 +283,7 @@ def _stream(survey: Survey, given: GraspSet | None) -> Stream:
         return stream_of(grasp_set, labels, np.flatnonzero(np.isin(movements, movements[test])), seed=seed)
     if given.fingerprint() == grasp_set.fingerprint():
         raise FrontierError(
-            f"the stream equals the training set, {survey.source}: name other recordings with --stream, or leave it "
+            f"the stream equals the training set, {survey.source}: name other recordings with ``stream``, or leave it "
             "out to use held-out rows"
         )
     if (given.element_names, given.joints) != (grasp_set.element_names, grasp_set.joints):
@@ -301,8 +301,8 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
     screened, curves = screen(survey)
     if not screened:
         raise FrontierError(
-            f"no placement that was tried can be built for {survey.equipment.model.target}: name other --methods or "
-            "another --target"
+            f"no placement that was tried can be built for {survey.equipment.model.target}: name other ``methods`` or "
+            "another ``target``"
         )
     several = finalists(screened, (), _WIDER * search.finalists)
     screened += screen_fewer(survey, finalists([one for one in screened if one.choice.joints], (), _FEWER))

@@ -61,10 +61,12 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     # Comparable with the frontier's rates.
     pooled = [rate for rate in manifest.rates if rate.protocol != "training" and not rate.of.startswith("new")]
     if not pooled:
-        raise FrontierError(f"{folder} has no accuracy: compile it with --folds 4, or leave --build out")
+        raise FrontierError(f"{folder} has no accuracy: compile it with ``folds`` 4, or leave ``build`` out")
     options, fitting = equipment.model.options(build.tables), equipment.fitting(names)
     if not options or (names and not fitting):
-        raise FrontierError(f"{folder} cannot be built for {equipment.model.target}: leave --build out, or --target")
+        raise FrontierError(
+            f"{folder} cannot be built for {equipment.model.target}: leave ``build`` out, or ``target``"
+        )
     joints = [joint.name for joint in manifest.joints]
     _check([switch.source for switch in manifest.switches], grasp_set.element_names, folder)
     _check(joints, [joint.name for joint in grasp_set.joints], folder)

@@ -63,7 +63,7 @@ class Picked:
             return given
         if setting.wiring == AS_WIRED and given is None:
             raise FrontierError(
-                f"point {self.point.number} is read as the glove was wired: name its glove.toml with --glove"
+                f"point {self.point.number} is read as the glove was wired: name its glove.toml with ``glove``"
             )
 
         def harness_of(kept: Sequence[str]) -> Harness:
@@ -107,7 +107,7 @@ def picked(path: Path, number: int | None, grasp_set: GraspSet) -> Picked:
     found = frontier_from_bytes(read_file(path, MAX_BYTES, FrontierError), str(path))
     wanted = found.picked if number is None else number
     if wanted is None:
-        raise FrontierError(f"{path} has points 1 to {len(found.points)}: say with --point which to build")
+        raise FrontierError(f"{path} has points 1 to {len(found.points)}: say with ``point`` which to build")
     if found.fingerprint != grasp_set.fingerprint():
         raise FrontierError(
             f"{path} was found for other recordings ({found.source}): run thenar frontier on these, or compile those"

@@ -136,7 +136,7 @@ def glove_spec(
     switch, or does not match the scan map.
     """
     if not manifest.switches:
-        raise SpecError("the build keeps no switch, so there is no glove to build: compile it with --inputs both")
+        raise SpecError("the build keeps no switch, so there is no glove to build: compile it with ``inputs`` both")
     wired = _harness(manifest, scan, harness)
     asked = [switch.name for switch in manifest.switches]
     read = whole_scan(wired, asked) if scan is None else scan
@@ -173,7 +173,7 @@ def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) 
     names = [switch.name for switch in manifest.switches]
     if harness is None:
         if scan is not None:
-            raise SpecError("the build was compiled for a specific wiring: name its glove.toml with --glove")
+            raise SpecError("the build was compiled for a specific wiring: name its glove.toml with ``glove``")
         return propose_harness(names, cyberglove=propose_cyberglove([joint.name for joint in manifest.joints]))
     names = [switch.name for switch in manifest.switches]
     if scan is not None:

@@ -58,15 +58,19 @@ class Limits:
             if name not in (every := (*self.names, *self.joints)):
                 raise PlacementError(f"there is no input {name!r} to keep or to leave out{nearest(name, every)}")
         if self.apart_mm and (lost := [name for name in self.names if name not in self.places]):
-            raise PlacementError(f"--apart-mm: the position of {list_names(lost)} is unknown: give --layout your glove")
+            raise PlacementError(
+                f"``apart_mm``: the position of {list_names(lost)} is unknown: give ``layout`` your glove"
+            )
         if both := [name for name in self.keep if name in self.never]:
-            raise PlacementError(f"--keep-these and --never both name {list_names(both)}: take it out of one of them")
+            raise PlacementError(
+                f"``keep_these`` and ``never`` both name {list_names(both)}: take it out of one of them"
+            )
         for at, name in enumerate(self.keep):
             for other in self.keep[:at] if self.apart_mm and name in self.names else ():
                 if other in self.names and self._apart(name, other) < self.apart_mm:
                     raise PlacementError(
-                        f"--keep-these {other},{name} are {self._apart(name, other):.1f} mm apart, --apart-mm requires "
-                        f"{self.apart_mm:g}: drop one of them, or allow less"
+                        f"``keep_these`` {other},{name} are {self._apart(name, other):.1f} mm apart, ``apart_mm`` "
+                        f"requires {self.apart_mm:g}: drop one of them, or allow less"
                     )
 
     @classmethod
@@ -96,10 +100,10 @@ class Limits:
         Raises PlacementError if they cannot be met.
         """
         if self.budget_us is not None and ports is None and elements:
-            raise PlacementError("--budget-us needs the cost of reading the glove: name its --glove")
+            raise PlacementError("``budget_us`` needs the cost of reading the glove: name its ``glove``")
         own = [self.names[element.column] for element in elements]
         if lost := [name for name in self.keep if name in self.names and name not in own]:
-            raise PlacementError(f"--keep-these names {list_names(lost)}, and --inputs leaves that out")
+            raise PlacementError(f"``keep_these`` names {list_names(lost)}, and ``inputs`` leaves that out")
         bound = Bound(
             self,
             groups=tuple(
@@ -122,14 +126,14 @@ class Limits:
             tuple(joint for joint, name in enumerate(self.joints) if name in asked) for asked in (self.keep, self.never)
         )
         if most is not None and len(keep) > most:
-            raise PlacementError(f"--keep-these names {len(keep)} joints, --keep-joints allows {most}: name fewer")
+            raise PlacementError(f"``keep_these`` names {len(keep)} joints, ``keep_joints`` allows {most}: name fewer")
         fit = len(self.joints)
         if self.budget_us is not None and self.records_us:
             fit = sum(us <= self.budget_us for us in self.records_us)
         if len(keep) > fit:
             raise PlacementError(
-                f"--keep-these names {len(keep)} joints, whose record takes {self.records_us[len(keep) - 1]:.1f} us, "
-                f"--budget-us allows {self.budget_us:g}: name fewer, or allow more"
+                f"``keep_these`` names {len(keep)} joints, whose record takes {self.records_us[len(keep) - 1]:.1f} us, "
+                f"``budget_us`` allows {self.budget_us:g}: name fewer, or allow more"
             )
         return keep, never, fit if most is None else min(most, fit)
 
@@ -187,18 +191,18 @@ class Bound:
         limits, kept = self.limits, self.required(())
         if limits.taxels is not None and len(set(self.taxel[kept].tolist()) - {-1}) > limits.taxels:
             raise PlacementError(
-                f"--keep-these names more taxels than --at-most {limits.taxels} taxels allows: name fewer, or allow "
-                "more"
+                f"``keep_these`` names more taxels than ``at_most`` {limits.taxels} taxels allows: name fewer, or "
+                "allow more"
             )
         if limits.budget_us is not None and self.ports is not None:
             taken = sum(self._times[port] for port in {self.ports.port_of[one] for one in kept})
             if taken > _ns(limits.budget_us):
                 raise PlacementError(
-                    f"--keep-these takes {taken / 1000:.1f} us to read, --budget-us allows {limits.budget_us:g}: name "
-                    "fewer, or allow more"
+                    f"``keep_these`` takes {taken / 1000:.1f} us to read, ``budget_us`` allows {limits.budget_us:g}: "
+                    "name fewer, or allow more"
                 )
         if self.never.size and not kept and not self.addable(()).any():
-            raise PlacementError("--never and --budget-us leave nothing to choose: allow more")
+            raise PlacementError("``never`` and ``budget_us`` leave nothing to choose: allow more")
 
     def required(self, order: Sequence[int]) -> list[int]:
         """Return one element of each group that must be kept, the first in `order`."""
@@ -209,7 +213,9 @@ class Bound:
         """Return at most `most` of `order`, required elements first, skipping each that would break a constraint."""
         kept = self.required(order)
         if len(kept) > most:
-            raise PlacementError(f"--keep-these names {len(kept)}, --keep allows {most:g}: name fewer, or keep more")
+            raise PlacementError(
+                f"``keep_these`` names {len(kept)}, ``keep`` allows {most:g}: name fewer, or keep more"
+            )
         for column in order:
             if len(kept) < most and column not in kept and self.addable(kept)[column]:
                 kept.append(column)

@@ -318,5 +318,5 @@ def _joints_kept(
 ) -> tuple[str, ...]:
     """Return the names of the joints to keep in addition to the switches `columns`."""
     if not grasp_set.joints:
-        raise PlacementError("the set has no joints to choose from: leave --keep-joints out")
+        raise PlacementError("the set has no joints to choose from: leave ``keep_joints`` out")
     return tuple(grasp_set.joint_names[joint] for joint in kept_joints(samples.keeping(columns), most, limits))

@@ -112,7 +112,7 @@ def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
     lacking = next((name for number, name in enumerate(names) if number not in port_of), None)
     if lacking is not None:
         raise HarnessError(
-            f"harness {harness.name!r} has no pin or column for {lacking!r}: add it to its file, or leave --glove out"
+            f"harness {harness.name!r} has no pin or column for {lacking!r}: add it to its file, or leave ``glove`` out"
         )
     return PortCosts(tuple(port_of[number] for number in range(len(names))), tuple(us))
 

@@ -105,7 +105,9 @@ def import_files(
             raise ColumnsError(f"a recording describes its own columns: leave {columns.name} out")
         return import_recordings(paths, stream)
     if stream:
-        raise ColumnsError("each row of a table is imported as it is: --stream is for recordings (.mcap), leave it out")
+        raise ColumnsError(
+            "each row of a table is imported as it is: ``stream`` is for recordings (.mcap), leave it out"
+        )
     if len(paths) > 1:
         raise TableError(
             "several recordings (.mcap) can be imported together, but only one table: of tables with one trial each, "

@@ -120,7 +120,7 @@ def split_into(grasp_set: GraspSet, by: By, folder: Path, *, overwrite: bool = F
     def theirs(target: Path) -> list[str]:
         there = entries(target)
         if not overwrite and (taken := sorted({*there} & {*files.values()})):
-            raise RecordingError(f"{folder} holds {list_names(taken)}: name another folder, or add --overwrite")
+            raise RecordingError(f"{folder} holds {list_names(taken)}: name another folder, or add ``overwrite``")
         return [path for path in there if path not in files.values()]
 
     content = {files[name]: part.encoded() for name, part in parts.items()}
@@ -207,8 +207,8 @@ def _check_trials(names: list[str], sets: list[GraspSet]) -> None:
             subject, grasp, thing, session, number = clash[0]
             raise RecordingError(
                 f"{len(clash)} trials are in {owner[clash[0]]} and in {name}, the first of subject {subject}, {grasp} "
-                f"with {thing}, session {session}, trial {number}: if each file is a separate session, add --each "
-                "session; if it is somebody else's, --each subject"
+                f"with {thing}, session {session}, trial {number}: if each file is a separate session, add ``each`` "
+                "session; if it is somebody else's, ``each`` subject"
             )
         owner |= trials
 

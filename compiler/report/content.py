@@ -80,7 +80,9 @@ class ReportContent:
         if self.hand is not None and not self.hand.knows(self.sources):
             raise ReportError("the hand lacks a kept switch: it belongs to another glove")
         if self.scan is not None and (self.harness is None or self.scan.harness != self.harness.fingerprint):
-            raise ReportError("the scan map does not match the harness: compile with --glove and the glove.toml in use")
+            raise ReportError(
+                "the scan map does not match the harness: compile with ``glove`` and the glove.toml in use"
+            )
 
     @property
     def switch_names(self) -> tuple[str, ...]:

@@ -97,7 +97,7 @@ def plan_scan(switch_names: Sequence[str], harness: Harness) -> ScanMap:
     if lacking := unwired(harness, switch_names):
         raise HarnessError(
             f"harness {harness.name!r} has no pin or column for {list_names(lacking)}, which the build keeps: "
-            "add what is missing to its file, or let --propose write one"
+            "add what is missing to its file, or let ``propose`` write one"
         )
     scan = whole_scan(harness, switch_names)
     return replace(scan, ports=tuple(scan.ports[port] for port in ports_in(Costs(scan.ports, harness).units)))
@@ -111,7 +111,7 @@ def check_harness(scan: ScanMap, harness: Harness, switch_names: Sequence[str]) 
     if scan.harness != harness.fingerprint:
         raise HarnessError(
             f"the build's scan map was made for another wiring than harness {harness.name!r}: "
-            "compile again with --glove"
+            "compile again with ``glove``"
         )
     # A sealed map may still hold anything its author wanted.
     wired = whole_scan(harness, switch_names)
@@ -131,7 +131,7 @@ def check_harness(scan: ScanMap, harness: Harness, switch_names: Sequence[str]) 
     if not right:
         raise HarnessError(
             f"the build's scan map reads other pins or columns than harness {harness.name!r} has switches on: "
-            "compile again with --glove"
+            "compile again with ``glove``"
         )
 
 

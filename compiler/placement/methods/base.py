@@ -110,11 +110,11 @@ class Method:
     def check_given(self, keep: int | None, prune: int) -> None:
         """Raise PlacementError unless the method's parameter is given, and nothing else."""
         if self.by_number and keep is None:
-            raise PlacementError(f"method {self.name!r} needs --keep M: how many switches to keep")
+            raise PlacementError(f"method {self.name!r} needs ``keep`` M: how many switches to keep")
         if self.by_number and prune:
-            raise PlacementError(f"method {self.name!r} takes --keep M and no --prune")
+            raise PlacementError(f"method {self.name!r} takes ``keep`` M and no ``prune``")
         if not self.by_number and keep is not None:
-            raise PlacementError(f"method {self.name!r} takes --prune S and no --keep: choose another --method")
+            raise PlacementError(f"method {self.name!r} takes ``prune`` S and no ``keep``: choose another ``method``")
 
     def ladder(self, n_switches: int) -> tuple[int, ...]:
         """Return the parameters that a frontier tries among `n_switches` switches."""

@@ -229,7 +229,7 @@ def test_either_kind_of_input_will_do(
         ({"switches": 0}, {"inputs": "switches"}, "the recordings have no switches"),
         ({"joints": 0}, {"inputs": "joints"}, "the recordings have no joints"),
         ({"types": 1}, {}, "nothing to distinguish"),
-        ({}, {"inputs": "switches", "prune": 1000}, "no switch is worth keeping: lower --prune"),
+        ({}, {"inputs": "switches", "prune": 1000}, "no switch is worth keeping: lower ``prune``"),
         ({}, {"rounds": 0}, "rounds=0"),
         ({}, {"shrinkage": 2.0}, "shrinkage=2.0"),
         ({}, {"prune": -1}, "min_samples is -1"),

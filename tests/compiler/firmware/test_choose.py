@@ -66,7 +66,7 @@ def test_what_takes_too_much_flash_or_ram_is_refused_with_a_remedy(wide_tables: 
     told = (
         f"about {cost.flash} bytes of flash and {cost.ram} of RAM on an atmega328p, but {cost.flash - 1} and 2048 are"
     )
-    with pytest.raises(FirmwareError, match=f"{told} allowed: compile with a higher --prune, .*or use a larger part"):
+    with pytest.raises(FirmwareError, match=f"{told} allowed: compile with a higher ``prune``, .*or use a larger part"):
         fit_for(SMALL, wide_tables, cost.flash - 1)
     with pytest.raises(FirmwareError, match=f"but 24576 and {cost.ram - 1} are allowed"):
         fit_for(replace(SMALL, ram=cost.ram - 1), wide_tables)

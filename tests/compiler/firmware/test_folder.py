@@ -30,7 +30,7 @@ def test_a_new_or_empty_folder_takes_the_files_and_their_sums(tmp_path: Path, to
 
 
 def test_firmware_is_replaced_only_where_that_is_asked_for(folder: Path) -> None:
-    with pytest.raises(FirmwareError, match="already holds firmware: name another folder, or add --overwrite"):
+    with pytest.raises(FirmwareError, match="already holds firmware: name another folder, or add ``overwrite``"):
         write_folder(NEW, folder)
     assert content(folder) == {**OLD, SUMS: sums(OLD)}
     write_folder(NEW, folder, overwrite=True)

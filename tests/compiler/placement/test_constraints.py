@@ -110,13 +110,13 @@ def test_a_limit_that_forbids_nothing_changes_nothing_and_one_that_does_is_obeye
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
-        ({"keep": ("a",), "never": ("b", "a")}, "--keep-these and --never both name a"),
-        ({"keep": ("a", "b"), "apart_mm": 6.5}, "--keep-these a,b are 6.0 mm apart, --apart-mm requires 6.5"),
-        ({"keep": ("p", "q"), "taxels": 1}, "--keep-these names more taxels than --at-most 1 taxels"),
-        ({"keep": ("a", "c"), "budget_us": 12.0}, "--keep-these takes 15.5 us to read, --budget-us allows 12"),
-        ({"budget_us": 5.0}, "--never and --budget-us leave nothing"),
+        ({"keep": ("a",), "never": ("b", "a")}, "``keep_these`` and ``never`` both name a"),
+        ({"keep": ("a", "b"), "apart_mm": 6.5}, "``keep_these`` a,b are 6.0 mm apart, ``apart_mm`` requires 6.5"),
+        ({"keep": ("p", "q"), "taxels": 1}, "``keep_these`` names more taxels than ``at_most`` 1 taxels"),
+        ({"keep": ("a", "c"), "budget_us": 12.0}, "``keep_these`` takes 15.5 us to read, ``budget_us`` allows 12"),
+        ({"budget_us": 5.0}, "``never`` and ``budget_us`` leave nothing"),
         ({"never": ("pp",)}, "no input 'pp'"),
-        ({"apart_mm": 1.0, "places": {"a": (0.0, 0.0)}}, "--apart-mm: the position of b, c, p, q is unknown"),
+        ({"apart_mm": 1.0, "places": {"a": (0.0, 0.0)}}, "``apart_mm``: the position of b, c, p, q is unknown"),
     ],
 )
 def test_contradictions_are_refused_by_both_names(asked: dict[str, object], message: str) -> None:
@@ -126,9 +126,9 @@ def test_contradictions_are_refused_by_both_names(asked: dict[str, object], mess
 
 def test_more_to_keep_than_there_is_room_for_and_a_budget_without_costs_are_refused() -> None:
     limits = Limits(names=NAMES, n_switches=3, keep=("a", "b", "q"), budget_us=99.0)
-    with pytest.raises(PlacementError, match="--keep-these names 3, --keep allows 2"):
+    with pytest.raises(PlacementError, match="``keep_these`` names 3, ``keep`` allows 2"):
         choose(samples_of(1), "cmim", 2, PORTS, limits.on(ELEMENTS, PORTS))
-    with pytest.raises(PlacementError, match="--budget-us needs the cost of reading"):
+    with pytest.raises(PlacementError, match="``budget_us`` needs the cost of reading"):
         limits.on(ELEMENTS, None)
 
 
@@ -142,9 +142,9 @@ def test_joints_are_kept_and_left_out_by_name_as_switches_are() -> None:
     assert kept_joints(samples, 2, limits) == (1, 3)
     assert kept_joints(samples, None, limits) == (1, 2, 3)
     assert kept_joints(samples, 1, limits) == (3,)
-    with pytest.raises(PlacementError, match="--keep-these names 2 joints, --keep-joints allows 1"):
+    with pytest.raises(PlacementError, match="``keep_these`` names 2 joints, ``keep_joints`` allows 1"):
         kept_joints(samples, 1, Limits(**own, keep=("j3", "j1")))  # type: ignore[arg-type]
-    with pytest.raises(PlacementError, match="--keep-these names a, and --inputs leaves that out"):
+    with pytest.raises(PlacementError, match="``keep_these`` names a, and ``inputs`` leaves that out"):
         Limits(**own, keep=("a",)).on((), None)  # type: ignore[arg-type]
     limits.on((), None)
 
@@ -173,7 +173,7 @@ def test_no_more_joints_are_kept_than_a_record_within_the_budget_has(budget_us: 
     assert len(kept) == max(map(len, allowed))
     assert len(kept_joints(samples, 2, limits)) == min(2, len(kept))
     if len(kept) < 3:
-        with pytest.raises(PlacementError, match=r"--keep-these names 3 joints, whose record takes \d+\.\d us"):
+        with pytest.raises(PlacementError, match=r"``keep_these`` names 3 joints, whose record takes \d+\.\d us"):
             kept_joints(samples, None, replace(limits, keep=joints[:3]))
 
 

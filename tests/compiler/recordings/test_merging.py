@@ -231,7 +231,7 @@ def test_other_files_stay_and_files_of_the_same_name_are_only_replaced_on_reques
     (folder / "notes.txt").write_text("mine")
     (folder / "subject-A.grasps").write_text("old")
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    with pytest.raises(RecordingError, match=r"out holds subject-A.grasps: name another folder, or add --overwrite"):
+    with pytest.raises(RecordingError, match=r"out holds subject-A.grasps: name another folder, or add ``overwrite``"):
         split_into(small, "subject", folder)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
     split_into(small, "subject", folder, overwrite=True)
