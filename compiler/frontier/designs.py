@@ -23,7 +23,7 @@ from .timing.scan_times import NO_TIME
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Design:
-    """One design of a finalist: these tables in this layout, and the scan of its switches (None: it reads none).
+    """One design of a finalist: these tables, and the scan of its switches (None: it reads none).
 
     transfer  time of reading the joints
     measured  time of classifying, simulated or measured; None: the model's estimate
@@ -73,11 +73,9 @@ Latencies = Mapping[tuple[Design, DecisionKind], Latency]
 def designs(close: Close, read: Time = NO_TIME) -> Iterator[Design]:
     """Yield all designs of a finalist, whose joints take `read`."""
     for tables in close.priced:
-        for classified in tables.classified:
-            if not close.screened.columns:
-                yield Design(close, tables, classified, None, read)
-            for wired in tables.wired:
-                yield Design(close, tables, classified, wired, read)
+        if tables.classified is not None:
+            wirings = tables.wired if close.screened.columns else (None, *tables.wired)
+            yield from (Design(close, tables, tables.classified, wired, read) for wired in wirings)
 
 
 def best_designs(several: Sequence[Design]) -> tuple[list[Design], list[Design]]:
@@ -217,7 +215,6 @@ def _point(
             inputs=choice.inputs,
             rounds=tabled.rounds if TRAINERS.named(training.trainer).staged else None,
             width=tabled.shape.width,
-            layout=design.classified.layout,
             decision=kind,
             wiring="" if wired is None else wired.wiring,
             clock_hz=0 if wired is None else wired.clock_hz,

@@ -62,8 +62,8 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     pooled = [rate for rate in manifest.rates if rate.protocol != "training" and not rate.of.startswith("new")]
     if not pooled:
         raise FrontierError(f"{folder} has no accuracy: compile it with ``folds`` 4, or leave ``build`` out")
-    options, fitting = equipment.model.options(build.tables), equipment.fitting(names)
-    if not options or (names and not fitting):
+    cost, fitting = equipment.model.cost(build.tables), equipment.fitting(names)
+    if cost is None or (names and not fitting):
         raise FrontierError(
             f"{folder} cannot be built for {equipment.model.target}: leave ``build`` out, or ``target``"
         )
@@ -71,7 +71,7 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     _check([switch.source for switch in manifest.switches], grasp_set.element_names, folder)
     _check(joints, [joint.name for joint in grasp_set.joints], folder)
     scans = [scan_times(names, wiring, equipment.overhead).us for wiring in fitting]
-    frame_us = max(min(scans, default=0.0), equipment.records.of(len(joints)).us) + options[0].us
+    frame_us = max(min(scans, default=0.0), equipment.records.of(len(joints)).us) + cost.us
     return Mark(
         f"build {folder.name}", len(names), Rate.counted((pooled[0].correct,), pooled[0].total, of="pooled"), frame_us
     )

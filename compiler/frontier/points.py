@@ -58,7 +58,6 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 
     rounds      None for a trainer without rounds
     width       bits that every sum fits; table_bits: 8 if firmware may store a byte per entry
-    layout      of the tables in flash, in words; "" on host and pi, which have none
     wiring      "as wired" (the given glove.toml), "board" (one that prints rows) or a kind of port expander; clock_hz
                 of its bus, or baud of the board's line; 0 if no switch is read
     trainer     of the model, and its `settings` that are not defaults; the paper's is not written
@@ -70,7 +69,6 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     inputs: Inputs
     rounds: Annotated[int, Meta(ge=1, le=10**6)] | None
     width: Annotated[int, Meta(ge=4, le=16)]
-    layout: str
     decision: DecisionKind
     wiring: str
     clock_hz: Annotated[int, Meta(ge=0, le=12_000_000)]

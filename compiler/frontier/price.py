@@ -43,19 +43,19 @@ class PricedTables(Struct, frozen=True):
 
     tabled: Tabled
     content: bytes
-    classified: tuple[Classified, ...]
+    classified: Classified | None
     wired: tuple[Wired, ...]
     seconds: float
 
     def fastest_us(self, joints_us: float) -> float | None:
         """Return the least frame time in any wiring; None if nothing fits the target."""
-        if not self.classified:
+        if self.classified is None:
             return None
         scan_us = min((wired.scan.us for wired in self.wired), default=0.0)
-        return max(scan_us, joints_us) + self.classified[0].us
+        return max(scan_us, joints_us) + self.classified.us
 
 
-@stored(4)
+@stored(5)
 def price(
     samples: Samples,
     names: tuple[str, ...],
@@ -75,7 +75,7 @@ def price(
         for wiring in equipment.fitting(names)
     )
     return tuple(
-        PricedTables(tabled, tables_to_bytes(made), equipment.model.options(made), wired, seconds)
+        PricedTables(tabled, tables_to_bytes(made), equipment.model.cost(made), wired, seconds)
         for tabled, made, seconds in tables_of(samples, rows, columns, tables, training, lost=lost)
     )
 

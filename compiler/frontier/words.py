@@ -13,7 +13,7 @@ from ..text import cells, counted, duration, interval, listed, percent
 from .points import Frontier, Mark, Point, Recipe, Time
 
 COLUMNS = (
-    *("number", "fronts", "n_switches", "inputs", "method", "parameter", "rounds", "width", "layout"),
+    *("number", "fronts", "n_switches", "inputs", "method", "parameter", "rounds", "width"),
     *("wiring", "clock_hz", "decision", "rate_of", "rate", "rate_low", "rate_high", "luck"),
     *(
         "frames_of",
@@ -219,7 +219,7 @@ def csv_bytes(frontier: Frontier) -> bytes:
 def _values(point: Point) -> Iterator[object]:
     setting, latency = point.setting, point.latency
     yield from (point.number, _list(point.fronts), len(point.switches), setting.inputs)
-    yield from (setting.placement.method, setting.placement.parameter, setting.rounds, setting.width, setting.layout)
+    yield from (setting.placement.method, setting.placement.parameter, setting.rounds, setting.width)
     yield from (setting.wiring, setting.clock_hz, setting.decision)
     yield from (*_rate(point.rate), point.luck, *_rate(point.frames), *_rate(point.other_rate))
     for time in (point.scan, point.transfer, point.classify, point.frame):

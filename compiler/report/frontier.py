@@ -198,8 +198,7 @@ def _facts(point: Point, frontier: Frontier) -> Iterable[tuple[str, str]]:
     yield "Placement", _placement(point)
     yield "Inputs", f"{setting.inputs}, {counted(len(point.switches), 'switch', 'switches')}"
     yield "Wiring", f"{_wiring(point)}; {counted(point.ports, 'port')}, {counted(point.chips, 'chip')}"
-    layout = setting.layout and f"; {setting.layout}"
-    yield "Tables", f"{trainer_of(setting)}, {setting.width} bits{layout}"
+    yield "Tables", f"{trainer_of(setting)}, {setting.width} bits"
     yield "Scan", _time(point.scan) if point.switches else DASH
     yield "Joints", DASH if setting.inputs == "switches" else _time(point.transfer)
     yield "Classify", _time(point.classify)

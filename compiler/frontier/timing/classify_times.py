@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ...firmware import FirmwareError
-from ...firmware.choose import Fit, features, fit_for
+from ...firmware.choose import Fit, fit_for
 from ...firmware.targets import TARGETS, Target, timed
 from ..points import FrontierError, How
 from .machine import machine_name, on_a_pi
@@ -17,12 +17,8 @@ PI_FACTOR = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Classified:
-    """The costs of tables: microseconds a frame, bytes of flash and RAM; of the tables alone on host and pi.
+    """The costs of tables: microseconds a frame, bytes of flash and RAM; of the tables alone on host and pi."""
 
-    layout  in words; "" on host and pi, which have none
-    """
-
-    layout: str
     us: float
     how: How
     flash: int
@@ -59,17 +55,17 @@ class ClassifyModel:
         """Everything that its predictions depend on, in addition to the tables."""
         return self.target, self.clock_hz, self.python, self.factor
 
-    def options(self, tables: IntegerTables) -> tuple[Classified, ...]:
-        """Return the cost of tables; empty where they do not fit."""
+    def cost(self, tables: IntegerTables) -> Classified | None:
+        """Return the cost of tables; None where they do not fit."""
         if self.part is None:
             assert self.python is not None
             size = len(tables_to_bytes(tables))
             how: How = "guess" if self.guessed else "model"
-            return (Classified("", self.python.us(tables) * self.factor, how, size, size),)
+            return Classified(self.python.us(tables) * self.factor, how, size, size)
         fit = fitting(tables, self.part)
         if fit is None or fit.cost is None:
-            return ()
-        return (Classified(features(fit.layout), self.us(fit.cost.cycles), "model", fit.cost.flash, fit.cost.ram),)
+            return None
+        return Classified(self.us(fit.cost.cycles), "model", fit.cost.flash, fit.cost.ram)
 
     def us(self, steps: int) -> float:
         """Return the microseconds of `steps` cycles or instructions of the part."""

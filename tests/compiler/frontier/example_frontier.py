@@ -181,10 +181,7 @@ def _point(
     p99_us: float,
 ) -> Point:
     transfer_us = 0.0 if inputs == "switches" else TRANSFER_US
-    layout = f"{8 * (1 + (width > 8))}-bit entries, {4 if kept > 8 else 2} switches per lookup"
-    setting = Recipe(
-        PlacementChoice(method, parameter), inputs, rounds, width, layout, decision, wiring, 1000 * clock_khz
-    )
+    setting = Recipe(PlacementChoice(method, parameter), inputs, rounds, width, decision, wiring, 1000 * clock_khz)
     return Point(
         number=number,
         setting=setting,

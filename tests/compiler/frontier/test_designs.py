@@ -38,13 +38,13 @@ def judged(rate: float) -> Judged:
     )
 
 
-def close_of(switches: int = 20, rate: float = 0.9, scan_us: float = 500.0, layout_us: float = 50.0) -> Close:
+def close_of(switches: int = 20, rate: float = 0.9, scan_us: float = 500.0, classify_us: float = 50.0) -> Close:
     scan = ScanTimes(scan_us, 4, 2, "wire")
     wired = (Wired("mcp23017", 400_000, scan),) if switches else ()
-    tables = PricedTables(TABLED, b"", (Classified("plain", layout_us, "model", 900, 30),), wired, 1.25)
+    tables = PricedTables(TABLED, b"", Classified(classify_us, "model", 900, 30), wired, 1.25)
     choice = PlacementChoice("id3", float(switches))
     screened = Screened(
-        Candidate(choice, "switches" if switches else "joints"), tuple(range(switches)), judged(rate), layout_us
+        Candidate(choice, "switches" if switches else "joints"), tuple(range(switches)), judged(rate), classify_us
     )
     return Close(screened, {}, {TABLED: judged(rate)}, {}, {}, (tables,), 2.0)
 
@@ -53,7 +53,7 @@ def simulated(design: Design, us: float) -> Design:
     return replace(design, measured=Time(us, "simulated"))
 
 
-def test_joints_alone_have_one_design_a_layout_and_wait_for_a_record() -> None:
+def test_joints_alone_have_one_design_and_wait_for_a_record() -> None:
     (design,) = designs(close_of(switches=0), records_of(SENSORS_18).of(18))
     assert (design.scan.us, design.wired, design.classify.us) == (0.0, None, 50.0)
     assert design.frame.us == pytest.approx(18 * 250 + 21 * 10 / 115_200 * 1e6 + 50.0)
@@ -75,7 +75,7 @@ def test_luck_is_the_same_however_often_the_same_folds_are_repeated() -> None:
         random = np.random.default_rng(1)
         several = []
         for switches in range(1, 9):
-            close = close_of(switches, 0.9, layout_us=50.0 + switches)
+            close = close_of(switches, 0.9, classify_us=50.0 + switches)
             hits = (random.random(200) < 0.8).astype(np.intp)
             judged_so = Judged(Rate.counted((int(hits.sum()),), 200, of="pooled"), repeats * hits, repeats)
             close = replace(close, tables={TABLED: judged_so}, screened=replace(close.screened, judged=judged_so))
@@ -98,7 +98,7 @@ def test_fronts_hold_the_quickest_and_the_smallest() -> None:
 
 
 def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
-    one, other = next(designs(close_of(20, 0.9))), next(designs(close_of(10, 0.8, layout_us=30.0)))
+    one, other = next(designs(close_of(20, 0.9))), next(designs(close_of(10, 0.8, classify_us=30.0)))
     # The model has the other one faster, the simulator the better one: so the other is beaten on time.
     assert other.frame.us < one.frame.us
     several = [simulated(one, 20.0), simulated(other, 60.0)]

@@ -30,11 +30,12 @@ def design_of(model: ClassifyModel) -> Design:
     tables = random_tables(6, 0, 4)
     scan = ScanTimes(500.0, 4, 2, "wire")
     wired = Wired("mcp23017", 400_000, scan)
-    priced = PricedTables(Tabled(1, Shape(16)), tables_to_bytes(tables), model.options(tables), (wired,), 1.0)
+    priced = PricedTables(Tabled(1, Shape(16)), tables_to_bytes(tables), model.cost(tables), (wired,), 1.0)
     judged = Judged(Rate.counted((9,), 10, of="pooled"), np.arange(10), 1)
     screened = Screened(Candidate(PlacementChoice("id3", 6.0), "switches"), tuple(range(6)), judged, 1.0)
     close = Close(screened, {}, {}, {}, {}, (priced,), 1.0)
-    return Design(close, priced, priced.classified[0], wired, Time(0.0, "wire"))
+    assert priced.classified is not None
+    return Design(close, priced, priced.classified, wired, Time(0.0, "wire"))
 
 
 @pytest.mark.slow

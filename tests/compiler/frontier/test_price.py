@@ -25,4 +25,4 @@ def test_a_finalist_is_priced_with_what_its_build_holds_for_lost_inputs(grasp_se
     (quick,) = price(*asked, equipment, False)
     built, means = built_tables(trained, samples, options), integers_of(trained, samples, options)
     assert close.content == tables_to_bytes(built) != quick.content == tables_to_bytes(means)
-    assert close.classified == equipment.model.options(built)
+    assert close.classified == equipment.model.cost(built)

@@ -114,7 +114,7 @@ def test_what_is_read_again_are_the_points(examples: Any) -> None:
         assert tuple(row) == COLUMNS
         assert (int(row["number"]), int(row["n_switches"])) == (point.number, len(point.switches))
         assert (row["method"], float(row["parameter"])) == (way.method, way.parameter)
-        for name in ("inputs", "layout", "wiring", "decision"):
+        for name in ("inputs", "wiring", "decision"):
             assert row[name] == getattr(setting, name)
         for name in ("rounds", "width", "clock_hz"):
             assert int(row[name]) == getattr(setting, name)

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.choose import features, fit_for
+from thenar.compiler.firmware.choose import fit_for
 from thenar.compiler.firmware.targets import TARGETS, timed
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.frontier.timing.classify_times import ClassifyModel
+from thenar.compiler.frontier.timing.classify_times import Classified, ClassifyModel
 from thenar.compiler.frontier.timing.python_times import YARDSTICK, PythonCost, classify_us, fit_here, random_tables
 from thenar.compiler.workers import in_workers
 from thenar.runtime.tables import tables_to_bytes
@@ -14,17 +14,15 @@ TABLES = random_tables(33, 16, 14)
 
 
 @pytest.mark.parametrize("target", [target for target in timed() if target not in ("host", "pi")])
-def test_an_option_costs_what_the_formula_of_the_target_says(target: str) -> None:
+def test_tables_cost_what_the_formula_of_the_target_says(target: str) -> None:
     part, model = TARGETS[target], ClassifyModel(target)
-    (option,) = model.options(TABLES)
-    fit = fit_for(part, TABLES)
+    found, fit = model.cost(TABLES), fit_for(part, TABLES)
     assert fit.cost is not None
-    assert (option.layout, option.us, option.how) == (features(fit.layout), model.us(fit.cost.cycles), "model")
-    assert (option.flash, option.ram) == (fit.cost.flash, fit.cost.ram)
+    assert found == Classified(model.us(fit.cost.cycles), "model", fit.cost.flash, fit.cost.ram)
 
 
-def test_tables_that_do_not_fit_have_no_option() -> None:
-    assert ClassifyModel("avr328p").options(random_tables(160, 22, 60)) == ()
+def test_tables_that_do_not_fit_have_no_cost() -> None:
+    assert ClassifyModel("avr328p").cost(random_tables(160, 22, 60)) is None
 
 
 @pytest.mark.parametrize("target", ["cortex-m0plus", "cortex-m4"])
@@ -32,36 +30,40 @@ def test_instructions_take_a_cycle_each_at_a_clock_that_is_said(target: str) -> 
     usual, slow = ClassifyModel(target), ClassifyModel(target, clock_hz=8_000_000)
     cost = fit_for(TARGETS[target], TABLES).cost
     assert cost is not None
-    assert slow.options(TABLES)[0].us == cost.cycles / 8
-    assert usual.options(TABLES)[0].us == pytest.approx(
-        cost.cycles * 1e6 / {"cortex-m0plus": 48e6, "cortex-m4": 64e6}[target]
-    )
+    assert _us(slow) == cost.cycles / 8
+    assert _us(usual) == pytest.approx(cost.cycles * 1e6 / {"cortex-m0plus": 48e6, "cortex-m4": 64e6}[target])
     assert "at 8 MHz" in slow.note
     assert "lower bound" in slow.note
 
 
 def test_on_a_computer_there_is_the_runtime_alone_and_a_line_through_what_it_took() -> None:
-    (option,) = ClassifyModel("host", python=PYTHON).options(TABLES)
-    size = len(tables_to_bytes(TABLES))
-    assert (option.layout, option.flash, option.ram) == ("", size, size)
-    assert option.us == pytest.approx(1 + 3.3 + 3.2 + 4.2 + 0.01 * 33 * 14 + 0.02 * 16 * 14)
+    found, size = ClassifyModel("host", python=PYTHON).cost(TABLES), len(tables_to_bytes(TABLES))
+    assert found is not None
+    assert (found.flash, found.ram) == (size, size)
+    assert found.us == pytest.approx(1 + 3.3 + 3.2 + 4.2 + 0.01 * 33 * 14 + 0.02 * 16 * 14)
 
 
 def test_a_raspberry_pi_elsewhere_is_so_many_times_as_slow_and_that_is_said_to_be_a_guess() -> None:
     here, there = ClassifyModel("host", python=PYTHON), ClassifyModel("pi", python=PYTHON, factor=3.0)
-    assert there.options(TABLES)[0].us == pytest.approx(3 * here.options(TABLES)[0].us)
+    assert _us(there) == pytest.approx(3 * _us(here))
     assert "guess" in there.note
     assert "unusual frames" in here.note
 
 
 def test_models_go_to_other_processes() -> None:
     models = [ClassifyModel(target, python=PYTHON) for target in timed()]
-    found = dict(in_workers(_options, enumerate(models), 2))
-    assert [found[number] for number in range(len(models))] == [model.options(TABLES) for model in models]
+    found = dict(in_workers(_cost, enumerate(models), 2))
+    assert [found[number] for number in range(len(models))] == [model.cost(TABLES) for model in models]
 
 
-def _options(task: tuple[int, ClassifyModel]) -> tuple[int, object]:
-    return task[0], task[1].options(TABLES)
+def _cost(task: tuple[int, ClassifyModel]) -> tuple[int, object]:
+    return task[0], task[1].cost(TABLES)
+
+
+def _us(model: ClassifyModel) -> float:
+    found = model.cost(TABLES)
+    assert found is not None
+    return found.us
 
 
 def test_there_is_no_other_target() -> None:
