@@ -114,11 +114,6 @@ def _lookup_places(layout: Layout, lookup: Lookup) -> list[int]:
     return [_code_place(layout, joint.number) for joint in lookup.joints]
 
 
-def found_size(layout: Layout) -> int:
-    """Return the size of the row numbers that classify() stores if it finds all rows first."""
-    return max(_n_found(layout), 1) if finds_first(layout) else 0
-
-
 def seen_size(layout: Layout) -> int:
     """Return the size of the state of update(): the distances of slopes, the row numbers of lookups, and the compared
     input bytes.

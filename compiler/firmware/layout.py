@@ -185,11 +185,6 @@ class Lookup:
     group: int | None
     joints: tuple[JointLayout, ...]
 
-    @property
-    def zero_row(self) -> int:
-        """The number of the row that is added when all switches are open and all codes are 0."""
-        return sum(joint.most for joint in self.joints)
-
 
 @dataclass(frozen=True, eq=False)
 class Layout:
@@ -259,13 +254,6 @@ class Layout:
     def n_rows(self) -> int:
         """The number of rows of all lookups together."""
         return sum(len(lookup.rows) for lookup in self.lookups)
-
-    @property
-    def all_open(self) -> NDArray[np.int64]:
-        """The scores (K,) of the frame in which all switches are open and all codes 0."""
-        nothing = np.zeros((1, self.tables.n_switches), bool), np.zeros((1, self.tables.n_joints), np.uint16)
-        scores: NDArray[np.int64] = self.scores(*nothing)[0]
-        return scores
 
     @property
     def places(self) -> tuple[tuple[int, int], ...]:

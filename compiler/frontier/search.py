@@ -15,7 +15,6 @@ from .points import FrontierError, PlacementChoice
 CURVE_SIZES = (4, 8, 16, 33, 66)
 # The placement of inputs without switches.
 NO_SWITCHES = PlacementChoice("none", 0.0)
-USUAL_BASELINES = ("rfe", "forest", "mrmr", "mutual-information", "random", "sspoc", "qr")
 ROUNDS = (1, 2, 3, 5, 8, 12, 20, 30, 50, 75, 100, 150, 200, 300)
 
 

@@ -105,13 +105,6 @@ class Taxonomy:
         """Return the type of `label`, or None."""
         return self.finder()(label)
 
-    def require(self, label: str) -> str:
-        """Return the type of `label`; raises RecordingError naming the most similar types."""
-        found = self.find(label)
-        if found is None:
-            raise RecordingError(self.unknown(label))
-        return found
-
     def unknown(self, label: str) -> str:
         """Return the message about an unknown `label`, with the most similar types."""
         return f"{shortened(repr(label))} is not a grasp type of {self.name}{self.suggestion(label)}"

@@ -49,10 +49,6 @@ class LiveSegments:
         self._shown: tuple[State, int, int, int] | None = None
         self.newest = Segment()
 
-    def due(self, now_us: int) -> bool:
-        """Return whether an update takes a tick now."""
-        return self._next_us is None or now_us >= self._next_us
-
     def update(self, now_us: int, scores: Sequence[int] | None, refused: bool = False) -> Segment:
         """Take the newest scores of all classes, and whether the build refuses their frame; None: too little can be
         read. Return the segment at `now_us`.
