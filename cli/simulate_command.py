@@ -253,13 +253,12 @@ def _print_explanation(explanation: "Explanation") -> None:
     console = out()
     steps = _table(
         f"Steps of scene {explanation.scene}, in order (own: a step that every scene has)",
-        *("step", "whose", "stage", "acts", "draws a grasp", "us a grasp", "share"),
+        *("step", "whose", "acts", "draws a grasp", "us a grasp", "share"),
     )
     for step in explanation.steps:
         steps.add_row(
             Text(step.name),
             "own" if step.own else "effect",
-            step.stage,
             "on bytes" if step.on_wire else "in time" if step.timed else "",
             f"{step.draws_a_grasp:.1f}",
             f"{step.us_a_grasp:.1f}",

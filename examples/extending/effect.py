@@ -32,7 +32,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="joint.offset",
     summary="joint sensors are off, by the same in all that a subject does",
-    stage="sense",
+    order=525,
     reads=("sensors_deg",),
     writes=("sensors_deg",),
     parameters=Parameters,

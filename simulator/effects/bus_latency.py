@@ -54,8 +54,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="bus.latency",
     summary="ports are read one after the other",
-    stage="frame",
-    place=2,
+    order=430,
     reads=("on_us",),
     writes=("delay_us",),
     timed=True,

@@ -103,8 +103,7 @@ def model(parameters: Parameters, setting: Setting) -> ContactModel:
 MEMBER = Effect(
     name="contact.quasistatic",
     summary="hand and object at rest: skin springs, sticking friction, weight",
-    stage="contact",
-    place=1,
+    order=200,
     reads=CONTACT_READS,
     writes=CONTACT_WRITES,
     parameters=Parameters,

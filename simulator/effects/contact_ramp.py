@@ -79,8 +79,7 @@ def _time(batch: Batch, grown: Sequence[Contact], rise_us: float) -> None:
 MEMBER = Effect(
     name="contact.ramp",
     summary="the grip grows, and switches close one by one",
-    stage="switch",
-    place=2,
+    order=330,
     reads=(
         *("commanded_deg", "commanded_pose", "grip_n", "forces_n", "thresholds_n"),
         *("settled", "residual_n", "residual_nmm", "on_us", "off_us"),

@@ -46,7 +46,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="frame.at_force",
     summary="frames come at even steps of the force of initial contact",
-    stage="frame",
+    order=410,
     reads=("frame_us", "ramp"),
     writes=("frame_us",),
     timed=True,

@@ -30,8 +30,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="frame.jitter",
     summary="frames start early or late, in order",
-    stage="frame",
-    place=1,
+    order=420,
     reads=("frame_us",),
     writes=("frame_us",),
     timed=True,

@@ -29,8 +29,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="hand.grip",
     summary="grip force varies from repetition to repetition",
-    stage="posture",
-    place=4,
+    order=140,
     reads=("grip_n",),
     writes=("grip_n",),
     parameters=Parameters,

@@ -50,8 +50,7 @@ def turned(vectors: Floats, turn: Floats) -> Floats:
 MEMBER = Effect(
     name="hand.object_pose",
     summary="the object lies a little elsewhere in each repetition",
-    stage="posture",
-    place=3,
+    order=130,
     reads=("pose",),
     writes=("pose",),
     parameters=Parameters,

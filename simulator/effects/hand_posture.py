@@ -30,8 +30,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="hand.posture",
     summary="joint angles vary from repetition to repetition",
-    stage="posture",
-    place=2,
+    order=120,
     reads=("posture_deg",),
     writes=("posture_deg",),
     parameters=Parameters,

@@ -44,8 +44,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="hand.style",
     summary="every subject has individual habits of posture, also by grasp type, and grip force",
-    stage="posture",
-    place=1,
+    order=110,
     reads=("posture_deg", "grip_n"),
     writes=("posture_deg", "grip_n"),
     parameters=Parameters,

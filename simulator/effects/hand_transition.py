@@ -75,8 +75,7 @@ def path(start_deg: Floats, end_deg: Floats, way: Floats, opening_deg: float) ->
 MEMBER = Effect(
     name="hand.transition",
     summary="the hand comes from the grasp before",
-    stage="sense",
-    place=1,
+    order=510,
     reads=("previous_deg", "rest_deg", "posture_deg", "frame_us", "sensors_deg"),
     writes=("sensors_deg",),
     timed=True,

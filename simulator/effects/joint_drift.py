@@ -30,8 +30,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="joint.drift",
     summary="joint sensors drift, trial by trial, differently for each subject",
-    stage="sense",
-    place=3,
+    order=530,
     reads=("trials", "sensors_deg"),
     writes=("sensors_deg",),
     parameters=Parameters,

@@ -38,8 +38,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="joint.noise",
     summary="joint sensors are off a little, in every frame and for a whole repetition",
-    stage="sense",
-    place=2,
+    order=520,
     reads=("sensors_deg",),
     writes=("sensors_deg",),
     parameters=Parameters,

@@ -41,8 +41,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="port.dead",
     summary="whole ports read as open",
-    stage="read",
-    place=5,
+    order=760,
     reads=("bits",),
     writes=("bits",),
     parameters=Parameters,

@@ -65,8 +65,7 @@ def _flipped(batch: Batch, edge_us: Integers, next_us: Integers, length_us: Floa
 MEMBER = Effect(
     name="switch.bounce",
     summary="closing and opening contacts chatter",
-    stage="read",
-    place=1,
+    order=720,
     reads=("bits", "on_us", "off_us", "frame_us", "delay_us"),
     writes=("bits",),
     timed=True,

@@ -55,8 +55,7 @@ def _columns(bits: Bits) -> NDArray[np.uint16]:
 MEMBER = Effect(
     name="switch.ghosting",
     summary="a matrix without diodes closes the fourth corner",
-    stage="read",
-    place=4,
+    order=750,
     reads=("bits",),
     writes=("bits",),
     parameters=Parameters,

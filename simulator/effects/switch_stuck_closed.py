@@ -23,11 +23,9 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="switch.stuck_closed",
     summary="some switches always read closed",
-    stage="read",
-    place=3,
+    order=740,
     reads=("bits",),
     writes=("bits",),
-    after=("switch.stuck_open",),
     parameters=Parameters,
     prepare=prepare,
 )

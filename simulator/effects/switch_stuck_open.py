@@ -23,8 +23,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="switch.stuck_open",
     summary="some switches never read closed",
-    stage="read",
-    place=2,
+    order=730,
     reads=("bits",),
     writes=("bits",),
     parameters=Parameters,

@@ -32,8 +32,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="switch.threshold",
     summary="each switch has its own closing force",
-    stage="switch",
-    place=1,
+    order=310,
     reads=("thresholds_n",),
     writes=("thresholds_n",),
     parameters=Parameters,

@@ -34,8 +34,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="taxel.adc",
     summary="a converter quantises forces to counts",
-    stage="read",
-    place=6,
+    order=770,
     reads=("taxels_n",),
     writes=("taxels",),
     parameters=Parameters,

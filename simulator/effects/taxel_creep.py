@@ -47,8 +47,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="taxel.creep",
     summary="readings creep up under a load that stays",
-    stage="sense",
-    place=6,
+    order=580,
     reads=("frame_us", "taxels_n"),
     writes=("taxels_n",),
     parameters=Parameters,

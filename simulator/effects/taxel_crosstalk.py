@@ -47,8 +47,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="taxel.crosstalk",
     summary="pads of a row of a matrix take from one another",
-    stage="sense",
-    place=7,
+    order=590,
     reads=("taxels_n",),
     writes=("taxels_n",),
     parameters=Parameters,

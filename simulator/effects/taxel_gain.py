@@ -40,8 +40,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="taxel.gain",
     summary="each pad has its own gain and actuation force",
-    stage="sense",
-    place=4,
+    order=560,
     reads=("taxels_n",),
     writes=("taxels_n",),
     parameters=Parameters,

@@ -39,8 +39,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="taxel.hysteresis",
     summary="pads that are let go read more than pads that are pressed",
-    stage="sense",
-    place=5,
+    order=570,
     reads=("taxels_n",),
     writes=("taxels_n",),
     timed=True,

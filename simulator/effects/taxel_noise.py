@@ -37,8 +37,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="taxel.noise",
     summary="pads are off a little, in every frame and for a whole repetition",
-    stage="sense",
-    place=8,
+    order=600,
     reads=("taxels_n",),
     writes=("taxels_n",),
     parameters=Parameters,

@@ -41,8 +41,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="wire.damaged_bytes",
     summary="bits are turned on the serial lines",
-    stage="wire",
-    place=2,
+    order=820,
     reads=("traffic",),
     writes=("traffic",),
     on_wire=True,

@@ -38,8 +38,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 MEMBER = Effect(
     name="wire.lost_bytes",
     summary="bytes are lost on the serial lines",
-    stage="wire",
-    place=1,
+    order=810,
     reads=("traffic",),
     writes=("traffic",),
     on_wire=True,

@@ -4,7 +4,7 @@ An effect's module holds three things:
 
     class Parameters(EffectParameters)         the parameters of a scene, with defaults and limits
     def prepare(parameters, setting) -> Step   the one-time work; the step does the rest, batch by batch
-    MEMBER = Effect(...)                       its name, stage, fields that it reads and writes, and these two
+    MEMBER = Effect(...)                       its name, order, fields that it reads and writes, and these two
 
 A contact model has `model(parameters, setting) -> ContactModel` instead of `prepare`. An effect that calls the contact
 model again has `together(parameters, setting, contact) -> Together`.
@@ -12,30 +12,27 @@ model again has `together(parameters, setting, contact) -> Together`.
 `Effect.name` is the key of the scene: [effects.joint.noise] is "joint.noise", in the module effects/joint_noise.py.
 Other packages add effects by entry points of that name in the group `thenar.effects`.
 
-Steps act stage by stage. Within a stage, an effect acts after the glove's own step that creates its fields, and before
-the one that reads them; after those named in `Effect.after` and the scene's `after`; and otherwise by its rank.
+Steps act in the order of their numbers, effects and the glove's own alike:
+
+    1xx  the hand takes its posture             5xx  sensors follow the hand, taxels are pressed
+    2xx  it closes on the object                7xx  switches and taxels are read
+    3xx  switches close                         8xx  bytes travel
+    4xx  frames get their times
 """
 
-import heapq
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from graphlib import CycleError, TopologicalSorter
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from thenar.drivers.members import MembersByName
-from thenar.runtime.names import nearest
 
 from ..contact.model import ContactModel
-from ..errors import SceneError
 from ..streams import Draw
 from .batch import Batch
-
-Stage = Literal["posture", "contact", "switch", "frame", "sense", "read", "wire"]
-STAGES: tuple[Stage, ...] = ("posture", "contact", "switch", "frame", "sense", "read", "wire")
 
 # The fields of a batch that a contact model reads and writes (`Batch.load`, `Batch.take`).
 CONTACT_READS = ("posture_deg", "pose", "grip_n")
@@ -50,18 +47,15 @@ Together = Callable[[Sequence[Batch], Sequence[Draw]], None]
 
 
 class EffectParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The parameters common to all effects: names of effects that must act before it, beyond the usual order."""
-
-    after: tuple[str, ...] = ()
+    """The parameters of an effect in a scene: none, unless it has some."""
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
     """The record of an effect for the pipeline.
 
-    place          among the effects of its stage, if nothing else decides
+    order          a number: steps with lower ones act before it
     reads, writes  fields of `Batch`
-    after          effects that act before it when they are listed too
     timed          True if the effect depends on time, so that whole streams of frames are simulated
     on_wire        True if it acts on bytes, so that frames are sent and received as bytes
     parameters     the parameters of a scene
@@ -70,22 +64,15 @@ class Effect:
 
     name: str
     summary: str
-    stage: Stage
+    order: int
     reads: tuple[str, ...]
     writes: tuple[str, ...]
-    place: int = 0
-    after: tuple[str, ...] = ()
     timed: bool = False
     on_wire: bool = False
     parameters: type[EffectParameters] = EffectParameters
     prepare: Callable[[Any, "Setting"], Step] | None = None
     model: Callable[[Any, "Setting"], ContactModel] | None = None
     together: Callable[[Any, "Setting", ContactModel], Together] | None = None
-
-    @property
-    def rank(self) -> tuple[int, int]:
-        """The sort key of effects if nothing else decides."""
-        return STAGES.index(self.stage), self.place
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,69 +166,13 @@ def drawn_rows(setting: Setting) -> NDArray[np.intp]:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A step to be ordered: `own` steps keep their order, `parameters` come from the scene."""
+    """A step of a scene: `own` if every scene has it; `parameters` come from the scene."""
 
     effect: Effect
     own: bool
     parameters: EffectParameters = field(default_factory=EffectParameters)
 
 
-def in_order(places: Sequence[Place]) -> list[Place]:
-    """Return the steps in the order in which they act.
-
-    Raises SceneError if an `after` names a missing effect, or if some wait for each other in a circle.
-    """
-    _check_after(places)
-    return [place for stage in STAGES for place in _sorted([p for p in places if p.effect.stage == stage])]
-
-
-def _check_after(places: Sequence[Place]) -> None:
-    stages = {place.effect.name: STAGES.index(place.effect.stage) for place in places}
-    listed = [place.effect.name for place in places if not place.own]
-    for place in places:
-        name, stage = place.effect.name, place.effect.stage
-        for other in place.parameters.after:
-            if other not in listed:
-                raise SceneError(
-                    f"effects.{name}.after: the scene lists no effect {other!r}{nearest(other, listed)}: "
-                    "list it too, or leave it out here"
-                )
-        for other in (*place.parameters.after, *place.effect.after):
-            if stages.get(other, 0) > STAGES.index(stage):
-                raise SceneError(
-                    f"effects.{name}.after: a circle: {name} -> {other} -> {name}: {other!r} belongs to the stage "
-                    f"{STAGES[stages[other]]!r}, which comes after {stage!r}, where {name!r} acts"
-                )
-
-
-def _sorted(places: list[Place]) -> Iterator[Place]:
-    by_name = {place.effect.name: place for place in places}
-    sorter = TopologicalSorter({name: _waits_for(place, places) for name, place in by_name.items()})
-    try:
-        sorter.prepare()
-    except CycleError as reason:
-        raise SceneError(f"effects act after each other in a circle: {' -> '.join(reason.args[1])}") from None
-    ready: list[tuple[tuple[int, int], str]] = []
-    while sorter.is_active():
-        for name in sorter.get_ready():
-            heapq.heappush(ready, (by_name[name].effect.rank, name))
-        _, name = heapq.heappop(ready)
-        yield by_name[name]
-        sorter.done(name)
-
-
-def _waits_for(place: Place, places: list[Place]) -> set[str]:
-    """Return the names of the steps of its stage that act before `place`."""
-    named = {*place.parameters.after, *place.effect.after} & {other.effect.name for other in places}
-    return named | {other.effect.name for other in places if other is not place and _precedes(other, place, places)}
-
-
-def _precedes(first: Place, second: Place, places: list[Place]) -> bool:
-    one, two = first.effect, second.effect
-    if first.own and second.own:
-        return places.index(first) < places.index(second)
-    if first.own:
-        return bool({*two.reads, *two.writes} & {*one.writes})
-    if second.own:
-        return bool({*one.writes} & {*two.reads}) and not {*one.writes} & {*two.writes}
-    return False
+def in_order(places: Iterable[Place]) -> list[Place]:
+    """Return the steps in the order in which they act."""
+    return sorted(places, key=lambda place: (place.effect.order, place.effect.name))

@@ -1,6 +1,6 @@
 """The steps of every scene: the hand recalls a posture, switches close, frames are scanned and read.
 
-`STEPS` holds these steps in their order within a stage; effects come in between (`effect.in_order`).
+Effects act before and after them, by their order numbers.
 """
 
 from collections.abc import Callable
@@ -10,14 +10,14 @@ import numpy as np
 from ..body.cyberglove import Calibration, sensors_deg
 from ..streams import Draw
 from .batch import Batch
-from .effect import Effect, EffectParameters, Setting, Stage, Step, frame_times
+from .effect import Effect, EffectParameters, Setting, Step, frame_times
 from .ramp import NEVER
 
 Act = Callable[[Batch, Setting], None]
 STEPS: tuple[Effect, ...] = ()
 
 
-def _own(stage: Stage, summary: str, reads: tuple[str, ...], writes: tuple[str, ...]) -> Callable[[Act], Act]:
+def _own(order: int, summary: str, reads: tuple[str, ...], writes: tuple[str, ...]) -> Callable[[Act], Act]:
     """Add the decorated function to `STEPS`; _recall is "glove.recall". It draws no random numbers."""
 
     def add(act: Act) -> Act:
@@ -29,13 +29,13 @@ def _own(stage: Stage, summary: str, reads: tuple[str, ...], writes: tuple[str, 
 
         global STEPS
         name = f"glove{act.__name__.replace('_', '.', 1)}"
-        STEPS += (Effect(name, summary, stage, reads, writes, prepare=prepare),)
+        STEPS += (Effect(name, summary, order, reads, writes, prepare=prepare),)
         return act
 
     return add
 
 
-@_own("posture", "takes the planned posture, the object's pose and the grip", (), ("posture_deg", "pose", "grip_n"))
+@_own(100, "takes the planned posture, the object's pose and the grip", (), ("posture_deg", "pose", "grip_n"))
 def _recall(batch: Batch, setting: Setting) -> None:
     held = batch.condition.held
     batch.posture_deg = np.tile(held.posture_deg, (len(batch), 1))
@@ -43,12 +43,12 @@ def _recall(batch: Batch, setting: Setting) -> None:
     batch.grip_n = np.full(len(batch), held.grip_n)
 
 
-@_own("switch", "sets the closing force of every switch", ("forces_n",), ("thresholds_n",))
+@_own(300, "sets the closing force of every switch", ("forces_n",), ("thresholds_n",))
 def _threshold(batch: Batch, setting: Setting) -> None:
     batch.thresholds_n = np.full(batch.forces_n.shape[1], setting.threshold_n)
 
 
-@_own("switch", "closes the switches that are pressed hard enough", ("forces_n", "thresholds_n"), ("on_us", "off_us"))
+@_own(320, "closes the switches that are pressed hard enough", ("forces_n", "thresholds_n"), ("on_us", "off_us"))
 def _close(batch: Batch, setting: Setting) -> None:
     let_go_us = NEVER if setting.let_go_us is None else setting.let_go_us
     closed = batch.forces_n > batch.thresholds_n
@@ -56,23 +56,23 @@ def _close(batch: Batch, setting: Setting) -> None:
     batch.off_us = np.where(closed, let_go_us, NEVER)
 
 
-@_own("frame", "sets the times of frames", (), ("frame_us",))
+@_own(400, "sets the times of frames", (), ("frame_us",))
 def _frames(batch: Batch, setting: Setting) -> None:
     batch.frame_us = np.tile(frame_times(setting), (len(batch), 1))
 
 
-@_own("sense", "bends the CyberGlove's sensors with the hand", ("posture_deg", "frame_us"), ("sensors_deg",))
+@_own(500, "bends the CyberGlove's sensors with the hand", ("posture_deg", "frame_us"), ("sensors_deg",))
 def _sense(batch: Batch, setting: Setting) -> None:
     felt = sensors_deg(batch.posture_deg)
     batch.sensors_deg = np.repeat(felt[:, None], batch.frame_us.shape[1], axis=1)
 
 
-@_own("sense", "converts the sensors to bytes by the subject's calibration", ("sensors_deg",), ("raw",))
+@_own(540, "converts the sensors to bytes by the subject's calibration", ("sensors_deg",), ("raw",))
 def _encode(batch: Batch, setting: Setting) -> None:
     batch.raw = Calibration.of_subject(setting.seed, batch.condition.subject).bytes(batch.sensors_deg)
 
 
-@_own("read", "reads every switch in every frame", ("on_us", "off_us", "frame_us", "delay_us"), ("bits",))
+@_own(700, "reads every switch in every frame", ("on_us", "off_us", "frame_us", "delay_us"), ("bits",))
 def _sample(batch: Batch, setting: Setting) -> None:
     at = batch.frame_us[:, :, None] if batch.delay_us is None else batch.frame_us[:, :, None] + batch.delay_us
     batch.bits = (batch.on_us[:, None] <= at) & (at < batch.off_us[:, None])

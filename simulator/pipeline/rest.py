@@ -46,7 +46,7 @@ def _prepare(parameters: Parameters, setting: Setting) -> Step:
 _REST = Effect(
     name="glove.rest",
     summary="opens the hand before and after each grasp",
-    stage="posture",
+    order=105,
     reads=("trials",),
     writes=("previous_deg", "rest_deg"),
     parameters=Parameters,

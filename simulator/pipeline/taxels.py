@@ -67,7 +67,7 @@ STEPS = (
     Effect(
         name="glove.feel",
         summary="presses every taxel with the force on its place, frame by frame",
-        stage="sense",
+        order=550,
         reads=("forces_n", "frame_us", "delay_us", "ramp"),
         writes=("taxels_n",),
         prepare=_feel,
@@ -75,7 +75,7 @@ STEPS = (
     Effect(
         name="glove.count",
         summary="converts the taxels' newtons to counts",
-        stage="read",
+        order=710,
         reads=("taxels_n",),
         writes=("taxels",),
         prepare=_count,

@@ -176,7 +176,7 @@ def _newest(came: Bits) -> NDArray[np.intp]:
 SEND = Effect(
     name="glove.send",
     summary="puts rows and records on the serial lines as bytes",
-    stage="wire",
+    order=800,
     reads=("bits", "raw", "frame_us", "delay_us", "taxels"),
     writes=("traffic",),
     on_wire=True,
@@ -185,7 +185,7 @@ SEND = Effect(
 RECEIVE = Effect(
     name="glove.receive",
     summary="decodes the received bytes like a driver",
-    stage="wire",
+    order=830,
     reads=("traffic", "bits", "settled", "taxels"),
     writes=("bits", "raw", "lost", "settled", "taxels"),
     on_wire=True,

@@ -71,7 +71,6 @@ class StepPlan(msgspec.Struct, frozen=True):
     name: str
     summary: str
     own: bool
-    stage: str
     reads: tuple[str, ...]
     writes: tuple[str, ...]
     timed: bool
@@ -135,7 +134,6 @@ def _step(stop: Stop, entry: Cost, all_ns: int) -> StepPlan:
         name=effect.name,
         summary=effect.summary,
         own=stop.own,
-        stage=effect.stage,
         reads=effect.reads,
         writes=effect.writes,
         timed=effect.timed,

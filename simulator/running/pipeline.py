@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 from time import perf_counter_ns
 from typing import Self
 
-import msgspec
-
 from thenar.runtime.names import nearest
 
 from ..contact.model import ContactModel
@@ -136,8 +134,8 @@ def _closing(model: ContactModel) -> Together:
 def compile_pipeline(scene: Scene, without: str | None = None) -> Pipeline:
     """Return the steps of `scene`, except for the listed effect `without`.
 
-    Raises SceneError if effects wait for each other in a circle, or have impossible parameters;
-    MissingPackageError if one needs a package that is not installed.
+    Raises SceneError if effects have impossible parameters; MissingPackageError if one needs a package that is not
+    installed.
     """
     listed = list(_listed(scene, without))
     setting = scene.setting(place.effect for place in listed)
@@ -166,8 +164,7 @@ def _listed(scene: Scene, without: str | None) -> Iterator[Place]:
     closes = False
     for name, parameters in scene.effects:
         if name != without:
-            after = tuple(other for other in parameters.after if other != without)
-            place = Place(EFFECTS[name], own=False, parameters=msgspec.structs.replace(parameters, after=after))
+            place = Place(EFFECTS[name], own=False, parameters=parameters)
             closes = closes or place.effect.model is not None
             yield place
     if not closes:

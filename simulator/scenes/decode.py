@@ -18,8 +18,7 @@ from thenar.runtime.toml_struct import as_list, as_table, check_finite, check_ke
 
 from ..body.shapes import Shape
 from ..errors import SceneError, ThenarError
-from ..pipeline.effect import EFFECTS, in_order
-from ..pipeline.effect import Place as Ordered
+from ..pipeline.effect import EFFECTS
 from . import shipped
 from .scene import Glove, Listed, Population, Recording, Scene, SceneObject, Subject, draw_subjects
 
@@ -242,27 +241,13 @@ class _Decoder:
 
     def _effects(self) -> tuple[Listed, ...]:
         tables = dict(self._effect_tables())
-        effects = sorted((EFFECTS[name] for name in tables), key=lambda effect: (effect.rank, effect.name))
-        listed = tuple(
+        effects = sorted((EFFECTS[name] for name in tables), key=lambda effect: (effect.order, effect.name))
+        return tuple(
             Listed(
                 each.name, convert(self.source, ("effects", *each.name.split(".")), tables[each.name], each.parameters)
             )
             for each in effects
         )
-        places = [Ordered(EFFECTS[name], own=False, parameters=each) for name, each in listed]
-        try:
-            in_order(places)
-        except SceneError as reason:
-            raise self._placed(str(reason), list(tables)) from reason
-        return listed
-
-    def _placed(self, words: str, names: list[str]) -> ThenarError:
-        """Return an error about the order of effects, with the line of the key or of the first named effect."""
-        where, _, what = words.partition(": ")
-        if where.startswith("effects."):
-            return self.source.error(tuple(where.split(".")), what)
-        first = min(names, key=lambda name: (name not in words, words.find(name)))
-        return self.source.error(("effects", *first.split(".")), words)
 
     def _effect_tables(self) -> Iterator[tuple[str, object]]:
         for group, value in as_table(self.source, ("effects",), self.file.effects).items():

@@ -58,7 +58,7 @@ def _draw(effect: str, batch: Batch, seed: int = 7) -> Draw:
 
 def _scene(effects: Sequence[str | tuple[str, EffectParameters]] = (), **changes: object) -> Scene:
     pairs = [(given, EFFECTS[given].parameters()) if isinstance(given, str) else given for given in effects]
-    listed = tuple(Listed(*pair) for pair in sorted(pairs, key=lambda pair: EFFECTS[pair[0]].rank))
+    listed = tuple(Listed(*pair) for pair in sorted(pairs, key=lambda pair: EFFECTS[pair[0]].order))
     usual = {
         "name": "small",
         "seed": 7,

@@ -18,7 +18,7 @@ def test_a_record_has_parameters_with_defaults_and_one_thing_that_makes_what_act
     assert effect.parameters() == effect.parameters()
 
 
-def test_every_module_of_effects_has_the_name_of_its_effect_and_a_rank_of_its_own() -> None:
+def test_every_module_of_effects_has_the_name_of_its_effect_and_an_order_of_its_own() -> None:
     modules = {path.stem for path in Path(effects.__path__[0]).glob("*.py")} - {"__init__"}
     assert modules == {name.replace(".", "_") for name in EFFECTS}
-    assert len({effect.rank for effect in EFFECTS.values()}) == len(EFFECTS)
+    assert len({effect.order for effect in EFFECTS.values()}) == len(EFFECTS)

@@ -14,7 +14,7 @@ def test_steps_are_explained_in_the_order_in_which_they_run() -> None:
     stops = compile_pipeline(QUICK).stops
     for step, stop in zip(found.steps, stops, strict=True):
         effect = stop.effect
-        assert (step.name, step.own, step.stage) == (effect.name, stop.own, effect.stage)
+        assert (step.name, step.own) == (effect.name, stop.own)
         assert (step.reads, step.writes, step.timed, step.on_wire) == (
             effect.reads,
             effect.writes,

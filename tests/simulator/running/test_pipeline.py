@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import EFFECTS, STAGES, hold_frame
+from thenar.simulator.pipeline.effect import EFFECTS, hold_frame
 from thenar.simulator.running.pipeline import Ledger, compile_pipeline
 from thenar.simulator.scenes.scene import Recording, Scene
 
@@ -63,7 +63,7 @@ def test_a_pipeline_holds_the_scenes_effects_and_the_gloves_own_steps_and_nothin
 
 
 @given(names=SUBSETS, seed=st.integers(0, 100))
-def test_the_order_is_that_of_stages_and_ranks_however_the_scene_lists_them(
+def test_the_order_is_that_of_the_numbers_however_the_scene_lists_them(
     make_scene: SceneMaker, names: list[str], seed: int
 ) -> None:
     scene = make_scene(names)
@@ -72,11 +72,8 @@ def test_the_order_is_that_of_stages_and_ranks_however_the_scene_lists_them(
     mixed = Scene(**{f: getattr(other, f) for f in other.__struct_fields__} | {"effects": _pick(scene, shuffled)})
     assert order(mixed) == order(scene)
     stops = compile_pipeline(scene).stops
-    stages = [STAGES.index(stop.effect.stage) for stop in stops]
-    assert stages == sorted(stages)
-    for stage in STAGES:
-        ranks = [s.effect.rank for s in stops if not s.own and s.effect.stage == stage]
-        assert ranks == sorted(ranks)
+    numbers = [stop.effect.order for stop in stops]
+    assert numbers == sorted(numbers)
 
 
 def _pick(scene: Scene, places: np.ndarray) -> tuple:
@@ -143,7 +140,7 @@ def test_every_step_reads_and_writes_what_it_says(make_scene: SceneMaker, make_b
 
 def test_a_scene_without_a_contact_model_gets_the_default_as_the_gloves_own(make_scene: SceneMaker) -> None:
     stops = compile_pipeline(make_scene(["hand.grip"])).stops
-    assert [(s.effect.name, s.own) for s in stops if s.effect.stage in ("posture", "contact")] == [
+    assert [(s.effect.name, s.own) for s in stops if s.effect.order < 300] == [
         ("glove.recall", True),
         ("hand.grip", False),
         ("contact.quasistatic", True),
@@ -172,52 +169,6 @@ def test_what_cannot_be_left_out_is_refused_with_the_reason(
     with pytest.raises(SceneError) as caught:
         compile_pipeline(make_scene(["contact.quasistatic", "joint.drift"]), without)
     assert all(word in str(caught.value) for word in words)
-
-
-def test_after_puts_an_effect_behind_one_that_follows_it_in_the_registry(make_scene: SceneMaker) -> None:
-    plain = make_scene(["joint.noise", "joint.drift"])
-    turned = make_scene([listed_with("joint.noise", after=("joint.drift",)), "joint.drift"])
-    assert [name for name in order(plain) if name.startswith("joint.")] == ["joint.noise", "joint.drift"]
-    assert [name for name in order(turned) if name.startswith("joint.")] == ["joint.drift", "joint.noise"]
-    # What the scene said of an effect that is left out is not said any more.
-    assert "joint.drift" not in order(turned, without="joint.drift")
-
-
-@pytest.mark.parametrize(
-    ("effects", "words"),
-    [
-        (
-            [("hand.grip", ("joint.noise",)), ("joint.noise", ())],
-            ["effects.hand.grip.after", "hand.grip -> joint.noise -> hand.grip", "'sense'", "'posture'"],
-        ),
-        (
-            [("joint.noise", ("joint.drift",)), ("joint.drift", ("joint.noise",))],
-            ["circle", "joint.noise", "joint.drift", "->"],
-        ),
-        ([("joint.noise", ("joint.noise",))], ["circle", "joint.noise -> joint.noise"]),
-        (
-            [("switch.stuck_open", ("switch.stuck_closed",)), ("switch.stuck_closed", ())],
-            ["circle", "switch.stuck_open", "switch.stuck_closed"],
-        ),
-        (
-            [("switch.threshold", ("contact.ramp",)), ("contact.ramp", ())],
-            ["circle", "switch.threshold", "glove.close", "contact.ramp"],
-        ),
-        ([("joint.noise", ("joint.drift",))], ["effects.joint.noise.after", "no effect 'joint.drift'", "leave it out"]),
-        (
-            [("joint.noise", ("joint.drfit",)), ("joint.drift", ())],
-            ["effects.joint.noise.after", "'joint.drfit'", "did you mean 'joint.drift'"],
-        ),
-        ([("joint.noise", ("glove.sense",))], ["no effect 'glove.sense'"]),
-    ],
-)
-def test_an_after_that_cannot_be_is_refused_with_its_place_and_its_circle(
-    make_scene: SceneMaker, effects: list[tuple[str, tuple[str, ...]]], words: list[str]
-) -> None:
-    with pytest.raises(SceneError) as caught:
-        compile_pipeline(make_scene([listed_with(name, after=after) for name, after in effects]))
-    for word in words:
-        assert word in str(caught.value)
 
 
 def outcome(batch: Batch, row: int) -> dict[str, bytes]:
