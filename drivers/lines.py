@@ -98,7 +98,7 @@ def checked(fields: Iterable[str]) -> bytes:
 
 
 def switches_field(closed: int, switches: int) -> str:
-    """Return the field of a row for so many `switches`, of which those with a bit in `closed` are closed."""
+    """Return the field of a row for `switches` switches, of which those with a bit in `closed` are closed."""
     digits = -(-switches // 4)
     return f"{closed:0{digits}X}" if digits else ""
 

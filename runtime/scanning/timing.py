@@ -199,7 +199,7 @@ def glove_us(glove: GloveWiring, sensors: int, *, wire_only: bool = False) -> fl
     return max(us, 1e6 / glove.rate_hz if glove.rate_hz else 0.0)
 
 
-# A row of a board beside its switches and readings: name, sequence number, clock, checksum, end of line. A reading has
+# A row of a board without its switches and readings: name, sequence number, clock, checksum, end of line. A reading has
 # at most five digits.
 _ROW_BYTES, _READING_BYTES = len("$row,65535,4294967295,*00\r\n"), len(",65535")
 

@@ -151,7 +151,7 @@ def _decoded(data: Bytes, at_us: Integers, ends: bytes, feed: Feed) -> Iterator[
 
 
 def _values(columns: int) -> Feed:
-    """Return what decodes the rows of so many columns to their values, each in the two bytes of _CODE."""
+    """Return a decoder of rows of this number of columns to their values, each in the two bytes of _CODE."""
     parser = LineParser(columns)
 
     def feed(chunk: bytes) -> list[bytes]:

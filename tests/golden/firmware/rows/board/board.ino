@@ -7,7 +7,7 @@
    switch k, 1 is closed. Readings are what analogRead() returns. The two digits after the asterisk are the exclusive or
    of all bytes between it and the dollar sign. Rows in which a chip does not reply are left out.
 
-   An ESP32 or a Pico W can send the lines by Wi-Fi, as UDP datagrams: write a file secrets.h beside this one with
+   An ESP32 or a Pico W can send the lines by Wi-Fi, as UDP datagrams: write a file secrets.h next to this one with
 
      #define SSID "..."
      #define PASSWORD "..."
