@@ -1,9 +1,6 @@
 import hashlib
 import json
-import os
 import re
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -256,28 +253,6 @@ def test_an_interrupt_leaves_the_old_build_and_no_litter(grasp_set: GraspSet, tm
         compile_build(grasp_set, tmp_path / "build", rounds=5, folds=0, progress=interrupt)
     assert _bytes(tmp_path / "build") == before
     assert [path.name for path in tmp_path.iterdir()] == ["build"]
-
-
-@pytest.mark.parametrize("environment", [("1", "0"), ("2", "77")])
-def test_threads_and_hash_seed_change_no_byte(
-    grasp_set: GraspSet, tmp_path: Path, environment: tuple[str, str]
-) -> None:
-    compile_build(grasp_set, tmp_path / "here", rounds=ROUNDS)
-    grasp_set.save(tmp_path / "set.grasps")
-    threads, hash_seed = environment
-    subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "import sys; from thenar.compiler import GraspSet, compile_build\n"
-            f"compile_build(GraspSet.load(sys.argv[1]), sys.argv[2], rounds={ROUNDS})",
-            tmp_path / "set.grasps",
-            tmp_path / "there",
-        ],
-        env=os.environ | {"OPENBLAS_NUM_THREADS": threads, "OMP_NUM_THREADS": threads, "PYTHONHASHSEED": hash_seed},
-        check=True,
-    )
-    assert _bytes(tmp_path / "here") == _bytes(tmp_path / "there")
 
 
 def test_tables_for_narrow_entries_are_coarser_say_so_and_hold(grasp_set: GraspSet, tmp_path: Path) -> None:

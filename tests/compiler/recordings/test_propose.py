@@ -16,6 +16,7 @@ from thenar.compiler.recordings.columns import Columns, TextFormat, read_columns
 from thenar.compiler.recordings.errors import TableError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_table
+from thenar.compiler.recordings.inputs import listed
 from thenar.compiler.recordings.propose import Proposal, propose, propose_file
 from thenar.compiler.recordings.table import Column, Table
 from thenar.drivers.errors import ThenarError
@@ -254,3 +255,8 @@ def test_any_table_is_proposed_for_or_refused(columns: list[tuple[str, str, str,
         assert isinstance(proposal.columns, Columns)
         if not proposal.lacks:
             assert len(import_table(table, proposal.columns)[0]) <= 3
+
+
+def test_many_columns_are_listed_by_the_first_and_the_last() -> None:
+    assert listed(("a", "b", "c")) == "a, b, c"
+    assert listed(("a", "b", "c", "d")) == "a ... d (4)"

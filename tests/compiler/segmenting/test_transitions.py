@@ -15,9 +15,10 @@ from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.segmenting.streams import SegmentingError
-from thenar.compiler.segmenting.transitions import FREQUENT, Transitions
+from thenar.compiler.segmenting.transitions import FREQUENT, SIZE, Transitions, graph_of
 
 TYPES = tuple(f"type {number}" for number in range(14))
+MANY = tuple(f"type {number}" for number in range(60))
 SEQUENCES = st.lists(st.lists(st.sampled_from(TYPES), max_size=12), max_size=6)
 
 
@@ -33,6 +34,24 @@ def test_every_change_is_counted_once_and_shares_are_of_a_types_own_changes(sequ
         shares = [found.probabilities[place, TYPES.index(each)] for each in frequent]
         assert shares == sorted(shares, reverse=True)
         assert all(share >= FREQUENT for share in shares)
+
+
+@given(SEQUENCES, st.sampled_from([TYPES, MANY]))
+def test_each_change_is_an_arrow_within_the_picture_between_types_that_do_not_touch(
+    sequences: list[list[str]], types: tuple[str, ...]
+) -> None:
+    found = Transitions.of(sequences, types)
+    graph = graph_of(found)
+    assert [node.name for node in graph.nodes] == list(types)
+    assert len(graph.edges) == np.count_nonzero(found.counts)
+    for one in graph.nodes:
+        for other in graph.nodes:
+            assert one is other or np.hypot(one.x - other.x, one.y - other.y) > 2 * graph.radius
+    for edge in graph.edges:
+        numbers = [float(number) for number in re.findall(r"-?\d+\.\d", f"{edge.path} {edge.tip}")]
+        assert all(0 <= number <= SIZE for number in numbers)
+        assert re.search(r": \d+ of \d+ \(\d+%\)", edge.words)
+    assert [edge.width for edge in graph.edges] == sorted(edge.width for edge in graph.edges)
 
 
 def test_nothing_held_is_passed_over_and_what_is_written_is_read(
