@@ -69,7 +69,7 @@ def _left_out(parent: ast.AST, child: ast.AST) -> bool:
     if child in (getattr(parent, "annotation", None), getattr(parent, "returns", None)):
         return True
     decorators = getattr(parent, "decorator_list", ())
-    return child in decorators or (isinstance(parent, ast.If) and "TYPE_CHECKING" in ast.unparse(parent.test))
+    return child in decorators or (isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test))
 
 
 def changed(node: ast.AST) -> ast.AST | None:

@@ -156,9 +156,8 @@ def staged(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def run(staged: Path, *tests: str) -> "subprocess.CompletedProcess[str]":
     # No bytecode: what is as long as before and written within the same second would not be compiled again.
-    paths = os.pathsep.join(map(str, (staged, staged / "tests" / "mutants")))
-    environment = {**os.environ, "PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
-    options = ["-x", "-q", "-pquick_verdict", "-pno:cacheprovider", "-m", "not slow", "--tb=no"]
+    environment = {**os.environ, "PYTHONPATH": str(staged), "PYTHONDONTWRITEBYTECODE": "1"}
+    options = ["-x", "-q", "-pno:cacheprovider", "-m", "not slow", "--tb=no"]
     command = [sys.executable, "-m", "pytest", *options, *tests]
     return subprocess.run(command, cwd=staged, env=environment, capture_output=True, text=True, check=False)
 
