@@ -29,6 +29,7 @@ from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import Scene
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+CONTACT = 200  # the order of the contact model
 MOST_MS = 0.5  # that a grasp may take
 DIGITS = ("thumb", "index", "middle", "ring", "little", "palm")
 MEMORY_REPETITIONS = (25, 100, 400)
@@ -37,7 +38,7 @@ MEMORY_REPETITIONS = (25, 100, 400)
 def poses(scene: Scene, repetitions: int) -> Iterator[Batch]:
     """Yield every condition's first repetitions, in the form that the contact model takes."""
     pipeline = compile_pipeline(scene)
-    before = tuple(stop for stop in pipeline.stops if stop.effect.stage == "posture")
+    before = tuple(stop for stop in pipeline.stops if stop.effect.order < CONTACT)
     for session in sessions(scene, Postures.shipped(scene.taxonomy)):
         for place, trials in enumerate(session.trials):
             batch = session.batch(place, np.arange(min(repetitions, len(trials))))

@@ -152,11 +152,12 @@ def test_every_changed_row_is_told(folder: Path, grasp_set: GraspSet) -> None:
 
 
 def test_codes_that_mean_something_else_are_refused(folder: Path, grasp_set: GraspSet) -> None:
-    for change, said in (
-        ({"value_a": 10.0}, "j1 is coded differently here: code 0 is 10 deg, but 0 deg in the build"),
-        ({"value_b": 200.0}, r"code 255 is 200 deg, but 127\.5 deg in the build"),
+    first, second, third = grasp_set.joints
+    for other, said in (
+        (replace(second, value_a=10.0), "j1 is coded differently here: code 0 is 10 deg, but 0 deg in the build"),
+        (replace(second, value_b=200.0), r"code 255 is 200 deg, but 127\.5 deg in the build"),
     ):
-        joints = (grasp_set.joints[0], replace(grasp_set.joints[1], **change), grasp_set.joints[2])
+        joints = (first, other, third)
         with pytest.raises(CompileError, match=said):
             verify(folder, replace(grasp_set, joints=joints))
 

@@ -208,6 +208,7 @@ def test_a_longer_lead_and_no_release_leave_the_frame_that_is_read_as_it_is(
         batch, held = make_batch(range(2)), hold_frame(pipeline.setting)
         pipeline.run([batch], Ledger())
         assert batch.lost is not None
+        assert batch.taxels is not None
         read = (batch.bits, batch.sensors_deg, batch.raw, batch.taxels, batch.lost, batch.frame_us)
         found.append([each[:, held] for each in read])
     for one, other in zip(*found, strict=True):
