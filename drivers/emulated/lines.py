@@ -1,6 +1,7 @@
 """Emulated boards or programs that send rows of numbers as lines: over a pty, TCP, UDP, Unix socket or WebSocket."""
 
 import contextlib
+import json
 import math
 import socket
 from collections.abc import Callable, Sequence
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 from ..closing import Closing
 from ..errors import DeviceError, SettingError
 from ..extras import optional
-from ..lines import CLOCK_US, SEQUENCES, checked, switches_field
+from ..lines import CLOCK_US, SEQUENCES, Header, checked, parsed, switches_field
 
 if TYPE_CHECKING:
     from websockets.sync.server import ServerConnection
@@ -20,20 +21,31 @@ if TYPE_CHECKING:
 _UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6}
 # A client that does not accept a line within this time is dropped.
 _SEND_S = 0.2
-# A board names its columns so often.
+# Columns are named once in this time.
 _NAMED_S = 1.0
 
 
 class LineSender(Closing):
-    """Sends the current values to `send`, `rate_hz` times a second: numbers in the order of the columns.
+    """Sends the current values to `send`, `rate_hz` times a second: numbers in the order of the columns. With `named`,
+    a header comes once a second; where names cannot stand in one, each line is a JSON object.
 
     The column `time` holds the sender's clock, which counts from the start in `unit`.
     """
 
     def __init__(
-        self, send: Callable[[bytes], None], columns: Sequence[str], rate_hz: float, time: str | None, unit: str
+        self,
+        send: Callable[[bytes], None],
+        columns: Sequence[str],
+        rate_hz: float,
+        time: str | None,
+        unit: str,
+        *,
+        named: bool = False,
     ) -> None:
         self._send, self._columns, self._time, self._scale = send, tuple(columns), time, _UNITS[unit]
+        header = ",".join(self._columns).encode()
+        self._header = header + b"\n" if named and parsed(header) == Header(self._columns) and len(columns) > 1 else b""
+        self._json, self._named_s = named and not self._header, -math.inf
         self._period_s, self._began = 1 / rate_hz, monotonic()
         self._values = dict.fromkeys(columns, 0.0)
         self._stop = Event()
@@ -48,8 +60,11 @@ class LineSender(Closing):
         """Return the line for a time `now_s` after the start."""
         values = self._values
         clock = {} if self._time is None else {self._time: now_s * self._scale}
-        numbers = (clock.get(name, values.get(name, 0.0)) for name in self._columns)
-        return ",".join(f"{round(number, 6):.10g}" for number in numbers).encode() + b"\n"
+        row = {name: round(clock.get(name, values.get(name, 0.0)), 6) for name in self._columns}
+        text = json.dumps(row) if self._json else ",".join(f"{number:.10g}" for number in row.values())
+        named = now_s >= self._named_s + _NAMED_S
+        self._named_s = now_s if named else self._named_s
+        return self._header * named + text.encode() + b"\n"
 
     def close(self) -> None:
         """Stop sending."""

@@ -135,7 +135,8 @@ class Bench(Closing):
             return stack.enter_context(BoardSender(send, wiring.switches, readings, wiring.rate_hz)), port
         time = () if wiring.time is None else (wiring.time,)
         columns = wiring.columns or (*time, *wiring.used)
-        sender = LineSender(send, columns, wiring.rate_hz, wiring.time, wiring.time_unit)
+        unit, named = wiring.time_unit, not wiring.columns
+        sender = LineSender(send, columns, wiring.rate_hz, wiring.time, unit, named=named)
         return stack.enter_context(sender), port
 
     def _numbers_of(

@@ -54,6 +54,15 @@ def test_the_same_rows_come_by_every_way(way: tuple[str, Send]) -> None:
         assert heard(reader, 2)
 
 
+@pytest.mark.parametrize("columns", [("a", "b"), ("a",), ("a", "b, c")])
+def test_a_sender_may_name_its_columns(way: tuple[str, Send], columns: tuple[str, ...]) -> None:
+    port, send = way
+    with LineReader(port) as reader, LineSender(send, columns, 200, None, "ms", named=True):
+        reader.open()
+        last = heard(reader, 300)[-1]  # the header comes once a second
+        assert (last.names, last.values) == (columns, (0.0,) * len(columns))
+
+
 def test_a_board_is_emulated_with_names_numbers_and_its_clock(way: tuple[str, Send]) -> None:
     port, send = way
     with LineReader(port) as reader, BoardSender(send, ("a", "b"), ("i",), 200) as sender:
