@@ -112,6 +112,6 @@ class HandShape:
         strange = next((name for name, place in zip(names, places, strict=True) if place not in number), None)
         if strange is not None:
             if self.length_mm is not None and number.keys().isdisjoint(places):
-                raise MapError(f"the position of switch {strange!r} is unknown: say it in a ``layout``")
+                raise MapError(f"the position of switch {strange!r} is unknown: say it with ``layout``")
             raise MapError(f"{strange!r} is no switch of the glove {self.glove}{nearest(strange, self.names)}")
         return np.array([number[place] for place in places], dtype=np.intp)
