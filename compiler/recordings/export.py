@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.drivers.extras import optional
 from thenar.runtime.files import write_atomically
 
 from ..text import cell, cells
@@ -187,11 +188,17 @@ def to_dataframe(grasp_set: GraspSet, codes: bool = False) -> "pd.DataFrame":
         appended to the column. `attrs["thenar"]` is the text of a columns.toml: roles, calibrations, taxonomy, and the
         simulator of the grasps. Parquet keeps it.
 
+    Raises
+    ------
+    MissingPackageError
+        If pandas is not installed.
+
     Examples
     --------
     >>> to_dataframe(grasp_set).groupby("subject")["grasp"].value_counts()  # doctest: +SKIP
     """
-    import pandas as pd
+    with optional():
+        import pandas as pd
 
     heads = heads_of(grasp_set)
     columns: dict[str, object] = {
