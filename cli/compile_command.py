@@ -95,8 +95,8 @@ class _ChipOption(click.Option):
         measuring = _converters()
         chips = [kind for kind in _chips() if kind != _BOARD and kind not in measuring]
         self.help = (
-            f"Port expander to propose: {', '.join(chips)}; {_BOARD}, one that prints rows; or a converter for taxels: "
-            f"{', '.join(measuring)}.  [default: {chips[0]}, and ads7828 for taxels]"
+            f"Port expander to propose: {', '.join(chips)}; {_BOARD} for one that prints rows; or a converter for "
+            f"taxels: {', '.join(measuring)}.  [default: {chips[0]}, and ads7828 for taxels]"
         )
         return super().get_help_record(ctx)
 

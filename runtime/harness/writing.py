@@ -16,13 +16,15 @@ _GLOVE = re.compile(r"(?ms)^\[cyberglove\][^\n]*\n(?:(?!^\[).)*")
 _RECORD_US = re.compile(r"(?m)^record_us[ \t]*=[^\n]*\n?")
 # Two numbers; a name is in quotes.
 _RANGE = re.compile(r"\[\n    ([-+.e\d]+),\n    ([-+.e\d]+),\n\]")
-_ADDRESS = re.compile(r"^address = (\d+)$", re.MULTILINE)
+# Of a chip; a short one is an inline table.
+_ADDRESS = re.compile(r'^(    \{ kind = "[^"]*", )?address = (\d+)', re.MULTILINE)
 
 
 def harness_to_toml(harness: Harness) -> str:
-    """Return the text of a file that `load_harness` reads as `harness`; addresses are written in hex."""
+    """Return the text of a file that `load_harness` reads as `harness`; addresses of chips are in hex."""
     # tomli_w has no hex; it writes every key on a separate line and no line break inside a text.
-    text = _ADDRESS.sub(lambda found: f"address = 0x{int(found[1]):02X}", tomli_w.dumps(msgspec.to_builtins(harness)))
+    text = tomli_w.dumps(msgspec.to_builtins(harness))
+    text = _ADDRESS.sub(lambda found: f"{found[1] or ''}address = 0x{int(found[2]):02X}", text)
     return _RANGE.sub(lambda found: f"[{float(found[1]):.12g}, {float(found[2]):.12g}]", text)
 
 

@@ -2,9 +2,9 @@
 
 Two lines of 8 data bits, no parity, one stop bit: of 1,000,000 baud with the rows that a board prints, of its switches
 and taxels, and of 115,200 baud with the CyberGlove's streamed records, which the glove sends after digitising its
-sensors one by one, which limits it to 160 records a second. The numbers of a row are padded with zeros, so that all
-rows are as long; the names of the columns, which a board prints once a second, are left out, since the receiver knows
-how many there are.
+sensors one by one, which limits it to 160 records a second. The numbers of a row are padded with zeros, so all rows
+have the same length. The names of the columns, which a board prints once a second, are left out, since the receiver
+knows how many there are.
 The wire effects act on the bytes between `SEND` and `RECEIVE`.
 """
 

@@ -93,6 +93,7 @@ def test_addresses_are_written_as_they_are_spoken_of(load: Load, full_text: str)
     text = harness_to_toml(load(full_text))
     assert "address = 0x20\n" in text
     assert "address = 0x70\nchannel = 2\n" in text
+    assert '    { kind = "mcp23017", address = 0x21, pins = ' in text
 
 
 @pytest.mark.parametrize("rest", ["", "# mine\nbaud = 38_400\n", "record_us = 5.5\n\n[debounce]\nrelease_ms = 4\n"])
