@@ -4,9 +4,10 @@
     python tests/mutants/mutants.py FOLDER --again OTHER/mutants.json
 
 Each fault is put into a copy of thenar in FOLDER, and the quick tests that are nearest to it judge it: those that
-import its module, then those that import a module that does, and so on. Prints a table by room, and the survivors; the
-list of all is FOLDER/mutants.json. With --again, the faults of that list are judged, as far as their lines are the same
-here: to compare the tests of two commits.
+import its module, then those that import a module that does, and so on. A test that also fails without the fault
+catches nothing. Prints a table by room, and the survivors; the list of all, each with the test that caught it, is
+FOLDER/mutants.json. With --again, the faults of that list are judged, as far as their lines are the same here: to
+compare the tests of two commits.
 """
 
 import argparse
@@ -43,14 +44,16 @@ _OTHER: dict[type[ast.AST], Any] = {
 
 @dataclass(slots=True)
 class Mutant:
-    """A fault: its file and line, and the place of its node among those of the file; `caught` is None until judged."""
+    """A fault: its file and line, and the place of its node among those of the file; `caught` is the test that failed,
+    "" if none did, None until it is judged.
+    """
 
     path: str
     line: int
     node: int
     text: str
     change: str
-    caught: bool | None = None
+    caught: str | None = None
 
 
 def nodes_of(tree: ast.Module) -> Iterator[ast.AST]:
@@ -204,14 +207,25 @@ def judge(mutant: Mutant, copy: Path, nearest: Nearest) -> Mutant:
     place.write_text(faulty(mutant), encoding="utf-8")
     try:
         tests = nearest.tests_of(mutant.path)
-        mutant.caught = bool(tests) and _fails(tests, copy)
+        mutant.caught = next(iter(_failed(tests, copy, _LONGEST_S)), "") if tests else ""
     finally:
         shutil.copy(ROOT / mutant.path, place)
     return mutant
 
 
-def _fails(tests: Sequence[str], copy: Path) -> bool:
-    options = ["-x", "-q", "-m", "not slow", "-p", "no:cacheprovider", "-p", "no:xdist"]
+def _failed(tests: Sequence[str], copy: Path, longest_s: float | None = None) -> list[str]:
+    """Return the tests that fail: the first one if there is a longest time, otherwise all."""
+    options = [
+        "-q",
+        "-rfE",
+        "-m",
+        "not slow",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "no:xdist",
+        *(["-x"] if longest_s else []),
+    ]
     environment = os.environ | {"PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-m", "pytest", *options, *tests]
     with subprocess.Popen(
@@ -219,17 +233,22 @@ def _fails(tests: Sequence[str], copy: Path) -> bool:
         cwd=ROOT,
         env=environment,
         stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         start_new_session=True,
+        text=True,
     ) as process:
         try:
-            return process.wait(_LONGEST_S) != 0
+            said, _ = process.communicate(timeout=longest_s)
         except subprocess.TimeoutExpired:
-            return False
+            return []
         finally:
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
+    named = [
+        line.split(" - ")[0].partition(" ")[2] for line in said.splitlines() if line.startswith(("FAILED ", "ERROR "))
+    ]
+    return named or (["pytest itself"] if process.returncode else [])
 
 
 def judged(mutants: Sequence[Mutant], folder: Path) -> list[Mutant]:
@@ -253,6 +272,12 @@ def judged(mutants: Sequence[Mutant], folder: Path) -> list[Mutant]:
     with ThreadPoolExecutor(_JUDGES) as pool:
         found = list(pool.map(in_a_copy, mutants))
     print()
+    judges = sorted({mutant.caught.partition("[")[0] for mutant in found if mutant.caught and "::" in mutant.caught})
+    failing = set(_failed(judges, copies.get())) if judges else set()
+    for mutant in found:
+        if mutant.caught in failing:
+            mutant.caught = ""
+    (folder / "mutants.json").write_text(json.dumps([asdict(each) for each in found], indent=1))
     return found
 
 

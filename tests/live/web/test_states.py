@@ -83,7 +83,7 @@ def test_a_run_that_sends_nothing_more_is_grey_and_says_its_age(page: Callable[.
     assert browser.text("glove-state").startswith("glove: silent since ")
     assert browser.driver.title == "no data · thenar"
     grey = "rgb(104, 112, 122)"
-    assert browser.script(_INK, "grasp") == grey
+    browser.wait(lambda: browser.script(_INK, "grasp") == grey)
     assert browser.axe() == []
     browser.picture("stopped")
     run.until(lambda: (browser.text("health"), browser.text("age")) == ("ok", ""))
@@ -121,12 +121,12 @@ def test_devices_that_are_lost_are_named_and_only_what_is_read_is_counted(
 ) -> None:
     run = page()
     run.health(("glove", True), ("stream", True))
-    run.until(lambda: browser.text("glove-state") == "glove: connected")
-    assert browser.text("hand-says") == "2 of 3 switches closed: a, b"
+    connected = ("glove: connected", "2 of 3 switches closed: a, b")
+    run.until(lambda: (browser.text("glove-state"), browser.text("hand-says")) == connected)
     run.health(("glove", True), ("stream", False))
     lost = replace(GRASP, grasp="unknown", candidate="unknown", health="unknown", lost=("a", "b", "c"))
     run.until(lambda: browser.text("hand-says") == "0 of 0 readable switches closed; 3 lost", grasp=lost)
-    assert browser.text("glove-state").startswith("glove: stream lost since ")
+    browser.wait(lambda: browser.text("glove-state").startswith("glove: stream lost since "))
     part = replace(GRASP, health="degraded", lost=("a",))
     run.until(lambda: browser.text("hand-says") == "1 of 2 readable switches closed; 1 lost: b", grasp=part)
     # Both are silent: moments go on, but what they rest on is old.
