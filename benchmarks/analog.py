@@ -22,11 +22,11 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.tables.collapse import model_scores
 from thenar.compiler.trainers.base import Training
-from thenar.runtime.manifest import Options
+from thenar.runtime.recipe import Recipe
 from thenar.simulator import load_scene, simulate
 
 KEPT, FOLDS, CLOSES_N, LEVELS = 33, 4, 1.0, 3
-LOGIT = Options(trainer="logit")
+LOGIT = Recipe(trainer="logit")
 
 
 def read(learning: Samples, test: Samples, pads: GraspSet, reading: Reading) -> tuple[Samples, Samples]:

@@ -24,7 +24,7 @@ from thenar.compiler.samples import Samples, decided
 from thenar.compiler.tables.collapse import collapse, model_scores
 from thenar.compiler.tables.quantise import integer_scores, quantise
 from thenar.compiler.trainers.base import Training
-from thenar.runtime.manifest import AUTO, Options
+from thenar.runtime.recipe import AUTO, Recipe
 
 WEKA_JAR = Path("/usr/share/java/weka.jar")
 FEW, SEED = 2000, 1
@@ -83,7 +83,7 @@ def recognised(predict: Classes, test: Samples) -> NDArray[np.bool_]:
 
 def _trained(name: str) -> Predicting:
     def predict(cut: Cut, _: Given) -> tuple[Classes, Classes]:
-        train, test, options = cut.train, cut.test, Options(trainer=name)
+        train, test, options = cut.train, cut.test, Recipe(trainer=name)
         training = Training.of(options)
         if name == AUTO:
             groups = train.subjects if cut.of == "new subject" else None

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,10 @@ from thenar.compiler.tables.collapse import model_scores
 from thenar.compiler.trainers.base import Training
 from thenar.compiler.workers import in_workers
 from thenar.runtime.files import write_atomically
-from thenar.runtime.manifest import Of, Options
+from thenar.runtime.recipe import Recipe
+
+if TYPE_CHECKING:
+    from thenar.runtime.manifest import Of
 
 Reading = Literal["switches", "levels", "codes", "nothing"]
 READINGS: tuple[Reading, ...] = ("switches", "levels", "codes")
@@ -69,7 +72,7 @@ def onset(
     n_folds: int = 4,
     seed: int = 1,
     jobs: int = -1,
-    options: Options | None = None,
+    options: Recipe | None = None,
     levels: int | None = None,
 ) -> Onset:
     """Return the curves of initial contact of a set with a row per frame, such as the scene `initial-contact` makes.
@@ -86,7 +89,7 @@ def onset(
         Folds of trials, and their seed.
     jobs : int
         Worker processes; the result does not depend on their number.
-    options : Options, optional
+    options : Recipe, optional
         The trainer and its settings; the additive logit by default.
     levels : int, optional
         The most levels of a taxel, found in each fold's training rows; the default is that of placements.
@@ -112,7 +115,7 @@ def onset(
     if grasp_set.joints:
         kinds += [("nothing", True), *((reading, True) for reading in READINGS)]
     folds = trial_folds(samples.labels, samples.trials, n_folds, seed)
-    training = Training.of(options or Options(trainer="logit"))
+    training = Training.of(options or Recipe(trainer="logit"))
     tasks = ((samples, closed, levels, kind, fold, training) for kind in kinds for fold in folds)
     predicted = {kind: np.empty(len(samples.labels), np.intp) for kind in kinds}
     for kind, fold, labels in in_workers(_predicted, tasks, jobs):

@@ -8,8 +8,8 @@ import click
 from click.core import ParameterSource
 
 from thenar.compiler.text import INDEPENDENT, duration
-from thenar.runtime.manifest import AUTO
 from thenar.runtime.published import NONE
+from thenar.runtime.recipe import AUTO, choices
 
 from .common import (
     Number,
@@ -24,22 +24,18 @@ from .common import (
     out,
     overwrite_flag,
     progress,
-    seed_range,
     show,
     table,
     warning,
 )
 from .options import (
+    CHOOSING,
+    LIMITS,
     Grouped,
     asked_settings,
     fitted_hand,
-    keep_joints_option,
-    keep_option,
     layout_option,
-    levels_option,
-    limit_options,
-    method_option,
-    prune_option,
+    recipe_options,
     trainer_option,
     warn_of_budget,
 )
@@ -55,7 +51,7 @@ if TYPE_CHECKING:
 
 _BOARD = "board"
 # Options that a point of a frontier sets.
-_SETTLED = ("preset", "prune", "inputs", "table_bits", "method", "keep", "width", "trainer")
+_SETTLED = ("preset", "prune", "inputs", "table_bits", "placement", "keep", "width", "trainer")
 # Chosen by measurement: docs/reference/commands.md shows the effect of each. None sets both --keep and --prune.
 PRESETS: dict[str, dict[str, str]] = {
     "smallest": {"method": "elimination", "keep": "8", "max-bins": "8", "table-bits": "8"},
@@ -63,8 +59,8 @@ PRESETS: dict[str, dict[str, str]] = {
     "best": {"method": "elimination", "keep": "33"},
 }
 _GROUPS = {
-    "Basics": ("output", "preset", "method", "keep", "levels", "keep_joints", "prune", "inputs"),
-    "Limits": ("keep_these", "never", "apart_mm", "at_most", "budget_us"),
+    "Basics": ("output", "preset", "placement", "keep", "levels", "keep_joints", "prune", "inputs"),
+    "Limits": LIMITS[:-1],
     "Training": ("trainer", "robust", "refuse"),
     "Integer tables": ("table_bits", "width"),
     "The accuracies in build.json": ("folds", "seed", "by", "jobs"),
@@ -103,8 +99,9 @@ class _ChipOption(click.Option):
 
 def _preset(context: click.Context, _: click.Parameter, name: str | None) -> None:
     """Make the preset's values the defaults: explicit options override them."""
-    given = PRESETS.get(name or "", {})
-    context.default_map = {option.replace("-", "_"): value for option, value in given.items()}
+    names = {choice.option: choice.name for choice in choices().values()}
+    given = ((option.replace("-", "_"), value) for option, value in PRESETS.get(name or "", {}).items())
+    context.default_map = {names[option]: value for option, value in given}
 
 
 @click.command("compile", cls=Grouped, groups=_GROUPS)
@@ -124,54 +121,12 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
         for name, given in PRESETS.items()
     ),
 )
-@method_option
-@keep_option
-@levels_option
-@keep_joints_option
-@prune_option
-@limit_options
-@click.option(
-    "--inputs",
-    type=click.Choice(["both", "switches", "joints"]),
-    default="both",
-    show_default=True,
-    help="Inputs that the build reads.",
-)
+@recipe_options(*CHOOSING, "inputs")
 @trainer_option(AUTO)
-@click.option(
-    "--refuse",
-    type=Number(0, 0.5),
-    default=0.01,
-    show_default=True,
-    metavar="SHARE",
-    help="Share of grasps that may be refused as nothing held, if no row of the set has nothing held; 0: refuse none.",
-)
-@click.option(
-    "--folds",
-    type=click.IntRange(0),
-    default=4,
-    show_default=True,
-    help="Folds of the pooled accuracy; 0: measure no accuracy.",
-)
-@click.option("--seed", type=seed_range, default=1, show_default=True, help="Seed of the folds.")
-@click.option(
-    "--by",
-    type=click.Choice(("trial", "subject", "object", "session")),
-    help="What the folds of the first accuracy leave out.  [default: subject if there are several, otherwise trial]",
-)
+@recipe_options("refuse", "folds", "seed", "by")
 @jobs_option()
 @dask_option
-@click.option(
-    "--table-bits",
-    type=click.Choice(["16", "8"]),
-    callback=lambda _context, _parameter, bits: int(bits),
-    default="16",
-    show_default=True,
-    help="Bits per table entry. With 8, steps are coarser and the firmware is smaller.",
-)
-@click.option(
-    "--width", type=click.IntRange(4, 16), default=16, show_default=True, help="Bits that every sum of scores fits."
-)
+@recipe_options("table_bits", "width")
 @click.option("--from", "from_frontier", type=existing_file, help="A frontier.json: build one of its points.")
 @click.option("--point", type=click.IntRange(1), help="Number of the point.  [default: the picked one]")
 @click.option("--report/--no-report", default=True, show_default=True, help="Also write report.html and spec/.")
@@ -230,7 +185,8 @@ def command(
     _check_point(context, from_frontier, point)
     _check_hand_length(hand_length, report)
     keep_apart(recordings, layout, glove, propose, from_frontier)
-    options = asked_settings(context, asked) | _placed(context, asked)
+    _leave_out_preset_keep(context, asked)
+    options = asked_settings(context, asked) | asked
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
     hand = _hand(layout, grasp_set.element_names, hand_length)
@@ -254,14 +210,13 @@ def command(
     show(made.manifest, lambda _: _print(made, output, propose))
 
 
-def _placed(context: click.Context, asked: dict[str, Any]) -> dict[str, Any]:
-    """Return the requested build options. A preset's --keep applies only to the preset's own --method."""
-    from thenar.compiler.placement.methods.base import METHODS, PAPERS
+def _leave_out_preset_keep(context: click.Context, asked: dict[str, Any]) -> None:
+    """Take out a preset's --keep if another --method takes no number of switches."""
+    from thenar.compiler.placement.methods.base import METHODS
 
-    method = asked.pop("method") or PAPERS
-    if context.get_parameter_source("keep") is ParameterSource.DEFAULT_MAP and not METHODS[method].by_number:
+    preset = context.get_parameter_source("keep") is ParameterSource.DEFAULT_MAP
+    if preset and not METHODS[asked["placement"]].by_number:
         asked["keep"] = None
-    return asked | {"placement": method, "at_most_taxels": asked.pop("at_most")}
 
 
 def _documents(hand: "HandShape | None", hand_length: float | None, chosen: "Picked | None") -> "Documents":

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import msgspec
 from rich.text import Text
 
 from .common import (
@@ -25,7 +24,18 @@ from .common import (
     warning,
     write_json,
 )
-from .options import Training, asked_settings, keep_joints_option, levels_option, method_list, trainer_option
+from .options import (
+    CHOOSING,
+    LIMITS,
+    Training,
+    asked_settings,
+    glove_option,
+    layout_option,
+    method_list,
+    recipe_options,
+    terms_of,
+    trainer_option,
+)
 
 if TYPE_CHECKING:
     from rich.table import Table as Grid
@@ -34,6 +44,7 @@ if TYPE_CHECKING:
     from thenar.compiler.evaluation.learning import Learning
     from thenar.compiler.evaluation.study import Study
     from thenar.compiler.evaluation.tables import Cell, RateTable
+    from thenar.runtime.recipe import Recipe
 
 _USUAL = ("compositions", "generality", "pruning", "baselines", "trainers")
 TABLES = (*_USUAL, "joints")
@@ -54,7 +65,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
 @click.command(cls=Training)
 @click.argument("grasps", type=existing_file)
 @click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Use only this subject; repeatable.")
-@click.option("--folds", type=click.IntRange(min=2), default=4, show_default=True, help="Folds of cross-validation.")
+@recipe_options("folds", least=2)
 @click.option(
     "--by",
     "scheme",
@@ -71,7 +82,9 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     help="Repeats of random folds, each with another seed.",
 )
 @trainer_option("logitboost")
-@click.option("--prune", type=click.IntRange(min=0), default=0, show_default=True, help="S: smallest node ID3 splits.")
+@recipe_options(*CHOOSING)
+@layout_option
+@glove_option
 @click.option(
     "--prune-list",
     callback=_numbers,
@@ -89,7 +102,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     show_default=True,
     help="Rows that choose the placement: all (paper), or those of each training fold (nested).",
 )
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the first repeat.")
+@recipe_options("seed")
 @jobs_option()
 @dask_option
 @click.option(
@@ -97,7 +110,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     type=method_list,
     default="cmim,mutual-information",
     show_default=True,
-    help="Methods to compare ID3 with, separated by commas.",
+    help="Methods to compare the recipe's with, separated by commas.",
 )
 @click.option(
     "--tables",
@@ -106,8 +119,6 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     show_default=True,
     help="Tables to print, or none; joints: the best 1, 2, ... of them.",
 )
-@levels_option
-@keep_joints_option
 @click.option(
     "--permute",
     type=click.IntRange(min=0, max=100_000),
@@ -147,6 +158,8 @@ def command(
     confusion: bool,
     folder: Path | None,
     output: Path | None,
+    layout: Path | None,
+    glove: Path | None,
     **asked: Any,
 ) -> None:
     """Cross-validate GRASPS and print the paper's tables: accuracies in percent, with 95 % intervals.
@@ -174,21 +187,26 @@ def command(
         thenar evaluate set.grasps --by subject --tables joints
         thenar evaluate set.grasps --by subject --protocol nested --plot pictures/ -o result.json
     """
-    from thenar.compiler.evaluation.study import Options, evaluate
+    from thenar.compiler.evaluation.study import StudyDesign, evaluate
     from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.runtime.recipe import Recipe, changed
 
-    keep_apart(grasps, output)
+    keep_apart(grasps, output, layout, glove)
     training = asked_settings(context, asked)
+    chosen = {name: asked.pop(name) for name in (*CHOOSING, "folds", "seed")}
+    recipe = changed(Recipe(), chosen | training)
     if streams:
-        _evaluate_streams(grasps, training, asked, jobs, output)
+        if limit := next((name for name in LIMITS if chosen[name]), ""):
+            raise click.UsageError(f"--{limit.replace('_', '-')} is not for --streams: leave one of them out.")
+        _evaluate_streams(grasps, recipe, asked["subjects"], jobs, output)
         return
-    named = {name: training.pop(name) for name in ("trainer", "rounds") if name in training}
     asked["tables"] = tuple(name for name in TABLES if name in asked["tables"])
-    options = msgspec.convert(asked | named | {"settings": training}, Options)
-    if (confusion or (folder is not None and not options.learning)) and "compositions" not in options.tables:
+    design = StudyDesign(recipe, **asked)
+    if (confusion or (folder is not None and not design.learning)) and "compositions" not in design.tables:
         raise click.UsageError("--confusion and --plot show the compositions: name one of them in --tables")
     with progress("evaluating") as report:
-        study = evaluate(GraspSet.load(grasps), options, jobs, report)
+        grasp_set = GraspSet.load(grasps)
+        study = evaluate(grasp_set, design, jobs, report, **terms_of(recipe, grasp_set, layout, glove))
     if folder is not None:
         from thenar.compiler.evaluation.pictures import draw
 
@@ -201,22 +219,19 @@ def command(
 
 
 def _evaluate_streams(
-    grasps: Path, training: dict[str, Any], asked: dict[str, Any], jobs: int, output: Path | None
+    grasps: Path, recipe: "Recipe", subjects: tuple[str, ...], jobs: int, output: Path | None
 ) -> None:
+    """Evaluate the decoders of segments, each subject left out in turn."""
     import numpy as np
 
     from thenar.compiler.artifact.stream_study import study_streams
     from thenar.compiler.recordings.graspset import GraspSet
-    from thenar.compiler.trainers.base import changed
-    from thenar.runtime.manifest import Options
 
-    named = {name: asked[name] for name in ("prune", "seed", "levels", "keep_joints")}
-    options = changed(Options(trainer="logitboost"), {**named, **training})
     with progress("evaluating streams", lines=True) as report:
         grasp_set = GraspSet.load(grasps)
-        if chosen := asked["subjects"]:
-            grasp_set = grasp_set.rows(np.isin(grasp_set.subjects, chosen))
-        study = study_streams(grasp_set, options, jobs, report)
+        if subjects:
+            grasp_set = grasp_set.rows(np.isin(grasp_set.subjects, subjects))
+        study = study_streams(grasp_set, recipe, jobs, report)
     if output is not None:
         write_json(output, study)
     show(study, _print_streams)

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from thenar.compiler.text import duration, interval
 from thenar.drivers.names import printable
-from thenar.runtime.manifest import AUTO
+from thenar.runtime.recipe import AUTO
 
 from .common import (
     Number,

@@ -1,6 +1,7 @@
 """Options shared by several commands: the placement methods and the trainers, read from their registries."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -8,15 +9,17 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from thenar.runtime.manifest import AUTO
+from thenar.runtime.recipe import AUTO, Choice, choices
 
 from .common import Command, ListOf, Number, OneOf, comma_separated, existing_file, warning
 
 if TYPE_CHECKING:
     from thenar.compiler.hand import HandShape
     from thenar.compiler.placement.methods.base import Method
+    from thenar.compiler.recordings.graspset import GraspSet
     from thenar.compiler.trainers.base import Setting
     from thenar.runtime.harness.wiring import GloveWiring
+    from thenar.runtime.recipe import Recipe
 
 
 def _methods() -> Iterable[str]:
@@ -50,68 +53,93 @@ class _Scene(click.ParamType[str]):
 
 scene_name = _Scene()
 
-# Its value is None if it is not given.
-method_option = click.option(
-    "--method", type=method_name, metavar="NAME", help="How switches are chosen: see below.  [default: id3]"
-)
-keep_option = click.option(
-    "--keep", type=click.IntRange(1), metavar="M", help="Number of switches to keep, for methods that take it."
-)
-levels_option = click.option(
-    "--levels",
-    type=click.IntRange(1, 65535),
-    metavar="L",
-    help="Choose from L levels of each taxel.  [default: 7]",
-)
-keep_joints_option = click.option(
-    "--keep-joints", type=click.IntRange(1), metavar="N", help="Keep the best N joints.  [default: all]"
-)
-prune_option = click.option(
-    "--prune",
-    type=click.IntRange(0),
-    metavar="S",
-    default=0,
-    show_default=True,
-    help="Prune ID3's tree: nodes with fewer than S rows are not split.",
-)
-
 
 def _names(_: click.Context, __: click.Parameter, text: str | None) -> tuple[str, ...]:
     return () if text is None else comma_separated(text)
 
 
-def limit_options(command: Command) -> Command:
-    """Add the options that limit a placement, and --robust."""
-    for option in (
-        click.option(
-            "--robust",
-            is_flag=True,
-            help="Choose elements that minimise the worst single loss; train on rows with lost inputs.",
-        ),
-        click.option(
-            "--budget-us",
-            type=Number(0),
-            metavar="US",
-            help="Limit the scan time of the kept elements, and the record time of the kept joints.",
-        ),
-        click.option(
-            "--at-most",
-            type=(click.IntRange(0), click.Choice(["taxels"])),
-            callback=lambda _context, _parameter, most: None if most is None else most[0],
-            metavar="N taxels",
-            help="Keep at most N taxels, each with any number of levels.",
-        ),
-        click.option(
-            "--apart-mm",
-            type=Number(0, min_open=True),
-            metavar="MM",
-            help="Keep elements at least this far apart.",
-        ),
-        click.option("--never", callback=_names, metavar="NAMES", help="Never keep these inputs, by name: a,b."),
-        click.option("--keep-these", callback=_names, metavar="NAMES", help="Always keep these inputs, by name: a,b."),
-    ):
-        command = option(command)
-    return command
+LIMITS = ("keep_these", "never", "apart_mm", "at_most_taxels", "budget_us", "robust")
+CHOOSING = ("placement", "keep", "levels", "keep_joints", "prune", *LIMITS)
+
+
+def recipe_options(*names: str, **changes: Any) -> Callable[[Command], Command]:
+    """Return what adds an option for each of these fields of a `Recipe`, in this order; `changes` replace properties of
+    a `Choice`.
+    """
+    described = choices()
+
+    def add(command: Command) -> Command:
+        for name in reversed(names):
+            command = _recipe_option(replace(described[name], **changes))(command)
+        return command
+
+    return add
+
+
+def _recipe_option(choice: Choice) -> Callable[[Command], Command]:
+    """Return the option for a field of a `Recipe`."""
+    named = f"--{choice.option.replace('_', '-')}", choice.name
+    usual = f"  [default: {choice.usual}]" if choice.usual else ""
+    about: dict[str, Any] = {"help": f"{choice.help}{usual}", "metavar": choice.metavar}
+    if choice.kind is bool:
+        return click.option(*named, is_flag=True, **about)
+    if choice.kind is tuple:
+        return click.option(*named, callback=_names, **about)
+    kind = _kind_of(choice)
+    if choice.unit:
+        about |= {"type": (kind, click.Choice([choice.unit])), "metavar": f"N {choice.unit}"}
+        return click.option(*named, callback=lambda _context, _parameter, value: value and value[0], **about)
+    if choice.kind is int and choice.names:
+        about["callback"] = lambda _context, _parameter, value: int(value)
+    default = choice.default if choice.default is None or not choice.names else str(choice.default)
+    return click.option(*named, type=kind, default=default, show_default=default is not None, **about)
+
+
+def _kind_of(choice: Choice) -> click.ParamType[Any]:
+    """Return what converts the text of an option."""
+    if choice.name == "placement":
+        return method_name
+    if choice.names:
+        return click.Choice([str(name) for name in choice.names])
+    if choice.kind is float:
+        return Number(choice.least, choice.most, min_open=choice.open)
+    least, most = (None if end is None else int(end) for end in (choice.least, choice.most))
+    return click.IntRange(least, most)
+
+
+glove_option = click.option(
+    "--glove",
+    type=existing_file,
+    help="A glove.toml: the costs of its ports, for methods and limits that weigh them.  [default: MCP23017]",
+)
+
+
+def terms_of(recipe: "Recipe", grasp_set: "GraspSet", layout: Path | None, glove: Path | None) -> dict[str, Any]:
+    """Return the costs and the limits under which a recipe chooses elements of a set: the arguments `ports` and
+    `limits` of the library.
+
+    Raises UsageError for files that the recipe does not use, and for a glove that lacks an element of the set.
+    """
+    from thenar.compiler.placement.constraints import Limits
+    from thenar.compiler.placement.methods.base import METHODS
+    from thenar.compiler.placement.ports import ports_of_whole_glove
+    from thenar.runtime.harness.loading import load_harness
+    from thenar.runtime.scanning.plan import unwired
+
+    if layout is not None and recipe.apart_mm is None:
+        raise click.UsageError("--layout gives positions for --apart-mm: add that")
+    weighs = METHODS.named(recipe.placement).uses_ports or recipe.budget_us is not None
+    if glove is not None and not weighs:
+        weighing = ", ".join(name for name, method in METHODS.items() if method.uses_ports)
+        raise click.UsageError(f"--glove gives the scan costs: use it with a --method that weighs them: {weighing}")
+    harness = None if glove is None else load_harness(glove)
+    if harness is not None and (lacking := unwired(harness, grasp_set.element_names)):
+        raise click.UsageError(f"{glove} does not wire {min(lacking)!r} of the set: name the whole glove's glove.toml.")
+    cyberglove = None if harness is None else harness.cyberglove
+    warn_of_budget(recipe.budget_us, grasp_set.joint_names if recipe.keep_joints else (), cyberglove)
+    places = hand_of(layout).by_name if recipe.apart_mm else {}
+    ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
+    return {"ports": ports if weighs else None, "limits": Limits.of(recipe, grasp_set, places, cyberglove)}
 
 
 def warn_of_budget(budget_us: float | None, joints: Sequence[str], glove: "GloveWiring | None") -> None:
@@ -158,7 +186,7 @@ class _TrainerOption(click.Option):
 
         names = ", ".join(f"{trainer.name} ({trainer.what})" for trainer in TRAINERS.values())
         chosen = f"; {AUTO}: chosen by folds of the training rows, among those that take the given settings"
-        self.help = f"What trains the model: {names}{chosen if self.default == AUTO else ''}."
+        self.help = f"What trains the model: {names}{chosen}."
         return super().get_help_record(ctx)
 
 
@@ -171,8 +199,8 @@ class _SettingOption(click.Option):
 
 
 def trainer_option(default: str) -> Callable[[Command], Command]:
-    """Return the option --trainer; if its default is AUTO, the trainer and its settings can be chosen."""
-    kind = OneOf("trainer", lambda: (AUTO, *_trainers()) if default == AUTO else _trainers())
+    """Return the option --trainer; if its default is AUTO, so are the defaults of the settings."""
+    kind = OneOf("trainer", lambda: (AUTO, *_trainers()))
     return click.option("--trainer", type=kind, default=default, show_default=True, cls=_TrainerOption)
 
 

@@ -10,7 +10,7 @@ from thenar.drivers.extras import optional
 
 if TYPE_CHECKING:
     from thenar.drivers.errors import ThenarError
-    from thenar.runtime.manifest import Options
+    from thenar.runtime.recipe import Recipe
 
     from .additive.classifier import AdditiveLogitClassifier
     from .artifact import CompileError
@@ -22,13 +22,14 @@ if TYPE_CHECKING:
     from .boosting.classifier import LogitBoostClassifier
     from .cluster import dask_cluster
     from .evaluation.folds import EvaluationError
-    from .evaluation.study import Study, evaluate
+    from .evaluation.study import Study, StudyDesign, evaluate
     from .firmware.targets import TARGETS
     from .frontier.find import find_frontier
     from .frontier.points import Frontier
     from .frontier.search import Search
     from .placement.id3 import grow_id3
     from .placement.methods.base import METHODS
+    from .placement.placement import Placement, place
     from .placement.selectors import ID3Selector, SwitchSelector
     from .recordings.columns import Columns
     from .recordings.dataframes import from_dataframe
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "thenar.drivers.errors": ("ThenarError",),
-    "thenar.runtime.manifest": ("Options",),
+    "thenar.runtime.recipe": ("Recipe",),
     ".additive.classifier": ("AdditiveLogitClassifier",),
     ".artifact.compile": ("compile_build",),
     ".artifact.documents": ("BuildReport", "Documents"),
@@ -52,13 +53,14 @@ _HOMES = {
     ".boosting.classifier": ("LogitBoostClassifier",),
     ".cluster": ("dask_cluster",),
     ".evaluation.folds": ("EvaluationError",),
-    ".evaluation.study": ("Study", "evaluate"),
+    ".evaluation.study": ("Study", "StudyDesign", "evaluate"),
     ".firmware.targets": ("TARGETS",),
     ".frontier.find": ("find_frontier",),
     ".frontier.points": ("Frontier",),
     ".frontier.search": ("Search",),
     ".placement.id3": ("grow_id3",),
     ".placement.methods.base": ("METHODS",),
+    ".placement.placement": ("Placement", "place"),
     ".placement.selectors": ("ID3Selector", "SwitchSelector"),
     ".recordings.columns": ("Columns",),
     ".recordings.dataframes": ("from_dataframe",),
@@ -90,12 +92,14 @@ __all__ = [
     "Joint",
     "Line",
     "LogitBoostClassifier",
-    "Options",
+    "Placement",
+    "Recipe",
     "Samples",
     "ScoreTables",
     "Search",
     "Setting",
     "Study",
+    "StudyDesign",
     "SwitchSelector",
     "ThenarError",
     "Trainer",
@@ -108,6 +112,7 @@ __all__ = [
     "from_dataframe",
     "grow_id3",
     "merge",
+    "place",
     "split",
     "to_dataframe",
     "verify",

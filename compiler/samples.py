@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.manifest import Inputs
+from thenar.runtime.recipe import Inputs
 
 from .limits import check_types
 from .recordings.graspset import GraspSet

@@ -17,8 +17,9 @@ from msgspec import Meta, Struct
 from .build import read_member
 from .errors import BuildError
 from .json_document import decode_document
-from .manifest import Calibration, Code, Count, Manifest, Name, Value
+from .manifest import Calibration, Code, Manifest
 from .names import fault, shortened
+from .recipe import Count, Name, Value
 
 HAND_NAME = "hand.json"
 SCHEMA = 1

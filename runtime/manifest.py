@@ -4,43 +4,26 @@
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal
 
-from msgspec import Meta, Struct, field
+from msgspec import Meta, Struct
 
 from .names import list_names
 from .published import NONE
+from .recipe import AUTO, PAPERS_TRAINER, Count, Given, Name, Recipe, Share, Value
 from .segmenting.model import SegmentModel
 
 SCHEMA = 1
 
-AUTO, PAPERS_TRAINER = "auto", "logitboost"  # trainers: automatic choice, and the paper's
-
-Inputs = Literal["both", "switches", "joints"]
-TableBits = Literal[8, 16]
-By = Literal["trial", "subject", "object", "session"]
 Of = Literal["pooled", "within subject", "new subject", "new object", "new session"]
 Protocol = Literal["training", "nested"]
 Unit = Literal["trials", "frames"]
-Count = Annotated[int, Meta(ge=0, le=2**53)]
 Code = Annotated[int, Meta(ge=0, le=65535)]
 # Bounds of errors and margins in steps, and of gains in bits and the values of joints.
 Amount = Annotated[float, Meta(ge=0.0, le=1e9)]
-Value = Annotated[float, Meta(ge=-1e300, le=1e300)]
-Share = Annotated[float, Meta(ge=0.0, le=1.0)]
-Name = Annotated[str, Meta(min_length=1)]
-# A number, or one of a few names.
-Given = Value | Name
 Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 # A byte for each grasp type.
 Bytes = Annotated[str, Meta(pattern="^([0-9a-f]{2})*$")]
-_T = TypeVar("_T")
-
-
-def _written(default: _T) -> _T:
-    """Return a field that has a default and is still written."""
-    made: _T = field(default_factory=lambda: default)
-    return made
 
 
 class Origin(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -60,71 +43,6 @@ class Origin(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     taxels: Count = 0
     joints: Count = 0
     trials: Annotated[str, Meta(pattern="^([0-9a-f]{8})*$")] = ""
-
-
-class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Every option of `thenar compile`, with its default; defaults from `tolerance` on are left out.
-
-    Attributes
-    ----------
-    prune : int
-        The paper's S: ID3 splits no fewer rows.
-    rounds, shrinkage, tolerance, max_bins : int, float, float, int; or None
-        Settings of trainers: how many rounds of boosting, the share of each that is kept, the change of the mean loss
-        below which a round is the last, and the most bins of a joint. None: chosen, or the trainer's default.
-    inputs : {"both", "switches", "joints"}
-        Which of the recordings' inputs are used.
-    folds, seed : int
-        Folds and seed of the pooled cross-validation; 0 folds: only the accuracy on training rows is measured.
-    by : {"trial", "subject", "object", "session"} or None
-        What the folds of the first accuracy leave out; None: a subject if there are several, else trials.
-    table_bits : {16, 8}
-        With 8, steps are coarse enough for firmware with 8-bit entries.
-    placement, keep : str, int or None
-        The method that chooses the switches, and how many it keeps, unless it is pruned by S.
-    width : int
-        No sum of the tables needs more bits, 4 to 16.
-    trainer, settings : str, dict
-        The trainer, and its specific settings by name. "auto": of the trainers that take the given settings, the one
-        that inner folds choose; with `rounds` that is LogitBoost.
-    levels : int or None
-        Maximum number of levels of a taxel to choose from; None: the usual number.
-    keep_joints : int or None
-        Maximum number of joints kept, chosen after the switches; None: all.
-    robust : bool
-        Choose and train for the worst single lost input.
-    keep_these, never : tuple of str
-        Switches and taxels that are always kept, and those that never are.
-    apart_mm, at_most_taxels, budget_us : float, int, float; or None
-        Minimum distance between kept elements, maximum number of taxels, and maximum scan time.
-    refuse : float
-        The share of grasps that may be refused if no row has nothing held; 0: none is.
-    """
-
-    prune: Count = _written(0)
-    rounds: Annotated[int, Meta(ge=1, le=2**53)] | None = _written(None)
-    inputs: Inputs = _written("both")
-    shrinkage: Annotated[float, Meta(gt=0.0, le=1.0)] | None = _written(None)
-    folds: Count = _written(4)
-    seed: int = _written(1)
-    tolerance: Annotated[float, Meta(ge=0.0)] | None = None
-    table_bits: TableBits = 16
-    max_bins: Annotated[int, Meta(ge=2, le=2**53)] | None = None
-    placement: Name = "id3"
-    keep: Annotated[int, Meta(ge=1, le=2**53)] | None = None
-    width: Annotated[int, Meta(ge=4, le=16)] = 16
-    trainer: Name = AUTO
-    settings: dict[Name, Given] = {}
-    by: By | None = None
-    levels: Annotated[int, Meta(ge=1, le=65535)] | None = None
-    keep_joints: Annotated[int, Meta(ge=1, le=2**53)] | None = None
-    robust: bool = False
-    keep_these: tuple[Name, ...] = ()
-    never: tuple[Name, ...] = ()
-    apart_mm: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
-    at_most_taxels: Count | None = None
-    budget_us: Annotated[float, Meta(ge=0.0, le=1e12)] | None = None
-    refuse: Share = 0.01
 
 
 class Compared(Struct, frozen=True, forbid_unknown_fields=True):
@@ -405,7 +323,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     tables_sha256: Digest
     ensemble_sha256: Digest
     source: Origin
-    options: Options
+    options: Recipe
     grasps: Annotated[tuple[Name, ...], Meta(min_length=2)]
     switches: tuple[Switch, ...]
     joints: tuple[Calibration, ...]

@@ -11,10 +11,10 @@ import pytest
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
-from thenar.runtime.manifest import Options
+from thenar.runtime.recipe import Recipe
 
 NEWTONS = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
-FAST = Options(trainer="logitboost", rounds=10)
+FAST = Recipe(trainer="logitboost", rounds=10)
 
 
 @pytest.fixture

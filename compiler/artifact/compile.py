@@ -16,20 +16,9 @@ from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES
 from thenar.runtime.hand import HAND_NAME, HandDrawing, hand_from_bytes, hand_to_bytes
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.system import unread_joints
-from thenar.runtime.manifest import (
-    AUTO,
-    PAPERS_TRAINER,
-    SCHEMA,
-    Calibration,
-    Manifest,
-    Options,
-    Origin,
-    Proof,
-    Switch,
-    TableBits,
-    Threshold,
-)
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Switch, Threshold
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.recipe import AUTO, PAPERS_TRAINER, Recipe, TableBits, changed
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
@@ -42,12 +31,13 @@ from ..placement.elements import Element, names_of
 from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts, ports_of_whole_glove
 from ..publication import check_folder, publish_folder, sweep
+from ..recogniser import Recogniser, predicted_classes
 from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet, Joint
 from ..samples import Samples
 from ..tables.compare import Comparison, compare
 from ..tables.faults import count_faults, groups_of, worst_faults
-from ..trainers.base import SHARED, TRAINERS, Training, changed
+from ..trainers.base import SHARED, TRAINERS, Training
 from . import CompileError
 from .documents import REPORT_NAME, SPEC_FOLDER, TRY_NAME, BuildReport, Documents, Progress
 from .drawn_hand import drawn_hand
@@ -55,19 +45,14 @@ from .ensemble import ensemble_to_bytes
 from .replay import stored_digests
 from .training import (
     Tested,
-    Trained,
-    built_tables,
     cross_validated,
     cuts_of,
     detection_of,
     groups_for,
-    predicted_classes,
     rates_of,
-    rejected_by,
     samples_of,
     scores_of,
     segments_for,
-    train,
 )
 from .verify_firmware import made_firmware
 
@@ -126,7 +111,7 @@ Wired = Harness | Callable[[Sequence[str]], Harness]
 def compile_build(
     grasp_set: GraspSet,
     folder: str | Path,
-    options: Options | None = None,
+    options: Recipe | None = None,
     *,
     harness: Wired | None = None,
     ports: PortCosts | None = None,
@@ -146,7 +131,7 @@ def compile_build(
         The recordings.
     folder : path
         The folder to write: new, empty, or a build, which is replaced.
-    options : Options, optional
+    options : Recipe, optional
         How to choose, train and quantise.
     harness : Harness or callable, optional
         A wiring, or a function that returns one for the names of the kept switches. It makes the build state how to
@@ -189,7 +174,7 @@ def compile_build(
     10
     """
     target = check_target(Path(folder))
-    asked = _sound(changed(options or Options(), changes))
+    asked = _sound(changed(options or Recipe(), changes))
     samples = samples_of(grasp_set, asked)
     if asked.folds:
         check_trials(grasp_set, CompileError)
@@ -200,15 +185,17 @@ def compile_build(
     groups = groups_for(grasp_set, asked)
     glove = harness.cyberglove if isinstance(harness, Harness) else None
     limits = Limits.of(asked, grasp_set, {} if hand is None else hand.by_name, glove)
-    trained = train(samples, asked, steps.trained, ports, groups, jobs, limits)
-    made = Making(grasp_set, samples, asked, trained, harness, hand)
+    recogniser = Recogniser.fit(
+        samples, asked, ports=ports, limits=limits, groups=groups, jobs=jobs, report=steps.trained
+    )
+    made = BuildAssembly(grasp_set, recogniser, harness, hand)
     tested = cross_validated(
         samples, cuts, asked, partial(scores_of, samples, asked, ports, groups, limits), jobs, steps.tested
     )
     return made.publish(target, tested, documents, jobs, progress)
 
 
-def _sound(options: Options) -> Options:
+def _sound(options: Recipe) -> Recipe:
     """Return the options in canonical form, however they were given. Raises CompileError for invalid ones."""
     if options.table_bits not in get_args(TableBits):
         raise CompileError(f"table_bits={options.table_bits}: firmware tables have entries of 8 or 16 bits")
@@ -220,7 +207,7 @@ def _sound(options: Options) -> Options:
     only, *others = Training.candidates(options)
     trainer, given = options.trainer, {name: getattr(options, name) for name in SHARED} | options.settings
     if not others:
-        # Nothing is left to choose. Options with rounds mean LogitBoost.
+        # Nothing is left to choose. Recipe with rounds mean LogitBoost.
         trainer, given = AUTO if only.trainer == PAPERS_TRAINER else only.trainer, dict(only.settings)
     values = {name: float(value) if isinstance(value, int) else value for name, value in given.items()}
     # The first of several names is the default, and is not written.
@@ -230,7 +217,7 @@ def _sound(options: Options) -> Options:
     shared |= {name: int(shared[name]) for name in ("rounds", "max_bins") if shared[name] is not None}
     # msgspec omits a value that equals its default only if it is the same object.
     names = {"placement": sys.intern(options.placement), "trainer": sys.intern(trainer)}
-    usually = Options().refuse
+    usually = Recipe().refuse
     refuse = usually if options.refuse == usually else float(options.refuse)
     return replace(options, **shared, **names, settings=own, refuse=refuse)
 
@@ -250,36 +237,27 @@ class _Steps:
         self.trained(self._steps * (1 + done), self._steps)
 
 
-class Making:
-    """A build in progress: integer tables of the model trained on `samples`, the comparison between the two, and how to
-    read the switches.
+class BuildAssembly:
+    """A build before it is written: a recogniser, the comparison of its model with its integer tables, and how to read
+    the switches.
     """
 
     def __init__(
-        self,
-        grasp_set: GraspSet,
-        samples: Samples,
-        options: Options,
-        trained: Trained,
-        harness: Wired | None,
-        hand: HandShape | None = None,
+        self, grasp_set: GraspSet, recogniser: Recogniser, harness: Wired | None, hand: HandShape | None = None
     ) -> None:
-        self.grasp_set, self.samples = grasp_set, samples
-        self.options, self.trained, self.hand = options, trained, hand
-        kept = trained.read(samples)
-        self.integers = built_tables(trained, samples, options)
-        names = names_of(grasp_set, trained.kept)
+        self.grasp_set, self.recogniser, self.hand = grasp_set, recogniser, hand
+        kept, self.integers = recogniser.read(recogniser.samples), recogniser.tables
+        names = names_of(grasp_set, recogniser.elements)
         self.harness = harness(names) if callable(harness) else harness
         self.scan, self.unread = None, ""
         if self.harness is not None:
             self.scan = plan_scan(names, self.harness)
-            joints = [grasp_set.joint_names[joint] for joint in trained.joints]
+            joints = [grasp_set.joint_names[joint] for joint in recogniser.selection.joints]
             self.unread = unread_joints(self.harness, self.scan, joints)
-        self.comparison = compare(trained.model, self.integers, kept.switches, kept.codes)
-        self.rejection = rejected_by(trained, samples, self.integers, options, groups_for(grasp_set, options))
-        self._inputs = (*names, *(grasp_set.joint_names[joint] for joint in trained.joints))
-        sources = [grasp_set.element_names[element.column] for element in trained.kept]
-        self._groups = groups_of(self.scan, sources, len(trained.joints))
+        self.comparison = compare(recogniser.model, self.integers, kept.switches, kept.codes)
+        self._inputs = (*names, *(grasp_set.joint_names[joint] for joint in recogniser.selection.joints))
+        sources = [grasp_set.element_names[element.column] for element in recogniser.elements]
+        self._groups = groups_of(self.scan, sources, len(recogniser.selection.joints))
         groups = tuple(self._groups.values())
         held = kept.without_none()
         self.faults = count_faults(self.integers, held.switches, held.codes, held.labels, held.trials, groups)
@@ -293,7 +271,7 @@ class Making:
         progress: Progress | None,
     ) -> BuildReport:
         """Write the build as `target`, with the requested `documents`."""
-        files = {TABLES_NAME: tables_to_bytes(self.integers), ENSEMBLE_NAME: ensemble_to_bytes(self.trained.model)}
+        files = {TABLES_NAME: tables_to_bytes(self.integers), ENSEMBLE_NAME: ensemble_to_bytes(self.recogniser.model)}
         if self.scan is not None:
             files[SCAN_NAME] = scanmap_to_bytes(self.scan)
         undrawn = self._manifest(tested, files)
@@ -313,7 +291,7 @@ class Making:
             scan=self.scan,
             harness=self.harness,
             grasp_set=self.grasp_set,
-            trained=self.trained,
+            recogniser=self.recogniser,
             comparison=self.comparison,
             faults=self.faults,
             has_page=page is not None,
@@ -329,29 +307,31 @@ class Making:
     def _drawn(self, manifest: Manifest) -> HandDrawing:
         taxels = len(self.grasp_set.switch_names)
         names = self.grasp_set.element_names
-        codes = self.trained.read(self.samples).codes
+        codes = self.recogniser.read(self.recogniser.samples).codes
         return drawn_hand(manifest, self.hand, names[:taxels], names[taxels:], codes)
 
     def _page(self, manifest: Manifest, tables: bytes, hand: bytes) -> bytes | None:
         from ..tryout.writing import try_html
 
-        kept = self.trained.read(self.samples)
+        kept = self.recogniser.read(self.recogniser.samples)
         rows = kept.switches, kept.codes, kept.labels
         return try_html(manifest, tables, hand_from_bytes(hand, manifest), rows)
 
     def _only_answer(self) -> str | None:
         predicted = np.unique(self.comparison.deployed)
-        return self.samples.grasps[predicted[0]] if len(predicted) == 1 else None
+        return self.recogniser.samples.grasps[predicted[0]] if len(predicted) == 1 else None
 
     def _manifest(self, tested: Tested | None, files: Mapping[str, bytes]) -> Manifest:
         """Return the content of `build.json`, not sealed yet; `files` maps the names of its neighbours to content."""
         digests = {name: _sha256(data) for name, data in files.items()}
-        grasp_set, options, fitting = self.grasp_set, self.options, self.trained.fitting
-        kept = self.trained.read(self.samples)
-        deployed = predicted_classes(self.integers, self.rejection, kept.switches, kept.codes)
-        rates = rates_of("training", self.samples, deployed, options.seed)
-        detection = detection_of("training", self.samples, deployed, options.seed)
-        switches = zip(self.trained.kept, names_of(grasp_set, self.trained.kept), self.trained.gains, strict=True)
+        grasp_set, recogniser = self.grasp_set, self.recogniser
+        options, samples, fitting = recogniser.recipe, recogniser.samples, recogniser.fitting
+        kept = recogniser.read(samples)
+        deployed = predicted_classes(self.integers, recogniser.rejection, kept.switches, kept.codes)
+        rates = rates_of("training", samples, deployed, options.seed)
+        detection = detection_of("training", samples, deployed, options.seed)
+        elements = recogniser.elements
+        switches = zip(elements, names_of(grasp_set, elements), recogniser.selection.chosen.gains, strict=True)
         shares = kept.switches.mean(axis=0).tolist()
         return Manifest(
             schema=SCHEMA,
@@ -371,7 +351,7 @@ class Making:
                 trials=stored_digests(grasp_set),
             ),
             options=options,
-            grasps=self.samples.grasps,
+            grasps=samples.grasps,
             switches=tuple(
                 replace(
                     self._switch(*each),
@@ -381,19 +361,17 @@ class Making:
                 )
                 for each, least, most, share in zip(switches, *closed_shares(kept), shares, strict=True)
             ),
-            joints=tuple(_calibration(column, grasp_set.joints[column]) for column in self.trained.joints),
+            joints=tuple(_calibration(column, grasp_set.joints[column]) for column in recogniser.selection.joints),
             proof=_proof(self.integers, self.comparison, options.width),
             rates=rates if tested is None else (*rates, *tested.rates),
-            stopped_after=self.trained.stopped_after,
-            zero_gain_nodes=self.trained.zero_gain_nodes,
+            stopped_after=recogniser.stopped_after,
+            zero_gain_nodes=recogniser.zero_gain_nodes,
             scan_sha256=digests.get(SCAN_NAME),
             fitting=fitting if fitting is not None and fitting.compared else None,
             faults=worst_faults(self.faults, self._inputs, self._groups),
             detection=detection if tested is None else (*detection, *tested.detection),
-            rejection=self.rejection,
-            segments=segments_for(
-                grasp_set, self.samples, None if tested is None else tested.scores, self.integers.scale
-            ),
+            rejection=recogniser.rejection,
+            segments=segments_for(grasp_set, samples, None if tested is None else tested.scores, self.integers.scale),
         )
 
     def _switch(self, element: Element, name: str, gain: float) -> Switch:

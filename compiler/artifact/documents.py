@@ -10,16 +10,18 @@ from numpy.typing import NDArray
 
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest
+from thenar.runtime.recipe import Recipe, changed
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.tables import IntegerTables
 
 from ..evaluation.folds import EvaluationError
 from ..hand import HandShape
+from ..recogniser import Recogniser
 from ..recordings.graspset import GraspSet
 from ..tables.compare import Comparison, worst_case
 from ..tables.faults import FaultCounts
 from ..workers import little
-from .training import USUAL_ROUNDS, Trained
+from .training import USUAL_ROUNDS
 
 if TYPE_CHECKING:
     from ..evaluation.study import Study
@@ -75,7 +77,7 @@ class BuildReport:
     harness: Harness | None
     unread: str
     grasp_set: GraspSet
-    trained: Trained
+    recogniser: Recogniser
     comparison: Comparison
     faults: FaultCounts
     has_page: bool
@@ -128,10 +130,10 @@ class Documents:
                 manifest=made.manifest,
                 tables=made.tables,
                 tables_bytes=made.tables_bytes,
-                rounds=made.trained.rounds,
+                rounds=made.recogniser.rounds,
                 firmware=made.firmware,
                 only_answer=made.only_answer,
-                tree=made.trained.tree,
+                tree=made.recogniser.selection.chosen.tree,
                 confusion=made.confusion,
                 study=study,
                 no_study=no_study,
@@ -144,7 +146,7 @@ class Documents:
                 comparison=made.comparison,
                 faults=made.faults,
                 has_page=made.has_page,
-                worst=worst_case(made.trained.model, made.tables, made.comparison, made.manifest.grasps, names),
+                worst=worst_case(made.recogniser.model, made.tables, made.comparison, made.manifest.grasps, names),
             )
         )
 
@@ -165,7 +167,7 @@ def _study(made: BuildReport, jobs: int, progress: Progress | None) -> "tuple[St
 
     They are computed last, when nothing else can fail any more.
     """
-    from ..evaluation.study import Options, evaluate
+    from ..evaluation.study import StudyDesign, evaluate
 
     asked, fit = made.manifest.options, made.manifest.fit
     settings = {name: value for name, value in fit.settings.items() if value is not None}
@@ -173,20 +175,14 @@ def _study(made: BuildReport, jobs: int, progress: Progress | None) -> "tuple[St
         return None, "The build was compiled without folds."
     if (subjects := len(np.unique(made.grasp_set.subjects))) > _MOST_SUBJECTS:
         return None, f"The paper's tables have a column for each subject: {subjects} are too many for a page."
-    options = Options(
-        folds=asked.folds,
-        repeats=1,
-        rounds=int(settings.pop("rounds", None) or USUAL_ROUNDS),
-        protocols=("nested",),
-        tables=("compositions", "generality", "pruning"),
-        seed=asked.seed,
-        trainer=fit.trainer,
-        settings=settings,
-        levels=asked.levels,
-        keep_joints=asked.keep_joints,
+    rounds = int(settings.pop("rounds", None) or USUAL_ROUNDS)
+    recipe = Recipe(
+        trainer=fit.trainer, folds=asked.folds, seed=asked.seed, levels=asked.levels, keep_joints=asked.keep_joints
     )
+    recipe = changed(recipe, {"rounds": rounds, **settings})
     try:
-        work = _TRAININGS * len(made.grasp_set) * (options.rounds or USUAL_ROUNDS)
-        return evaluate(made.grasp_set, options, little(work, jobs), progress), ""
+        design = StudyDesign(recipe, repeats=1, protocols=("nested",), tables=("compositions", "generality", "pruning"))
+        work = _TRAININGS * len(made.grasp_set) * rounds
+        return evaluate(made.grasp_set, design, little(work, jobs), progress), ""
     except EvaluationError as reason:
         return None, f"These recordings do not allow the paper's tables: {reason}."

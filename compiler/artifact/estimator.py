@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from thenar.drivers.extras import optional
 from thenar.runtime.build import Build as LoadedBuild
-from thenar.runtime.manifest import By, Inputs, Options, TableBits
 from thenar.runtime.published import NONE
+from thenar.runtime.recipe import By, Inputs, Recipe, TableBits
 from thenar.runtime.tables import HIGHEST_CODE
 
 from ..additive.classifier import AdditiveLogitClassifier
@@ -24,18 +24,18 @@ from ..firmware.classifier import LIBRARY_NAME
 from ..firmware.generate import Firmware, write_folder
 from ..placement.elements import elements_of
 from ..placement.methods.base import METHODS, PAPERS
-from ..placement.placement import information_alone
+from ..placement.placement import Chosen, Selection, information_alone
 from ..placement.selectors import SwitchSelector
+from ..recogniser import Recogniser, Scores
 from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..tables.collapse import Model, ScoreTables
-from ..tables.quantise import integer_scores
 from . import CompileError
-from .compile import Making, Wired, check_target
+from .compile import BuildAssembly, Wired, check_target
 from .documents import BuildReport, Documents, Progress
 from .ensemble import model_fault
-from .training import Scores, Trained, cross_validated, cuts_of, integers_of
+from .training import cross_validated, cuts_of
 
 with optional():
     from sklearn.base import clone
@@ -121,9 +121,9 @@ def compile(  # noqa: A001
     folder : path
         The folder to write: new, empty, or a build, which is replaced.
     folds, seed, by
-        As in Options; folds fit clones of the estimator.
+        As in Recipe; folds fit clones of the estimator.
     table_bits, width : int
-        As in Options.
+        As in Recipe.
     harness, documents, jobs
         As in `compile_build`.
     progress : callable, optional
@@ -159,17 +159,19 @@ def compile(  # noqa: A001
     samples, classifier = Samples.of(grasp_set), _classifier(estimator)
     _columns(estimator, samples.inputs)
     samples = _labelled(samples, grasp_set, classifier.classes_)
-    trained = _trained(estimator, samples)
-    inputs: Inputs = "both" if trained.columns and trained.joints else "switches" if trained.columns else "joints"
-    options = Options(
+    selection, model = _learnt(estimator, samples)
+    columns = selection.chosen.columns
+    inputs: Inputs = "both" if columns and selection.joints else "switches" if columns else "joints"
+    options = Recipe(
         inputs=inputs, folds=folds, seed=seed, table_bits=table_bits, width=width, placement="estimator", by=by
     )
     if folds:
         check_trials(grasp_set, CompileError)
     cuts = cuts_of(grasp_set, options)
     options, gains = _placed_by(estimator, _trained_by(classifier, options))
-    trained = replace(trained, gains=gains or information_alone(samples.without_none(), trained.columns))
-    made = Making(grasp_set, samples, options, trained, harness)
+    gains = gains or information_alone(samples.without_none(), columns)
+    selection = replace(selection, chosen=Chosen(columns, gains, None))
+    made = BuildAssembly(grasp_set, Recogniser(options, samples, selection, model), harness)
     test = partial(_scores_of, estimator, samples, options)
     tested = cross_validated(samples, cuts, options, test, jobs, progress or _silent)
     return made.publish(target, tested, documents, jobs, progress)
@@ -183,8 +185,8 @@ def _classifier(estimator: Any) -> Any:
     return estimator[-1] if hasattr(estimator, "steps") else estimator
 
 
-def _trained(estimator: Any, samples: Samples) -> Trained:
-    """Return the model that an estimator learned from these samples, and the switches and joints that it uses."""
+def _learnt(estimator: Any, samples: Samples) -> tuple[Selection, Model]:
+    """Return the switches and joints that an estimator uses, and the model that it learned from these samples."""
     columns = _columns(estimator, samples.inputs)
     switches = tuple(column for column in columns if column < samples.n_switches)
     joints = tuple(column - samples.n_switches for column in columns if column >= samples.n_switches)
@@ -192,7 +194,7 @@ def _trained(estimator: Any, samples: Samples) -> Trained:
     model = _model(classifier, columns, samples.n_switches)
     if fault := model_fault(model, len(switches), len(joints), len(classifier.classes_)):
         raise CompileError(f"the estimator has a model that {fault}: fit it on these recordings")
-    return Trained(elements_of(samples), switches, (), None, model, joints)
+    return Selection(elements_of(samples), Chosen(switches, (), None), joints), model
 
 
 def _columns(estimator: Any, X: NDArray[np.uint16]) -> Columns:
@@ -248,7 +250,7 @@ def _model(classifier: Any, columns: Columns, n_switches: int) -> Model:
     return tables
 
 
-def _placed_by(estimator: Any, options: Options) -> tuple[Options, tuple[float, ...]]:
+def _placed_by(estimator: Any, options: Recipe) -> tuple[Recipe, tuple[float, ...]]:
     """Return the options with the method of the pipeline's SwitchSelector, if it has exactly one, and the gain of each
     switch in the ID3 tree, in the order of the columns.
     """
@@ -263,7 +265,7 @@ def _placed_by(estimator: Any, options: Options) -> tuple[Options, tuple[float, 
     return structs.replace(options, placement=method.name, **parameter), gains
 
 
-def _trained_by(classifier: Any, options: Options) -> Options:
+def _trained_by(classifier: Any, options: Recipe) -> Recipe:
     if isinstance(classifier, AdditiveLogitClassifier):
         own = {"penalty": float(classifier.penalty), "smoothness": float(classifier.smoothness)}
         own |= {"linear": 1.0} if classifier.linear else {}
@@ -281,14 +283,12 @@ def _trained_by(classifier: Any, options: Options) -> Options:
     )
 
 
-def _scores_of(estimator: Any, samples: Samples, options: Options, fold: Fold) -> Scores:
+def _scores_of(estimator: Any, samples: Samples, options: Recipe, fold: Fold) -> Scores:
     """Fit a clone on the fold's training rows only; return the scores (m, K) of its integers on the test rows."""
     learnt, classes = samples.rows(fold.train), estimator.classes_
     fitted = clone(estimator).fit(learnt.inputs, classes[learnt.labels])
-    trained = _trained(fitted, learnt)
-    tables = integers_of(trained, learnt, options)
-    test = trained.read(samples.rows(fold.test))
+    recogniser = Recogniser(options, learnt, *_learnt(fitted, learnt))
     scores = np.full((len(fold.test), len(classes)), _UNSEEN)
     known = (_classifier(fitted).classes_[:, np.newaxis] == classes).argmax(axis=1)
-    scores[:, known] = integer_scores(tables, test.switches, test.codes) / tables.scale
+    scores[:, known] = recogniser.scores(samples.rows(fold.test))
     return scores

@@ -10,8 +10,9 @@ frame is rejected for the rank of its rarest deviation, so one limit on ranks de
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.manifest import Options, Rejection
+from thenar.runtime.manifest import Rejection
 from thenar.runtime.published import NONE
+from thenar.runtime.recipe import Recipe
 from thenar.runtime.tables import HIGHEST_CODE, LIMIT, IntegerTables
 
 from ..evaluation.choosing import inner_folds
@@ -30,7 +31,7 @@ TAIL = 0.01
 
 
 def rejection_of(
-    samples: Samples, tables: IntegerTables, training: Training, options: Options, groups: NDArray[np.generic] | None
+    samples: Samples, tables: IntegerTables, training: Training, options: Recipe, groups: NDArray[np.generic] | None
 ) -> Rejection | None:
     """Return the rejection rule of a build with these tables.
 
@@ -60,7 +61,7 @@ def rejection_of(
     return _Limits(samples, tables).rejection(*slacks, options.refuse)
 
 
-def _tables(samples: Samples, training: Training, options: Options) -> IntegerTables:
+def _tables(samples: Samples, training: Training, options: Recipe) -> IntegerTables:
     model = collapse(training.train(samples), samples.n_switches)
     return quantise(model, samples.switches, samples.codes, options.width, options.table_bits)
 

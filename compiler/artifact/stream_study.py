@@ -18,8 +18,8 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.runtime.live.decision import Decision, SequentialTest, Standing
-from thenar.runtime.manifest import Inputs, Options
 from thenar.runtime.policy import Policy
+from thenar.runtime.recipe import Inputs, Recipe
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.segmenting.decoder import decode, emissions
 from thenar.runtime.segmenting.model import SegmentModel
@@ -27,6 +27,7 @@ from thenar.runtime.segmenting.model import SegmentModel
 from ..evaluation.folds import Fold, leave_groups_out, trial_folds
 from ..evaluation.rates import RecipeWords, student
 from ..evaluation.study import recipe_words
+from ..recogniser import Recogniser
 from ..recordings.graspset import GraspSet
 from ..samples import FRAMES, Samples
 from ..segmenting.learning import LAG_TICKS, Counts, announced_live, live_states
@@ -36,7 +37,7 @@ from ..tables.quantise import integer_scores
 from ..trainers.base import SHARED
 from ..workers import in_workers
 from .documents import Progress
-from .training import integers_of, scores_of, segments_for, train
+from .training import scores_of, segments_for
 
 Labels = NDArray[np.intp]
 _INNER = 4
@@ -89,7 +90,7 @@ class StreamStudy(msgspec.Struct, frozen=True):
 
 
 def study_streams(
-    grasp_set: GraspSet, options: Options, jobs: int = -1, progress: Progress | None = None
+    grasp_set: GraspSet, options: Recipe, jobs: int = -1, progress: Progress | None = None
 ) -> StreamStudy:
     """Evaluate segmentation on subjects that were left out.
 
@@ -97,7 +98,7 @@ def study_streams(
     ----------
     grasp_set : GraspSet
         Whole movements of two or more subjects, with rows in which nothing is held.
-    options : Options
+    options : Recipe
         How to place and train.
     jobs : int
         Worker processes; the result does not depend on their number.
@@ -127,7 +128,7 @@ def study_streams(
     kinds = [kind for kind, some in {"both": all(there.values()), **there}.items() if some]
     report, total = progress or (lambda _done, _total: None), len(subjects) * (1 + len(kinds))
     report(0, total)
-    chosen: dict[str, Options] = {}
+    chosen: dict[str, Recipe] = {}
     for subject, own in in_workers(partial(_chosen, grasp_set, kinds[0], options), subjects, jobs):
         chosen[subject] = own
         report(len(chosen), total)
@@ -151,7 +152,7 @@ def study_streams(
 
 
 def _learning(
-    grasp_set: GraspSet, kind: Inputs, options: Options, subject: str
+    grasp_set: GraspSet, kind: Inputs, options: Recipe, subject: str
 ) -> tuple[GraspSet, Samples, NDArray[np.intp]]:
     """Return the rows of all other subjects, as a set and as samples, and the numbers of those to learn from.
 
@@ -173,28 +174,28 @@ def _groups(own: GraspSet) -> NDArray[np.str_] | None:
     return own.subjects if len(np.unique(own.subjects)) > 1 else None
 
 
-def _chosen(grasp_set: GraspSet, kind: Inputs, options: Options, subject: str) -> tuple[str, Options]:
+def _chosen(grasp_set: GraspSet, kind: Inputs, options: Recipe, subject: str) -> tuple[str, Recipe]:
     """Return the options with the trainer and settings that suit all other subjects best."""
     own, learning, some = _learning(grasp_set, kind, options, subject)
-    training = train(learning.rows(some), options, groups=_groups(own.rows(some))).training
+    training = Recogniser.fit(learning, options, some, groups=_groups(own)).training
     assert training is not None
     settings: dict[str, Any] = dict(training.settings)
     return subject, replace(options, trainer=training.trainer, settings=settings, **dict.fromkeys(SHARED))
 
 
-def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Options]) -> tuple[Inputs, str, dict[str, Score]]:
+def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Recipe]) -> tuple[Inputs, str, dict[str, Score]]:
     kind, subject, options = task
     own, learning, some = _learning(grasp_set, kind, options, subject)
     samples, few = Samples.of(grasp_set, kind), learning.rows(some)
-    trained = train(few, options)
-    tables = integers_of(trained, few, options)
+    recogniser = Recogniser.fit(few, options)
+    tables = recogniser.integers
     scores = np.zeros((len(own), samples.n_classes))
     for fold in _inner_folds(learning, own, options):
         thinned = Fold(np.intersect1d(fold.train, some), fold.test, fold.name)
         scores[fold.test] = scores_of(learning, options, None, _groups(own), None, thinned)
     model = segments_for(own, learning, scores, tables.scale)
     assert model is not None
-    read = trained.read(samples)
+    read = recogniser.read(samples)
     counts = Counts.of((learning.labels[stream.rows] for stream in streams_of(own)), samples.n_types)
     parts: dict[str, list[tuple[bool, Labels, Labels, Labels | None]]] = {name: [] for name in METHODS}
     for stream in streams_of(grasp_set):
@@ -207,7 +208,7 @@ def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Options]) -> tuple
     return kind, subject, {name: score_streams(every, model.n_types) for name, every in parts.items()}
 
 
-def _inner_folds(learning: Samples, own: GraspSet, options: Options) -> list[Fold]:
+def _inner_folds(learning: Samples, own: GraspSet, options: Recipe) -> list[Fold]:
     """Return folds that together test all rows of streams: each leaves out some subjects, or half of the movements of
     the only one.
     """

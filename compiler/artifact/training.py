@@ -1,93 +1,35 @@
-"""The training of `compile`: choose a placement, fit a model on kept switches and joints, and repeat both in folds."""
+"""The folds of `compile`: recognisers of the training rows, and their accuracies on the test rows."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.manifest import By, Detected, Fitting, Of, Options, Protocol, Recognised, Rejection
-from thenar.runtime.rejection import refused
+from thenar.runtime.manifest import Detected, Of, Protocol, Recognised
+from thenar.runtime.recipe import By, Recipe
 from thenar.runtime.segmenting.model import SegmentModel
-from thenar.runtime.tables import IntegerTables
 
-from ..boosting.stumps import Stumps
-from ..evaluation.choosing import choose_training
 from ..evaluation.folds import Fold, leave_groups_out, leave_one_out, trial_folds
 from ..evaluation.populations import OF, groups_of
 from ..evaluation.rates import UNITS, rated
 from ..limits import check_inputs, check_memory, check_types
 from ..placement.constraints import Limits
-from ..placement.elements import Elements, bits_of, elements_of, ports_of
-from ..placement.joints import kept_joints
-from ..placement.methods.base import METHODS, PAPERS
-from ..placement.placement import choose
 from ..placement.ports import PortCosts
-from ..placement.tree import Tree
+from ..recogniser import Classes, Groups, Recogniser, Scores
+from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
-from ..samples import Columns, Samples
+from ..samples import Samples
 from ..segmenting.learning import learnt
 from ..segmenting.streams import TICK_US, SegmentingError, streams_of
-from ..tables.collapse import Model, collapse
-from ..tables.quantise import integer_scores, quantise
-from ..tables.standing_in import fit_lost
 from ..trainers.base import Report, Training
 from ..workers import in_workers, little
 from . import CompileError
-from .ensemble import MAX_STUMPS, model_fault
-from .rejecting import rejection_of
-
-Classes = NDArray[np.intp]
-Groups = NDArray[np.str_] | None
+from .ensemble import MAX_STUMPS
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Trained:
-    """A trained model and the choices behind it.
-
-    elements  switches, and levels of taxels, that were available
-    columns   indices of the kept ones among them, in the order in which they were chosen
-    gains     the gain of each (bits): in the ID3 tree, where None means that another method chose; else on its own
-    joints    columns of the kept joints
-    fitting   how the fit was chosen; training: how the model was trained. None for an estimator
-    """
-
-    elements: Elements
-    columns: Columns
-    gains: tuple[float, ...]
-    tree: Tree | None
-    model: Model
-    joints: Columns
-    fitting: Fitting | None = None
-    training: Training | None = None
-
-    @property
-    def kept(self) -> Elements:
-        """The kept elements, in the order in which they were chosen."""
-        return tuple(self.elements[column] for column in self.columns)
-
-    def read(self, samples: Samples) -> Samples:
-        """Return these samples as a glove with only the kept elements and joints reads them."""
-        return bits_of(samples.with_joints(self.joints), self.kept)
-
-    @property
-    def stopped_after(self) -> int:
-        """The number of rounds after which a tolerance ended the training; 0 if none did."""
-        early = isinstance(self.model, Stumps) and self.model.stopped_early
-        return self.rounds if early else 0
-
-    @property
-    def rounds(self) -> int:
-        """The number of boosting rounds in the model."""
-        return self.model.n_rounds if isinstance(self.model, Stumps) else 0
-
-    @property
-    def zero_gain_nodes(self) -> int:
-        """The number of tree nodes at which no single switch gained anything."""
-        return 0 if self.tree is None else self.tree.n_zero_gain
-
-
-def samples_of(grasp_set: GraspSet, options: Options) -> Samples:
+def samples_of(grasp_set: GraspSet, options: Recipe) -> Samples:
     """Return the samples of `grasp_set` for the option `inputs`. Raises CompileError if nothing can be learned."""
     wanted = options.inputs
     for kind, names in (("switches", grasp_set.element_names), ("joints", grasp_set.joint_names)):
@@ -113,69 +55,8 @@ def samples_of(grasp_set: GraspSet, options: Options) -> Samples:
     return samples
 
 
-def train(
-    samples: Samples,
-    options: Options,
-    report: Report | None = None,
-    ports: PortCosts | None = None,
-    groups: Groups = None,
-    jobs: int = 1,
-    limits: Limits | None = None,
-) -> Trained:
-    """Choose elements and fit, and train on them and the joints. Raises CompileError if no input separates grasp types.
-
-    Elements and joints are chosen to distinguish grasp types. Rows in which nothing is held are used only for the fit,
-    and no more of them than there are rows of grasps.
-
-    ports   the cost of reading switches and taxels, for methods that use it
-    groups  for each row (n,), what is left out where the fit is to generalise to new subjects, objects or sessions
-    jobs    worker processes that compare fits
-    limits  constraints on the placement
-    """
-    held, rows = samples.without_none(), samples.balanced()
-    elements = elements_of(held, options.levels)
-    held = bits_of(held, elements)
-    # Without switches the tree is a single leaf.
-    method = options.placement if held.n_switches else PAPERS
-    parameter = options.keep or 0 if METHODS.named(method).by_number else options.prune
-    own = None if ports is None else ports_of(ports, elements)
-    bound = None if limits is None else limits.on(elements, own)
-    chosen = choose(held, method, float(parameter), own, bound, robust=options.robust)
-    columns = chosen.columns
-    if not columns and not held.codes.shape[1]:
-        raise CompileError("no switch is worth keeping: lower ``prune``, or record switches that differ between grasps")
-    joints = kept_joints(held.keeping(columns), options.keep_joints, limits)
-    kept = bits_of(samples.rows(rows), elements).keeping(columns).with_joints(joints)
-    check_inputs(len(samples.grasps), len(columns), len(joints), CompileError)
-    inputs = kept.inputs
-    if not (inputs != inputs[0]).any():
-        raise CompileError("no input differs between rows: nothing distinguishes the grasp types")
-    candidates, of = Training.candidates(options), OF[options.by or "subject"]
-    by = None if groups is None else groups[rows]
-    fitting = choose_training(kept, candidates, seed=options.seed, groups=by, of=of, jobs=jobs, report=report)
-    training = Training.chosen(fitting, masked=options.robust)
-    model = training.train(kept, report if len(candidates) == 1 else None)
-    if fault := model_fault(model, kept.n_switches, kept.codes.shape[1], kept.n_classes):
-        raise CompileError(f"trainer {fitting.trainer!r} returned an invalid model that {fault}: fix the trainer")
-    return Trained(elements, columns, chosen.gains, chosen.tree, model, joints, fitting, training)
-
-
-def integers_of(trained: Trained, samples: Samples, options: Options) -> IntegerTables:
-    """Return the integer tables of a model trained on these samples."""
-    kept = trained.read(samples.rows(samples.balanced()))
-    tables = collapse(trained.model, kept.n_switches)
-    return quantise(tables, kept.switches, kept.codes, options.width, options.table_bits)
-
-
-def built_tables(trained: Trained, samples: Samples, options: Options) -> IntegerTables:
-    """Return the integer tables of a model trained on these samples, with fitted substitutes for lost inputs."""
-    kept = trained.read(samples.rows(samples.balanced()))
-    return fit_lost(integers_of(trained, samples, options), kept.switches, kept.codes, kept.labels)
-
-
 USUAL_ROUNDS = 100  # assumed amount of work where the fit is still to be chosen
 
-Scores = NDArray[np.float64]
 Test = Callable[[Fold], Scores]
 
 
@@ -188,16 +69,16 @@ class Cut:
     groups: Groups = None
 
 
-def groups_for(grasp_set: GraspSet, options: Options) -> Groups:
+def groups_for(grasp_set: GraspSet, options: Recipe) -> Groups:
     """Return the subject, object or session of each row (n,), if the headline rate is for new ones."""
     return groups_of(grasp_set, _by(grasp_set, options))
 
 
-def _by(grasp_set: GraspSet, options: Options) -> By:
+def _by(grasp_set: GraspSet, options: Recipe) -> By:
     return options.by or ("subject" if (grasp_set.subjects != grasp_set.subjects[0]).any() else "trial")
 
 
-def cuts_of(grasp_set: GraspSet, options: Options) -> tuple[Cut, ...]:
+def cuts_of(grasp_set: GraspSet, options: Recipe) -> tuple[Cut, ...]:
     """Return the folds for each rate to measure, the headline first; none without folds.
 
     No fold splits a movement. Raises EvaluationError where the recordings cannot be divided that way.
@@ -233,51 +114,21 @@ class Tested:
 
 
 def scores_of(
-    samples: Samples, options: Options, ports: PortCosts | None, groups: Groups, limits: Limits | None, fold: Fold
+    samples: Samples, options: Recipe, ports: PortCosts | None, groups: Groups, limits: Limits | None, fold: Fold
 ) -> Scores:
-    """Choose and train on the fold's training rows only; return the scores (m, K), in units, of its test rows.
+    """Fit a recogniser on the fold's training rows only; return its scores of the test rows: see `Recogniser.scores`.
 
-    Scores come from the integer tables. If frames can be rejected, column K is +infinity for rejected ones and
-    -infinity for the others. Raises CompileError, which names the fold, as `train` does.
+    Raises CompileError, which names the fold.
     """
-    learning = samples.rows(fold.train)
     try:
-        own = None if groups is None else groups[fold.train]
-        trained = train(learning, options, ports=ports, groups=own, limits=limits)
+        recogniser = Recogniser.fit(samples, options, fold.train, ports=ports, limits=limits, groups=groups)
     except CompileError as wrong:
         raise CompileError(f"in fold {fold.name}: {wrong}, or compile without folds (0)") from None
-    tables = integers_of(trained, learning, options)
-    rejection = rejected_by(trained, learning, tables, options, own)
-    test = trained.read(samples.rows(fold.test))
-    scores = integer_scores(tables, test.switches, test.codes)
-    if rejection is None:
-        return scores / tables.scale
-    beyond = np.where(refused(rejection, scores, test.switches, test.codes), np.inf, -np.inf)
-    return np.column_stack([scores / tables.scale, beyond])
-
-
-def rejected_by(
-    trained: Trained, samples: Samples, tables: IntegerTables, options: Options, groups: Groups
-) -> Rejection | None:
-    """Return the rejection rule learned from the training rows for these tables; None for an estimator."""
-    if trained.training is None:
-        return None
-    return rejection_of(trained.read(samples), tables, trained.training, options, groups)
-
-
-def predicted_classes(
-    tables: IntegerTables, rejection: Rejection | None, bits: NDArray[np.bool_], codes: NDArray[np.uint16]
-) -> Classes:
-    """Return the predicted classes (n,) of rows of kept switches (n, s) and codes (n, j); K: rejected."""
-    scores = integer_scores(tables, bits, codes)
-    found: Classes = scores.argmax(axis=1)
-    if rejection is not None:
-        found[refused(rejection, scores, bits, codes)] = tables.n_classes
-    return found
+    return recogniser.scores(samples.rows(fold.test))
 
 
 def cross_validated(
-    samples: Samples, cuts: Sequence[Cut], options: Options, test: Test, jobs: int, report: Report
+    samples: Samples, cuts: Sequence[Cut], options: Recipe, test: Test, jobs: int, report: Report
 ) -> Tested | None:
     """Return the result of the folds, None without folds; `test` returns the scores of a fold's test rows.
 
@@ -306,6 +157,27 @@ def cross_validated(
     rates = [rate for cut, own in measured for rate in rates_of("nested", samples, own, seed, cut)]
     detection = [each for cut, own in measured for each in detection_of("nested", samples, own, seed, cut)]
     return Tested(tuple(rates), tuple(detection), confusion, scores)
+
+
+def rates_of_recipe(
+    grasp_set: GraspSet,
+    recipe: Recipe,
+    *,
+    ports: PortCosts | None = None,
+    limits: Limits | None = None,
+    jobs: int = -1,
+    report: Report | None = None,
+) -> tuple[Recognised, ...]:
+    """Return the accuracies that `compile_build` would measure, the headline first: in every fold, elements and joints
+    are chosen and a model is trained on the training rows alone.
+
+    Raises CompileError or EvaluationError for recordings that do not allow it.
+    """
+    samples = samples_of(grasp_set, recipe)
+    check_trials(grasp_set, CompileError)
+    test = partial(scores_of, samples, recipe, ports, groups_for(grasp_set, recipe), limits)
+    tested = cross_validated(samples, cuts_of(grasp_set, recipe), recipe, test, jobs, report or (lambda *_: None))
+    return () if tested is None else tested.rates
 
 
 def learns_none(samples: Samples, cut: "Cut") -> NDArray[np.bool_]:

@@ -14,6 +14,7 @@ from thenar.runtime.manifest import Faults, Unit
 
 from ..boosting.stumps import Stumps
 from ..evaluation.rates import rated
+from ..recogniser import predicted_classes
 from ..recordings.graspset import GraspSet
 from ..tables.collapse import Model
 from ..tables.compare import Comparison, WorstCase, compare, worst_case
@@ -22,7 +23,6 @@ from . import CompileError
 from .documents import Progress
 from .ensemble import MAX_BYTES, ensemble_from_bytes, model_fault
 from .replay import trained_on
-from .training import predicted_classes
 from .verify_firmware import FirmwareVerification, select_inputs, verify_firmware
 
 

@@ -124,9 +124,9 @@ def plan_learning(
     parts = leave_groups_out(subjects, "subject") if scheme == "subject" else []
     cuts, counts = [], []
     for repeat in range(repeats):
-        random = np.random.default_rng((planner.seed, repeat))
+        random = np.random.default_rng((planner.recipe.seed, repeat))
         place = random.permutation(int(data.trials.max()) + 1)
-        for fold in parts or trial_folds(data.labels, data.trials, n_folds, planner.seed + repeat):
+        for fold in parts or trial_folds(data.labels, data.trials, n_folds, planner.recipe.seed + repeat):
             rank, count = _ranks(data, numbers, fold.train, place)
             cuts.append((repeat, fold, rank))
             counts.append(count)

@@ -7,11 +7,12 @@ import numpy as np
 
 from thenar.runtime.manifest import Of, Unit
 
+from ..placement.placement import Placer
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..trainers.base import Training
 from ..workers import in_workers
-from .plan import ANGLE, ANGLE_SELECTED, SELECTED, Composition, Data, Planner, Progress, predictions
+from .plan import ANGLE, ANGLE_SELECTED, SELECTED, Composition, Data, Planner, Progress, Ways, predictions
 from .populations import NESTED, OF, Population, Scheme, groups_of, populations
 from .rates import RecipeWords
 from .tables import Reader
@@ -52,15 +53,14 @@ class Permuted:
 
 @dataclass(frozen=True, slots=True)
 class Permutations:
-    """The evaluation to repeat m times, from a study's Options; parts are the populations of the true labels."""
+    """The evaluation to repeat m times, of a study; parts are the populations of the true labels."""
 
     parts: tuple[Population, ...]
     scheme: Scheme
-    folds: int
-    prune: int
-    seed: int
+    placer: Placer
     training: Training
-    recipe: RecipeWords
+    ways: Ways
+    words: RecipeWords
 
     def test(self, grasp_set: GraspSet, m: int, jobs: int, progress: Progress | None) -> Permuted:
         """Return the test with selected switches and joints, as far as the set has them; m > 0."""
@@ -75,7 +75,7 @@ class Permutations:
                 progress(len(shuffled), m)
         return Permuted(
             composition=f"{kind.name} {kind.what}",
-            recipe=self.recipe,
+            recipe=self.words,
             of=OF[self.scheme],
             unit="trials",
             rate=correct / total,
@@ -89,13 +89,14 @@ class Permutations:
 def _counted(task: tuple[Permutations, GraspSet, Composition, int]) -> tuple[int, int]:
     """Return the number of trials that a permutation (0: the true labels) predicts correctly, and the total."""
     how, grasp_set, kind, number = task
-    made = shuffled_labels(grasp_set, (how.seed, number)) if number else grasp_set
-    parts = populations(made, "trial", how.folds, 1, how.seed) if how.scheme == "trial" else how.parts
-    planner = Planner(parts, Samples.of(made), how.prune, (), how.seed)
+    recipe = how.placer.recipe
+    made = shuffled_labels(grasp_set, (recipe.seed, number)) if number else grasp_set
+    parts = populations(made, "trial", recipe.folds, 1, recipe.seed) if how.scheme == "trial" else how.parts
+    planner = Planner(parts, Samples.of(made), how.placer)
     cells = [planner.cell(part, kind, partial(planner.own, NESTED)) for part in parts]
     cells = [replace(cell, runs=cell.runs[:1]) for cell in cells]
     data = Data.of(made)
-    found = {fit: predictions(data, fit, how.training) for cell in cells for fit in cell.fits}
+    found = {fit: predictions(data, fit, how.training, how.ways) for cell in cells for fit in cell.fits}
     grasps = tuple(np.unique(made.labels).tolist())
     scheme = how.scheme
     groups = groups_of(made, scheme)

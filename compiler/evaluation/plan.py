@@ -3,19 +3,19 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
-from msgspec.structs import replace as replace_option
 from numpy.typing import NDArray
 
-from thenar.runtime.manifest import Options
+from thenar.runtime.recipe import AUTO, Recipe, changed
 
 from ..boosting.stumps import winners
 from ..placement.elements import Elements, bits_of, elements_of
 from ..placement.joints import joint_order
-from ..placement.methods.base import METHODS, PAPERS, Chooser
+from ..placement.methods.base import METHODS, PAPERS
 from ..placement.methods.filters import random_placement
+from ..placement.placement import Placer
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..tables.collapse import model_scores
@@ -58,8 +58,8 @@ class Data:
 class FoldFit:
     """Train on a fold's training rows with these elements, joints, and classes `grasps` (ascending labels); then test.
 
-    `learner` is a trainer, whose settings are chosen on the training rows, or one of CLASSIFIERS; "": the trainer and
-    settings of the evaluation. Two fits are equal if they have the same `Fold` object, inputs and learner.
+    `learner` is a trainer or AUTO, whose settings are chosen on the training rows, or one of CLASSIFIERS; "": the
+    trainer and settings of the recipe. Two fits are equal if they have the same `Fold` object, inputs and learner.
     """
 
     fold: Fold
@@ -90,7 +90,8 @@ def predictions(data: Data, fit: FoldFit, training: Training, ways: Ways | None 
         return grasps[CLASSIFIERS[fit.learner].predict(learning, test.inputs)]
     if fit.learner:
         groups = None if data.groups is None else data.groups[rows]
-        training = Training.chosen(choose_training(learning, (ways or {})[fit.learner], groups=groups))
+        fitting = choose_training(learning, (ways or {})[fit.learner], groups=groups)
+        training = Training.chosen(fitting, masked=training.masked)
     return grasps[winners(model_scores(training.train(learning), test.switches, test.codes))]
 
 
@@ -187,10 +188,10 @@ def learners() -> tuple[str, ...]:
     return tuple(dict.fromkeys([REFERENCE, *(name for name in TRAINERS if TRAINERS[name].tried), *CLASSIFIERS]))
 
 
-def ways_of(asked: Options) -> Ways:
-    """Return the candidates of each trainer; requested settings apply to the trainers that have them."""
+def ways_of(recipe: Recipe) -> Ways:
+    """Return the candidates of each trainer, and of AUTO: requested settings apply to the trainers that have them."""
     trainers = [name for name in learners() if name not in CLASSIFIERS]
-    own = {name: asked if name == asked.trainer else replace_option(Options(), trainer=name) for name in trainers}
+    own = {name: recipe if name == recipe.trainer else Recipe(trainer=name) for name in (*trainers, recipe.trainer)}
     return {name: Training.candidates(each) for name, each in own.items()}
 
 
@@ -220,22 +221,24 @@ class RowPlan:
 class Planner:
     """Plans the tables for populations of one set.
 
-    samples  of all rows; prune: S of the paper's placements; baselines: placement methods to compare with; levels:
-             the most of a taxel; keep_joints: how many joints classifiers get, chosen from the training rows, given
-             the switches. A method learns once from the same rows.
+    samples  of all rows; placer: chooses elements from the training rows, and its recipe says how many joints
+             classifiers get, chosen from the training rows, given the switches; baselines: methods to compare with.
+             A placement is chosen once from the same rows.
     """
 
     parts: tuple[Population, ...]
     samples: Samples
-    prune: int
-    prune_list: tuple[int, ...]
-    seed: int
+    placer: Placer
+    prune_list: tuple[int, ...] = ()
     baselines: tuple[str, ...] = BASELINES
-    levels: int | None = None
-    keep_joints: int | None = None
-    _choosers: dict[tuple[str, bytes], Chooser] = field(default_factory=dict, init=False, repr=False)
+    _chosen: dict[tuple[str, int | None, int, bytes], Elements] = field(default_factory=dict, init=False, repr=False)
     _elements: dict[bytes, Elements] = field(default_factory=dict, init=False, repr=False)
     _joint_orders: dict[tuple[Elements, bytes], Columns] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def recipe(self) -> Recipe:
+        """The recipe of the classifiers."""
+        return self.placer.recipe
 
     def table(self, name: TableName, protocol: Protocol) -> list[RowPlan]:
         """Return the rows of a table under a protocol."""
@@ -258,7 +261,7 @@ class Planner:
         def chosen_by(giver: Population, part: Population, fold: Fold) -> Elements:
             # Another subject's placement has never seen this subject's rows: both protocols allow it.
             own = part is giver
-            return self.own(protocol, part, fold) if own else self.chosen(PAPERS, giver.rows, self.prune)
+            return self.own(protocol, part, fold) if own else self.chosen(giver.rows)
 
         return [
             self._row(giver.name, f"placement of subject {giver.name}", SELECTED, partial(chosen_by, giver))
@@ -269,7 +272,7 @@ class Planner:
         everyone = np.unique(np.concatenate([part.rows for part in self.parts]))
 
         def pooled(least: int, part: Population, fold: Fold) -> Elements:
-            return self.chosen(PAPERS, protocol.may_choose_pooled(everyone, fold), least)
+            return self.chosen(protocol.may_choose_pooled(everyone, fold), prune=least)
 
         everything = self._row("all", "all switches", ALL_SWITCHES, lambda part, fold: ())
         pruned = [self._row(str(s), f"S = {s}", SELECTED, partial(pooled, s)) for s in self.prune_list]
@@ -277,17 +280,20 @@ class Planner:
 
     def _baselines(self, protocol: Protocol) -> list[RowPlan]:
         def baseline(name: str, part: Population, fold: Fold) -> Elements:
-            return self.chosen(name, protocol.may_choose(part, fold), len(self.own(protocol, part, fold)))
+            number = len(self.own(protocol, part, fold))
+            return self.chosen(protocol.may_choose(part, fold), placement=name, keep=number or None, prune=0)
 
         def drawn(draw: int, part: Population, fold: Fold) -> Elements:
             every = self.elements(fold.train)
-            places = random_placement(len(every), len(self.own(protocol, part, fold)), self.seed + draw)
+            places = random_placement(len(every), len(self.own(protocol, part, fold)), self.recipe.seed + draw)
             return tuple(every[place] for place in places)
 
-        baselines = [METHODS.named(name) for name in self.baselines]
+        recipe = METHODS.named(self.recipe.placement)
+        what = "the paper's placement" if recipe.name == PAPERS else recipe.help
+        baselines = [METHODS.named(name) for name in self.baselines if name != recipe.name]
         draws = [self._row("random", f"mean of {DRAWS} draws", SELECTED, partial(drawn, draw)) for draw in range(DRAWS)]
         return [
-            self._row(METHODS[PAPERS].title, "the paper's placement", SELECTED, partial(self.own, protocol)),
+            self._row(recipe.title, what, SELECTED, partial(self.own, protocol)),
             *(self._row(each.title, each.help, SELECTED, partial(baseline, each.name)) for each in baselines),
             _joined(draws),
         ]
@@ -317,27 +323,32 @@ class Planner:
     def _n_switches(self) -> int:
         return self.samples.n_switches + int(self.samples.taxels.shape[1])
 
+    @property
+    def _learner(self) -> str:
+        return AUTO if self.recipe.trainer == AUTO else ""
+
     def own(self, protocol: Protocol, part: Population, fold: Fold) -> Elements:
-        """Return ID3's placement for a fold, chosen from the population's own rows as the protocol allows."""
-        return self.chosen(PAPERS, protocol.may_choose(part, fold), self.prune)
+        """Return the recipe's placement for a fold, chosen from the population's own rows as the protocol allows."""
+        return self.chosen(protocol.may_choose(part, fold))
 
     def elements(self, rows: Rows) -> Elements:
         """Return the elements available in these rows."""
         key = rows.tobytes()
         if key not in self._elements:
-            self._elements[key] = elements_of(self.samples.rows(rows), self.levels)
+            self._elements[key] = elements_of(self.samples.rows(rows), self.recipe.levels)
         return self._elements[key]
 
-    def chosen(self, method: str, rows: Rows, parameter: int) -> Elements:
-        """Return the elements that a method keeps from these rows, in any order of rows."""
-        if not self._n_switches:
+    def chosen(self, rows: Rows, **changes: Any) -> Elements:
+        """Return the elements that the recipe, with other choices `changes`, keeps from these rows, in any order."""
+        recipe = changed(self.recipe, changes)
+        method = METHODS.named(recipe.placement)
+        if not self._n_switches or (method.by_number and recipe.keep is None):
             return ()
         rows = np.sort(rows)
-        key, elements = (method, rows.tobytes()), self.elements(rows)
-        if key not in self._choosers:
-            alone = self.samples.rows(rows).with_joints(())
-            self._choosers[key] = METHODS.named(method).chooser(bits_of(alone, elements))
-        return tuple(elements[place] for place in self._choosers[key](parameter))
+        key = method.name, recipe.keep, recipe.prune, rows.tobytes()
+        if key not in self._chosen:
+            self._chosen[key] = self.placer.elements(self.samples.rows(rows), **changes)
+        return self._chosen[key]
 
     def joints(self, rows: Rows, elements: Elements, most: int | None) -> Columns:
         """Return the best joints, ascending, at most `most`, given these elements and rows; None: all."""
@@ -358,14 +369,14 @@ class Planner:
     ) -> CellPlan:
         """Return the fits of composition `kind` on every fold of `part`.
 
-        `select` returns the placement for a fold, and `most` is the number of joints kept, None: `keep_joints`.
+        `select` returns the placement for a fold, and `most` is the number of joints kept, None: the recipe's.
         """
 
         def fit(fold: Fold) -> FoldFit:
             placement = select(part, fold) if kind.needs_placement else ()
             elements = kind.elements(placement, self.elements(fold.train) if kind.others else ())
-            joints = self.joints(fold.train, elements, most or self.keep_joints) if kind.angle else ()
-            return FoldFit(fold, elements, joints, part.grasps, learner)
+            joints = self.joints(fold.train, elements, most or self.recipe.keep_joints) if kind.angle else ()
+            return FoldFit(fold, elements, joints, part.grasps, learner or self._learner)
 
         return CellPlan(part, tuple(tuple(map(fit, folds)) for folds in part.repeats))
 

@@ -8,7 +8,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thenar.runtime.manifest import Of, Options, Unit
+from thenar.runtime.manifest import Of, Unit
+from thenar.runtime.recipe import Recipe
 
 from ..samples import decided
 from ..text import counted, interval
@@ -164,7 +165,7 @@ class Rate:
         return f"{interval(self)} % {self.what}"
 
 
-def placement_words(options: Options) -> str:
+def placement_words(options: Recipe) -> str:
     """Return a placement method with its settings in words: "elimination, keep 16, the best 3 joints"."""
     by = f"S = {options.prune}" if options.keep is None else f"keep {options.keep}"
     joints = "" if options.keep_joints is None else f", the best {counted(options.keep_joints, 'joint')}"

@@ -1,22 +1,24 @@
 """An evaluation: the paper's tables for the user's own recordings, with each distinct fit run once."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
 import numpy as np
-from msgspec.structs import replace as replace_fields
 
-from thenar.runtime.manifest import Options as Manifested
 from thenar.runtime.manifest import fit_name
+from thenar.runtime.recipe import AUTO, PAPERS_TRAINER, Recipe, changed
 
 from ..limits import check_memory, check_types
+from ..placement.constraints import Limits
 from ..placement.methods.base import METHODS, PAPERS
+from ..placement.placement import Placer
+from ..placement.ports import PortCosts
 from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..text import counted
-from ..trainers.base import Training, changed
+from ..trainers.base import Training
 from .folds import EvaluationError
 from .learning import Learning, LearningPlan, plan_learning
 from .permutation import Permutations, Permuted
@@ -29,7 +31,6 @@ from .plan import (
     Progress,
     RowPlan,
     TableName,
-    Ways,
     is_blind,
     run_fits,
     ways_of,
@@ -43,46 +44,50 @@ _NESTED: tuple[TableName, ...] = ("trainers", "joints")
 
 # Tables with a row that trains on all switches at once.
 _OF_ALL_SWITCHES: tuple[TableName, ...] = ("compositions", "pruning")
+_FEWEST_FOLDS = 2
+PAPERS_RECIPE = Recipe(trainer=PAPERS_TRAINER)
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
-    """Settings of an evaluation.
+class StudyDesign:
+    """What to evaluate, and how.
 
+    recipe      of every classifier: its placement, which the tables vary, its trainer, and folds and seed. In the table
+                of trainers and the learning curve, the settings that are not given are chosen from the training rows
     subjects    whose rows to use; empty: everybody's
     scheme      what is kept together in a fold: trials (stratified as in Weka), blocks of trial numbers, or subjects,
                 objects or sessions, each left out in turn
-    folds       for `trial` and `block`
     repeats     for `trial`, with seeds seed, seed + 1, ...
-    prune       S of the placements of the compositions, the generality and the baselines
     prune_list  each S of the table of pooled and pruned placements
-    baselines   methods to compare with ID3, in addition to random placements
-    trainer     the trainer of every classifier, with its `settings`; in the table of trainers and the learning curve,
-                what is not given is chosen from the training rows
-    rounds      LogitBoost's; None: the paper's hundred
-    levels      the most levels of a taxel to choose from, None: the usual number
-    keep_joints the number of joints for classifiers, chosen from the training rows, None: all
+    baselines   methods to compare with the recipe's, in addition to random placements
     learning    whether to compute learning curves
     permute     number of evaluations with shuffled labels, for the chance level; 0: none
     """
 
+    recipe: Recipe = PAPERS_RECIPE
     subjects: tuple[str, ...] = ()
     scheme: Scheme = "trial"
-    folds: int = 4
     repeats: int = 3
-    rounds: int | None = None
-    prune: int = 0
     prune_list: tuple[int, ...] = (0, 13, 62)
     protocols: tuple[ProtocolName, ...] = ("paper", "nested")
     tables: tuple[TableName, ...] = TABLES
-    seed: int = 1
     baselines: tuple[str, ...] = BASELINES
-    trainer: str = "logitboost"
-    settings: Mapping[str, float | str] = field(default_factory=dict)
     permute: int = 0
     learning: bool = False
-    levels: int | None = None
-    keep_joints: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.recipe.folds < _FEWEST_FOLDS:
+            raise EvaluationError(f"``folds`` {self.recipe.folds}: an evaluation needs {_FEWEST_FOLDS} or more")
+        METHODS.named(self.recipe.placement).check_given(self.recipe.keep, self.recipe.prune)
+        for name in self.baselines:
+            if not METHODS.named(name).by_number:
+                raise EvaluationError(f"{name} takes S: baselines must be methods that take a number of switches")
+
+    def changed(self, **changes: Any) -> Self:
+        """Return a design with other values, by name: fields, choices of the recipe, or settings of its trainer."""
+        names = {each.name for each in fields(self)}
+        recipe = changed(self.recipe, {name: value for name, value in changes.items() if name not in names})
+        return replace(self, **{"recipe": recipe, **{name: changes[name] for name in changes if name in names}})
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +100,7 @@ class LeftOut:
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """The result: the options and the set, the grasp types that occur, warnings, and the tables.
+    """The result: the design and the set, the grasp types that occur, warnings, and the tables.
 
     left_out names requested tables that have no meaning here, with the reason; permuted is the permutation test,
     learning the learning curves; each is None if not requested. rests is the number of trials in which nothing is held;
@@ -105,7 +110,7 @@ class Study:
     fingerprint: str
     rows: int
     trials: int
-    options: Options
+    options: StudyDesign
     grasps: tuple[str, ...]
     warnings: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
@@ -116,14 +121,15 @@ class Study:
 
     def __str__(self) -> str:
         """Return the numbers of trials and frames, and the scheme of the folds."""
-        options, repeats = self.options, counted(self.options.repeats, "repeat")
+        design, recipe = self.options, self.options.recipe
+        repeats = counted(design.repeats, "repeat")
         cut = {
-            "trial": f"{options.folds} stratified folds of whole trials, {repeats} from seed {options.seed}",
+            "trial": f"{recipe.folds} stratified folds of whole trials, {repeats} from seed {recipe.seed}",
             "subject": "one subject left out at a time (the column), all others trained on",
             "object": "one object left out at a time",
             "session": "one session left out at a time",
-            "block": f"{options.folds} blocks of trials",
-        }[options.scheme]
+            "block": f"{recipe.folds} blocks of trials",
+        }[design.scheme]
         grasps = counted(len(self.grasps), "grasp type")
         frames = f" of {self.rows:,} frames" if self.rows > self.trials else ""
         rests = f"; {counted(self.rests, 'rest')} left out" if self.rests else ""
@@ -133,25 +139,30 @@ class Study:
 
 def evaluate(
     grasp_set: GraspSet,
-    options: Options | None = None,
+    design: StudyDesign | None = None,
     jobs: int = -1,
     progress: Progress | None = None,
+    *,
+    ports: PortCosts | None = None,
+    limits: Limits | None = None,
     **changes: Any,
 ) -> Study:
-    """Cross-validate: return the paper's tables that `options` request and the set has inputs for.
+    """Cross-validate: return the paper's tables that `design` requests and the set has inputs for.
 
     Parameters
     ----------
     grasp_set : GraspSet
         The recordings. Rows in which nothing is held are left out.
-    options : Options, optional
+    design : StudyDesign, optional
         What to evaluate, and how.
     jobs : int
         Worker processes; -1: all cores. The result does not depend on their number.
     progress : callable, optional
         Called with (done, total) after each classifier.
+    ports, limits : PortCosts, Limits, optional
+        Costs of reading the glove, and constraints on every placement, as for `place`.
     **changes
-        Single options, such as `folds=5`, which override those in `options`.
+        Single fields of the design, choices of its recipe such as `folds=5`, or settings of its trainer.
 
     Returns
     -------
@@ -173,33 +184,20 @@ def evaluate(
     >>> 0 <= study.tables[0].rows[0].rate.mean <= 1
     True
     """
-    options = replace(options or Options(), **changes)
-    training, ways = _trainers(options)
-    chosen = _of_subjects(grasp_set.without_none(), options.subjects)
-    planned = _Planned.of(chosen, options)
-    before = None if progress is None else _before(progress, options.permute)
+    design = (design or StudyDesign()).changed(**changes)
+    training, ways = Training.of(design.recipe), ways_of(design.recipe)
+    chosen = _of_subjects(grasp_set.without_none(), design.subjects)
+    planned = _Planned.of(chosen, design, Placer(design.recipe, ports, limits))
+    before = None if progress is None else _before(progress, design.permute)
     predictions = run_fits(planned.data, planned.fits, training, jobs, before, ways)
     permuted = None
-    if m := options.permute:
-        recipe = _recipe_of("compositions", options)
-        how = Permutations(planned.parts, options.scheme, options.folds, options.prune, options.seed, training, recipe)
+    if m := design.permute:
+        words = _recipe_of("compositions", design.recipe)
+        how = Permutations(planned.parts, design.scheme, planned.placer, training, ways, words)
         permuted = how.test(chosen, m, jobs, None if progress is None else _after(progress, len(predictions)))
     found = planned.study(grasp_set.fingerprint(), predictions, permuted)
     empty = grasp_set.is_none & np.isin(grasp_set.subjects, np.unique(chosen.subjects))
     return replace(found, rests=len(np.unique(grasp_set.trial_ids[empty])))
-
-
-def _trainers(options: Options) -> tuple[Training, Ways]:
-    """Return the training of every classifier, and the candidates of each trainer; check the baselines too."""
-    for name in options.baselines:
-        if not METHODS.named(name).by_number:
-            raise EvaluationError(f"{name} takes S: baselines must be methods that take a number of switches")
-    wanted = _asked(options)
-    return Training.of(wanted), ways_of(wanted)
-
-
-def _asked(options: Options) -> Manifested:
-    return changed(Manifested(rounds=options.rounds, trainer=options.trainer), options.settings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,7 +205,8 @@ class _Planned:
     """An evaluation before its fits are run: the tables' rows and the learning curves of `grasp_set`."""
 
     grasp_set: GraspSet
-    options: Options
+    design: StudyDesign
+    placer: Placer
     parts: tuple[Population, ...]
     data: Data
     left_out: tuple[LeftOut, ...]
@@ -215,34 +214,26 @@ class _Planned:
     curves: LearningPlan | None
 
     @classmethod
-    def of(cls, grasp_set: GraspSet, options: Options) -> Self:
-        """Plan the tables that `options` request and the set has inputs for."""
-        parts = populations(grasp_set, options.scheme, options.folds, options.repeats, options.seed)
-        reasons = {name: _why_not(name, grasp_set, parts, options) for name in options.tables}
+    def of(cls, grasp_set: GraspSet, design: StudyDesign, placer: Placer) -> Self:
+        """Plan the tables that `design` requests and the set has inputs for."""
+        recipe = design.recipe
+        parts = populations(grasp_set, design.scheme, recipe.folds, design.repeats, recipe.seed)
+        reasons = {name: _why_not(name, grasp_set, parts, design) for name in design.tables}
         if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
             _check_all_switches(grasp_set, parts)
-        planner = Planner(
-            parts,
-            Samples.of(grasp_set),
-            options.prune,
-            options.prune_list,
-            options.seed,
-            options.baselines,
-            options.levels,
-            options.keep_joints,
-        )
+        planner = Planner(parts, Samples.of(grasp_set), placer, design.prune_list, design.baselines)
         tables = {
             (name, each.name): planner.table(name, each)
             for name, reason in reasons.items()
             if reason is None
             for each in PROTOCOLS
-            if each.name in options.protocols and (each is NESTED or name not in _NESTED)
+            if each.name in design.protocols and (each is NESTED or name not in _NESTED)
         }
-        data, curves = Data.of(grasp_set, options.scheme), None
-        if options.learning:
-            curves = plan_learning(data, grasp_set.subjects, planner, options.scheme, options.folds, options.repeats)
+        data, curves = Data.of(grasp_set, design.scheme), None
+        if design.learning:
+            curves = plan_learning(data, grasp_set.subjects, planner, design.scheme, recipe.folds, design.repeats)
         left_out = tuple(LeftOut(name, reason) for name, reason in reasons.items() if reason is not None)
-        return cls(grasp_set, options, parts, data, left_out, tables, curves)
+        return cls(grasp_set, design, placer, parts, data, left_out, tables, curves)
 
     @property
     def fits(self) -> list[FoldFit]:
@@ -252,38 +243,45 @@ class _Planned:
 
     def study(self, fingerprint: str, predictions: dict[FoldFit, Labels], permuted: Permuted | None) -> Study:
         """Read the accuracies off the predictions."""
-        grasp_set, options, data, curves = self.grasp_set, self.options, self.data, self.curves
+        grasp_set, design, data, curves = self.grasp_set, self.design, self.data, self.curves
         grasps = tuple(np.unique(grasp_set.labels).tolist())
         blind = frozenset(fit for fit in predictions if is_blind(data, fit))
-        of = OF[options.scheme]
+        of = OF[design.scheme]
         reader = Reader(grasp_set.labels, data.trials, grasps, predictions, blind, of, data.groups)
         return Study(
             fingerprint=fingerprint,
             rows=len(grasp_set),
             trials=int(data.trials.max()) + 1,
-            options=options,
+            options=design,
             grasps=tuple(grasp_set.taxonomy.types[label] for label in grasps),
-            warnings=concerns(grasp_set, self.parts, options.scheme, options.folds),
+            warnings=concerns(grasp_set, self.parts, design.scheme, design.recipe.folds),
             left_out=self.left_out,
             tables=tuple(
-                reader.table(*which, rows, _recipe_of(which[0], options)) for which, rows in self.tables.items()
+                reader.table(*which, rows, _recipe_of(which[0], design.recipe)) for which, rows in self.tables.items()
             ),
             permuted=permuted,
             learning=None
             if curves is None
-            else curves.read(replace(reader, of=curves.of), data.groups, options.seed, _recipe_of("trainers", options)),
+            else curves.read(
+                replace(reader, of=curves.of),
+                data.groups,
+                design.recipe.seed,
+                _recipe_of("trainers", design.recipe),
+            ),
         )
 
 
-def recipe_words(options: Manifested) -> RecipeWords:
-    """Return the recipe of classifiers that all have the same placement and trainer."""
-    training = Training.of(options)
-    return RecipeWords(placement_words(options), fit_name(training.trainer, training.settings))
+def recipe_words(recipe: Recipe) -> RecipeWords:
+    """Return the words for classifiers that all have the same placement and trainer."""
+    training, trainer = Training.of(recipe), "chosen from the training rows"
+    if recipe.trainer != AUTO:
+        trainer = fit_name(training.trainer, training.settings)
+    return RecipeWords(placement_words(recipe), trainer)
 
 
-def _recipe_of(name: TableName, options: Options) -> RecipeWords:
-    """Return the recipe of a table."""
-    same = recipe_words(replace_fields(_asked(options), prune=options.prune, keep_joints=options.keep_joints))
+def _recipe_of(name: TableName, recipe: Recipe) -> RecipeWords:
+    """Return the words for the recipe of a table."""
+    same = recipe_words(recipe)
     methods: dict[TableName, str] = {
         "pruning": f"{PAPERS}, S of the row, all subjects pooled",
         "baselines": f"that of the row, as many elements as {same.method}",
@@ -325,16 +323,18 @@ def _check_all_switches(grasp_set: GraspSet, parts: tuple[Population, ...]) -> N
         check_memory(rows, len(part.grasps), EvaluationError, varying)
 
 
-def _why_not(name: TableName, grasp_set: GraspSet, parts: tuple[Population, ...], options: Options) -> str | None:
-    """Return why a table has no meaning for the set and the options, or None."""
+def _why_not(name: TableName, grasp_set: GraspSet, parts: tuple[Population, ...], design: StudyDesign) -> str | None:
+    """Return why a table has no meaning for the set and the design, or None."""
     if name == "joints" and not grasp_set.joints:
         return "the set has no joints"
     if name in _NESTED:
-        return None if "nested" in options.protocols else f"{name} are compared under the nested protocol only"
+        return None if "nested" in design.protocols else f"{name} are compared under the nested protocol only"
     if name != "compositions" and not grasp_set.element_names:
         return "a placement needs switches, and the set has none"
     if name == "generality" and len(parts) < 2:
         return "another's placement needs a second subject"
-    if name == "generality" and options.scheme == "subject":
+    if name == "pruning" and design.recipe.placement != PAPERS:
+        return f"S prunes the tree of {PAPERS}, and the recipe has another method"
+    if name == "generality" and design.scheme == "subject":
         return "when a subject is left out, the placement is always that of others"
     return None

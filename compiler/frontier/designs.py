@@ -12,7 +12,7 @@ from ..evaluation.rates import Rate
 from ..trainers.base import TRAINERS, Training
 from .finalists import Close
 from .latency import POLICIES
-from .points import DecisionKind, Latency, Point, Recipe, Time, front
+from .points import DecisionKind, Latency, Point, PointSetting, Time, front
 from .price import PricedTables, Wired
 from .screen import Screened
 from .search import Candidate, Shape
@@ -188,7 +188,7 @@ def corrected(rate: Rate, luck: float) -> Rate:
 
 
 def _trained(training: Training) -> dict[str, Any]:
-    """Return the `Recipe` fields of the trainer, except for rounds."""
+    """Return the `PointSetting` fields of the trainer, except for rounds."""
     usual = {setting.name: setting.default for setting in TRAINERS.named(training.trainer).settings}
     own = {name: value for name, value in training.settings.items() if value not in (usual[name], None)}
     # msgspec omits a name that equals the default only if it is the very same string.
@@ -210,7 +210,7 @@ def _point(
     choice = close.screened.choice
     return Point(
         number=number,
-        setting=Recipe(
+        setting=PointSetting(
             placement=choice.placement,
             inputs=choice.inputs,
             rounds=tabled.rounds if TRAINERS.named(training.trainer).staged else None,

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 from math import log
 
-from thenar.runtime.manifest import Inputs
+from thenar.runtime.recipe import Inputs
 
 from ..evaluation.folds import Fold
 from ..evaluation.rates import Rate

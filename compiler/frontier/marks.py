@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import PAPERS_TRAINER
+from thenar.runtime.recipe import PAPERS_TRAINER
 
 from ..evaluation.rates import Rate
 from ..placement.methods.base import BEST, PAPERS

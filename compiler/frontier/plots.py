@@ -7,7 +7,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
-from thenar.runtime.manifest import Inputs
+from thenar.runtime.recipe import Inputs
 
 from ..evaluation.rates import Rate
 from ..pictures import on_paper, painting, rendered

@@ -7,8 +7,8 @@ import msgspec
 from msgspec import Meta, Struct, field
 
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.manifest import PAPERS_TRAINER, Given, Inputs, Name, TableBits
 from thenar.runtime.names import fault, shortened
+from thenar.runtime.recipe import PAPERS_TRAINER, Given, Inputs, Name, TableBits
 
 from ..evaluation.rates import Rate
 
@@ -53,7 +53,7 @@ class PlacementChoice(Struct, frozen=True, forbid_unknown_fields=True):
     parameter: Annotated[float, Meta(ge=0.0, le=1e6)]
 
 
-class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+class PointSetting(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """All choices of a point: the input of `compile --from`, and the settings of the runtime.
 
     rounds      None for a trainer without rounds
@@ -110,7 +110,7 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """
 
     number: int
-    setting: Recipe
+    setting: PointSetting
     switches: tuple[str, ...]
     rate: Rate
     luck: Share

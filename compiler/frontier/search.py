@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
-from thenar.runtime.manifest import AUTO, PAPERS_TRAINER, Inputs, Options, TableBits
+from thenar.runtime.recipe import AUTO, PAPERS_TRAINER, Inputs, Recipe, TableBits, changed
 
 from ..placement.elements import LEVELS
 from ..placement.methods.base import METHODS, usual
-from ..trainers.base import TRAINERS, Number, Training, changed
+from ..trainers.base import TRAINERS, Number, Training
 from .points import FrontierError, PlacementChoice
 
 # Baselines are only shown for comparison: their curves have few sizes.
@@ -148,8 +148,8 @@ class Search:
         }
         return tuple(found.values())
 
-    def _asked(self, trainer: str) -> Options:
-        return changed(Options(), {"trainer": trainer, **self.settings})
+    def _asked(self, trainer: str) -> Recipe:
+        return changed(Recipe(), {"trainer": trainer, **self.settings})
 
     @property
     def staged(self) -> bool:

@@ -8,7 +8,8 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from thenar.runtime.manifest import Fitting, Inputs
+from thenar.runtime.manifest import Fitting
+from thenar.runtime.recipe import Inputs
 
 from ..boosting.stumps import winners
 from ..evaluation.choosing import choose_training

@@ -4,13 +4,14 @@ import csv
 import io
 from collections.abc import Callable, Iterable, Iterator
 
-from thenar.runtime.manifest import PAPERS_TRAINER, in_words
+from thenar.runtime.manifest import in_words
 from thenar.runtime.names import printable, taxel_and_code
+from thenar.runtime.recipe import PAPERS_TRAINER
 
 from ..evaluation.rates import Rate
 from ..sensors import SensorCount
 from ..text import cells, counted, duration, interval, listed, percent
-from .points import Frontier, Mark, Point, Recipe, Time
+from .points import Frontier, Mark, Point, PointSetting, Time
 
 COLUMNS = (
     *("number", "fronts", "n_switches", "inputs", "method", "parameter", "rounds", "width"),
@@ -78,34 +79,34 @@ def shorten(name: str) -> str:
     return line if len(line) <= _LONGEST else f"{line[: _LONGEST - 3]}..."
 
 
-def way_of(setting: Recipe) -> str:
+def way_of(setting: PointSetting) -> str:
     """Return how switches were chosen: "id3 62", "id3 62, 3 levels"."""
     levels = "" if setting.levels is None else f", {counted(setting.levels, 'level')}"
     return f"{setting.placement.method} {setting.placement.parameter:g}{levels}"
 
 
-def training_of(setting: Recipe) -> str:
+def training_of(setting: PointSetting) -> str:
     """Return the training in words, without the paper's trainer: "100 rounds", "naive-bayes, joint-bins 5"."""
     name = () if setting.trainer == PAPERS_TRAINER else (setting.trainer,)
     rounds = () if setting.rounds is None else (counted(setting.rounds, "round"),)
     return ", ".join((*name, *rounds, *_settings(setting)))
 
 
-def trainer_of(setting: Recipe) -> str:
+def trainer_of(setting: PointSetting) -> str:
     """Return trainer and settings, including the paper's trainer: "logitboost, 100 rounds"."""
     return f"{setting.trainer}, {training_of(setting)}" if setting.trainer == PAPERS_TRAINER else training_of(setting)
 
 
-def is_usual(setting: Recipe) -> bool:
+def is_usual(setting: PointSetting) -> bool:
     """Return whether rounds and bins fully describe the training."""
     return setting.trainer == PAPERS_TRAINER and not setting.settings
 
 
-def _settings(setting: Recipe) -> list[str]:
+def _settings(setting: PointSetting) -> list[str]:
     return [in_words(name, value) for name, value in setting.settings.items()]
 
 
-def wiring_of(setting: Recipe) -> str:
+def wiring_of(setting: PointSetting) -> str:
     """Return wiring and clock: "mcp23017 400 kHz", "board 1 Mbaud"; "" if no switch is read."""
     if not setting.clock_hz:
         return ""

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.harness.wiring import GloveWiring
-from thenar.runtime.manifest import Options
 from thenar.runtime.names import list_names, nearest
+from thenar.runtime.recipe import Recipe
 
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
@@ -75,7 +75,7 @@ class Limits:
 
     @classmethod
     def of(
-        cls, options: Options, grasp_set: GraspSet, places: Places, glove: GloveWiring | None = None
+        cls, options: Recipe, grasp_set: GraspSet, places: Places, glove: GloveWiring | None = None
     ) -> "Limits | None":
         """Return the constraints that a build's options put on a set's elements and joints, or None."""
         asked = (options.keep_these, options.never, options.apart_mm, options.at_most_taxels, options.budget_us)

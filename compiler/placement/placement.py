@@ -11,6 +11,8 @@ import msgspec
 import numpy as np
 from msgspec.structs import replace
 
+from thenar.runtime.recipe import Recipe, changed
+
 from ..elementary import LN_2
 from ..limits import check_types
 from ..recordings.graspset import GraspSet
@@ -29,6 +31,75 @@ from .robust import most_robust
 from .tree import Tree
 
 Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """The elements and joints that a recipe keeps.
+
+    elements  those that there were to choose from: switches, and levels of taxels
+    chosen    the columns of the kept ones among them, in the method's order
+    joints    the columns of the kept joints
+    """
+
+    elements: Elements
+    chosen: "Chosen"
+    joints: Columns
+
+    @property
+    def kept(self) -> Elements:
+        """The kept elements, in the method's order."""
+        return tuple(self.elements[column] for column in self.chosen.columns)
+
+    def read(self, samples: Samples) -> Samples:
+        """Return these samples as a glove with only the kept elements and joints reads them."""
+        return bits_of(samples.with_joints(self.joints), self.kept)
+
+
+def select(samples: Samples, recipe: Recipe, ports: PortCosts | None = None, limits: Limits | None = None) -> Selection:
+    """Choose elements and joints of `samples`, rows in which something is held, as a recipe says.
+
+    Parameters
+    ----------
+    samples : Samples
+        The rows to choose from. A method that uses joints uses those that they have.
+    recipe : Recipe
+        The method, and how many elements, levels and joints to keep.
+    ports : PortCosts, optional
+        The costs of reading switches and taxels, for methods that use them; None: all cost the same.
+    limits : Limits, optional
+        Constraints on the placement.
+
+    Raises
+    ------
+    MemberError
+        If there is no such method.
+    PlacementError
+        If it cannot choose.
+    """
+    elements = elements_of(samples, recipe.levels)
+    bits = bits_of(samples, elements)
+    # Without switches the tree is a single leaf.
+    method = METHODS.named(recipe.placement if bits.n_switches else PAPERS)
+    parameter = float(recipe.keep or 0 if method.by_number else recipe.prune)
+    costs = None if ports is None else ports_of(ports, elements)
+    bound = None if limits is None else limits.on(elements, costs)
+    chosen = choose(bits, method.name, parameter, costs, bound, robust=recipe.robust)
+    return Selection(elements, chosen, kept_joints(bits.keeping(chosen.columns), recipe.keep_joints, limits))
+
+
+@dataclass(frozen=True, slots=True)
+class Placer:
+    """A recipe, and the costs and constraints under which it chooses: see `select`."""
+
+    recipe: Recipe
+    ports: PortCosts | None = None
+    limits: Limits | None = None
+
+    def elements(self, samples: Samples, **changes: Any) -> Elements:
+        """Return the elements that the recipe keeps with other choices `changes`, from rows (n, s) of any order."""
+        recipe = changed(self.recipe, {"keep_joints": None, **changes})
+        return select(samples, recipe, self.ports, self.limits).kept
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,40 +269,32 @@ class Placement:
 
 def place(
     grasp_set: GraspSet,
-    parameter: float = 0.0,
+    recipe: Recipe | None = None,
     *,
-    method: str = PAPERS,
-    joints: bool = False,
     ports: PortCosts | None = None,
-    levels: int | None = None,
-    keep_joints: int | None = None,
     limits: Limits | None = None,
-    robust: bool = False,
+    **changes: Any,
 ) -> Placement:
-    """Choose elements of all rows of a set: switches, and levels of taxels.
+    """Choose elements of all rows of a set, switches and levels of taxels, as `compile_build` does.
 
     Parameters
     ----------
     grasp_set : GraspSet
         The training rows; rows in which nothing is held are left out. A tie between grasp types goes to the first of
         them in the taxonomy.
-    parameter : float
-        The paper's S (rows below which a node decides nothing), or how many switches to keep at most, as the method
-        takes it.
-    method : str
-        A name in `METHODS`.
-    joints : bool
-        Choose the switches that help most in addition to the joints. Only elimination uses the joints.
-    ports : PortCosts or None
+    recipe : Recipe, optional
+        The method, and how many elements, levels and joints to keep.
+    ports : PortCosts, optional
         Costs of reading each switch and taxel, for methods that use them; None: all cost the same.
-    levels : int, optional
-        How many levels of a taxel there are to choose from, at most.
-    keep_joints : int, optional
-        How many joints to keep, in addition to the kept switches; None: joints are not chosen.
     limits : Limits, optional
         Constraints on the placement.
-    robust : bool
-        Choose the placement that loses least with its worst lost switch.
+    **changes
+        Single choices, such as `prune=13`, which override those of `recipe`.
+
+    Returns
+    -------
+    Placement
+        The kept elements, in the method's order.
 
     Raises
     ------
@@ -239,30 +302,34 @@ def place(
         If there is no such method.
     PlacementError
         If the set has no switches, no rows, or more grasp types than a build can hold.
+
+    Examples
+    --------
+    >>> from thenar.compiler import GraspSet, place
+    >>> len(place(GraspSet.load("set.grasps"), placement="elimination", keep=4).switches)
+    4
     """
+    recipe = changed(recipe or Recipe(), changes)
     fingerprint, grasp_set = grasp_set.fingerprint(), grasp_set.without_none()
-    read = _samples_of(grasp_set, joints=joints or keep_joints is not None)
-    elements = elements_of(read, levels)
-    read = bits_of(read, elements)
-    samples = read if joints else read.with_joints(())
-    own = None if ports is None else ports_of(ports, elements)
-    bound = None if limits is None else limits.on(elements, own)
-    chosen = choose(samples, method, parameter, own, bound, robust=robust)
-    name = partial(_kept_of, grasp_set, elements)
+    samples = _samples_of(grasp_set, recipe)
+    selection = select(samples, recipe, ports, limits)
+    method, chosen = METHODS.named(recipe.placement), selection.chosen
     return Placement(
-        method=method,
-        parameter=parameter,
-        joints=joints,
-        switches=_with_gains(name(chosen.columns), chosen),
+        method=method.name,
+        parameter=float(recipe.keep or 0 if method.by_number else recipe.prune),
+        joints=method.uses_joints and samples.codes.shape[1] > 0,
+        switches=_with_gains(_kept_of(grasp_set, selection.kept), chosen),
         rows=len(grasp_set),
         fingerprint=fingerprint,
-        all_names=names_of(grasp_set, elements),
+        all_names=names_of(grasp_set, selection.elements),
         n_switches=len(grasp_set.switch_names),
         n_taxels=len(grasp_set.taxel_columns),
         n_joints=len(grasp_set.joints),
         grasps=samples.grasps,
         tree=chosen.tree,
-        kept_joints=() if keep_joints is None else _joints_kept(grasp_set, read, chosen.columns, keep_joints, limits),
+        kept_joints=()
+        if recipe.keep_joints is None
+        else tuple(grasp_set.joint_names[joint] for joint in selection.joints),
     )
 
 
@@ -290,33 +357,27 @@ def place_by_subject(grasp_set: GraspSet, prune: int, on_done: Progress) -> list
     found = []
     for done, (title, rows) in enumerate(groups):
         on_done(done, len(groups))
-        found.append((title, place(rows, prune)))
+        found.append((title, place(rows, prune=prune)))
     return found
 
 
-def _samples_of(grasp_set: GraspSet, *, joints: bool) -> Samples:
-    """Return the rows of a set to choose switches from, with the joints' codes or without."""
-    if not grasp_set.element_names:
-        raise PlacementError("the set has no switches to place: it holds joints only")
+def _samples_of(grasp_set: GraspSet, recipe: Recipe) -> Samples:
+    """Return the rows of a set to choose from, with the recipe's inputs."""
+    if not grasp_set.element_names or recipe.inputs == "joints":
+        why = "``inputs`` are the joints" if grasp_set.element_names else "the set holds joints only"
+        raise PlacementError(f"there are no switches to place: {why}")
     if not len(grasp_set):
         raise PlacementError("there are no rows: a placement needs at least one labelled grasp")
+    if recipe.keep_joints is not None and (not grasp_set.joints or recipe.inputs == "switches"):
+        raise PlacementError("there are no joints to choose from: leave ``keep_joints`` out")
     check_types(len(np.unique(grasp_set.labels)), PlacementError)
-    return Samples.of(grasp_set, "both" if joints else "switches")
+    return Samples.of(grasp_set, recipe.inputs)
 
 
-def _kept_of(grasp_set: GraspSet, elements: Elements, columns: Columns) -> tuple[Kept, ...]:
-    """Return the elements at `columns`, with their names."""
-    kept, n_switches = tuple(elements[column] for column in columns), len(grasp_set.switch_names)
+def _kept_of(grasp_set: GraspSet, kept: Elements) -> tuple[Kept, ...]:
+    """Return the kept elements with their names."""
+    n_switches = len(grasp_set.switch_names)
     return tuple(
         Kept(one.column, name, above=None if one.column < n_switches else one.code)
         for one, name in zip(kept, names_of(grasp_set, kept), strict=True)
     )
-
-
-def _joints_kept(
-    grasp_set: GraspSet, samples: Samples, columns: Columns, most: int, limits: Limits | None
-) -> tuple[str, ...]:
-    """Return the names of the joints to keep in addition to the switches `columns`."""
-    if not grasp_set.joints:
-        raise PlacementError("the set has no joints to choose from: leave ``keep_joints`` out")
-    return tuple(grasp_set.joint_names[joint] for joint in kept_joints(samples.keeping(columns), most, limits))

@@ -6,8 +6,9 @@ from itertools import accumulate
 
 import msgspec
 
-from thenar.runtime.manifest import AUTO, Manifest
+from thenar.runtime.manifest import Manifest
 from thenar.runtime.published import NONE
+from thenar.runtime.recipe import AUTO
 from thenar.runtime.scanning.propose import own_joints
 from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us
 

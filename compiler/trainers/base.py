@@ -5,11 +5,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from msgspec.structs import replace
-
 from thenar.drivers.errors import ThenarError
 from thenar.drivers.members import Members
-from thenar.runtime.manifest import AUTO, Fitting, Options
+from thenar.runtime.manifest import Fitting
+from thenar.runtime.recipe import AUTO, Recipe
 
 if TYPE_CHECKING:
     from ..samples import Samples
@@ -154,18 +153,10 @@ class Trainer(ABC):
         return values
 
 
-def changed(options: Options, changes: Mapping[str, Any]) -> Options:
-    """Return `options` with other values, by name; names that are not options are settings of the trainer."""
-    fields = {name: value for name, value in changes.items() if name in Options.__struct_fields__}
-    settings = {name: value for name, value in changes.items() if name not in fields}
-    asked = replace(options, **fields)
-    return replace(asked, settings={**asked.settings, **settings})
-
-
 TRAINERS: Members[Trainer] = Members("trainer", Trainer, "thenar.compiler.trainers", "thenar.trainers")  # type: ignore[type-abstract]
 
 
-# Options that are settings of some trainers. None means not given.
+# Recipe that are settings of some trainers. None means not given.
 SHARED = ("rounds", "shrinkage", "tolerance", "max_bins")
 
 
@@ -181,7 +172,7 @@ class Training:
     masked: bool = False
 
     @classmethod
-    def of(cls, options: Options) -> "Training":
+    def of(cls, options: Recipe) -> "Training":
         """Return the training that `options` define, with defaults for what is not given.
 
         If no trainer is given, the defaults are the paper's, of LogitBoost. Raises MemberError or TrainerError for
@@ -195,7 +186,7 @@ class Training:
         )
 
     @classmethod
-    def candidates(cls, options: Options) -> "tuple[Training, ...]":
+    def candidates(cls, options: Recipe) -> "tuple[Training, ...]":
         """Return every training that `options` allow, to be compared: a single one if nothing is left open.
 
         Raises MemberError or TrainerError for invalid options.
@@ -226,7 +217,7 @@ class Training:
         return samples.masked() if self.masked else samples
 
 
-def _asked(options: Options) -> list[tuple[Trainer, dict[str, Number]]]:
+def _asked(options: Recipe) -> list[tuple[Trainer, dict[str, Number]]]:
     """Return the trainers that may be used, and the settings given to each.
 
     A given setting that some trainers lack applies to the simplest trainer that has it, the one with the fewest

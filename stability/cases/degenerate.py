@@ -12,7 +12,7 @@ from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import Stumps, winners
 from thenar.compiler.elementary import softmax
-from thenar.compiler.evaluation.study import Options, evaluate
+from thenar.compiler.evaluation.study import evaluate
 from thenar.compiler.placement.placement import place
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import Build
@@ -92,7 +92,7 @@ def _refused() -> Finding:
         ("placement of no switch", lambda _: place(SOLVABLE["one joint"]), "no switches to place"),
         ("rates of no row", lambda _: evaluate(_ONE_ROW.rows([])), "the set has no rows"),
         ("rates of one row", lambda _: evaluate(_ONE_ROW), fewer),
-        ("rates without the one subject", lambda _: evaluate(_ONE_CLASS, Options(scheme="subject")), "two or more"),
+        ("rates without the one subject", lambda _: evaluate(_ONE_CLASS, scheme="subject"), "two or more"),
     ]
     found = Worst("impossible requests not rejected with the right message", "the message", 0, "requests")
     for what, question, sentence in asked:
@@ -165,7 +165,7 @@ def _never_predicted(classes: Sequence[int], rounds: int) -> Finding:
 
 def _nothing_to_see() -> Finding:
     """If no input varies, every table of the evaluation predicts the most frequent grasp type."""
-    study = evaluate(_CONSTANT, Options(rounds=2, repeats=1), jobs=1)
+    study = evaluate(_CONSTANT, jobs=1, rounds=2, repeats=1)
     off = Worst("correct rows if no input varies: off by", "the commonest type's rows", 0, "rows")
     for table in study.tables:
         for row in table.rows:

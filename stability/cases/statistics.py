@@ -11,7 +11,7 @@ from thenar.compiler.evaluation.folds import Fold, weka_folds
 from thenar.compiler.evaluation.plan import Data, FoldFit, predictions
 from thenar.compiler.evaluation.populations import Population, Scheme, populations
 from thenar.compiler.evaluation.rates import ALIKE, UNITS, WEIGHT, Rate, clustered
-from thenar.compiler.evaluation.study import Options, evaluate
+from thenar.compiler.evaluation.study import evaluate
 from thenar.compiler.evaluation.tables import Cell
 from thenar.compiler.placement.elements import elements_of
 from thenar.compiler.recordings.graspset import GraspSet
@@ -212,7 +212,7 @@ def _evaluations() -> Iterator[Finding]:
     guessed = Worst("rows predicted as a class that their fold was not trained on", "the set's rows", 0, "rows")
     silent = Worst("sets silently evaluated on untrained types", "a warning", 0, "sets")
     for name, (grasp_set, scheme) in lopsided().items():
-        study = evaluate(grasp_set, Options(scheme=scheme, rounds=10, repeats=2, tables=("compositions",)), jobs=1)
+        study = evaluate(grasp_set, jobs=1, scheme=scheme, rounds=10, repeats=2, tables=("compositions",))
         rows = [row.cells for table in study.tables for row in table.rows]
         tested = [tested_labels(grasp_set, part) for part in parts_of(grasp_set, scheme)]
         miscounted.see(sum(sum(map(differs, cells, tested)) for cells in rows), name, tried=len(rows) * len(tested))

@@ -8,7 +8,8 @@ import numpy as np
 
 from thenar.compiler.tables.furthest import furthest
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Switch
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Switch
+from thenar.runtime.recipe import Recipe
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import (
     LIMIT,
@@ -37,7 +38,7 @@ def bare_build(tables: IntegerTables) -> Build:
             tables_sha256=_NO_DIGEST,
             ensemble_sha256=_NO_DIGEST,
             source=Origin(_NO_DIGEST, 0, "none", tables.n_switches, joints=tables.n_joints),
-            options=Options(0, 1, "both", 1.0, 0, 1),
+            options=Recipe(0, 1, "both", 1.0, 0, 1),
             grasps=tuple(str(number) for number in range(tables.n_classes)),
             switches=tuple(Switch(number, str(number), 0.0) for number in range(tables.n_switches)),
             joints=tuple(Calibration(number, str(number), "deg", 0, 0.0, 1, 1.0) for number in range(tables.n_joints)),

@@ -121,8 +121,10 @@ def test_json_on_stdout_and_in_the_file_are_one_document(
     assert run(["evaluate", grasps, *QUICK, *arguments, "--json", "-o", str(output)]) == 0
     result = json.loads(capsys.readouterr().out)
     assert result == json.loads(output.read_text())
-    options = {"subjects": ["Ann"], "prune": 3, "prune_list": [5, 0], "seed": 7, "rounds": 2, "scheme": "trial"}
-    assert options.items() <= result["options"].items()
+    recipe = {"prune": 3, "seed": 7, "rounds": 2, "trainer": "logitboost"}
+    assert recipe.items() <= result["options"].pop("recipe").items()
+    design = {"subjects": ["Ann"], "prune_list": [5, 0], "scheme": "trial"}
+    assert design.items() <= result["options"].items()
     assert {table["name"] for table in result["tables"]} == {"compositions", "pruning"}
     assert result["left_out"] == [{"name": "generality", "reason": "another's placement needs a second subject"}]
 
@@ -296,3 +298,20 @@ def test_an_interrupt_ends_the_workers_and_writes_nothing(grasps: str, tmp_path:
     assert not printed
     assert list(tmp_path.iterdir()) == []
     assert all_end(workers, within_s=10)
+
+
+def test_the_recipe_of_the_tables_is_the_one_that_is_asked_for(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:
+    tables = ["--tables", "compositions,baselines,pruning", "--protocol", "nested", "--jobs", "1", "--repeats", "1"]
+    recipe = ["--method", "elimination", "--keep", "2", "--never", "s0", "--trainer", "auto", "--rounds", "2"]
+    assert run(["evaluate", grasps, *tables, *recipe, "--json"]) == 0
+    study = json.loads(capsys.readouterr().out)
+    compositions, baselines = study["tables"]
+    assert compositions["recipe"]["method"] == "elimination, keep 2"
+    assert compositions["recipe"]["trainer"] == "chosen from the training rows"
+    selected = next(row for row in compositions["rows"] if row["name"] == "VI")
+    assert selected["switches"]["most"] == 2
+    assert [row["name"] for row in baselines["rows"]] == ["elimination", "CMIM", "top-k", "random"]
+    (missing,) = study["left_out"]
+    assert missing["name"] == "pruning"
+    assert run(["evaluate", grasps, "--streams", "--never", "s0"]) == 2
+    assert "--never is not for --streams" in capsys.readouterr().err

@@ -92,7 +92,7 @@ def test_what_cannot_be_built_is_refused_before_the_training(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.delattr("thenar.compiler.artifact.training.choose_training")
+    monkeypatch.delattr("thenar.compiler.recogniser.choose_training")
     code, complaint = compiled(change)
     assert (code, said in complaint, "Traceback" in complaint) == (2, True, False), complaint
     assert not (tmp_path / "build").exists()

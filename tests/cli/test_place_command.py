@@ -68,7 +68,7 @@ def test_a_set_without_switches_is_refused(
         tmp_path / "joints.grasps"
     )
     assert run(["place", str(tmp_path / "joints.grasps")]) == 2
-    assert capsys.readouterr().err == "thenar: the set has no switches to place: it holds joints only\n"
+    assert capsys.readouterr().err == "thenar: there are no switches to place: the set holds joints only\n"
 
 
 @pytest.mark.parametrize(

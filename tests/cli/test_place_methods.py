@@ -86,7 +86,7 @@ def test_a_glove_that_lacks_a_switch_says_nothing_of_its_cost(
         (["--method", "elimintion"], "there is no method 'elimintion' (did you mean 'elimination'"),
         (["--method", "cmim", "--keep", "3", "--tree"], "--tree prints the tree of the paper's ID3"),
         (["--method", "cmim", "--keep", "3", "--draw", "a.svg"], "--draw draws the tree of the paper's ID3"),
-        (["--joints"], "--joints is for methods other"),
+        (["--inputs", "joints"], "there are no switches to place"),
         (["--glove", "GLOVE"], "--glove gives the scan costs"),
         (["--method", "elimination", "--keep", "3", "--glove", "GLOVE"], "weighs them: elimination-cost, id3-cost"),
     ],
@@ -105,3 +105,35 @@ def test_what_does_not_go_together_is_one_sentence_and_code_two(
 def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["place", "--help"]) == 0
     assert "thenar place set.grasps --method elimination --keep 16" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--prune", "8"],
+        ["--method", "elimination", "--keep", "3"],
+        ["--method", "elimination", "--keep", "3", "--inputs", "switches", "--never", "s1"],
+        ["--method", "elimination", "--keep", "3", "--keep-joints", "1", "--robust"],
+    ],
+    ids=" ".join,
+)
+def test_place_keeps_what_compile_keeps(set_file: Path, tmp_path: Path, options: list[str], capsys: Captured) -> None:
+    assert run(["place", str(set_file), *options, "--json"]) == 0
+    placed = json.loads(capsys.readouterr().out)
+    made = ["compile", str(set_file), "-o", str(tmp_path / "build"), *options, "--trainer", "logitboost"]
+    assert run([*made, "--rounds", "2", "--folds", "0", "--no-report", "--json"]) == 0
+    manifest = json.loads(capsys.readouterr().out)
+    assert [switch["name"] for switch in manifest["switches"]] == [switch["name"] for switch in placed["switches"]]
+    if "kept_joints" in placed:
+        assert [joint["name"] for joint in manifest["joints"]] == placed["kept_joints"]
+
+
+def test_place_measures_what_compile_measures(set_file: Path, tmp_path: Path, capsys: Captured) -> None:
+    options = ["--method", "elimination", "--keep", "3", "--trainer", "logitboost", "--rounds", "3", "--folds", "3"]
+    assert run(["place", str(set_file), *options, "--json"]) == 0
+    rates = json.loads(capsys.readouterr().out)["rates"]
+    assert run(["compile", str(set_file), "-o", str(tmp_path / "build"), *options, "--no-report", "--json"]) == 0
+    measured = json.loads(capsys.readouterr().out)["rates"]
+    assert rates == [rate for rate in measured if rate["protocol"] == "nested"]
+    assert run(["place", str(set_file), *options]) == 0
+    assert "accuracy, " in capsys.readouterr().out

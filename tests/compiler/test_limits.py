@@ -11,7 +11,7 @@ from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.artifact import CompileError
 from thenar.compiler.boosting.boost import BoostingError, boost
 from thenar.compiler.evaluation.folds import EvaluationError
-from thenar.compiler.evaluation.study import Options, evaluate
+from thenar.compiler.evaluation.study import Study, StudyDesign, evaluate
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.limits import check_inputs, check_memory
@@ -20,6 +20,7 @@ from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.placement.placement import place
 from thenar.compiler.samples import Samples, SamplesError
 from thenar.drivers.errors import ThenarError
+from thenar.runtime.recipe import Recipe
 
 Make = Callable[..., GraspSet]
 Measure = Callable[[Callable[[], object]], int]
@@ -128,8 +129,9 @@ def test_of_many_switches_few_are_chosen_without_counting_all_pairs(
 
 
 def test_the_baselines_of_an_evaluation_take_a_set_of_many_switches(wide: GraspSet, peak_bytes: Measure) -> None:
-    options, studies = Options(folds=2, repeats=1, rounds=1, protocols=("nested",), tables=("baselines",)), []
-    assert peak_bytes(lambda: studies.append(evaluate(wide, options, jobs=1))) < 10_000 * wide.switches.shape[1]
+    recipe, studies = Recipe(trainer="logitboost", folds=2, rounds=1), list[Study]()
+    design = StudyDesign(recipe, repeats=1, protocols=("nested",), tables=("baselines",))
+    assert peak_bytes(lambda: studies.append(evaluate(wide, design, jobs=1))) < 10_000 * wide.switches.shape[1]
     assert [row.name for row in studies[0].tables[0].rows] == ["ID3", "CMIM", "top-k", "random"]
 
 
@@ -141,4 +143,4 @@ def test_all_switches_that_do_not_fit_into_memory_are_refused_before_placements_
     with pytest.raises(
         EvaluationError, match=r"30 rows of 2 grasp types needs some 0\.0 GB of memory.*fewer rows or columns"
     ):
-        evaluate(wide, Options(repeats=1), jobs=1)
+        evaluate(wide, jobs=1, repeats=1)

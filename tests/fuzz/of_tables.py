@@ -97,7 +97,7 @@ def _use(grasps: GraspSet) -> None:
     """Do what follows on an import: look at the set, choose switches, export it."""
     summarise(grasps)
     if grasps.switch_names:
-        place(grasps, 2)
+        place(grasps, prune=2)
     to_csv(grasps)
     to_arff(grasps, meta=True)
     grasps.fingerprint()

@@ -13,10 +13,11 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME, Build
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Recognised, Switch
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Recognised, Switch
 from thenar.runtime.manifest_file import manifest_to_bytes
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import Count, DeviceHealth, Drift, HealthReport, JointAngles, LiveGrasp
+from thenar.runtime.recipe import Recipe
 from thenar.runtime.tables import IntegerTables, Slope, tables_to_bytes
 
 MakeTables = Callable[..., IntegerTables]
@@ -61,7 +62,7 @@ def _describe(tables: IntegerTables) -> Manifest:
         tables_sha256=hashlib.sha256(data).hexdigest(),
         ensemble_sha256="0" * 64,
         source=Origin("1" * 64, 10, "own", 20, joints=22),
-        options=Options(0, 100, "both", 1.0, 4, 1),
+        options=Recipe(0, 100, "both", 1.0, 4, 1),
         grasps=tuple(f"grasp {number}" for number in range(tables.n_classes)),
         switches=tuple(Switch(number, f"s{number}", 0.5) for number in range(tables.n_switches)),
         joints=tuple(Calibration(n, f"j{n}", "deg", 0, 0.0, 100, 50.0) for n in range(tables.n_joints)),

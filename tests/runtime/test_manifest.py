@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from thenar.runtime.errors import BuildError, ThenarError
-from thenar.runtime.manifest import Compared, Fitting, Manifest, Options, Recognised
+from thenar.runtime.manifest import Compared, Fitting, Manifest, Recognised
 from thenar.runtime.manifest_file import MAX_BYTES, manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.published import NONE
+from thenar.runtime.recipe import Recipe
 from thenar.runtime.segmenting.model import SegmentModel
 from thenar.runtime.tables import IntegerTables
 
@@ -32,16 +33,16 @@ def test_what_was_written_is_read_again(manifest: Manifest) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (Options(rounds=50, shrinkage=1.0), "logitboost, rounds 50, shrinkage 1"),
+        (Recipe(rounds=50, shrinkage=1.0), "logitboost, rounds 50, shrinkage 1"),
         (
-            Options(rounds=50, shrinkage=0.5, trainer="logitboost", max_bins=8),
+            Recipe(rounds=50, shrinkage=0.5, trainer="logitboost", max_bins=8),
             "logitboost, rounds 50, shrinkage 0.5, max-bins 8",
         ),
-        (Options(rounds=100, shrinkage=1.0, trainer="bayes", settings={"smoothing": 2.0}), "bayes, smoothing 2"),
+        (Recipe(rounds=100, shrinkage=1.0, trainer="bayes", settings={"smoothing": 2.0}), "bayes, smoothing 2"),
     ],
 )
 def test_builds_that_chose_nothing_say_by_their_options_what_trained_them(
-    manifest: Manifest, options: Options, said: str
+    manifest: Manifest, options: Recipe, said: str
 ) -> None:
     """Older versions wrote LogitBoost's rounds and shrinkage whatever the trainer, and no trainer of LogitBoost."""
     read = manifest_from_bytes(manifest_to_bytes(replace(manifest, options=options)))

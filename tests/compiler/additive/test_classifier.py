@@ -7,7 +7,7 @@ import pytest
 from sklearn.base import clone
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from thenar.compiler import AdditiveLogitClassifier, GraspSet, Options, Samples
+from thenar.compiler import AdditiveLogitClassifier, GraspSet, Recipe, Samples
 from thenar.compiler.tables.collapse import ScoreTables
 from thenar.compiler.trainers.base import Training
 
@@ -22,7 +22,7 @@ def test_scikit_learn_accepts_the_estimator(
 
 def test_it_is_the_trainer_logit(grasp_set: GraspSet) -> None:
     samples = Samples.of(grasp_set)
-    options = Options(trainer="logit", settings={"penalty": 2.0, "smoothness": 3.0}, max_bins=5)
+    options = Recipe(trainer="logit", settings={"penalty": 2.0, "smoothness": 3.0}, max_bins=5)
     model = Training.of(options).train(samples)
     assert isinstance(model, ScoreTables)
     classifier = AdditiveLogitClassifier(penalty=2.0, smoothness=3.0, max_bins=5)

@@ -16,7 +16,7 @@ from thenar.compiler.artifact.verify import verify
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.drivers.errors import ThenarError
 from thenar.runtime import Build
-from thenar.runtime.manifest import Inputs, Options
+from thenar.runtime.recipe import Inputs, Recipe
 
 Make = Callable[..., GraspSet]
 ROUNDS = 12
@@ -91,7 +91,7 @@ def test_what_is_new_is_asked_for(make_set: Make, tmp_path: Path) -> None:
 def test_left_out_subjects_have_no_say_in_what_is_tested_on_them(make_set: Make) -> None:
     for subjects in (3, 23):
         whole = make_set(subjects=subjects, rows=96, frames=2)
-        cuts = cuts_of(whole, Options())
+        cuts = cuts_of(whole, Recipe())
         for cut in cuts:
             assert np.array_equal(np.sort(np.concatenate([fold.test for fold in cut.folds])), np.arange(len(whole)))
             for fold in cut.folds:
@@ -144,7 +144,7 @@ def test_the_rates_are_those_of_builds_of_each_folds_training_rows(
     (counted,) = verify(tmp_path / "build", whole).recognised
     training, *rates = manifest.rates
     assert training.correct == counted.integers
-    for rate, cut in zip(rates, cuts_of(whole, Options()), strict=True):
+    for rate, cut in zip(rates, cuts_of(whole, Recipe()), strict=True):
         correct = 0
         for fold in cut.folds:
             tested = whole.rows(fold.test)

@@ -11,16 +11,18 @@ from numpy.typing import NDArray
 
 from thenar.compiler import Build, GraspSet, compile_build, verify
 from thenar.compiler.artifact import CompileError
-from thenar.compiler.artifact.training import cuts_of, integers_of, rejected_by, samples_of, train
+from thenar.compiler.artifact.training import cuts_of, samples_of
 from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.evaluation.choosing import inner_folds
+from thenar.compiler.recogniser import Recogniser
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.merging import merge
 from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.samples import FRAMES as SAMPLED
 from thenar.compiler.samples import Samples
 from thenar.compiler.tables.quantise import integer_scores
-from thenar.runtime.manifest import Options, Rejection
+from thenar.runtime.manifest import Rejection
+from thenar.runtime.recipe import Recipe
 from thenar.runtime.rejection import refused
 
 TYPES, TRIALS, FRAMES = ("pinch", "hook", "disk"), 20, 4
@@ -77,8 +79,8 @@ def test_none_is_the_last_class_and_placed_on_grasps_alone(moved: GraspSet, tmp_
 
 
 def test_no_fold_parts_a_movement(moved: GraspSet) -> None:
-    samples, ids = samples_of(moved, Options()), moved.movement_ids
-    folds = [fold for cut in cuts_of(moved, Options()) for fold in cut.folds] + inner_folds(samples, 1)
+    samples, ids = samples_of(moved, Recipe()), moved.movement_ids
+    folds = [fold for cut in cuts_of(moved, Recipe()) for fold in cut.folds] + inner_folds(samples, 1)
     assert len(np.unique(ids)) == 180
     for fold in folds:
         assert not set(ids[fold.train]) & set(ids[fold.test])
@@ -135,12 +137,11 @@ def test_a_build_without_such_rows_refuses_the_share_that_it_was_asked_for(moved
 
 def test_frames_are_refused_by_how_far_whole_groups_deviate(moved: GraspSet) -> None:
     held = moved.without_none()
-    asked = Options(rounds=20, folds=0, refuse=0.02)
+    asked = Recipe(rounds=20, folds=0, refuse=0.02)
     samples = samples_of(held, asked)
 
     def rejection(groups: NDArray[np.str_] | None) -> Rejection | None:
-        trained = train(samples, asked, groups=groups)
-        return rejected_by(trained, samples, integers_of(trained, samples, asked), asked, groups)
+        return Recogniser.fit(samples, asked, groups=groups).rejection
 
     people = np.asarray(held.subjects)
     one, two = np.full(len(held), "S0"), np.where(people == "S2", "S1", people)
@@ -176,7 +177,7 @@ def mixed(moved: GraspSet) -> GraspSet:
 
 def test_static_grasps_teach_types_and_not_whether_something_is_held(mixed: GraspSet, tmp_path: Path) -> None:
     samples = Samples.of(mixed)
-    options = Options(trainer="logit", keep=6, placement="mrmr", folds=3, settings={"penalty": 1.0, "smoothness": 2.0})
+    options = Recipe(trainer="logit", keep=6, placement="mrmr", folds=3, settings={"penalty": 1.0, "smoothness": 2.0})
     assert (samples.silent == (mixed.subjects != "S0")).all()
     assert not Samples.of(mixed.rows(mixed.subjects == "S0")).silent.any()
     assert samples.rows(~samples.is_none).given_held is None

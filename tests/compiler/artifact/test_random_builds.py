@@ -9,7 +9,7 @@ import pytest
 
 from thenar.compiler import GraspSet, Joint, compile_build, verify
 from thenar.compiler.recordings.taxonomy import own
-from thenar.runtime.manifest import TableBits
+from thenar.runtime.recipe import TableBits
 
 # Switches, joints and taxels of the sets.
 KINDS = {

@@ -6,16 +6,18 @@ import numpy as np
 import pytest
 
 from thenar.compiler import compile_build
-from thenar.compiler.artifact.training import samples_of, train
+from thenar.compiler.artifact.training import samples_of
 from thenar.compiler.artifact.verify import verify
 from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import weka_folds
+from thenar.compiler.recogniser import Recogniser
 from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.tables.collapse import collapse, model_scores
 from thenar.compiler.tables.quantise import quantise
 from thenar.runtime import Build
-from thenar.runtime.manifest import Inputs, Of, Options
+from thenar.runtime.manifest import Of
+from thenar.runtime.recipe import Inputs, Recipe
 
 COLUMNS = Path(__file__).parents[3] / "examples" / "columns"
 
@@ -55,18 +57,18 @@ def test_integers_recognise_within_a_fifth_of_a_point_of_what_the_ensemble_does_
     icub_table: Path, inputs: Inputs, entry_bits: int
 ) -> None:
     grasp_set, _ = import_file(icub_table, COLUMNS / "icub.toml")
-    options = Options(0, 100, inputs, 1.0, 4, 1)
+    options = Recipe(0, 100, inputs, 1.0, 4, 1)
     material = samples_of(grasp_set, options)
     by_ensemble = by_integers = 0
     for fold in weka_folds(material.labels, options.folds, options.seed):
-        trained = train(material.rows(fold.train), options)
-        part, test = (material.rows(rows).keeping(trained.columns) for rows in (fold.train, fold.test))
-        tables = collapse(trained.model, len(trained.columns))
+        made = Recogniser.fit(material, options, fold.train)
+        part, test = (made.read(material.rows(rows)) for rows in (fold.train, fold.test))
+        tables = collapse(made.model, part.n_switches)
         integers = quantise(tables, part.switches, part.codes, entry_bits=entry_bits)
         scores = test.switches @ integers.switch_rows.astype(int) + integers.bias
         for codes, thresholds, rows in zip(test.codes.T, integers.thresholds, integers.joint_rows, strict=True):
             scores += rows[np.searchsorted(thresholds, codes)]
-        found = winners(model_scores(trained.model, test.switches, test.codes))
+        found = winners(model_scores(made.model, test.switches, test.codes))
         by_ensemble += int(np.count_nonzero(found == test.labels))
         by_integers += int(np.count_nonzero(scores.argmax(axis=1) == test.labels))
     assert by_ensemble > len(grasp_set) / 2

@@ -21,7 +21,7 @@ from thenar.compiler.artifact.verify import verify
 from thenar.compiler.placement.elements import LEVELS, bits_of, elements_of, names_of
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.samples import Samples
-from thenar.runtime.manifest import Options
+from thenar.runtime.recipe import Recipe
 
 Make = Callable[..., GraspSet]
 PADS = tuple(Joint(f"pad{number}", "N", 0, 0.0, 4095, 20.0) for number in range(3))
@@ -88,11 +88,11 @@ def test_levels_are_learnt_inside_each_fold(padded: GraspSet, tmp_path: Path) ->
     """The rates are those of builds of the training rows alone, whose thresholds are others than those of all rows."""
     rates = compile_build(padded, tmp_path / "build", rounds=5).manifest.rates[1:]
     everything, seen = elements_of(Samples.of(padded)), set()
-    for rate, cut in zip(rates, cuts_of(padded, Options()), strict=True):
+    for rate, cut in zip(rates, cuts_of(padded, Recipe()), strict=True):
         correct = 0
         for fold in cut.folds:
             made = compile_build(padded.rows(fold.train), tmp_path / "fold", rounds=5, folds=0)
-            seen.add(made.trained.elements)
+            seen.add(made.recogniser.selection.elements)
             correct += verify(tmp_path / "fold", padded.rows(fold.test)).recognised[0].integers
         assert rate.correct == correct
     assert seen - {everything}
@@ -148,7 +148,7 @@ def test_the_best_joints_are_chosen_inside_each_fold_and_read_alone(make_set: Ma
     assert [joint.name for joint in build.manifest.joints] == [recorded.joint_names[column] for column in kept]
     assert build.tables.n_joints == 2
     assert verify(tmp_path / "build", recorded).holds
-    for rate, cut in zip(build.manifest.rates[1:], cuts_of(recorded, Options()), strict=True):
+    for rate, cut in zip(build.manifest.rates[1:], cuts_of(recorded, Recipe()), strict=True):
         correct = 0
         for fold in cut.folds:
             compile_build(recorded.rows(fold.train), tmp_path / "fold", folds=0, **options)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace as replace_fields
 
-from thenar.compiler import TRAINERS, GraspSet, Options, compile_build
+from thenar.compiler import TRAINERS, GraspSet, Recipe, compile_build
 from thenar.compiler.artifact import CompileError
 from thenar.compiler.artifact.compile import MEMBERS
 from thenar.compiler.artifact.documents import REPORT_NAME
@@ -34,7 +34,7 @@ Make = Callable[..., GraspSet]
 def built(grasp_set: GraspSet, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Path:
     """Return a build of each trainer, its settings given so that nothing is chosen."""
     trainer, changes = request.param
-    settings = Training.candidates(Options(trainer=trainer))[0].settings
+    settings = Training.candidates(Recipe(trainer=trainer))[0].settings
     given: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
     given |= {"rounds": 15} if "rounds" in given else {}
     build = tmp_path_factory.mktemp("built") / "build"

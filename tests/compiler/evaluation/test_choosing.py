@@ -10,12 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler import TRAINERS, GraspSet, Options, Samples, ScoreTables, Setting, Trainer
+from thenar.compiler import TRAINERS, GraspSet, Recipe, Samples, ScoreTables, Setting, Trainer
 from thenar.compiler.evaluation import choosing as module
 from thenar.compiler.evaluation.choosing import choose_training, inner_folds
 from thenar.compiler.tables.collapse import model_scores
-from thenar.compiler.trainers.base import Training, changed
+from thenar.compiler.trainers.base import Training
 from thenar.runtime.manifest import fit_name
+from thenar.runtime.recipe import changed
 
 
 class Pointer(Trainer):
@@ -42,7 +43,7 @@ class Pointer(Trainer):
 
 def _pointing(monkeypatch: pytest.MonkeyPatch, *tried: Mapping[str, float]) -> tuple[Training, ...]:
     monkeypatch.setitem(TRAINERS.__dict__, "_members", MappingProxyType({"pointer": Pointer(*tried)}))
-    return Training.candidates(Options())
+    return Training.candidates(Recipe())
 
 
 def _samples(*wrong: list[int], n: int = 60, idle: int = 20, subjects: int = 1) -> Samples:
@@ -84,8 +85,8 @@ def test_every_candidate_is_scored_as_if_it_were_trained_alone(
     grasp_set = make_set(subjects=4, frames=3)
     samples = Samples.of(grasp_set)
     groups = grasp_set.subjects if by else None
-    candidates = [Training.of(Options(trainer="logitboost", rounds=rounds)) for rounds in (2, 9)]
-    candidates.append(Training.of(changed(Options(), {"trainer": "logit", "max_bins": 4})))
+    candidates = [Training.of(Recipe(trainer="logitboost", rounds=rounds)) for rounds in (2, 9)]
+    candidates.append(Training.of(changed(Recipe(), {"trainer": "logit", "max_bins": 4})))
     folds = inner_folds(samples, 5, groups)
     expected = []
     for candidate in candidates:
@@ -113,8 +114,8 @@ def test_every_candidate_is_scored_as_if_it_were_trained_alone(
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_any_number_of_workers_chooses_the_same(grasp_set: GraspSet, jobs: int) -> None:
-    candidates = Training.candidates(Options(trainer="logitboost")) + Training.candidates(
-        changed(Options(), {"trainer": "logit", "max_bins": 4, "penalty": 1.0, "linear": 0})
+    candidates = Training.candidates(Recipe(trainer="logitboost")) + Training.candidates(
+        changed(Recipe(), {"trainer": "logit", "max_bins": 4, "penalty": 1.0, "linear": 0})
     )
     seen: list[tuple[int, int]] = []
     fitting = choose_training(Samples.of(grasp_set), candidates, jobs=jobs, report=lambda *done: seen.append(done))
@@ -184,7 +185,7 @@ def test_what_holds_for_the_known_people_alone_is_not_chosen_for_new_ones(monkey
 def test_settings_that_are_given_are_fixed_and_name_the_trainer_that_takes_them(
     changes: dict[str, Any], trainers: set[str]
 ) -> None:
-    candidates = Training.candidates(changed(Options(), changes))
+    candidates = Training.candidates(changed(Recipe(), changes))
     assert {each.trainer for each in candidates} == trainers
     assert len({repr(each) for each in candidates}) == len(candidates)
     for each in candidates:
@@ -196,7 +197,7 @@ def test_settings_that_are_given_are_fixed_and_name_the_trainer_that_takes_them(
     "changes", [{"rounds": 3}, {"trainer": "logit", "penalty": 1.0, "smoothness": 2.0, "max_bins": 8, "linear": 0}]
 )
 def test_where_all_that_is_compared_is_given_one_candidate_is_left(changes: dict[str, Any]) -> None:
-    assert len(Training.candidates(changed(Options(), changes))) == 1
+    assert len(Training.candidates(changed(Recipe(), changes))) == 1
 
 
 @pytest.mark.parametrize(("frames", "compared"), [(1, 240), (7, 238), (24, 80)])

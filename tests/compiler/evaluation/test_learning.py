@@ -1,5 +1,4 @@
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,17 +13,19 @@ from thenar.compiler.evaluation.learning import LEAST, expected, plan_learning, 
 from thenar.compiler.evaluation.pictures import LEARNING_NAME, draw
 from thenar.compiler.evaluation.plan import Data, Planner, learners
 from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.evaluation.study import Options, evaluate
+from thenar.compiler.evaluation.study import StudyDesign, evaluate
+from thenar.compiler.placement.placement import Placer
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
+from thenar.runtime.recipe import Recipe
 
 Make = Callable[..., GraspSet]
 N = np.array([2.0, 4.0, 8.0, 16.0])
-QUICK = Options(rounds=3, repeats=1, tables=(), protocols=("nested",), learning=True)
+QUICK = StudyDesign(Recipe(trainer="logitboost", rounds=3), repeats=1, tables=(), protocols=("nested",), learning=True)
 
 
 def planned(grasps: GraspSet) -> Planner:
-    return Planner((), Samples.of(grasps), 0, (), seed=3)
+    return Planner((), Samples.of(grasps), Placer(Recipe(seed=3)))
 
 
 @given(st.floats(0, 0.5), st.floats(0, 0.5), st.integers(1, 60))
@@ -116,9 +117,9 @@ def test_curves_rise_and_say_what_to_expect(make_grasps: Make, tmp_path: Path) -
 
 def test_other_cuts_and_single_repetitions_have_no_curve(make_grasps: Make) -> None:
     with pytest.raises(EvaluationError, match="not objects left out"):
-        evaluate(make_grasps(), replace(QUICK, scheme="object"), jobs=1)
+        evaluate(make_grasps(), QUICK.changed(scheme="object"), jobs=1)
     with pytest.raises(EvaluationError, match="needs more than 2 repetitions to train on, and there are 2"):
-        evaluate(make_grasps(per_type=3), replace(QUICK, folds=3), jobs=1)
+        evaluate(make_grasps(per_type=3), QUICK.changed(folds=3), jobs=1)
     study = evaluate(make_grasps(per_type=8), QUICK, jobs=1)
     assert study.learning is not None
     assert len(study.learning.repetitions) < LEAST

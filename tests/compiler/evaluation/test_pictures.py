@@ -5,12 +5,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from thenar.compiler.evaluation.pictures import draw, draw_matrix
-from thenar.compiler.evaluation.study import Options, evaluate
+from thenar.compiler.evaluation.study import StudyDesign, evaluate
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.runtime.recipe import Recipe
 
 
 def test_every_composition_and_protocol_has_its_picture(make_grasps: Callable[..., GraspSet], tmp_path: Path) -> None:
-    options = Options(rounds=2, repeats=1, tables=("compositions", "pruning"))
+    options = StudyDesign(Recipe(trainer="logitboost", rounds=2), repeats=1, tables=("compositions", "pruning"))
     study = evaluate(make_grasps(n_joints=0), options, jobs=1)
     drawn = draw(study, tmp_path / "new" / "folder")
     names = [f"confusion-{protocol}-{name}.png" for protocol in ("paper", "nested") for name in ("V", "VI", "VII")]

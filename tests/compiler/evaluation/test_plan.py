@@ -16,8 +16,10 @@ from thenar.compiler.evaluation.plan import (
 from thenar.compiler.evaluation.populations import NESTED, PAPER, Protocol, populations
 from thenar.compiler.placement.elements import Element, columns_of
 from thenar.compiler.placement.methods.base import METHODS
+from thenar.compiler.placement.placement import Placer
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
+from thenar.runtime.recipe import Recipe
 
 OF_THE_PAPER = {
     "I": ("Angle + All-Co", True, (0, 1, 2, 3)),
@@ -52,7 +54,7 @@ both_protocols = pytest.mark.parametrize("protocol", [PAPER, NESTED], ids=lambda
 
 def planner_of(grasps: GraspSet, prune: int = 0, repeats: int = 2) -> Planner:
     parts = populations(grasps, "trial", 4, repeats, 1)
-    return Planner(parts, Samples.of(grasps), prune, (0, 30), 1)
+    return Planner(parts, Samples.of(grasps), Placer(Recipe(prune=prune)), (0, 30))
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +94,7 @@ def test_off_the_diagonal_both_protocols_take_the_others_placement(planner: Plan
     paper, nested = (planner.table("generality", protocol) for protocol in (PAPER, NESTED))
     for i, line in enumerate(paper):
         giver = planner.parts[i]
-        given = tuple(sorted(planner.chosen("id3", giver.rows, 0)))
+        given = tuple(sorted(planner.chosen(giver.rows)))
         for j, cell in enumerate(line.cells):
             if i != j:
                 assert cell == nested[i].cells[j]
@@ -111,7 +113,7 @@ def test_pruning_starts_from_all_switches_and_takes_one_placement_for_all_subjec
         for cell in line.cells:
             for fit in cell.fits:
                 seen = everyone if protocol is PAPER else np.setdiff1d(everyone, fit.fold.test)
-                assert fit.elements == tuple(sorted(planner.chosen("id3", seen, least)))
+                assert fit.elements == tuple(sorted(planner.chosen(seen, prune=least)))
 
 
 @both_protocols
@@ -134,19 +136,19 @@ def test_baselines_choose_from_the_rows_that_id3_may_choose_from(planner: Planne
         for cell in row(table, name).cells:
             for fit in cell.fits:
                 seen = cell.part.rows if protocol is PAPER else fit.fold.train
-                assert fit.elements == tuple(sorted(planner.chosen(method, seen, len(fit.elements))))
+                assert fit.elements == tuple(sorted(planner.chosen(seen, placement=method, keep=len(fit.elements))))
 
 
 def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps: Make) -> None:
     grasps, rows = make_grasps(noise=0.3), np.arange(5, 40)
     used, fresh = planner_of(grasps), planner_of(grasps)
     seen = Samples.of(grasps, "switches").rows(rows)
-    assert columns_of(used.chosen("id3", rows, 4)) == grow_id3(seen.switches, seen.labels, min_samples=4).inputs
-    assert used.chosen("id3", rows, 20) == fresh.chosen("id3", rows[::-1], 20) != used.chosen("id3", rows, 0)
-    assert used.chosen("id3", rows[:20], 0) == fresh.chosen("id3", rows[:20], 0)
+    assert columns_of(used.chosen(rows, prune=4)) == grow_id3(seen.switches, seen.labels, min_samples=4).inputs
+    assert used.chosen(rows, prune=20) == fresh.chosen(rows[::-1], prune=20) != used.chosen(rows)
+    assert used.chosen(rows[:20]) == fresh.chosen(rows[:20])
     for name in ("cmim", "mutual-information"):
-        assert used.chosen(name, rows, 3) == fresh.chosen(name, rows, 3)
-        assert columns_of(used.chosen(name, rows, 3)) == METHODS[name].chooser(seen)(3)
+        assert used.chosen(rows, placement=name, keep=3) == fresh.chosen(rows, placement=name, keep=3)
+        assert columns_of(used.chosen(rows, placement=name, keep=3)) == METHODS[name].chooser(seen)(3)
 
 
 def test_any_method_can_be_a_baseline(make_grasps: Make) -> None:

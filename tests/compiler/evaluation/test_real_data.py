@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.evaluation.study import Options, Study, evaluate
+from thenar.compiler.evaluation.study import Study, evaluate
 from thenar.compiler.evaluation.tables import RateTable
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import import_file
@@ -23,7 +23,7 @@ def icub(icub_table: Path) -> GraspSet:
 
 @pytest.fixture(scope="module")
 def icub_study(icub: GraspSet) -> Study:
-    return evaluate(icub, Options(tables=("compositions", "baselines")))
+    return evaluate(icub, tables=("compositions", "baselines"))
 
 
 @pytest.fixture(scope="module")
@@ -69,12 +69,12 @@ def test_id3_beats_random_placements_of_as_many_bits(icub_study: Study) -> None:
 
 
 def test_aml_reaches_90_percent_in_four_folds(aml: GraspSet) -> None:
-    study = evaluate(aml, Options(protocols=("nested",)))
+    study = evaluate(aml, protocols=("nested",))
     assert np.mean([rate.mean for rate in rates(study, "compositions", "IV")]) >= 0.90
 
 
 def test_aml_reaches_69_percent_within_its_interval_and_84_on_subjects_never_trained_on(aml: GraspSet) -> None:
-    study = evaluate(aml, Options(scheme="subject", protocols=("nested",)))
+    study = evaluate(aml, scheme="subject", protocols=("nested",))
     first, second = rates(study, "compositions", "IV")
     assert first.mean >= 0.65
     assert first.low <= 0.69 <= first.high

@@ -10,11 +10,12 @@ from thenar.compiler.evaluation.folds import EvaluationError, Fold
 from thenar.compiler.evaluation.plan import REFERENCE, CellPlan, FoldFit, RowPlan, learners
 from thenar.compiler.evaluation.populations import Population, Scheme
 from thenar.compiler.evaluation.rates import Rate, RecipeWords
-from thenar.compiler.evaluation.study import TABLES, Options, Study, evaluate
+from thenar.compiler.evaluation.study import TABLES, Study, StudyDesign, evaluate
 from thenar.compiler.evaluation.tables import RateTable, Reader, Row
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import TRAINERS
+from thenar.runtime.recipe import Recipe
 
 # Six rows of labels 2 and 5 (others do not occur), two folds, two repeats of the same folds; three switches.
 LABELS = np.array([2, 2, 2, 5, 5, 5])
@@ -78,7 +79,7 @@ def test_a_row_counts_all_its_subjects_and_only_compositions_carry_confusions() 
 
 
 Make = Callable[..., GraspSet]
-QUICK = Options(rounds=5, repeats=2, prune_list=(0, 10))
+QUICK = StudyDesign(Recipe(trainer="logitboost", rounds=5), repeats=2, prune_list=(0, 10))
 
 
 @pytest.fixture(scope="module")
@@ -126,7 +127,7 @@ def test_the_same_set_and_options_give_the_same_result_on_any_number_of_workers(
 def test_rows_in_which_nothing_is_held_change_no_table(
     make_grasps: Make, with_none: Callable[[GraspSet], GraspSet]
 ) -> None:
-    quick = replace(QUICK, rounds=2, repeats=1, folds=2, learning=True, permute=2, tables=("compositions", "trainers"))
+    quick = QUICK.changed(rounds=2, repeats=1, folds=2, learning=True, permute=2, tables=("compositions", "trainers"))
     grasps = make_grasps(noise=0.2, per_type=8)
     without, among = (evaluate(found, quick, jobs=1) for found in (grasps, with_none(grasps)))
     assert among.fingerprint == with_none(grasps).fingerprint() != without.fingerprint
@@ -136,7 +137,7 @@ def test_rows_in_which_nothing_is_held_change_no_table(
 def test_choosing_from_test_rows_flatters_where_there_is_nothing_to_learn(make_grasps: Make) -> None:
     # Coin flips say nothing about the grasp: a nested rate is about 1 in 4, and the paper's protocol is above it.
     grasps = make_grasps(n_switches=200, n_joints=0, subjects="A", noise=0.5, per_type=10)
-    study = evaluate(grasps, replace(QUICK, rounds=20, repeats=3, tables=("compositions",)), jobs=1)
+    study = evaluate(grasps, QUICK.changed(rounds=20, repeats=3, tables=("compositions",)), jobs=1)
     paper, nested = (row(table(study, "compositions", name), "VI").cells[0].rate for name in ("paper", "nested"))
     assert paper.mean > nested.mean + 0.1
     assert nested.low <= 0.25 <= nested.high
@@ -154,7 +155,7 @@ def test_without_switches_there_are_the_joints_and_no_placements(make_grasps: Ma
 
 def test_a_composition_left_without_inputs_shows_the_rate_of_the_most_frequent_grasp(make_grasps: Make) -> None:
     grasps = make_grasps(n_joints=0, subjects="A")
-    study = evaluate(grasps, replace(QUICK, prune=1000, tables=("compositions",), protocols=("nested",)), jobs=1)
+    study = evaluate(grasps, QUICK.changed(prune=1000, tables=("compositions",), protocols=("nested",)), jobs=1)
     (cell,) = row(table(study, "compositions"), "VI").cells
     assert (cell.switches.most, cell.no_inputs) == (0, 8)
     assert cell.rate.mean <= 0.25
@@ -163,7 +164,7 @@ def test_a_composition_left_without_inputs_shows_the_rate_of_the_most_frequent_g
 
 def test_one_subject_alone_has_nobody_elses_placement(make_grasps: Make) -> None:
     grasps = make_grasps(n_switches=5)
-    study = evaluate(grasps, replace(QUICK, rounds=2, subjects=("B",)), jobs=1)
+    study = evaluate(grasps, QUICK.changed(rounds=2, subjects=("B",)), jobs=1)
     assert study.fingerprint == grasps.fingerprint()
     assert {t.name for t in study.tables} == {"compositions", "pruning", "baselines", "trainers"}
     assert [t.name for t in study.left_out] == ["generality"]
@@ -172,7 +173,7 @@ def test_one_subject_alone_has_nobody_elses_placement(make_grasps: Make) -> None
 
 
 def test_pruning_the_pool_of_one_subject_by_the_same_s_is_composition_six(make_grasps: Make) -> None:
-    options = replace(QUICK, subjects=("A",), prune=10, tables=("compositions", "pruning", "baselines"))
+    options = QUICK.changed(subjects=("A",), prune=10, tables=("compositions", "pruning", "baselines"))
     study = evaluate(make_grasps(noise=0.2), options, jobs=1)
     for protocol in ("paper", "nested"):
         six = row(table(study, "compositions", protocol), "VI").cells[0].rate
@@ -182,7 +183,7 @@ def test_pruning_the_pool_of_one_subject_by_the_same_s_is_composition_six(make_g
 
 @pytest.mark.parametrize("scheme", ["subject", "object", "block"])
 def test_other_cuts_have_one_repeat_and_a_column_a_subject(make_grasps: Make, scheme: Scheme) -> None:
-    quick = replace(QUICK, rounds=2, scheme=scheme, protocols=("nested",))
+    quick = QUICK.changed(rounds=2, scheme=scheme, protocols=("nested",))
     study = evaluate(make_grasps(n_switches=5, per_type=8), quick, jobs=1)
     assert ("generality" in {t.name for t in study.tables}) == (scheme != "subject")
     for each in study.tables:
@@ -209,14 +210,14 @@ def test_every_trainer_is_compared_on_the_same_folds_and_inputs_with_baselines(s
 
 
 def test_trainers_are_not_compared_where_test_rows_choose(make_grasps: Make) -> None:
-    study = evaluate(make_grasps(), replace(QUICK, protocols=("paper",), tables=("trainers",)), jobs=1)
+    study = evaluate(make_grasps(), QUICK.changed(protocols=("paper",), tables=("trainers",)), jobs=1)
     assert study.tables == ()
     assert [left.reason for left in study.left_out] == ["trainers are compared under the nested protocol only"]
 
 
 def test_an_unknown_subject_is_refused_with_those_there_are(make_grasps: Make) -> None:
     with pytest.raises(EvaluationError, match="no subject 'Z' in the set; its subjects are A, B"):
-        evaluate(make_grasps(), replace(QUICK, subjects=("A", "Z")))
+        evaluate(make_grasps(), QUICK.changed(subjects=("A", "Z")))
 
 
 def test_a_set_without_rows_is_refused(make_grasps: Make) -> None:

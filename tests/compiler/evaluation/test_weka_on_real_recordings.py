@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.evaluation.study import Options, evaluate
+from thenar.compiler.evaluation.study import evaluate
 from thenar.compiler.recordings.export import export
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import import_file
@@ -37,7 +37,7 @@ def inputs_of(icub: GraspSet, composition: str) -> GraspSet:
 def test_weka_and_thenar_recognise_as_many_rows(
     weka: Callable[..., str], icub: GraspSet, tmp_path: Path, composition: str
 ) -> None:
-    study = evaluate(icub, Options(rounds=10, repeats=1, protocols=("nested",), tables=("compositions",)))
+    study = evaluate(icub, rounds=10, repeats=1, protocols=("nested",), tables=("compositions",))
     (row,) = (row for row in study.tables[0].rows if row.name == composition)
     rate = row.cells[0].rate
 

@@ -12,7 +12,8 @@ import pytest
 
 from thenar.compiler.firmware.probes import Lost, Predictions, Probes, extreme_frames, joined, random_frames
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Recognised, Switch
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Recognised, Switch
+from thenar.runtime.recipe import Recipe
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.softmax import Softmax
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
@@ -58,7 +59,7 @@ def _describe(tables: IntegerTables) -> Manifest:
         tables_sha256=hashlib.sha256(tables_to_bytes(tables)).hexdigest(),
         ensemble_sha256="0" * 64,
         source=Origin("1" * 64, 10, "own", 20, joints=22),
-        options=Options(0, 100, "both", 1.0, 4, 1),
+        options=Recipe(0, 100, "both", 1.0, 4, 1),
         grasps=tuple(f"grasp {number}" for number in range(tables.n_classes)),
         switches=tuple(Switch(number, f"s{number}", 0.5) for number in range(tables.n_switches)),
         joints=tuple(Calibration(n, f"j{n}", "deg", 0, 0.0, 100, 50.0) for n in range(tables.n_joints)),

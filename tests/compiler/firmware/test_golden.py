@@ -15,7 +15,8 @@ from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.firmware.rows import rows_files
 from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Switch
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Switch
+from thenar.runtime.recipe import Recipe
 from thenar.runtime.tables import IntegerTables
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "firmware"
@@ -69,7 +70,7 @@ def small_build() -> Build:
         tables_sha256="0123456789abcdef" * 4,
         ensemble_sha256="0" * 64,
         source=Origin("1" * 64, 60, "own", 160, joints=22),
-        options=Options(13, 100, "both", 1.0, 4, 1),
+        options=Recipe(13, 100, "both", 1.0, 4, 1),
         grasps=GRASPS,
         switches=tuple(Switch(number, name, 0.5) for number, name in enumerate(SWITCHES)),
         joints=tuple(Calibration(n, name, "raw", 1, 1.0, 255, 255.0) for n, name in enumerate(JOINTS)),

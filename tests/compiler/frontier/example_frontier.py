@@ -19,13 +19,14 @@ from thenar.compiler.frontier.points import (
     Mark,
     PlacementChoice,
     Point,
-    Recipe,
+    PointSetting,
     Time,
     Tried,
     frontier_from_bytes,
     frontier_to_bytes,
 )
-from thenar.runtime.manifest import Inputs, Of
+from thenar.runtime.manifest import Of
+from thenar.runtime.recipe import Inputs
 
 GRASPS = (
     *("PoS", "PoH", "PoI", "PoE-W", "PoE-N", "Lat", "Tri"),
@@ -181,7 +182,9 @@ def _point(
     p99_us: float,
 ) -> Point:
     transfer_us = 0.0 if inputs == "switches" else TRANSFER_US
-    setting = Recipe(PlacementChoice(method, parameter), inputs, rounds, width, decision, wiring, 1000 * clock_khz)
+    setting = PointSetting(
+        PlacementChoice(method, parameter), inputs, rounds, width, decision, wiring, 1000 * clock_khz
+    )
     return Point(
         number=number,
         setting=setting,

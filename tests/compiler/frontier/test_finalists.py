@@ -8,7 +8,7 @@ from thenar.compiler.frontier.price import Tabled
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import NO_SWITCHES, Candidate, Search, Shape
 from thenar.compiler.frontier.survey import Judged, Tally
-from thenar.runtime.manifest import Inputs
+from thenar.runtime.recipe import Inputs
 
 
 def judged(rate: float) -> Judged:

@@ -18,9 +18,10 @@ from thenar.compiler.frontier.stream import Stream, stream_from
 from thenar.runtime.build import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.recogniser import LiveRecognizer
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Recognised, Switch
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Recognised, Switch
 from thenar.runtime.policy import Policy
 from thenar.runtime.published import UNKNOWN
+from thenar.runtime.recipe import Recipe
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 CLASSES, SWITCHES, JOINTS = 4, 7, 3
@@ -73,7 +74,7 @@ def make_build(tables: IntegerTables) -> Build:
         tables_sha256=hashlib.sha256(tables_to_bytes(tables)).hexdigest(),
         ensemble_sha256="0" * 64,
         source=Origin("1" * 64, 10, "own", 20, joints=22),
-        options=Options(0, 100, "both", 1.0, 4, 1),
+        options=Recipe(0, 100, "both", 1.0, 4, 1),
         grasps=tuple(f"grasp {number}" for number in range(CLASSES)),
         switches=tuple(Switch(column, f"s{column}", 0.5) for column in KEPT),
         joints=tuple(Calibration(n, f"j{n}", "raw", 1, 1.0, 255, 255.0) for n in range(tables.n_joints)),

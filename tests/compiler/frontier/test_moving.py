@@ -15,8 +15,8 @@ from thenar.compiler.frontier.stream import stream_of
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import Training
-from thenar.runtime.manifest import Options
 from thenar.runtime.published import NONE
+from thenar.runtime.recipe import Recipe
 from thenar.runtime.segmenting.model import SegmentModel
 
 Make = Callable[..., GraspSet]
@@ -54,7 +54,7 @@ def test_a_subject_who_is_left_out_has_no_part_in_what_is_learnt(make_set: Make)
         switches=np.where(new[:, None], random.random(grasp_set.switches.shape) < 0.5, grasp_set.switches),
         codes=np.where(new[:, None], 7, grasp_set.codes).astype(np.uint16),
     )
-    columns, training = tuple(range(14)), Training.of(Options(rounds=5))
+    columns, training = tuple(range(14)), Training.of(Recipe(rounds=5))
     found = []
     for one in (grasp_set, changed):
         moving = Moving.of(one, held_by(one, "S0"), seed=1)
@@ -90,7 +90,7 @@ def test_what_has_no_streams_or_never_says_that_nothing_is_held_teaches_nothing(
 
 def test_segments_alone_are_decided_at_learnt_costs_and_with_a_class_of_nothing_held(make_set: Make) -> None:
     grasp_set = movements(make_set)
-    held, columns, training = Samples.of(grasp_set.without_none()), tuple(range(14)), Training.of(Options(rounds=5))
+    held, columns, training = Samples.of(grasp_set.without_none()), tuple(range(14)), Training.of(Recipe(rounds=5))
     train, new = held_by(grasp_set, "S0"), np.flatnonzero(grasp_set.subjects == "S1")
     labels = np.where(grasp_set.is_none, -1, np.searchsorted(np.unique(grasp_set.labels), grasp_set.labels))
     stream = stream_of(grasp_set, labels, new, seed=1)

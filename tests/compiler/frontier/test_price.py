@@ -1,6 +1,5 @@
 """Tables that are priced: a finalist's are those of the build, byte for byte."""
 
-from thenar.compiler.artifact.training import built_tables, integers_of, train
 from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.price import Tabled, price
 from thenar.compiler.frontier.search import Shape
@@ -8,21 +7,21 @@ from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY
 from thenar.compiler.frontier.timing.wirings import wirings
 from thenar.compiler.placement.elements import names_of
+from thenar.compiler.recogniser import Recogniser
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
-from thenar.runtime.manifest import Options
+from thenar.runtime.recipe import Recipe
 from thenar.runtime.tables import tables_to_bytes
 
 
 def test_a_finalist_is_priced_with_what_its_build_holds_for_lost_inputs(grasp_set: GraspSet) -> None:
-    samples, options = Samples.of(grasp_set), Options(rounds=20, table_bits=8)
-    trained = train(samples, options)
-    assert trained.training is not None
-    names = names_of(grasp_set, trained.kept)
+    samples, options = Samples.of(grasp_set), Recipe(rounds=20, table_bits=8)
+    made = Recogniser.fit(samples, options)
+    assert made.training is not None
+    names, columns = names_of(grasp_set, made.elements), made.selection.chosen.columns
     equipment = Equipment(ClassifyModel("avr328p"), wirings(None), WIRE_ONLY)
-    asked = samples, names, trained.columns, (Tabled(20, Shape(options.width, options.table_bits)),), trained.training
+    asked = samples, names, columns, (Tabled(20, Shape(options.width, options.table_bits)),), made.training
     (close,) = price(*asked, equipment, True)
     (quick,) = price(*asked, equipment, False)
-    built, means = built_tables(trained, samples, options), integers_of(trained, samples, options)
-    assert close.content == tables_to_bytes(built) != quick.content == tables_to_bytes(means)
-    assert close.classified == equipment.model.cost(built)
+    assert close.content == tables_to_bytes(made.tables) != quick.content == tables_to_bytes(made.integers)
+    assert close.classified == equipment.model.cost(made.tables)

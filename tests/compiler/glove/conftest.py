@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import pytest
 
 from thenar.compiler.hand import HandShape
-from thenar.runtime.manifest import Calibration, Manifest, Options, Origin, Proof, Recognised, Switch
+from thenar.runtime.manifest import Calibration, Manifest, Origin, Proof, Recognised, Switch
+from thenar.runtime.recipe import Recipe
 from thenar.simulator.handmaps.handmap import hand_map
 
 Tree = str | list["Tree"]
@@ -107,7 +108,7 @@ def manifest_of() -> Callable[..., Manifest]:
             tables_sha256="0" * 64,
             ensemble_sha256="0" * 64,
             source=Origin("0" * 64, 10, "own", 160, joints=22),
-            options=Options(0, 1, "both", 1.0, 0, 1),
+            options=Recipe(0, 1, "both", 1.0, 0, 1),
             grasps=("cup", "pen"),
             switches=tuple(Switch(number, name, 0.1) for number, name in enumerate(names)),
             joints=(Calibration(0, "thumb_mpj", "deg", 0, 0.0, 255, 90.0),) if joints else (),

@@ -12,7 +12,7 @@ from thenar.compiler.placement.placement import choose
 from thenar.compiler.placement.robust import most_robust, spread
 from thenar.compiler.samples import MASKED, Samples
 from thenar.compiler.trainers.base import Training
-from thenar.runtime.manifest import Options
+from thenar.runtime.recipe import Recipe
 from thenar.simulator import load_scene, simulate
 
 
@@ -68,9 +68,9 @@ def test_the_placement_is_taken_whose_worst_lost_switch_costs_least() -> None:
 
 
 def test_options_say_that_training_is_masked() -> None:
-    assert all(each.masked for each in Training.candidates(Options(robust=True)))
-    assert not any(each.masked for each in Training.candidates(Options()))
-    samples, training = backed_up(), Training.of(replace(Options(rounds=3), robust=True))
+    assert all(each.masked for each in Training.candidates(Recipe(robust=True)))
+    assert not any(each.masked for each in Training.candidates(Recipe()))
+    samples, training = backed_up(), Training.of(replace(Recipe(rounds=3), robust=True))
     plain = Training(training.trainer, training.settings)
     assert (training.train(samples).values == plain.train(samples.masked()).values).all()  # type: ignore[union-attr]
     (stage,) = training.stages(samples, [3])

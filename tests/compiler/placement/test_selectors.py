@@ -18,6 +18,7 @@ from thenar.compiler.placement.placement import place
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.placement.selectors import ID3Selector, SwitchSelector
 from thenar.drivers.members import MemberError
+from thenar.runtime.recipe import Recipe
 
 Make = Callable[..., GraspSet]
 
@@ -44,7 +45,9 @@ def data() -> tuple[Any, Any]:
 def test_a_selector_keeps_what_thenar_place_keeps(make_set: Make, name: str) -> None:
     grasps = make_set(rows=60, switches=10)
     selector = SwitchSelector(name, n_switches=4, min_samples=6).fit(grasps.switches, grasps.grasps)
-    placement = place(grasps, 6 if name == "id3" else 4, method=name)
+    papers = name == "id3"
+    recipe = Recipe(placement=name, inputs="switches", prune=6 * papers, keep=None if papers else 4)
+    placement = place(grasps, recipe)
     assert selector.order_.tolist() == [kept.number for kept in placement.switches]
     assert selector.get_support(indices=True).tolist() == sorted(selector.order_)
 
@@ -54,7 +57,7 @@ def test_rows_in_which_nothing_is_held_place_no_switch(
 ) -> None:
     grasps = make_set(subjects=8, types=2)
     more = with_none(grasps)
-    found, other = place(grasps, 4.0, keep_joints=1), place(more, 4.0, keep_joints=1)
+    found, other = place(grasps, prune=4, keep_joints=1), place(more, prune=4, keep_joints=1)
     assert other.fingerprint == more.fingerprint()
     assert replace(other, fingerprint=found.fingerprint) == found
 

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.artifact.compile import compile_build
-from thenar.compiler.evaluation.study import Options as Asked
-from thenar.compiler.evaluation.study import evaluate
+from thenar.compiler.evaluation.study import StudyDesign, evaluate
 from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.hand import HandShape
 from thenar.compiler.placement.id3 import grow_id3
@@ -21,6 +20,7 @@ from thenar.compiler.report.content import ReportContent
 from thenar.compiler.tables.compare import worst_case
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.harness.wiring import GloveWiring
+from thenar.runtime.recipe import Recipe
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.simulator.handmaps.handmap import hand_map
 
@@ -80,12 +80,13 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
     glove = GloveWiring(port="/dev/ttyUSB0", joints=sensors) if joints else None
     harness = propose_harness(names, cyberglove=glove)
     made = compile_build(grasp_set, folder, prune=8, rounds=4, folds=2, harness=harness)
-    asked = Asked(rounds=2, folds=2, repeats=1, prune=8, prune_list=(0, 8))
+    recipe = Recipe(trainer="logitboost", rounds=2, folds=2, prune=8)
+    asked = StudyDesign(recipe, repeats=1, prune_list=(0, 8))
     return ReportContent(
         manifest=made.manifest,
         tables=made.tables,
         tables_bytes=made.tables_bytes,
-        rounds=made.trained.rounds,
+        rounds=made.recogniser.rounds,
         firmware=made.firmware,
         tree=tree,
         confusion=made.confusion,
@@ -94,7 +95,7 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
         scan=made.scan,
         harness=harness,
         comparison=made.comparison,
-        worst=worst_case(made.trained.model, made.tables, made.comparison, made.manifest.grasps, names),
+        worst=worst_case(made.recogniser.model, made.tables, made.comparison, made.manifest.grasps, names),
     )
 
 

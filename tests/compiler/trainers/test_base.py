@@ -10,7 +10,7 @@ from thenar.compiler import (
     TRAINERS,
     GraspSet,
     LogitBoostClassifier,
-    Options,
+    Recipe,
     Samples,
     ScoreTables,
     Setting,
@@ -19,8 +19,9 @@ from thenar.compiler import (
 )
 from thenar.compiler.boosting.boost import SMALLEST_SHRINKAGE
 from thenar.compiler.boosting.stumps import Stumps
-from thenar.compiler.trainers.base import Training, changed
+from thenar.compiler.trainers.base import Training
 from thenar.runtime.errors import ThenarError
+from thenar.runtime.recipe import changed
 
 
 class Constant(Trainer):
@@ -47,8 +48,8 @@ def constant(monkeypatch: pytest.MonkeyPatch) -> Constant:
 
 def test_options_give_a_trainer_all_its_settings(constant: Constant) -> None:
     given = {"rounds": 7, "shrinkage": 1.0, "tolerance": None, "max_bins": 3, "ties": "first"}
-    assert Training.of(Options(rounds=7, max_bins=3)) == Training("logitboost", given)
-    asked = changed(Options(), {"trainer": "constant", "excess": 2, "prune": 4})
+    assert Training.of(Recipe(rounds=7, max_bins=3)) == Training("logitboost", given)
+    asked = changed(Recipe(), {"trainer": "constant", "excess": 2, "prune": 4})
     assert (asked.prune, asked.settings) == (4, {"excess": 2})
     assert Training.of(asked) == Training("constant", {"excess": 2, "weight": None})
 
@@ -89,7 +90,7 @@ def test_a_trainer_that_makes_a_model_of_something_else_is_at_fault(
 def test_logitboost_is_the_classifier(grasp_set: GraspSet) -> None:
     samples = Samples.of(grasp_set)
     seen: list[tuple[int, int]] = []
-    model = Training.of(Options(rounds=3, shrinkage=0.5)).train(samples, lambda *done: seen.append(done))
+    model = Training.of(Recipe(rounds=3, shrinkage=0.5)).train(samples, lambda *done: seen.append(done))
     classifier = LogitBoostClassifier(rounds=3, shrinkage=0.5).fit(samples.inputs, samples.labels)
     assert isinstance(model, Stumps)
     assert model.values.tobytes() == classifier.stumps_.values.tobytes()
@@ -100,8 +101,8 @@ def test_stages_are_the_models_of_fewer_rounds_and_the_same_for_all_where_there_
     constant: Constant, grasp_set: GraspSet
 ) -> None:
     samples, rounds = Samples.of(grasp_set), (2, 7, 3)
-    for number, stage in zip(rounds, Training.of(Options(max_bins=5)).stages(samples, rounds), strict=True):
-        alone = Training.of(Options(max_bins=5, rounds=number)).train(samples)
+    for number, stage in zip(rounds, Training.of(Recipe(max_bins=5)).stages(samples, rounds), strict=True):
+        alone = Training.of(Recipe(max_bins=5, rounds=number)).train(samples)
         assert isinstance(stage, Stumps)
         assert isinstance(alone, Stumps)
         assert [stage.columns.tolist(), stage.thresholds.tolist(), stage.values.tolist()] == [
@@ -109,6 +110,6 @@ def test_stages_are_the_models_of_fewer_rounds_and_the_same_for_all_where_there_
             alone.thresholds.tolist(),
             alone.values.tolist(),
         ]
-    first, *others = Training.of(Options(trainer="constant")).stages(samples, rounds)
+    first, *others = Training.of(Recipe(trainer="constant")).stages(samples, rounds)
     assert len(others) == 2
     assert all(other is first for other in others)

@@ -3,7 +3,7 @@ import pytest
 
 from thenar.compiler.evaluation.ablation import Ablation
 from thenar.compiler.evaluation.folds import EvaluationError
-from thenar.compiler.evaluation.study import Options, evaluate
+from thenar.compiler.evaluation.study import evaluate
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.effects import joint_noise
 from thenar.simulator.effects.contact_quasistatic import Parameters
@@ -45,8 +45,10 @@ def test_every_effect_is_removed_in_turn_from_the_whole_scene(ablation: Ablation
 @pytest.mark.slow
 def test_rates_are_those_of_the_evaluation_with_all_switches(ablation: Ablation) -> None:
     made = simulate(scene_of(8, subjects=2), jobs=1).grasp_set
-    options = Options(repeats=1, tables=("compositions",), protocols=("paper",))
-    rows = {row.name: row for row in evaluate(made, options, jobs=1).tables[0].rows}
+    rows = {
+        row.name: row
+        for row in evaluate(made, jobs=1, repeats=1, tables=("compositions",), protocols=("paper",)).tables[0].rows
+    }
     for one, name in zip(ablation.variants[0].rates, ("V", "IV", "I"), strict=True):
         assert one.rate.correct[0] == sum(cell.rate.correct[0] for cell in rows[name].cells)
         assert one.rate.total == len(made)

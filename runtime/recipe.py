@@ -1,0 +1,235 @@
+"""The recipe of a classifier: every choice of `thenar compile`, with its type, range, default and help.
+
+The options of the commands, the fields of build.json and the candidates of a frontier are made of the fields of
+`Recipe`, and so is the table in the reference.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+
+from msgspec import Meta, Struct, field
+from msgspec.structs import replace
+
+AUTO, PAPERS_TRAINER = "auto", "logitboost"  # trainers: automatic choice, and the paper's
+
+Inputs = Literal["both", "switches", "joints"]
+TableBits = Literal[16, 8]
+By = Literal["trial", "subject", "object", "session"]
+Count = Annotated[int, Meta(ge=0, le=2**53)]
+Value = Annotated[float, Meta(ge=-1e300, le=1e300)]
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+Name = Annotated[str, Meta(min_length=1)]
+# A number, or one of a few names.
+Given = Value | Name
+# What a choice changes, and all that comes after it: the elements, the model, the integer tables, or only what is
+# measured.
+Part = Literal["placement", "limits", "training", "tables", "rates"]
+_T = TypeVar("_T")
+
+
+def _written(default: _T) -> _T:
+    """Return a field that has a default and is still written."""
+    made: _T = field(default_factory=lambda: default)
+    return made
+
+
+def _choice(part: Part, text: str, **more: Any) -> Meta:
+    """Return the description of a choice; `more` are properties of `Choice`."""
+    return Meta(description=text, extra={"part": part, **more})
+
+
+class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Every choice of `thenar compile`, with its default; defaults from `tolerance` on are left out of build.json.
+
+    `choices` describes the fields. `rounds`, `shrinkage`, `tolerance` and `max_bins` are settings that trainers share;
+    `settings` are those of a single trainer, by name. None means: chosen, or the trainer's default. If `trainer` is
+    "auto", inner folds choose among the trainers that have all the given settings; with `rounds` that is LogitBoost.
+    """
+
+    prune: Annotated[
+        Count,
+        _choice("placement", "Prune ID3's tree: nodes with fewer than S rows are not split.", metavar="S"),
+    ] = _written(0)
+    rounds: Annotated[Annotated[int, Meta(ge=1, le=2**53)] | None, _choice("training", "Rounds of boosting.")] = (
+        _written(None)
+    )
+    inputs: Annotated[Inputs, _choice("placement", "Inputs that the build reads.")] = _written("both")
+    shrinkage: Annotated[
+        Annotated[float, Meta(gt=0.0, le=1.0)] | None, _choice("training", "Share of each round that is kept.")
+    ] = _written(None)
+    folds: Annotated[Count, _choice("rates", "Folds of the pooled accuracy; 0: measure no accuracy.")] = _written(4)
+    seed: Annotated[int, _choice("rates", "Seed of the folds.", least=0)] = _written(1)
+    tolerance: Annotated[
+        Annotated[float, Meta(ge=0.0)] | None,
+        _choice("training", "A round that changes the mean loss by less is the last."),
+    ] = None
+    table_bits: Annotated[
+        TableBits,
+        _choice("tables", "Bits per table entry. With 8, steps are coarser and the firmware is smaller."),
+    ] = 16
+    max_bins: Annotated[
+        Annotated[int, Meta(ge=2, le=2**53)] | None, _choice("training", "The most bins of a joint.")
+    ] = None
+    placement: Annotated[
+        Name, _choice("placement", "How switches are chosen: see below.", option="method", metavar="NAME")
+    ] = "id3"
+    keep: Annotated[
+        Annotated[int, Meta(ge=1, le=2**53)] | None,
+        _choice("placement", "Number of switches to keep, for methods that take it.", metavar="M"),
+    ] = None
+    width: Annotated[Annotated[int, Meta(ge=4, le=16)], _choice("tables", "Bits that every sum of scores fits.")] = 16
+    trainer: Annotated[Name, _choice("training", "What trains the model.")] = AUTO
+    settings: Annotated[dict[Name, Given], _choice("training", "Settings of the trainer, by name.")] = {}
+    by: Annotated[
+        By | None,
+        _choice(
+            "rates",
+            "What the folds of the first accuracy leave out.",
+            default="subject if there are several, otherwise trial",
+        ),
+    ] = None
+    levels: Annotated[
+        Annotated[int, Meta(ge=1, le=65535)] | None,
+        _choice("placement", "Choose from L levels of each taxel.", metavar="L", default="7"),
+    ] = None
+    keep_joints: Annotated[
+        Annotated[int, Meta(ge=1, le=2**53)] | None,
+        _choice("placement", "Keep the best N joints.", metavar="N", default="all"),
+    ] = None
+    robust: Annotated[
+        bool,
+        _choice("training", "Choose elements that minimise the worst single loss; train on rows with lost inputs."),
+    ] = False
+    keep_these: Annotated[
+        tuple[Name, ...], _choice("limits", "Always keep these inputs, by name: a,b.", metavar="NAMES")
+    ] = ()
+    never: Annotated[
+        tuple[Name, ...], _choice("limits", "Never keep these inputs, by name: a,b.", metavar="NAMES")
+    ] = ()
+    apart_mm: Annotated[
+        Annotated[float, Meta(gt=0.0, le=1e6)] | None,
+        _choice("limits", "Keep elements at least this far apart.", metavar="MM"),
+    ] = None
+    at_most_taxels: Annotated[
+        Count | None,
+        _choice("limits", "Keep at most N taxels, each with any number of levels.", option="at_most", unit="taxels"),
+    ] = None
+    budget_us: Annotated[
+        Annotated[float, Meta(ge=0.0, le=1e12)] | None,
+        _choice(
+            "limits", "Limit the scan time of the kept elements, and the record time of the kept joints.", metavar="US"
+        ),
+    ] = None
+    refuse: Annotated[
+        Share,
+        _choice(
+            "training",
+            "Share of grasps that may be refused as nothing held, if no row of the set has nothing held; 0: refuse "
+            "none.",
+            metavar="SHARE",
+            most=0.5,
+        ),
+    ] = 0.01
+
+
+def changed(recipe: Recipe, changes: Mapping[str, Any]) -> Recipe:
+    """Return a recipe with other choices, by name; names that are not fields are settings of the trainer."""
+    chosen = {name: value for name, value in changes.items() if name in Recipe.__struct_fields__}
+    settings = {name: value for name, value in changes.items() if name not in chosen}
+    made = replace(recipe, **chosen)
+    return replace(made, settings={**made.settings, **settings}) if settings else made
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A field of `Recipe`.
+
+    Attributes
+    ----------
+    name : str
+        The field.
+    option : str
+        Its name on the command line, with underscores.
+    part : {"placement", "limits", "training", "tables", "rates"}
+        What it changes; what comes after that is made again too.
+    help : str
+        One sentence for users.
+    kind : type
+        bool, int, float, str, tuple (of names) or dict.
+    names : tuple
+        The valid values, where there are a few.
+    least, most : float or None
+        The range of a number; `open`: the least itself is not in it.
+    default : object
+        The default value; `usual` says in words what None means.
+    metavar, unit : str
+        What stands for the value in help, and a word that follows it on the command line.
+    """
+
+    name: str
+    option: str
+    part: Part
+    help: str
+    kind: type
+    default: Any
+    names: tuple[Any, ...] = ()
+    least: float | None = None
+    most: float | None = None
+    open: bool = False
+    usual: str = ""
+    metavar: str | None = None
+    unit: str = ""
+
+
+def choices() -> Mapping[str, Choice]:
+    """Return all choices by the name of the field, in the order of `Recipe`."""
+    hints, defaults = get_type_hints(Recipe, include_extras=True), Recipe()
+    return {name: _choice_of(name, hint, getattr(defaults, name)) for name, hint in hints.items()}
+
+
+def _choice_of(name: str, hint: Any, default: Any) -> Choice:
+    metas = list(_metas(hint))
+    (about,) = (meta for meta in metas if meta.extra)
+    more: dict[str, Any] = dict(about.extra or {})
+    # Of several types, the outermost stands first.
+    range_of = next((meta for meta in metas if meta is not about), Meta())
+    kind, names = _kind(hint)
+    most = more.get("most", range_of.le)
+    return Choice(
+        name=name,
+        option=more.get("option", name),
+        part=more["part"],
+        help=about.description or "",
+        kind=kind,
+        default=default,
+        names=names,
+        least=more.get("least", range_of.ge if range_of.gt is None else range_of.gt),
+        most=None if most is None or most >= _NO_LIMIT else most,
+        open=range_of.gt is not None,
+        usual=more.get("default", ""),
+        metavar=more.get("metavar"),
+        unit=more.get("unit", ""),
+    )
+
+
+# Larger limits only keep a file sound; nobody reaches them.
+_NO_LIMIT = 1e6
+
+
+def _metas(hint: Any) -> Iterator[Meta]:
+    """Yield what is said of a type, and of the types that it is made of."""
+    yield from (each for each in getattr(hint, "__metadata__", ()) if isinstance(each, Meta))
+    yield from (meta for part in get_args(hint) if not isinstance(part, Meta) for meta in _metas(part))
+
+
+def _kind(hint: Any) -> tuple[type, tuple[Any, ...]]:
+    """Return the kind of a type's values, and these if there are a few."""
+    origin, parts = get_origin(hint), get_args(hint)
+    if origin is Literal:
+        return type(parts[0]), parts
+    if origin is None:
+        return hint, ()
+    if origin in (tuple, dict):
+        return origin, ()
+    return _kind(next(part for part in parts if part is not type(None)))
