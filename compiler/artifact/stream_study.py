@@ -27,11 +27,11 @@ from thenar.runtime.segmenting.model import SegmentModel
 from ..evaluation.folds import Fold, leave_groups_out, trial_folds
 from ..evaluation.rates import RecipeWords, student
 from ..evaluation.study import recipe_words
+from ..movements.learning import LAG_TICKS, Counts, announced_live, live_states
+from ..movements.scores import OVERLAPS, SegmentScore, score_streams, segments_of
+from ..movements.streams import TICK_US, MovementError, movements_of, streams_of
 from ..recordings.graspset import GraspSet
 from ..samples import FRAMES, Samples
-from ..segmenting.learning import LAG_TICKS, Counts, announced_live, live_states
-from ..segmenting.scores import OVERLAPS, Score, score_streams, segments_of
-from ..segmenting.streams import TICK_US, SegmentingError, moving, streams_of
 from ..tables.quantise import integer_scores
 from ..trainers.base import SHARED
 from ..workers import in_workers
@@ -56,7 +56,7 @@ TIMES = ("onset ms", "onset 90 % ms", "end ms", "end 90 % ms", "latency ms")
 FALSE = "false per 100"
 
 
-class Measured(msgspec.Struct, frozen=True):
+class SubjectMean(msgspec.Struct, frozen=True):
     """A mean over subjects and its 95 % interval (Student's t; None with one subject); None: nothing was measured."""
 
     mean: float | None
@@ -74,7 +74,7 @@ class MethodRow(msgspec.Struct, frozen=True):
     inputs: Inputs
     method: str
     what: str
-    values: dict[str, Measured]
+    values: dict[str, SubjectMean]
 
 
 class StreamStudy(msgspec.Struct, frozen=True):
@@ -111,18 +111,18 @@ def study_streams(
 
     Raises
     ------
-    SegmentingError
+    MovementError
         If the set holds no whole movements, no rows in which nothing is held, or only one subject.
     """
     streams = streams_of(grasp_set)
     if not grasp_set.is_none.any():
-        raise SegmentingError(
+        raise MovementError(
             "the set has no rows in which nothing is held: record them (thenar record), or simulate a scene that keeps "
             'every frame (rows = "all")'
         )
     subjects = tuple(sorted({stream.subject for stream in streams}))
     if len(subjects) < 2:
-        raise SegmentingError(f"the set holds streams of {subjects[0]} only: leaving a subject out takes two")
+        raise MovementError(f"the set holds streams of {subjects[0]} only: leaving a subject out takes two")
     there: dict[Inputs, bool] = {"switches": bool(grasp_set.element_names), "joints": bool(grasp_set.joints)}
     kinds = [kind for kind, some in {"both": all(there.values()), **there}.items() if some]
     report, total = progress or (lambda _done, _total: None), len(subjects) * (1 + len(kinds))
@@ -132,7 +132,7 @@ def study_streams(
         chosen[subject] = own
         report(len(chosen), total)
     tasks = [(kind, subject, chosen[subject]) for kind in kinds for subject in subjects]
-    found: dict[tuple[Inputs, str], dict[str, Score]] = {}
+    found: dict[tuple[Inputs, str], dict[str, SegmentScore]] = {}
     for kind, subject, scores in in_workers(partial(_of_subject, grasp_set), tasks, jobs):
         found[kind, subject] = scores
         report(len(chosen) + len(found), total)
@@ -182,7 +182,7 @@ def _chosen(grasp_set: GraspSet, kind: Inputs, options: Options, subject: str) -
     return subject, replace(options, trainer=training.trainer, settings=settings, **dict.fromkeys(SHARED))
 
 
-def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Options]) -> tuple[Inputs, str, dict[str, Score]]:
+def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Options]) -> tuple[Inputs, str, dict[str, SegmentScore]]:
     kind, subject, options = task
     own, learning, some = _learning(grasp_set, kind, options, subject)
     samples, few = Samples.of(grasp_set, kind), learning.rows(some)
@@ -211,7 +211,7 @@ def _inner_folds(learning: Samples, own: GraspSet, options: Options) -> list[Fol
     """Return folds that together test all rows of streams: each leaves out some subjects, or half of the movements of
     the only one.
     """
-    rows = np.flatnonzero(moving(own))
+    rows = np.flatnonzero(movements_of(own).inside)
     several = len(np.unique(own.subjects[rows]))
     if several > 1:
         folds = leave_groups_out(own.subjects[rows], "subject", min(several, _INNER))
@@ -274,7 +274,7 @@ class _Decoded:
         return np.array(states[::-1], np.intp)
 
 
-def _row(scores: list[Score]) -> dict[str, Measured]:
+def _row(scores: list[SegmentScore]) -> dict[str, SubjectMean]:
     def ticks(values: tuple[int, ...], percent: float, *, signed: bool = False) -> float | None:
         size = values if signed else tuple(map(abs, values))
         return float(np.percentile(size, percent)) * TICK_US / 1000 if values else None
@@ -290,16 +290,16 @@ def _row(scores: list[Score]) -> dict[str, Measured]:
     columns["end 90 % ms"] = [ticks(one.ends, 90) for one in scores]
     columns["latency ms"] = [ticks(one.latencies, 50, signed=True) for one in scores]
     columns[FALSE] = [100 * one.false / max(one.true, 1) for one in scores]
-    return {name: _measured(values, most=1.0 if name in SHARES else None) for name, values in columns.items()}
+    return {name: _mean(values, most=1.0 if name in SHARES else None) for name, values in columns.items()}
 
 
-def _measured(values: list[float | None], most: float | None) -> Measured:
+def _mean(values: list[float | None], most: float | None) -> SubjectMean:
     there = [value for value in values if value is not None]
     if not there:
-        return Measured(None, None, None, tuple(values))
+        return SubjectMean(None, None, None, tuple(values))
     rounded: list[Any] = [None if value is None else round(value, 6) for value in values]
     if len(there) < 2:
-        return Measured(round(there[0], 6), None, None, tuple(rounded))
+        return SubjectMean(round(there[0], 6), None, None, tuple(rounded))
     low, high = student(there)
     low, high = max(low, 0.0) if min(there) >= 0 else low, high if most is None else min(high, most)
-    return Measured(round(fmean(there), 6), round(low, 6), round(high, 6), tuple(rounded))
+    return SubjectMean(round(fmean(there), 6), round(low, 6), round(high, 6), tuple(rounded))

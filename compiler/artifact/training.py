@@ -17,6 +17,8 @@ from ..evaluation.folds import Fold, leave_groups_out, leave_one_out, trial_fold
 from ..evaluation.populations import OF, groups_of
 from ..evaluation.rates import UNITS, rated
 from ..limits import check_inputs, check_memory, check_types
+from ..movements.learning import learnt
+from ..movements.streams import TICK_US, MovementError, streams_of
 from ..placement.constraints import Limits
 from ..placement.elements import Elements, bits_of, elements_of, ports_of
 from ..placement.joints import kept_joints
@@ -26,8 +28,6 @@ from ..placement.ports import PortCosts
 from ..placement.tree import Tree
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
-from ..segmenting.learning import learnt
-from ..segmenting.streams import TICK_US, SegmentingError, streams_of
 from ..tables.collapse import Model, collapse
 from ..tables.quantise import integer_scores, quantise
 from ..tables.standing_in import fit_lost
@@ -334,7 +334,7 @@ def segments_for(grasp_set: GraspSet, samples: Samples, scores: Scores | None, s
         return None
     try:
         streams = streams_of(grasp_set)
-    except SegmentingError:
+    except MovementError:
         return None
     return learnt(streams, samples.labels, scores, samples.n_types, scale, TICK_US)
 

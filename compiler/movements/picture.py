@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..pictures import on_paper, painting, rendered
-from .scores import Segment, segments_of
-from .streams import SegmentingError
+from .scores import Span, segments_of
+from .streams import MovementError
 from .timeline import Timeline
 
 if TYPE_CHECKING:
@@ -23,11 +23,11 @@ _COLOURS = ("switches", "joints", "both", "baseline-1", "baseline-2", "baseline-
 def draw(timelines: Sequence[Timeline], kind: str) -> bytes:
     """Return the picture as the bytes of a "png" or "svg"; the same timelines give the same bytes.
 
-    Raises SegmentingError where there is nothing to draw, PictureError if matplotlib is not installed.
+    Raises MovementError where there is nothing to draw, PictureError if matplotlib is not installed.
     """
     length = [len(each.states) * each.tick_us / 1e6 for each in timelines]
     if not any(length):
-        raise SegmentingError("the recordings have no frames to draw")
+        raise MovementError("the recordings have no frames to draw")
     # Long recordings get more seconds per line, and very long ones no names.
     seconds = _SECONDS * max(1.0, sum(length) / (_SECONDS * _MOST_LINES))
     lines = [
@@ -71,7 +71,7 @@ def _draw_line(axes: "Axes", timeline: Timeline, start_s: float, seconds: float)
                 _draw_segment(axes, timeline.types[one.state], one, (begin, number + 0.08, width), inch)
 
 
-def _draw_segment(axes: "Axes", name: str, one: Segment, place: tuple[float, float, float], inch: float) -> None:
+def _draw_segment(axes: "Axes", name: str, one: Span, place: tuple[float, float, float], inch: float) -> None:
     from matplotlib.patches import Rectangle
 
     x, y, width = place

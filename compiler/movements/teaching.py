@@ -21,7 +21,7 @@ from thenar.runtime.preshape.selector import PreshapeTable
 from thenar.runtime.task import Step, Task
 
 from .scores import levenshtein
-from .streams import SegmentingError
+from .streams import MovementError
 from .transitions import Transitions
 
 # Holding a grasp this much longer than the longest demonstration is a deviation.
@@ -29,7 +29,7 @@ LIMIT = 2.0
 Column = tuple[int | None, ...]
 
 
-class Shown(NamedTuple):
+class DemonstratedGrasp(NamedTuple):
     """A grasp of a demonstration: its type, its duration, and the median of each joint while it was held, in the
     build's units; empty if joints were not read.
     """
@@ -43,7 +43,7 @@ class Demonstration(NamedTuple):
     """A demonstration: its name, and its grasps in order."""
 
     name: str
-    grasps: tuple[Shown, ...]
+    grasps: tuple[DemonstratedGrasp, ...]
 
     @property
     def types(self) -> tuple[str, ...]:
@@ -126,13 +126,13 @@ def taught(
 
     Raises
     ------
-    SegmentingError
+    MovementError
         If no grasp occurs in most of them.
     """
     columns = aligned([one.types for one in shown])
     steps = [found for column in columns if (found := _majority(shown, column)) is not None]
     if not steps:
-        raise SegmentingError(
+        raise MovementError(
             f"the {len(shown)} demonstrations have no grasp that occurs in most of them: "
             f"{'; '.join(f'{one.name}: ' + ' '.join(one.types[:8]) for one in shown[:4])}"
         )

@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from thenar.compiler.movements.learning import Counts, learnt, live_states, model_of
+from thenar.compiler.movements.scores import score
+from thenar.compiler.movements.streams import streams_of
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.compiler.segmenting.learning import Counts, learnt, live_states, model_of
-from thenar.compiler.segmenting.scores import score
-from thenar.compiler.segmenting.streams import streams_of
 from thenar.runtime.segmenting.decoder import decode, emissions
 from thenar.runtime.segmenting.model import STEPS
 

@@ -13,11 +13,18 @@ from hypothesis import strategies as st
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.demonstrations import demonstrations
+from thenar.compiler.movements.scores import levenshtein
+from thenar.compiler.movements.streams import MovementError
+from thenar.compiler.movements.teaching import (
+    DemonstratedGrasp,
+    Demonstration,
+    aligned,
+    behaviour_tree,
+    task_json,
+    taught,
+)
+from thenar.compiler.movements.transitions import Transitions
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.compiler.segmenting.scores import levenshtein
-from thenar.compiler.segmenting.streams import SegmentingError
-from thenar.compiler.segmenting.teaching import Demonstration, Shown, aligned, behaviour_tree, task_json, taught
-from thenar.compiler.segmenting.transitions import Transitions
 from thenar.runtime import Build
 from thenar.runtime.preshape.selector import Preshape, PreshapeTable
 from thenar.runtime.task import Task, load_task
@@ -33,7 +40,7 @@ def build(make_movements: Callable[..., GraspSet], tmp_path_factory: pytest.Temp
 
 def demo(name: str, types: str, held_s: float = 1.0, bend: float = 30.0) -> Demonstration:
     names = {"p": "pinch", "h": "hook", "f": "fist"}
-    return Demonstration(name, tuple(Shown(names[each], held_s, (bend,)) for each in types))
+    return Demonstration(name, tuple(DemonstratedGrasp(names[each], held_s, (bend,)) for each in types))
 
 
 @given(STRINGS)
@@ -73,7 +80,7 @@ def test_a_step_has_medians_a_limit_a_preshape_and_what_often_follows_elsewhere(
 
 
 def test_demonstrations_with_nothing_in_common_teach_nothing(build: Path) -> None:
-    with pytest.raises(SegmentingError, match=r"have no grasp that occurs in most of them: 1: pinch; 2: hook"):
+    with pytest.raises(MovementError, match=r"have no grasp that occurs in most of them: 1: pinch; 2: hook"):
         taught(Build.load(build), [demo("1", "p"), demo("2", "h"), demo("3", "f")], "t")
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from matplotlib.patches import Rectangle
 
-from thenar.compiler.segmenting import picture
-from thenar.compiler.segmenting.streams import SegmentingError
-from thenar.compiler.segmenting.timeline import Timeline
+from thenar.compiler.movements import picture
+from thenar.compiler.movements.streams import MovementError
+from thenar.compiler.movements.timeline import Timeline
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,5 +59,5 @@ def test_equal_timelines_are_equal_bytes() -> None:
 
 def test_of_nothing_there_is_no_picture() -> None:
     nothing = replace(timeline(), states=np.zeros(0, np.intp), truth=None)
-    with pytest.raises(SegmentingError, match="no frame"):
+    with pytest.raises(MovementError, match="no frame"):
         picture.draw([nothing], "svg")

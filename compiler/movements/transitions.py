@@ -18,7 +18,7 @@ from thenar.runtime.files import read_file
 
 from ..recordings.graspset import GraspSet
 from .scores import segments_of
-from .streams import SegmentingError, streams_of
+from .streams import MovementError, streams_of
 from .timeline import Timeline
 
 # Rarer transitions are not admissible, and are drawn faintly.
@@ -55,7 +55,7 @@ class Transitions:
 
     @classmethod
     def of_set(cls, grasp_set: GraspSet) -> "Transitions":
-        """Count the changes in the true segments of a set. Raises SegmentingError if rows are not movements."""
+        """Count the changes in the true segments of a set. Raises MovementError if rows are not movements."""
         names, labels = grasp_set.taxonomy.types, grasp_set.labels
         there = sorted(set(labels[~grasp_set.is_none].tolist()))
         streams = [segments_of(labels[stream.rows], len(names)) for stream in streams_of(grasp_set)]
@@ -69,12 +69,12 @@ class Transitions:
 
     @classmethod
     def load(cls, path: Path) -> "Transitions":
-        """Load a file written by `save`. Raises SegmentingError that names the file, OSError."""
+        """Load a file written by `save`. Raises MovementError that names the file, OSError."""
         try:
-            found = msgspec.json.decode(read_file(path, _LARGEST, SegmentingError), type=TransitionFile)
+            found = msgspec.json.decode(read_file(path, _LARGEST, MovementError), type=TransitionFile)
             counts = np.array(found.counts, np.intp).reshape(len(found.types), len(found.types))
         except (msgspec.DecodeError, UnicodeDecodeError, ValueError, OverflowError) as wrong:
-            raise SegmentingError(f"{path} is not a transitions file: {wrong}") from None
+            raise MovementError(f"{path} is not a transitions file: {wrong}") from None
         return cls(found.types, counts)
 
     @property
@@ -102,7 +102,7 @@ SIZE, _CIRCLE, _LARGEST_DOT = 720, 262.0, 21.0
 
 
 @dataclass(frozen=True, slots=True)
-class Node:
+class GraphNode:
     """A type: its position, and the position of its name outside, aligned by `anchor`."""
 
     name: str
@@ -114,7 +114,7 @@ class Node:
 
 
 @dataclass(frozen=True, slots=True)
-class Edge:
+class GraphEdge:
     """A change: `path` is a value of `d`, `tip` of the arrow's `points`; its width, opacity and text."""
 
     path: str
@@ -128,8 +128,8 @@ class Edge:
 class Graph:
     """Types on a circle, and changes as arrows between them, the rarest first so that frequent ones are on top."""
 
-    nodes: tuple[Node, ...]
-    edges: tuple[Edge, ...]
+    nodes: tuple[GraphNode, ...]
+    edges: tuple[GraphEdge, ...]
     radius: float
     size: int = SIZE
 
@@ -146,7 +146,7 @@ def graph_of(found: Transitions) -> Graph:
         label = SIZE / 2 + reach * cos(angle), SIZE / 2 + reach * sin(angle) + 5
         anchor = "middle" if abs(cos(angle)) < 0.2 else "start" if cos(angle) > 0 else "end"
         nodes.append(
-            Node(
+            GraphNode(
                 name,
                 round(x, 1),
                 round(y, 1),
@@ -172,7 +172,7 @@ def graph_of(found: Transitions) -> Graph:
 
 def _edge(
     start: tuple[float, float], end: tuple[float, float], angle: float, dot: float, share: float, words: str
-) -> Edge:
+) -> GraphEdge:
     """Return the arrow from one type to another, or a loop outside the circle.
 
     Arrows bend towards the middle, so that both directions are apart.
@@ -184,7 +184,7 @@ def _edge(
         turned = [(x + 26 * cos(angle + turn), y + 26 * sin(angle + turn)) for turn in (-1.0, 1.0)]
         points = [(x, y), *turned, (x, y)]
         path = "M{} C{} {} {}".format(*map(_point, points))
-        return Edge(path, "", round(width, 2), round(opacity, 2), words)
+        return GraphEdge(path, "", round(width, 2), round(opacity, 2), words)
     middle = SIZE / 2
     dx, dy = end[0] - start[0], end[1] - start[1]
     # To the right of the straight line, and towards the middle.
@@ -199,7 +199,7 @@ def _edge(
     point = _towards(end, bend, dot)
     tip = [point, (last[0] - uy * half, last[1] + ux * half), (last[0] + uy * half, last[1] - ux * half)]
     path = f"M{_point(first)} Q{_point(bend)} {_point(last)}"
-    return Edge(path, " ".join(map(_point, tip)), round(width, 2), round(opacity, 2), words)
+    return GraphEdge(path, " ".join(map(_point, tip)), round(width, 2), round(opacity, 2), words)
 
 
 def _towards(place: tuple[float, float], other: tuple[float, float], far: float) -> tuple[float, float]:

@@ -19,7 +19,7 @@ Labels = NDArray[np.intp]
 OVERLAPS = (10, 25, 50)
 
 
-class Segment(NamedTuple):
+class Span(NamedTuple):
     """Ticks `start` to `end`, exclusive, in one state."""
 
     start: int
@@ -27,17 +27,17 @@ class Segment(NamedTuple):
     state: int
 
 
-def segments_of(states: ArrayLike, none: int) -> list[Segment]:
+def segments_of(states: ArrayLike, none: int) -> list[Span]:
     """Return the segments of types in `states` (T,): runs of one state other than `none`."""
     given = np.asarray(states, np.intp)
     starts = np.flatnonzero(np.diff(given, prepend=-1))
     ends = np.append(starts[1:], len(given))
     runs = zip(starts.tolist(), ends.tolist(), given[starts].tolist(), strict=True)
-    return [Segment(*run) for run in runs if run[2] != none]
+    return [Span(*run) for run in runs if run[2] != none]
 
 
 @dataclass(frozen=True, slots=True)
-class Score:
+class SegmentScore:
     """Counts over one stream, or sums over several.
 
     true, found   segments; right: those found correctly at each of OVERLAPS; recognised: true ones with their type in
@@ -104,8 +104,8 @@ class Score:
         return median(map(abs, self.onsets)) if self.onsets else float("inf")
 
 
-def score(truth: ArrayLike, found: ArrayLike, none: int, announced: ArrayLike | None = None) -> Score:
-    """Score the states found in a stream.
+def score(truth: ArrayLike, found: ArrayLike, none: int, announced: ArrayLike | None = None) -> SegmentScore:
+    """SegmentScore the states found in a stream.
 
     Parameters
     ----------
@@ -118,14 +118,14 @@ def score(truth: ArrayLike, found: ArrayLike, none: int, announced: ArrayLike | 
 
     Returns
     -------
-    Score
+    SegmentScore
         The counts.
     """
     right, given = np.asarray(truth, np.intp), np.asarray(found, np.intp)
     true, segments = segments_of(right, none), segments_of(given, none)
     hits, pairs = _matched(true, segments)
     latencies, false = ([], 0) if announced is None else _announced(true, right, np.asarray(announced, np.intp), none)
-    return Score(
+    return SegmentScore(
         true=len(true),
         found=len(segments),
         right=hits,
@@ -139,8 +139,8 @@ def score(truth: ArrayLike, found: ArrayLike, none: int, announced: ArrayLike | 
     )
 
 
-def score_streams(streams: Iterable[tuple[bool, Labels, Labels, Labels | None]], none: int) -> Score:
-    """Score streams, in order: whether one continues a grasp of the one before, then the arguments of `score`.
+def score_streams(streams: Iterable[tuple[bool, Labels, Labels, Labels | None]], none: int) -> SegmentScore:
+    """SegmentScore streams, in order: whether one continues a grasp of the one before, then the arguments of `score`.
 
     A grasp that a pause divides is one true segment all the same, whatever was found on either side.
     """
@@ -153,15 +153,15 @@ def score_streams(streams: Iterable[tuple[bool, Labels, Labels, Labels | None]],
             parts = zip(joined.pop(), pause, arrays, strict=False)
             arrays = [np.concatenate([one, [state], more]) for one, state, more in parts]
         joined.append(arrays)
-    return Score.total(score(truth, found, none, *rest) for truth, found, *rest in joined)
+    return SegmentScore.total(score(truth, found, none, *rest) for truth, found, *rest in joined)
 
 
-def _matched(true: list[Segment], found: list[Segment]) -> tuple[tuple[int, ...], list[tuple[Segment, int]]]:
+def _matched(true: list[Span], found: list[Span]) -> tuple[tuple[int, ...], list[tuple[Span, int]]]:
     """Return how many of `found` are right at each of OVERLAPS, and the matches at the smallest overlap.
 
     A match is the index of a true segment and the segment found for it.
     """
-    counts, pairs, first = [0] * len(OVERLAPS), list[tuple[Segment, int]](), 0
+    counts, pairs, first = [0] * len(OVERLAPS), list[tuple[Span, int]](), 0
     taken: list[set[int]] = [set() for _ in OVERLAPS]
     for place, one in enumerate(found):
         while first < len(true) and true[first].end <= one.start:
@@ -184,7 +184,7 @@ def _matched(true: list[Segment], found: list[Segment]) -> tuple[tuple[int, ...]
     return tuple(counts), pairs
 
 
-def _announced(true: list[Segment], truth: Labels, announced: Labels, none: int) -> tuple[list[int], int]:
+def _announced(true: list[Span], truth: Labels, announced: Labels, none: int) -> tuple[list[int], int]:
     """Return the latencies in ticks of true segments announced before the next one, and the number of false
     announcements.
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from thenar.compiler.frontier.latency import Pace, latencies, latency
-from thenar.compiler.frontier.moving import Moving
 from thenar.compiler.frontier.price import Tabled
+from thenar.compiler.frontier.replay import replay_of
 from thenar.compiler.frontier.search import Shape
-from thenar.compiler.frontier.stream import stream_of
+from thenar.compiler.frontier.segments import MovementSamples
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import Training
@@ -57,11 +57,11 @@ def test_a_subject_who_is_left_out_has_no_part_in_what_is_learnt(make_set: Make)
     columns, training = tuple(range(14)), Training.of(Options(rounds=5))
     found = []
     for one in (grasp_set, changed):
-        moving = Moving.of(one, held_by(one, "S0"), seed=1)
+        moving = MovementSamples.of(one, held_by(one, "S0"), seed=1)
         assert moving is not None
-        assert sum(len(ticks.rows) for ticks in moving.ticks) >= np.count_nonzero(~new)
-        assert {ticks.subject for ticks in moving.ticks} == {"S0"}
-        made, model = moving.segmenting(columns, [TABLED], training)[TABLED]
+        assert sum(len(stream.rows) for stream in moving.streams) >= np.count_nonzero(~new)
+        assert {stream.subject for stream in moving.streams} == {"S0"}
+        made, model = moving.segment_tables(columns, [TABLED], training)[TABLED]
         found.append((made.switch_rows.tobytes(), made.scale, model))
     assert found[0] == found[1]
     model = found[0][2]
@@ -73,11 +73,11 @@ def test_a_subject_who_is_left_out_has_no_part_in_what_is_learnt(make_set: Make)
 def test_no_stream_goes_over_a_movement_that_is_left_out(make_set: Make) -> None:
     grasp_set = movements(make_set, subjects=1)
     trials = grasp_set.without_none().trials
-    moving = Moving.of(grasp_set, np.flatnonzero((trials != 3) & (trials != 4)), seed=1)
+    moving = MovementSamples.of(grasp_set, np.flatnonzero((trials != 3) & (trials != 4)), seed=1)
     assert moving is not None
-    assert [len(ticks.rows) // 60 for ticks in moving.ticks] == [3, 7]
-    assert [ticks.start_us for ticks in moving.ticks] == [0, 5 * 600_000]
-    assert np.concatenate([ticks.rows for ticks in moving.ticks]).tolist() == list(range(600))
+    assert [len(stream.rows) // 60 for stream in moving.streams] == [3, 7]
+    assert [stream.start_us for stream in moving.streams] == [0, 5 * 600_000]
+    assert np.concatenate([stream.rows for stream in moving.streams]).tolist() == list(range(600))
 
 
 @pytest.mark.parametrize("change", [{"independent": True}, {"none": False}])
@@ -85,7 +85,7 @@ def test_what_has_no_streams_or_never_says_that_nothing_is_held_teaches_nothing(
     make_set: Make, change: dict[str, Any]
 ) -> None:
     grasp_set = make_set(rows=12) if "none" in change else replace(movements(make_set), **change)
-    assert Moving.of(grasp_set, np.arange(6), seed=1) is None
+    assert MovementSamples.of(grasp_set, np.arange(6), seed=1) is None
 
 
 def test_segments_alone_are_decided_at_learnt_costs_and_with_a_class_of_nothing_held(make_set: Make) -> None:
@@ -93,16 +93,16 @@ def test_segments_alone_are_decided_at_learnt_costs_and_with_a_class_of_nothing_
     held, columns, training = Samples.of(grasp_set.without_none()), tuple(range(14)), Training.of(Options(rounds=5))
     train, new = held_by(grasp_set, "S0"), np.flatnonzero(grasp_set.subjects == "S1")
     labels = np.where(grasp_set.is_none, -1, np.searchsorted(np.unique(grasp_set.labels), grasp_set.labels))
-    stream = stream_of(grasp_set, labels, new, seed=1)
+    replay = replay_of(grasp_set, labels, new, seed=1)
     paces = (Pace(TABLED, 3000.0),)
-    moving = Moving.of(grasp_set, train, seed=1)
+    moving = MovementSamples.of(grasp_set, train, seed=1)
     assert moving is not None
-    ((*others, segments),) = latencies(held, train, columns, stream, paces, training, moving)
-    ((*before, usual),) = latencies(held, train, columns, stream, paces, training)
+    ((*others, segments),) = latencies(held, train, columns, replay, paces, training, moving)
+    ((*before, usual),) = latencies(held, train, columns, replay, paces, training)
     assert others == before
-    made, model = moving.segmenting(columns, [TABLED], training)[TABLED]
+    made, model = moving.segment_tables(columns, [TABLED], training)[TABLED]
     assert made.n_classes == held.n_classes + 1
-    assert segments == latency(made, columns, stream, 3000.0, model)
+    assert segments == latency(made, columns, replay, 3000.0, model)
     assert segments != usual
     assert segments.missed == 0
     assert segments.wrong == 0

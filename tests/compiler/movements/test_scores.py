@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.segmenting.scores import OVERLAPS, Score, levenshtein, score, segments_of
+from thenar.compiler.movements.scores import OVERLAPS, SegmentScore, levenshtein, score, segments_of
 
 NONE = 3
 STATES = st.lists(st.integers(0, NONE), min_size=1, max_size=40)
@@ -114,9 +114,9 @@ def test_levenshtein_is_that_of_the_recursion(one: list[int], other: list[int]) 
 def test_scores_of_streams_add_up() -> None:
     one = score(spelled(".aa.bb"), spelled(".aa.cc"), NONE, spelled("..aa.c"))
     other = score(spelled("cc.."), spelled("cc.."), NONE, spelled("cc.."))
-    total = Score.total([one, other])
+    total = SegmentScore.total([one, other])
     assert (total.true, total.found, total.right) == (3, 3, (2, 2, 2))
     assert total.f1(0) == pytest.approx(2 / 3)
     assert total.onsets == (*one.onsets, *other.onsets)
     assert total.edit == pytest.approx(1 - 1 / 3)
-    assert Score.total([]) == Score()
+    assert SegmentScore.total([]) == SegmentScore()

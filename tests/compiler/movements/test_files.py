@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from thenar.compiler.segmenting.files import COLUMNS, TOPIC, WRITERS, write
-from thenar.compiler.segmenting.timeline import Timeline, probabilities
+from thenar.compiler.movements.files import COLUMNS, TOPIC, WRITERS, write
+from thenar.compiler.movements.timeline import Timeline, probabilities
 
 TYPES = ("pinch", "=hook")
 

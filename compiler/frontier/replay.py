@@ -1,7 +1,7 @@
-"""Streams: a glove's data while a hand goes from grasp to grasp, recorded or composed of single trials.
+"""Replays: a glove's data while a hand goes from grasp to grasp, recorded or composed of single trials.
 
-Without recordings of transitions, a stream is composed of single trials. The switches and joints of each held grasp
-come from the recordings; everything in between is modelled. When the hand lets go, the switches of the grasp open one
+Without recordings of transitions, a replay is composed of single trials. The switches and joints of each grasp come
+from the recordings; everything in between is modelled. When the hand lets go, the switches of the grasp open one
 by one, at times spread evenly over RELEASE_US. During the transition the joints follow a minimum-jerk path (Flash and
 Hogan 1985, J. Neurosci. 5: 1688) that opens the hand, most at two thirds of the path (Jeannerod 1984, J. Motor Behav.
 16: 235), in TRAVEL_US, sampled every RECORD_US as by a CyberGlove. When it grips, the switches of the next grasp close
@@ -13,21 +13,27 @@ The model leaves out movement within a hold: a trial is one frame, so an error i
 and more frames do not correct it. It also leaves out contact bounce, and switches that are touched in passing.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..movements.scores import Span
+from ..movements.streams import (
+    LEAST_FRAMES,
+    Bits,
+    Codes,
+    Rows,
+    Stream,
+    Times,
+    frames_are_dense,
+    holds_of,
+    movements_of,
+)
 from ..placement.elements import Elements, above
 from ..recordings.graspset import GraspSet
 from ..samples import Columns
-from .movements import Movements, holds_movements, movements_of
 from .points import FrontierError
-
-Rows = NDArray[np.intp]
-Bits = NDArray[np.bool_]
-Codes = NDArray[np.uint16]
-Times = NDArray[np.int64]
 
 RELEASE_US, TRAVEL_US, GRIP_US = 200_000, 300_000, 200_000
 TRANSITION_US = RELEASE_US + TRAVEL_US + GRIP_US
@@ -45,44 +51,32 @@ _GOLDEN = 0.618034
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stream:
-    """T states of a glove; each lasts until the next; the last is the end, of duration 0.
+class Replay:
+    """What latencies are measured on: n rows of a glove's readings, the stream that shows them, the grasps in it.
 
-    bits      (T, s) bool     every switch of the set
-    codes     (T, j) uint16   the joints
-    at_us     (T,) int64      when each begins, never falling
-    types     (T,) intp       the class of the grasp; -1 while the hand moves
-    arrivals  (g,) intp       the states at which a grasp is complete, if its type differs from the grasp before: the
-                              same type may still be decided on from before, which measures nothing
-    ends      (g,) intp       the states at which these grasps end
-    what      a sentence: the kind of stream, and the reason for it
-    taxels    (T, t) uint16   the taxels
+    bits    (n, s) bool     every switch of the set
+    codes   (n, j) uint16   the joints
+    taxels  (n, t) uint16   the taxels
+    grasps  every grasp, from the state at which it is complete to the one at which it ends, and its class
+    what    a sentence: the kind of stream, and the reason for it
     """
 
-    bits: NDArray[np.bool_]
-    codes: NDArray[np.uint16]
-    at_us: NDArray[np.int64]
-    types: Rows
-    arrivals: Rows
-    ends: Rows
-    what: str = ""
-    taxels: Codes = field(default_factory=lambda: np.empty((0, 0), np.uint16))
+    bits: Bits
+    codes: Codes
+    taxels: Codes
+    stream: Stream
+    grasps: tuple[Span, ...]
+    what: str
 
-    def __len__(self) -> int:
-        return len(self.at_us)
-
-    def with_elements(self, elements: Elements) -> "Stream":
-        """Return the same stream with these elements as switches, if it has taxels."""
-        if not self.taxels.shape[1]:
-            return self
-        return replace(self, bits=above(self.bits, self.taxels, elements), taxels=self.taxels[:, :0])
-
-    def with_joints(self, joints: Columns) -> "Stream":
-        """Return the same stream with only the joints `joints`; without any if it has none."""
-        return replace(self, codes=self.codes[:, list(joints)]) if 0 < len(joints) < self.codes.shape[1] else self
+    def reading(self, elements: Elements, joints: Columns) -> "Replay":
+        """Return the same replay with these elements as switches, if it has taxels, and with these joints, if any."""
+        found = self
+        if self.taxels.shape[1]:
+            found = replace(found, bits=above(self.bits, self.taxels, elements), taxels=self.taxels[:, :0])
+        return replace(found, codes=self.codes[:, list(joints)]) if 0 < len(joints) < self.codes.shape[1] else found
 
 
-def stream_of(
+def replay_of(
     grasp_set: GraspSet,
     labels: Rows,
     rows: Rows | None = None,
@@ -90,20 +84,20 @@ def stream_of(
     seed: int,
     grasps: int = GRASPS,
     period_us: int = PERIOD_US,
-) -> Stream:
-    """Return a stream of rows of a set: of its movements if it holds whole ones, else composed of its trials.
+) -> Replay:
+    """Return a replay of rows of a set: of its movements if its frames are dense, else composed of its trials.
 
     labels  (n,) the classes of all rows, as the tables number them; -1 for nothing held
-    rows    those that may be used, the tables' test rows; None: all. Of a set of whole movements, only movements with
-            all of their rows among them are used
+    rows    those that may be used, the tables' test rows; None: all. Of movements, only those with all of their rows
+            among them are used
 
-    `what` of the stream describes it in a sentence. Raises FrontierError if no stream can be made of the rows.
+    Raises FrontierError if no replay can be made of the rows.
     """
-    if holds_movements(grasp_set):
-        return recorded_stream(grasp_set, labels, rows, grasps=grasps, period_us=period_us)
+    if frames_are_dense(grasp_set):
+        return recorded(grasp_set, labels, rows, grasps=grasps, period_us=period_us)
     chosen = np.arange(len(grasp_set)) if rows is None else rows
     chosen = chosen[labels[chosen] >= 0]
-    return composed_stream(
+    return composed(
         grasp_set.switches[chosen],
         grasp_set.codes[chosen],
         labels[chosen],
@@ -115,15 +109,15 @@ def stream_of(
     )
 
 
-def recorded_stream(
+def recorded(
     grasp_set: GraspSet,
     labels: Rows,
     rows: Rows | None = None,
     *,
     grasps: int = GRASPS,
     period_us: int = PERIOD_US,
-) -> Stream:
-    """Return the movements of a set whose rows are the frames of whole movements, one after the other.
+) -> Replay:
+    """Return the movements of a set with a grasp and at least LEAST_FRAMES rows, one after the other.
 
     Rows of a set without times are taken to be `period_us` apart. Two movements are separated by a period plus a
     varying fraction, so that no frame time stays in step with the rows. If there are more than `grasps` movements, that
@@ -131,32 +125,47 @@ def recorded_stream(
 
     Raises FrontierError if no movement lies in `rows` as a whole.
     """
-    found = movements_of(grasp_set)
+    movements = movements_of(grasp_set)
+    movements = movements.pick((movements.sizes >= LEAST_FRAMES) & (movements.counts(~grasp_set.is_none) > 0))
     if rows is not None:
-        found = found.pick(_whole(found, rows, len(grasp_set)))
-    if not len(found):
+        usable = np.isin(np.arange(len(grasp_set)), rows)
+        movements = movements.pick(movements.counts(usable) == movements.sizes)
+    if not len(movements):
         raise FrontierError("no whole movement is among the held-out rows for latency: cut the folds between movements")
-    found = found.pick(np.unique(np.linspace(0, len(found) - 1, min(grasps, len(found))).astype(np.intp)))
+    spread = np.unique(np.linspace(0, len(movements) - 1, min(grasps, len(movements))).astype(np.intp))
+    movements = movements.pick(spread)
+    begins = np.cumsum(movements.sizes) - movements.sizes
+    complete, released = (begins + frame for frame in holds_of(grasp_set, movements))
+    number = np.repeat(np.arange(len(begins)), movements.sizes)
+    shown = movements.rows[np.arange(len(number)) - begins[number] + movements.first[number]]
+    times_us = grasp_set.times_us[shown] if grasp_set.times_us.size else np.arange(len(shown)) * period_us
+    steps_us = np.maximum(np.diff(times_us, prepend=times_us[:1]), 0)
+    steps_us[begins[1:]] = period_us + round(_GOLDEN * period_us)
+    at_us = np.cumsum(steps_us, dtype=np.int64)
     apart = "when they were recorded" if grasp_set.times_us.size else f"taken to be {period_us / 1000:g} ms apart"
-    what = (
-        f"Latencies are over {len(found)} recorded movements, frames {apart}: "
-        "neighbouring rows of a trial resemble each other, as the frames of a whole movement do."
+    return Replay(
+        grasp_set.switches[shown],
+        grasp_set.codes[shown],
+        grasp_set.taxels[shown],
+        Stream(np.arange(len(shown)), at_us, int(at_us[-1]) + period_us),
+        tuple(map(Span, complete.tolist(), released.tolist(), labels[shown[complete]].tolist())),
+        f"Latencies are over {len(movements)} recorded movements, frames {apart}: "
+        "neighbouring rows of a trial resemble each other, as the frames of a whole movement do.",
     )
-    return _laid_out(grasp_set, labels, found, period_us, what)
 
 
-def composed_stream(
-    switches: NDArray[np.bool_],
-    codes: NDArray[np.uint16],
+def composed(
+    switches: Bits,
+    codes: Codes,
     labels: Rows,
     *,
     seed: int,
     grasps: int = GRASPS,
-    opens_up: NDArray[np.bool_] | None = None,
+    opens_up: Bits | None = None,
     taxels: Codes | None = None,
-    eases_up: NDArray[np.bool_] | None = None,
-) -> Stream:
-    """Return a stream composed of single trials (n, s), (n, j) of classes `labels` (n,): see this module.
+    eases_up: Bits | None = None,
+) -> Replay:
+    """Return a replay composed of single trials (n, s), (n, j) of classes `labels` (n,): see this module.
 
     opens_up  (j,) the joints whose codes rise as the hand opens; None: the codes of all fall
     taxels    (n, t) codes; eases_up (t,): those that rise as the taxel is released; None: all fall
@@ -171,95 +180,32 @@ def composed_stream(
     random = np.random.default_rng(seed)
     order = _order(labels, grasps, random)
     legs = _legs(contacts, rest, codes, _open_hand(codes, opens_up), order, random)
-    found = np.concatenate([leg.contacts for leg in legs])
-    begins = np.concatenate([[0], np.cumsum([len(leg.at_us) for leg in legs])])
-    return stream_from(
-        bits=found[:, :n_switches] > 0,
-        taxels=found[:, n_switches:],
-        codes=np.concatenate([leg.codes for leg in legs]),
-        at_us=np.concatenate([leg.at_us for leg in legs]),
-        end_us=int(legs[-1].at_us[-1]) + HOLD_US[0],
-        arrivals=begins[:-1] + np.array([leg.arrival for leg in legs]),
-        ends=begins[1:],
-        grasps=labels[order],
-        what=f"Latencies are over a stream composed of {grasps} single trials, each held for {HOLD_US[0] / 1e6:g} to "
+    readings, at_us = np.concatenate([leg.contacts for leg in legs]), np.concatenate([leg.at_us for leg in legs])
+    ends = np.cumsum([len(leg.at_us) for leg in legs])
+    # A leg ends with the state in which its grasp is complete.
+    return Replay(
+        readings[:, :n_switches] > 0,
+        np.concatenate([leg.codes for leg in legs]),
+        readings[:, n_switches:],
+        Stream(np.arange(len(at_us)), at_us, int(at_us[-1]) + HOLD_US[0]),
+        tuple(map(Span, (ends - 1).tolist(), ends.tolist(), labels[order].tolist())),
+        f"Latencies are over a stream composed of {grasps} single trials, each held for {HOLD_US[0] / 1e6:g} to "
         f"{HOLD_US[1] / 1e6:g} s, up to {TRANSITION_US / 1e6:g} s from one to the next: the recordings hold no whole "
         "movements.",
     )
 
 
-def stream_from(
-    *,
-    bits: NDArray[np.bool_],
-    codes: NDArray[np.uint16],
-    at_us: NDArray[np.int64],
-    end_us: int,
-    arrivals: Rows,
-    ends: Rows,
-    grasps: Rows,
-    what: str,
-    taxels: Codes | None = None,
-) -> Stream:
-    """Return the stream of states that end at end_us, given all grasps (g,), classes `grasps`, in order."""
-    types = np.full(len(at_us) + 1, -1, np.intp)
-    for arrival, end, grasp in zip(arrivals.tolist(), ends.tolist(), grasps.tolist(), strict=True):
-        types[arrival:end] = grasp
-    another = np.concatenate([[True], grasps[1:] != grasps[:-1]])
-    pads = np.empty((len(at_us), 0), np.uint16) if taxels is None else taxels
-    return Stream(
-        bits=np.vstack([bits, bits[-1:]]),
-        codes=np.vstack([codes, codes[-1:]]),
-        at_us=np.append(at_us, np.int64(end_us)),
-        types=types,
-        arrivals=arrivals[another],
-        ends=ends[another],
-        what=what,
-        taxels=np.vstack([pads, pads[-1:]]),
-    )
-
-
-def _whole(movements: Movements, rows: Rows, count: int) -> NDArray[np.bool_]:
-    """Return which movements (m,) have all their rows among `rows`."""
-    there = np.zeros(count + 1, np.int64)
-    there[1:] = np.cumsum(np.bincount(rows, minlength=count) > 0)
-    whole: NDArray[np.bool_] = there[movements.beyond] - there[movements.first] == movements.beyond - movements.first
-    return whole
-
-
-def _laid_out(grasp_set: GraspSet, labels: Rows, movements: Movements, period_us: int, what: str) -> Stream:
-    sizes = movements.beyond - movements.first
-    begins = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    number = np.repeat(np.arange(len(sizes)), sizes)
-    rows = np.arange(sizes.sum()) - begins[number] + movements.first[number]
-    times_us = grasp_set.times_us[rows] if grasp_set.times_us.size else np.arange(len(rows)) * period_us
-    steps_us = np.maximum(np.diff(times_us, prepend=times_us[:1]), 0)
-    steps_us[begins[1:]] = period_us + round(_GOLDEN * period_us)
-    at_us = np.cumsum(steps_us, dtype=np.int64)
-    return stream_from(
-        bits=grasp_set.switches[rows],
-        codes=grasp_set.codes[rows],
-        at_us=at_us,
-        end_us=int(at_us[-1]) + period_us,
-        arrivals=begins + movements.complete - movements.first,
-        ends=begins + movements.released - movements.first,
-        grasps=labels[movements.complete],
-        what=what,
-        taxels=grasp_set.taxels[rows],
-    )
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Leg:
-    """The transition from one grasp to the next, and its hold: states (t,), of which `arrival` begins the hold."""
+    """The transition from one grasp to the next: states (t,), of which the last is its hold."""
 
     contacts: Codes
     codes: Codes
     at_us: Times
-    arrival: int
 
 
 def _order(labels: Rows, grasps: int, random: np.random.Generator) -> list[int]:
-    """Return the sequence of held trials; every trial occurs once before any is repeated."""
+    """Return the sequence of trials; every trial occurs once before any is repeated."""
     chosen: list[int] = []
     waiting: list[int] = []
     while len(chosen) < grasps:
@@ -301,7 +247,7 @@ def _legs(
         at_us, travelled = _changes(leaves_us, open_us, close_us, _path(pose, codes[row].astype(np.float64), opened))
         now = at_us[:, np.newaxis]
         seen = np.where(now < open_us, held, np.where(now >= close_us, contacts[row], rest))
-        leg = _Leg(seen, travelled, at_us, len(at_us) - 1)
+        leg = _Leg(seen, travelled, at_us)
         held, pose = contacts[row], codes[row].astype(np.float64)
         leaves_us = int(leg.at_us[-1]) + int(random.integers(*HOLD_US))
         legs.append(leg)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from thenar.runtime.segmenting.decoder import Decoder, emissions
 from thenar.runtime.segmenting.model import STEPS, SegmentModel, gain_of
 
-from .scores import OVERLAPS, Score, score
+from .scores import OVERLAPS, SegmentScore, score
 from .streams import Stream
 
 Labels = NDArray[np.intp]
@@ -107,10 +107,12 @@ def _best(
     """Return the temperature, lead and change cost that decode scores (T, K + 1) best to their states (T,)."""
     none = len(counts.durations) - 1
 
-    def tried(one: tuple[float, float, float]) -> Score:
+    def tried(one: tuple[float, float, float]) -> SegmentScore:
         model = model_of(counts, *one, _SCALE, tick_us)
         states = ((truth, live_states(model, lanes, LAG_TICKS)) for lanes, truth in tests)
-        return Score.total(score(truth, own, none, announced_live(own, none, LAG_TICKS)) for truth, own in states)
+        return SegmentScore.total(
+            score(truth, own, none, announced_live(own, none, LAG_TICKS)) for truth, own in states
+        )
 
     def best(candidates: Sequence[tuple[float, float, float]]) -> tuple[float, float, float]:
         found = {one: tried(one) for one in candidates}

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thenar.compiler.movements.streams import PAUSE_US, MovementError, streams_of
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.merging import merge
-from thenar.compiler.segmenting.streams import PAUSE_US, SegmentingError, streams_of
 
 Make = Callable[..., GraspSet]
 
@@ -70,9 +70,9 @@ def test_sessions_are_streams_of_their_own(make_movements: Make) -> None:
 def test_rows_that_are_trials_of_their_own_are_no_movements(make_movements: Make) -> None:
     grasp_set = make_movements()
     held = grasp_set.rows(np.unique(grasp_set.trial_ids, return_index=True)[1]).without_none()
-    with pytest.raises(SegmentingError, match="whole movements"):
+    with pytest.raises(MovementError, match="whole movements"):
         streams_of(held)
-    with pytest.raises(SegmentingError, match="separate trial"):
+    with pytest.raises(MovementError, match="separate trial"):
         streams_of(replace(grasp_set, independent=True))
 
 
