@@ -14,7 +14,7 @@ from ..body.shapes import rotation_vector
 from ..contact.balance import USUAL, Case, Pace, Skin
 from ..contact.model import Contact, ContactModel, Load, split
 from ..contact.settle import Rest, close
-from ..pipeline.effect import CONTACT_READS, CONTACT_WRITES, Effect, EffectParameters, Setting
+from ..pipeline.effect import CONTACT_READS, CONTACT_WRITES, Effect, EffectParameters, SceneSetting
 
 _Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)]
 # Repetitions solved at a time: enough to amortise numpy's calls, few enough for the processor's cache.
@@ -95,7 +95,7 @@ def _bundles(loads: list[Load]) -> list[list[Load]]:
     return bundles
 
 
-def model(parameters: Parameters, setting: Setting) -> ContactModel:
+def model(parameters: Parameters, setting: SceneSetting) -> ContactModel:
     """Return the contact model."""
     return Quasistatic(parameters)
 

@@ -21,7 +21,7 @@ from thenar.runtime.taxels import TaxelCalibration, TaxelLine
 
 from ..body.cyberglove import SENSORS, USED, Calibration
 from ..errors import SceneError
-from ..running.simulation import Progress, simulate
+from ..pipeline.simulation import Progress, simulate
 from ..scenes.scene import Scene
 
 Bits = NDArray[np.bool_]

@@ -15,8 +15,8 @@ from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
 from thenar.simulator.contact.balance import Case
 from thenar.simulator.contact.model import Load
+from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import SURVEYS
 
 HAND = Hand(Size(185.0, 83.0))

@@ -19,9 +19,9 @@ from thenar.simulator.effects import switch_threshold
 from thenar.simulator.effects.contact_quasistatic import Parameters, Quasistatic
 from thenar.simulator.pipeline.batch import SLID_OUT_MM
 from thenar.simulator.pipeline.ramp import crossings
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import conditions_of
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.running.simulation import conditions_of
-from thenar.simulator.scenes.decode import load_scene
 
 from ..finding import Finding, Worst
 

@@ -9,8 +9,8 @@ from thenar.simulator.body.condition import Condition, Held, Pad, Thing
 from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.body.shapes import Cylinder
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import EFFECTS, EffectParameters, Setting
-from thenar.simulator.scenes.scene import Glove, Listed, Recording, Scene, SceneObject, Subject
+from thenar.simulator.pipeline.effect import EFFECTS, EffectParameters, SceneSetting
+from thenar.simulator.scenes.scene import ListedEffect, Recording, Scene, SceneGlove, SceneObject, Subject
 from thenar.simulator.streams import Draw, Draws, Site
 
 BAR = Cylinder(diameter_mm=40.0, length_mm=120.0)
@@ -35,7 +35,7 @@ def _batch(repetitions: Iterable[int] = range(4), condition: Condition | None = 
     return Batch(condition or _condition(), numbers, 3 * numbers, np.tile(np.zeros(20), (len(numbers), 1)))
 
 
-def _setting(**changes: object) -> Setting:
+def _setting(**changes: object) -> SceneSetting:
     usual = {
         "seed": 7,
         "session_trials": 100,
@@ -47,7 +47,7 @@ def _setting(**changes: object) -> Setting:
         "timed": False,
         "on_wire": False,
     }
-    return Setting(**(usual | changes))  # type: ignore[arg-type]
+    return SceneSetting(**(usual | changes))  # type: ignore[arg-type]
 
 
 def _draw(effect: str, batch: Batch, seed: int = 7) -> Draw:
@@ -58,7 +58,7 @@ def _draw(effect: str, batch: Batch, seed: int = 7) -> Draw:
 
 def _scene(effects: Sequence[str | tuple[str, EffectParameters]] = (), **changes: object) -> Scene:
     pairs = [(given, EFFECTS[given].parameters()) if isinstance(given, str) else given for given in effects]
-    listed = tuple(Listed(*pair) for pair in sorted(pairs, key=lambda pair: EFFECTS[pair[0]].order))
+    listed = tuple(ListedEffect(*pair) for pair in sorted(pairs, key=lambda pair: EFFECTS[pair[0]].order))
     usual = {
         "name": "small",
         "seed": 7,
@@ -67,7 +67,7 @@ def _scene(effects: Sequence[str | tuple[str, EffectParameters]] = (), **changes
         "subjects": (Subject(name="A", hand_length_mm=185.0, hand_breadth_mm=83.0),),
         "repetitions": 8,
         "recording": Recording(lead_ms=30.0, hold_ms=250.0, release_ms=40.0),
-        "glove": Glove(taxels=PADS if any(name.startswith("taxel.") for name, _ in pairs) else ()),
+        "glove": SceneGlove(taxels=PADS if any(name.startswith("taxel.") for name, _ in pairs) else ()),
     }
     return Scene(effects=listed, **(usual | changes))  # type: ignore[arg-type]
 
@@ -85,8 +85,8 @@ def make_batch() -> Callable[..., Batch]:
 
 
 @pytest.fixture(scope="session")
-def make_setting() -> Callable[..., Setting]:
-    """Return a function of whatever field of `Setting` is to differ."""
+def make_setting() -> Callable[..., SceneSetting]:
+    """Return a function of whatever field of `SceneSetting` is to differ."""
     return _setting
 
 

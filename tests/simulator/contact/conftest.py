@@ -7,9 +7,9 @@ import pytest
 
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.contact.balance import Case, Skin
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import sessions
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.running.simulation import sessions
-from thenar.simulator.scenes.decode import load_scene
 
 SCENES = ("kamakura", "cutkosky")
 

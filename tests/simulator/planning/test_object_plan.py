@@ -10,11 +10,11 @@ from thenar.simulator.body.condition import Held, Thing
 from thenar.simulator.body.hand import Hand
 from thenar.simulator.body.shapes import Pose, Shape, Sphere
 from thenar.simulator.errors import PlanError
+from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.planning.plan import Work, average_hand, entry_of, plan_object, shipped_prehensions
 from thenar.simulator.planning.planner import Plan
 from thenar.simulator.planning.postures import Entry, Postures
 from thenar.simulator.planning.prehension import pad_sphere
-from thenar.simulator.scenes.decode import load_scene
 
 TYPES = shipped_prehensions("kamakura14")
 SHIPPED = [(name, entry) for name in ("kamakura14", "cutkosky16") for entry in Postures.shipped(name).entries]

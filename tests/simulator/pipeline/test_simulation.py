@@ -10,11 +10,11 @@ from thenar.simulator import load_scene, simulate
 from thenar.simulator.effects import wire_lost_bytes
 from thenar.simulator.effects.contact_quasistatic import Parameters
 from thenar.simulator.errors import SceneError
+from thenar.simulator.pipeline.report import SimulationReport
+from thenar.simulator.pipeline.simulation import Simulated, sessions
+from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.running.pipeline import Ledger, compile_pipeline
-from thenar.simulator.running.report import Report
-from thenar.simulator.running.simulation import Simulated, sessions
-from thenar.simulator.scenes.scene import Listed, Scene
+from thenar.simulator.scenes.scene import ListedEffect, Scene
 
 
 def scene_of(name: str, repetitions: int, types: tuple[str, ...] = (), **changes: object) -> Scene:
@@ -25,11 +25,11 @@ def scene_of(name: str, repetitions: int, types: tuple[str, ...] = (), **changes
 
 def hasty(scene: Scene, most_steps: int) -> Scene:
     """Return a scene whose contact model gives up early."""
-    listed = Listed("contact.quasistatic", Parameters(most_steps=most_steps))
+    listed = ListedEffect("contact.quasistatic", Parameters(most_steps=most_steps))
     return msgspec.structs.replace(scene, effects=(*scene.effects, listed))
 
 
-def without_times(report: Report) -> Report:
+def without_times(report: SimulationReport) -> SimulationReport:
     steps = tuple(
         msgspec.structs.replace(each, seconds=0.0, us_a_grasp=0.0, share=0.0, calls=0) for each in report.steps
     )
@@ -207,7 +207,7 @@ def test_a_scene_in_which_nothing_settles_is_an_error() -> None:
 
 
 def test_a_scene_of_which_no_byte_arrives_says_so_and_blames_no_hand() -> None:
-    lossy = Listed("wire.lost_bytes", wire_lost_bytes.Parameters(rate=0.999))
+    lossy = ListedEffect("wire.lost_bytes", wire_lost_bytes.Parameters(rate=0.999))
     scene = msgspec.structs.replace(QUICK, effects=(*QUICK.effects, lossy))
     with pytest.raises(SceneError, match="of the first, no frame arrived whole"):
         simulate(scene, jobs=1)

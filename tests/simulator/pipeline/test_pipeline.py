@@ -12,7 +12,7 @@ from thenar.simulator.body.condition import Condition
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS, hold_frame
-from thenar.simulator.running.pipeline import Ledger, compile_pipeline
+from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
 from thenar.simulator.scenes.scene import Recording, Scene
 
 NAMES = tuple(EFFECTS)
@@ -47,14 +47,14 @@ def light() -> list[tuple]:
 
 
 def order(scene: Scene, without: str | None = None) -> list[str]:
-    return [stop.effect.name for stop in compile_pipeline(scene, without).stops]
+    return [stop.effect.name for stop in compile_pipeline(scene, without).steps]
 
 
 @given(names=SUBSETS)
 def test_a_pipeline_holds_the_scenes_effects_and_the_gloves_own_steps_and_nothing_else(
     make_scene: SceneMaker, names: list[str]
 ) -> None:
-    stops = compile_pipeline(make_scene(names)).stops
+    stops = compile_pipeline(make_scene(names)).steps
     on_wire = any(name.startswith("wire.") for name in names)
     assert sorted(stop.effect.name for stop in stops if not stop.own) == sorted(names)
     felt = any(name.startswith("taxel.") for name in names)
@@ -71,7 +71,7 @@ def test_the_order_is_that_of_the_numbers_however_the_scene_lists_them(
     other = make_scene(names, name="other")
     mixed = Scene(**{f: getattr(other, f) for f in other.__struct_fields__} | {"effects": _pick(scene, shuffled)})
     assert order(mixed) == order(scene)
-    stops = compile_pipeline(scene).stops
+    stops = compile_pipeline(scene).steps
     numbers = [stop.effect.order for stop in stops]
     assert numbers == sorted(numbers)
 
@@ -127,7 +127,7 @@ def test_every_step_reads_and_writes_what_it_says(make_scene: SceneMaker, make_b
         assert {*EFFECTS[name].reads, *EFFECTS[name].writes} <= FIELDS
     pipeline = compile_pipeline(make_scene(["contact.quasistatic", *light()]))
     written = {"trials", "previous_deg", "rest_deg", "delay_us", "lost", "ramp", "taxels"}
-    for stop in pipeline.stops:
+    for stop in pipeline.steps:
         single = type(pipeline)(pipeline.setting, (stop,))
         single.run([batch], Ledger())
         effect, (reads, writes) = stop.effect, batch.taken()
@@ -139,7 +139,7 @@ def test_every_step_reads_and_writes_what_it_says(make_scene: SceneMaker, make_b
 
 
 def test_a_scene_without_a_contact_model_gets_the_default_as_the_gloves_own(make_scene: SceneMaker) -> None:
-    stops = compile_pipeline(make_scene(["hand.grip"])).stops
+    stops = compile_pipeline(make_scene(["hand.grip"])).steps
     assert [(s.effect.name, s.own) for s in stops if s.effect.order < 300] == [
         ("glove.recall", True),
         ("hand.grip", False),
@@ -151,7 +151,7 @@ def test_a_scene_without_a_contact_model_gets_the_default_as_the_gloves_own(make
 def test_leaving_an_effect_out_is_the_scene_without_it(make_scene: SceneMaker, name: str) -> None:
     rest = [other for other in EVERYTHING if other != name]
     left, never = compile_pipeline(make_scene(EVERYTHING), without=name), compile_pipeline(make_scene(rest))
-    assert [(stop.effect, stop.own) for stop in left.stops] == [(stop.effect, stop.own) for stop in never.stops]
+    assert [(stop.effect, stop.own) for stop in left.steps] == [(stop.effect, stop.own) for stop in never.steps]
     assert left.setting == never.setting
 
 
@@ -219,7 +219,7 @@ def test_a_run_enters_every_step_with_its_batches(make_scene: SceneMaker, make_b
     pipeline, ledger = compile_pipeline(make_scene(["hand.grip", "joint.noise"])), Ledger()
     pipeline.run([make_batch(range(3)), make_batch(range(2))], ledger)
     pipeline.run([make_batch(range(4))], ledger)
-    assert list(ledger.entries) == [stop.effect.name for stop in pipeline.stops]
+    assert list(ledger.entries) == [stop.effect.name for stop in pipeline.steps]
     for entry in ledger.entries.values():
         assert (entry.calls, entry.grasps) == (3, 9)
         assert entry.nanoseconds > 0

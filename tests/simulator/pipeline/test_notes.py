@@ -3,7 +3,7 @@ from collections.abc import Callable
 import numpy as np
 
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.running.report import Unsettled, notes_of
+from thenar.simulator.pipeline.report import Unsettled, notes_of
 
 
 def went_through(batch: Batch) -> Batch:

@@ -12,15 +12,15 @@ from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.cyberglove import common_joints
 from thenar.simulator.body.layout import murakami160
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.effect import SceneSetting
 from thenar.simulator.pipeline.ramp import NEVER, Ramp
-from thenar.simulator.running.report import Codes, Rows, grasp_set, joined, rows_of
+from thenar.simulator.pipeline.report import Codes, Rows, grasp_set, joined, rows_of
 
 SWITCHES = tuple(patch.name for patch in murakami160())
 FRAMES, HELD = 4, 2
 # Frames before contact, at contact, at read-out, and when the hand has let go.
 FRAME_US = np.array([-10_000, 0, 10_000, 20_000])
-MakeSetting = Callable[..., Setting]
+MakeSetting = Callable[..., SceneSetting]
 
 Recorded = tuple[Condition, Batch, Codes]
 
@@ -59,7 +59,9 @@ def make(make_setting: MakeSetting) -> MakeSetting:
     return lambda **changes: make_setting(**(times | changes))
 
 
-def blocks_of(recorded: list[Recorded], size: int, make_batch: Callable[..., Batch], setting: Setting) -> list[Rows]:
+def blocks_of(
+    recorded: list[Recorded], size: int, make_batch: Callable[..., Batch], setting: SceneSetting
+) -> list[Rows]:
     blocks = []
     for number, (_, whole, all_codes) in enumerate(recorded):
         for first in range(0, len(whole), size):

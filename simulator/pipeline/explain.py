@@ -8,17 +8,17 @@ import numpy as np
 
 from thenar.compiler.workers import workers_of
 
-from ..pipeline.batch import Batch
-from ..pipeline.effect import at_a_time
 from ..planning.plan import postures_of
 from ..scenes.scene import Scene
-from .pipeline import Cost, Ledger, Pipeline, Stop, compile_pipeline
-from .simulation import Session, conditions_of, session_of
+from .batch import Batch
+from .effect import at_a_time
+from .simulation import SubjectSession, conditions_of, session_of
+from .steps import Ledger, Pipeline, PipelineStep, StepCost, compile_pipeline
 
 _ROUNDS = 3
 
 
-def middle_session(scene: Scene) -> Session:
+def middle_session(scene: Scene) -> SubjectSession:
     """Return the session of the middle subject; the order of trials of all subjects alone can take minutes.
 
     Raises SceneError or PlanError if any subject's hand cannot hold an object.
@@ -28,7 +28,7 @@ def middle_session(scene: Scene) -> Session:
     return session_of(scene, conditions[len(conditions) // 2])
 
 
-def sample(session: Session, most: int) -> list[Batch]:
+def sample(session: SubjectSession, most: int) -> list[Batch]:
     """Return batches of all conditions of a session, at most about `most` repetitions in all."""
     share = max(most // len(session.trials), 1)
     return [session.batch(place, np.arange(min(share, len(trials)))) for place, trials in enumerate(session.trials)]
@@ -48,7 +48,7 @@ def best_us(scene: Scene, variants: Sequence[str | None], most: int = 128) -> li
     return [min(own) * 1e6 / grasps for own in zip(*times, strict=True)]
 
 
-def _seconds(pipeline: Pipeline, session: Session, most: int) -> float:
+def _seconds(pipeline: Pipeline, session: SubjectSession, most: int) -> float:
     batches = sample(session, most)
     start = process_time()
     pipeline.run(batches, Ledger())
@@ -110,8 +110,8 @@ def explain(scene: Scene, jobs: int = -1) -> Explanation:
     pipeline.run(sample(session, 1)[:1], Ledger())  # one-time work, such as imports
     ledger = Ledger()
     pipeline.run(sample(session, at_a_time(pipeline.setting, _MEASURED)), ledger)
-    first = ledger.entries[pipeline.stops[0].effect.name]
-    steps = tuple(_step(stop, ledger.entries[stop.effect.name], ledger.nanoseconds) for stop in pipeline.stops)
+    first = ledger.entries[pipeline.steps[0].effect.name]
+    steps = tuple(_plan(step, ledger.entries[step.effect.name], ledger.nanoseconds) for step in pipeline.steps)
     repetitions, workers = len(session.before) * len(scene.subjects), workers_of(jobs)
     us_a_grasp = sum(step.us_a_grasp for step in steps)
     return Explanation(
@@ -128,12 +128,12 @@ def explain(scene: Scene, jobs: int = -1) -> Explanation:
     )
 
 
-def _step(stop: Stop, entry: Cost, all_ns: int) -> StepPlan:
-    effect = stop.effect
+def _plan(step: PipelineStep, entry: StepCost, all_ns: int) -> StepPlan:
+    effect = step.effect
     return StepPlan(
         name=effect.name,
         summary=effect.summary,
-        own=stop.own,
+        own=step.own,
         reads=effect.reads,
         writes=effect.writes,
         timed=effect.timed,

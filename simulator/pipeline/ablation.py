@@ -8,8 +8,8 @@ from thenar.compiler.evaluation.ablation import FOLDS, ROUNDS, Ablation, Made, a
 
 from ..scenes.scene import Scene
 from .explain import best_us
-from .pipeline import DEFAULT_CONTACT
 from .simulation import simulate
+from .steps import DEFAULT_CONTACT
 
 
 def ablate(scene: Scene, jobs: int = -1, progress: Callable[[int, int], None] | None = None) -> Ablation:

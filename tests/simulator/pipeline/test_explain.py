@@ -2,16 +2,16 @@ import msgspec
 import pytest
 
 from thenar.simulator.errors import PlanError
-from thenar.simulator.running.explain import explain
-from thenar.simulator.running.pipeline import compile_pipeline
-from thenar.simulator.scenes.decode import load_scene
+from thenar.simulator.pipeline.explain import explain
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.steps import compile_pipeline
 
 QUICK = load_scene("quick")
 
 
 def test_steps_are_explained_in_the_order_in_which_they_run() -> None:
     found = explain(QUICK, jobs=1)
-    stops = compile_pipeline(QUICK).stops
+    stops = compile_pipeline(QUICK).steps
     for step, stop in zip(found.steps, stops, strict=True):
         effect = stop.effect
         assert (step.name, step.own) == (effect.name, stop.own)

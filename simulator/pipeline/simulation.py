@@ -14,21 +14,20 @@ from thenar.compiler.workers import in_workers
 
 from ..body.condition import Condition
 from ..body.cyberglove import USED, Calibration, common_joints, raw_joints
-from ..body.layout import murakami160
+from ..body.layout import murakami160, taxel_places
 from ..errors import SceneError
-from ..pipeline.batch import Batch, Integers
-from ..pipeline.effect import at_a_time
-from ..pipeline.taxels import IDEAL, Converter, taxel_places
 from ..planning.plan import postures_of
 from ..planning.postures import Postures
 from ..scenes.scene import Scene, Subject
 from ..streams import Draw, Draws
-from .pipeline import Ledger, compile_pipeline
+from .batch import Batch, Integers
+from .effect import at_a_time
+from .glove import IDEAL, Converter
 from .report import (
     Codes,
     Notes,
-    Report,
     Rows,
+    SimulationReport,
     Unsettled,
     grasp_reports,
     grasp_set,
@@ -37,12 +36,13 @@ from .report import (
     rows_of,
     step_reports,
 )
+from .steps import Ledger, compile_pipeline
 
 ORDER = "session.order"  # the draw site of the order of trials
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Session:
+class SubjectSession:
     """The trials of one subject: p conditions in the order of the scene's objects, t trials.
 
     first       (p,)     the number of each condition's first repetition
@@ -66,7 +66,7 @@ class Session:
         return Batch(self.conditions[place], numbers, self.done + trials, self.planned_deg[self.before[trials]])
 
 
-def sessions(scene: Scene, postures: Postures) -> tuple[Session, ...]:
+def sessions(scene: Scene, postures: Postures) -> tuple[SubjectSession, ...]:
     """Return every subject's session. Raises SceneError if an object has no planned posture."""
     return tuple(session_of(scene, conditions_of(scene, subject, postures)) for subject in scene.subjects)
 
@@ -80,7 +80,7 @@ def conditions_of(scene: Scene, subject: Subject, postures: Postures) -> tuple[C
     )
 
 
-def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> Session:
+def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> SubjectSession:
     """Return the session of the subject with these conditions."""
     numbers = [share for _, share in scene.shares() if share]
     sites = [each.site(np.array(share)) for each, share in zip(conditions, numbers, strict=True)]
@@ -91,7 +91,7 @@ def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> Session:
     order = np.argsort(np.concatenate(words), kind="stable")
     trials = np.empty(len(order), dtype=np.int64)
     trials[order] = np.arange(len(order))
-    return Session(
+    return SubjectSession(
         conditions=conditions,
         first=tuple(share.start for share in numbers),
         done=scene.done * scene.types,
@@ -109,7 +109,7 @@ class Simulated:
     """The results of a scene."""
 
     grasp_set: GraspSet
-    report: Report
+    report: SimulationReport
 
 
 # For one worker: batches, each with the number of its condition.
@@ -160,7 +160,7 @@ def simulate(
     return Simulated(found, _report(scene, rows, found, made, perf_counter() - start, keep_unsettled=keep_unsettled))
 
 
-def _groups(plan: Sequence[Session], block: int) -> Iterator[_Batches]:
+def _groups(plan: Sequence[SubjectSession], block: int) -> Iterator[_Batches]:
     """Yield groups of about `block` repetitions of one subject: batches with the numbers of their conditions."""
     first = 0
     for session in plan:
@@ -214,7 +214,7 @@ def _taxels(scene: Scene, without: str | None) -> tuple[Joint, ...]:
     return tuple(converter.column(murakami160()[place].name) for place in taxel_places(scene.glove.taxels))
 
 
-def _set_of(scene: Scene, plan: Sequence[Session], rows: Rows, taxels: tuple[Joint, ...]) -> GraspSet:
+def _set_of(scene: Scene, plan: Sequence[SubjectSession], rows: Rows, taxels: tuple[Joint, ...]) -> GraspSet:
     conditions = [condition for session in plan for condition in session.conditions]
     places = tuple(patch.name for patch in murakami160())
     joints = raw_joints() if scene.glove.codes == "raw" else common_joints()
@@ -222,8 +222,10 @@ def _set_of(scene: Scene, plan: Sequence[Session], rows: Rows, taxels: tuple[Joi
     return grasp_set(rows, conditions, places, taxels, joints, published(scene.taxonomy), scene.origin, timed=timed)
 
 
-def _report(scene: Scene, rows: Rows, found: GraspSet, made: _Done, seconds: float, *, keep_unsettled: bool) -> Report:
-    return Report(
+def _report(
+    scene: Scene, rows: Rows, found: GraspSet, made: _Done, seconds: float, *, keep_unsettled: bool
+) -> SimulationReport:
+    return SimulationReport(
         simulated=True,
         scene=scene.name,
         seed=scene.seed,

@@ -3,8 +3,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from thenar.simulator.running.pipeline import Ledger
-from thenar.simulator.running.report import Count, GraspReport, Notes, Rows, Unsettled, grasp_reports, step_reports
+from thenar.simulator.pipeline.report import GraspReport, Notes, Rows, StepCount, Unsettled, grasp_reports, step_reports
+from thenar.simulator.pipeline.steps import Ledger
 from thenar.simulator.streams import Draws
 
 ONE = Unsettled("A", "Tip", "pin", 3, 17, "the hand did not come to rest")
@@ -58,4 +58,4 @@ def test_steps_are_reported_in_their_order_with_their_share_of_the_time() -> Non
     assert (recall.name, recall.own, recall.us_a_grasp, recall.share) == ("glove.recall", True, 100.0, 0.25)
     assert (noise.calls, noise.grasps, noise.draws, noise.own) == (2, 20, 80, False)
     assert (noise.seconds, noise.us_a_grasp, noise.share) == pytest.approx((0.003, 150.0, 0.75))
-    assert noise.counts == (Count("a", 2), Count("bytes sent", 6))
+    assert noise.counts == (StepCount("a", 2), StepCount("bytes sent", 6))

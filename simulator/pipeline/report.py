@@ -13,9 +13,9 @@ from thenar.compiler.recordings.taxonomy import Taxonomy
 from thenar.runtime.published import NONE
 
 from ..body.condition import Condition
-from ..pipeline.batch import SLID_OUT_MM, Batch, Bits
-from ..pipeline.effect import Setting, frame_times, hold_frame
-from .pipeline import Ledger
+from .batch import SLID_OUT_MM, Batch, Bits
+from .effect import SceneSetting, frame_times, hold_frame
+from .steps import Ledger
 
 
 class Unsettled(msgspec.Struct, frozen=True):
@@ -115,7 +115,7 @@ class Rows:
         return Rows(*(getattr(self, field.name)[index] for field in fields(Rows)))
 
 
-def rows_of(batch: Batch, kept: Places, number: int, codes: Codes, setting: Setting) -> Rows:
+def rows_of(batch: Batch, kept: Places, number: int, codes: Codes, setting: SceneSetting) -> Rows:
     """Return the rows of the repetitions `kept` (k,) of a batch of condition `number`; codes (n, F, 16).
 
     One row a repetition, that of the frame that is read out, or one a frame.
@@ -216,7 +216,7 @@ class GraspReport(msgspec.Struct, frozen=True):
     between_n: float
 
 
-class Count(msgspec.Struct, frozen=True):
+class StepCount(msgspec.Struct, frozen=True):
     """A count of a step: solver steps, bytes sent, ..."""
 
     what: str
@@ -237,10 +237,10 @@ class StepReport(msgspec.Struct, frozen=True):
     seconds: float
     us_a_grasp: float
     share: float
-    counts: tuple[Count, ...]
+    counts: tuple[StepCount, ...]
 
 
-class Report(msgspec.Struct, frozen=True):
+class SimulationReport(msgspec.Struct, frozen=True):
     """A simulation: results by grasp type, costs of steps, and unsettled repetitions.
 
     simulated       True, so that a result is not mistaken for a recording
@@ -307,5 +307,5 @@ def step_reports(ledger: Ledger) -> Iterator[StepReport]:
             seconds=entry.nanoseconds / 1e9,
             us_a_grasp=entry.nanoseconds / 1e3 / entry.grasps,
             share=entry.nanoseconds / total if total else 0.0,
-            counts=tuple(Count(what, number) for what, number in sorted(entry.counters.items())),
+            counts=tuple(StepCount(what, number) for what, number in sorted(entry.counters.items())),
         )

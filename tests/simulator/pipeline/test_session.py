@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.simulator.errors import SceneError
+from thenar.simulator.pipeline.explain import middle_session, sample
+from thenar.simulator.pipeline.scene_file import load_scene
+from thenar.simulator.pipeline.simulation import SubjectSession, sessions
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.running.explain import middle_session, sample
-from thenar.simulator.running.simulation import Session, sessions
-from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import Scene
 from thenar.simulator.streams import Draw, Draws, Site
 
@@ -22,7 +22,7 @@ def quick(**changes: object) -> Scene:
     return msgspec.structs.replace(QUICK, **changes)
 
 
-def course(session: Session) -> list[tuple[str, str, int]]:
+def course(session: SubjectSession) -> list[tuple[str, str, int]]:
     """Return grasp type, object and repetition of each trial of a session, in order."""
     found = {
         int(trial): (condition.grasp, condition.thing.name, repetition)

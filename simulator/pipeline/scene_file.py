@@ -18,9 +18,18 @@ from thenar.runtime.toml_struct import as_list, as_table, check_finite, check_ke
 
 from ..body.shapes import Shape
 from ..errors import SceneError, ThenarError
-from ..pipeline.effect import EFFECTS
-from . import shipped
-from .scene import Glove, Listed, Population, Recording, Scene, SceneObject, Subject, draw_subjects
+from ..scenes import shipped
+from ..scenes.scene import (
+    ListedEffect,
+    Recording,
+    Scene,
+    SceneGlove,
+    SceneObject,
+    Subject,
+    SurveyPopulation,
+    draw_subjects,
+)
+from .effect import EFFECTS
 
 _SHAPES: dict[str, type[Shape]] = {str(shape.__struct_config__.tag): shape for shape in get_args(Shape)}
 _OF_ANY_SHAPE = SceneObject.__struct_encode_fields__
@@ -208,7 +217,7 @@ class _Decoder:
             subjects=self._subjects(),
             repetitions=file.repetitions,
             recording=convert(source, ("recording",), file.recording, Recording),
-            glove=convert(source, ("glove",), file.glove, Glove),
+            glove=convert(source, ("glove",), file.glove, SceneGlove),
             effects=self._effects(),
         )
 
@@ -233,17 +242,17 @@ class _Decoder:
             )
             raise source.error(("population",), f"{reason}: write one of the two")
         if population is not None:
-            return draw_subjects(convert(source, ("population",), population, Population), self.file.seed)
+            return draw_subjects(convert(source, ("population",), population, SurveyPopulation), self.file.seed)
         tables = enumerate(as_list(source, ("subjects",), listed))
         found = tuple(convert(source, ("subjects", number), table, Subject) for number, table in tables)
         check_names(source, ("subjects",), [subject.name for subject in found])
         return found
 
-    def _effects(self) -> tuple[Listed, ...]:
+    def _effects(self) -> tuple[ListedEffect, ...]:
         tables = dict(self._effect_tables())
         effects = sorted((EFFECTS[name] for name in tables), key=lambda effect: (effect.order, effect.name))
         return tuple(
-            Listed(
+            ListedEffect(
                 each.name, convert(self.source, ("effects", *each.name.split(".")), tables[each.name], each.parameters)
             )
             for each in effects
