@@ -92,13 +92,13 @@ def decisions(tables: IntegerTables, frames: Stretches, policy: Deciding) -> Dec
     for stretch, row in zip(frames.times, lanes, strict=True):
         standing = Standing(row)
         for time_us in stretch:
-            held = decide(time_us, standing)
-            if not types or held != types[-1]:
+            decided = decide(time_us, standing)
+            if not types or decided != types[-1]:
                 changes.append(time_us)
-                types.append(held)
+                types.append(decided)
     return Decisions(
         np.array(changes, np.int64) // frames.step_us,
-        np.array([NOTHING if held is None else held for held in types], np.intp),
+        np.array([NOTHING if one is None else one for one in types], np.intp),
     )
 
 
@@ -118,8 +118,8 @@ def _by_segments(tables: IntegerTables, model: SegmentModel | None) -> Decide:
     live = LiveSegments(model, [str(number) for number in range(tables.n_classes)], Policy().lag_us or 0)
 
     def decide(time_us: int, standing: Standing) -> int | None:
-        found = live.update(time_us, standing.lanes)
-        return None if found.state == "forming" else found.label
+        segment = live.update(time_us, standing.lanes)
+        return None if segment.state == "forming" else segment.label
 
     return decide
 
@@ -160,9 +160,9 @@ def latencies(
     movements  the same rows with those in which nothing is held: segments use tables trained with these rows, and costs
                learnt from them. None: segments have the default costs
     """
-    wanted = tuple(dict.fromkeys(pace.tabled for pace in paces))
-    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, wanted, training)}
-    learnt = movements.segment_tables(columns, wanted, training) if movements else {}
+    shapes = tuple(dict.fromkeys(pace.tabled for pace in paces))
+    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, shapes, training)}
+    learnt = movements.segment_tables(columns, shapes, training) if movements else {}
 
     def of(pace: Pace, kind: DecisionKind) -> Latency:
         if kind == "segments" and pace.tabled in learnt:
@@ -234,25 +234,25 @@ def _waits_and_errors(predicted_us: Times, types: NDArray[np.intp], grasps: _Gra
     waits_us, wrong_us = np.full(len(grasps.types), -1, np.int64), np.zeros(len(grasps.types), np.int64)
     for grasp, (first, last, right) in enumerate(zip(standing, beyond, grasps.types.tolist(), strict=True)):
         predictions = types[first:last]
-        found = np.flatnonzero(predictions == right)
-        if len(found):
-            since_us = np.maximum(predicted_us[first + found[0] : last], grasps.arrived_us[grasp])
+        hits = np.flatnonzero(predictions == right)
+        if len(hits):
+            since_us = np.maximum(predicted_us[first + hits[0] : last], grasps.arrived_us[grasp])
             waits_us[grasp] = since_us[0] - grasps.arrived_us[grasp]
             lasted_us = np.diff(since_us, append=grasps.ended_us[grasp])
-            wrong_us[grasp] = lasted_us[~np.isin(predictions[found[0] :], (right, NOTHING))].sum()
+            wrong_us[grasp] = lasted_us[~np.isin(predictions[hits[0] :], (right, NOTHING))].sum()
     return waits_us, wrong_us
 
 
 def _measured(grasps: _Grasps, waits_us: Times, wrong_us: Times, step_us: int) -> Latency:
     lasted_us, predicted = grasps.ended_us - grasps.arrived_us, waits_us >= 0
-    found = np.sort(np.maximum(waits_us[predicted], step_us))
-    if not len(found):
+    waits = np.sort(np.maximum(waits_us[predicted], step_us))
+    if not len(waits):
         return Latency(float(lasted_us.max()), float(lasted_us.max()), 1.0)
     left_us = int((lasted_us - waits_us)[predicted].sum())
     return Latency(
-        mean_us=int(found.sum()) / len(found),
-        p99_us=float(found[math.ceil(0.99 * len(found)) - 1]),
-        missed=(len(waits_us) - len(found)) / len(waits_us),
+        mean_us=int(waits.sum()) / len(waits),
+        p99_us=float(waits[math.ceil(0.99 * len(waits)) - 1]),
+        missed=(len(waits_us) - len(waits)) / len(waits_us),
         wrong=int(wrong_us.sum()) / left_us if left_us else 0.0,
     )
 

@@ -70,10 +70,12 @@ class Replay:
 
     def reading(self, elements: Elements, joints: Columns) -> "Replay":
         """Return the same replay with these elements as switches, if it has taxels, and with these joints, if any."""
-        found = self
+        bits, codes = self.bits, self.codes
         if self.taxels.shape[1]:
-            found = replace(found, bits=above(self.bits, self.taxels, elements), taxels=self.taxels[:, :0])
-        return replace(found, codes=self.codes[:, list(joints)]) if 0 < len(joints) < self.codes.shape[1] else found
+            bits = above(bits, self.taxels, elements)
+        if joints:
+            codes = codes[:, list(joints)]
+        return replace(self, bits=bits, codes=codes, taxels=self.taxels[:, :0])
 
 
 def replay_of(
@@ -238,17 +240,17 @@ def _legs(
     random: np.random.Generator,
 ) -> list[_Leg]:
     legs: list[_Leg] = []
-    held, pose, leaves_us = rest, opened, 0
+    contact, pose, leaves_us = rest, opened, 0
     for row in order:
         lets_go = leaves_us + random.integers(0, RELEASE_US, len(rest))
         grips = leaves_us + RELEASE_US + TRAVEL_US + random.integers(0, GRIP_US, len(rest))
-        open_us = np.where(held != rest, lets_go, -_NEVER)
+        open_us = np.where(contact != rest, lets_go, -_NEVER)
         close_us = np.where(contacts[row] != rest, grips, _NEVER)
         at_us, travelled = _changes(leaves_us, open_us, close_us, _path(pose, codes[row].astype(np.float64), opened))
         now = at_us[:, np.newaxis]
-        seen = np.where(now < open_us, held, np.where(now >= close_us, contacts[row], rest))
+        seen = np.where(now < open_us, contact, np.where(now >= close_us, contacts[row], rest))
         leg = _Leg(seen, travelled, at_us)
-        held, pose = contacts[row], codes[row].astype(np.float64)
+        contact, pose = contacts[row], codes[row].astype(np.float64)
         leaves_us = int(leg.at_us[-1]) + int(random.integers(*HOLD_US))
         legs.append(leg)
     return legs

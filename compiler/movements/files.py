@@ -54,7 +54,8 @@ def as_eaf(timelines: Sequence[Timeline]) -> bytes:
     )
     ElementTree.SubElement(root, "HEADER", {"MEDIA_FILE": "", "TIME_UNITS": "milliseconds"})
     order = ElementTree.SubElement(root, "TIME_ORDER")
-    first_us, tiers, number = min((each.start_us for each in timelines), default=0), list[ElementTree.Element](), 0
+    first_us = min((timeline.start_us for timeline in timelines), default=0)
+    tiers, number = list[ElementTree.Element](), 0
     slots: dict[int, str] = {}
 
     def slot(timeline: Timeline, tick: int) -> str:
@@ -62,9 +63,9 @@ def as_eaf(timelines: Sequence[Timeline]) -> bytes:
         return slots.setdefault(after_ms, f"ts{len(slots) + 1}")
 
     for place, timeline in enumerate(timelines):
-        before = sum(each.name == timeline.name for each in timelines[:place])
-        own = f"{timeline.name}, part {before + 1}" if before else timeline.name
-        kinds = {own: timeline.states} | ({} if timeline.truth is None else {f"{own}, true": timeline.truth})
+        before = sum(other.name == timeline.name for other in timelines[:place])
+        title = f"{timeline.name}, part {before + 1}" if before else timeline.name
+        kinds = {title: timeline.states} | ({} if timeline.truth is None else {f"{title}, true": timeline.truth})
         for name, states in kinds.items():
             tiers.append(ElementTree.Element("TIER", {"LINGUISTIC_TYPE_REF": "grasp", "TIER_ID": name}))
             for one in segments_of(states, len(timeline.types)):
@@ -94,9 +95,13 @@ def as_mcap(timelines: Sequence[Timeline]) -> bytes:
     schema = {"title": "thenar.Segment", **parts["FoundSegment"]}
     known = writer.register_schema("thenar.Segment", "jsonschema", json.dumps(schema, sort_keys=True).encode())
     channel = writer.register_channel(TOPIC, "json", known)
-    every = ((each.zero_us + round(1e6 * one.start_s), one) for each in timelines for one in each.segments())
-    for number, (at_us, one) in enumerate(sorted(every, key=lambda each: each[0])):
-        writer.add_message(channel, 1000 * at_us, msgspec.json.encode(one), 1000 * at_us, number)
+    segments = (
+        (timeline.zero_us + round(1e6 * segment.start_s), segment)
+        for timeline in timelines
+        for segment in timeline.segments()
+    )
+    for number, (at_us, segment) in enumerate(sorted(segments, key=lambda pair: pair[0])):
+        writer.add_message(channel, 1000 * at_us, msgspec.json.encode(segment), 1000 * at_us, number)
     writer.finish()  # type: ignore[no-untyped-call]
     return file.getvalue()
 

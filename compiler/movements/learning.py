@@ -107,19 +107,19 @@ def _best(
     """Return the temperature, lead and change cost that decode scores (T, K + 1) best to their states (T,)."""
     none = len(counts.durations) - 1
 
-    def tried(one: tuple[float, float, float]) -> SegmentScore:
-        model = model_of(counts, *one, _SCALE, tick_us)
-        states = ((truth, live_states(model, lanes, LAG_TICKS)) for lanes, truth in tests)
+    def score_of(costs: tuple[float, float, float]) -> SegmentScore:
+        model = model_of(counts, *costs, _SCALE, tick_us)
+        decoded = ((truth, live_states(model, lanes, LAG_TICKS)) for lanes, truth in tests)
         return SegmentScore.total(
-            score(truth, own, none, announced_live(own, none, LAG_TICKS)) for truth, own in states
+            score(truth, live, none, announced_live(live, none, LAG_TICKS)) for truth, live in decoded
         )
 
     def best(candidates: Sequence[tuple[float, float, float]]) -> tuple[float, float, float]:
-        found = {one: tried(one) for one in candidates}
-        highest = max(each.f1(_AT_HALF) for each in found.values())
-        error = math.sqrt(highest * (1 - highest) / max(found[candidates[0]].true, 1))
-        near = [one for one in candidates if found[one].f1(_AT_HALF) >= highest - error]
-        return min(near, key=lambda one: (found[one].false, found[one].onset, -found[one].f1(_AT_HALF)))
+        scores = {costs: score_of(costs) for costs in candidates}
+        highest = max(one.f1(_AT_HALF) for one in scores.values())
+        error = math.sqrt(highest * (1 - highest) / max(scores[candidates[0]].true, 1))
+        near = [costs for costs, one in scores.items() if one.f1(_AT_HALF) >= highest - error]
+        return min(near, key=lambda costs: (scores[costs].false, scores[costs].onset, -scores[costs].f1(_AT_HALF)))
 
     first = best(list(product(TEMPERATURES, LEADS, CHANGES[:1])))
     return best([(*first[:2], change) for change in CHANGES])
@@ -136,7 +136,7 @@ def model_of(
     K = len(counts.durations) - 1
     shift, gain = gain_of(scale, temperature)
     most = min(254, max(1, round(STEPS * _MOST_NATS * temperature)), 255 * gain >> 8)
-    pooled = [ticks for own in counts.durations[:K] for ticks in own]
+    pooled = [ticks for durations in counts.durations[:K] for ticks in durations]
     least = [_shortest(pooled)] * K + [_shortest(counts.durations[K])]
     stay = [_staying(pooled, least[0])] * K + [_staying(counts.durations[K], least[K])]
     bias = round(STEPS * temperature * lead)

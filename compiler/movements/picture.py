@@ -25,15 +25,15 @@ def draw(timelines: Sequence[Timeline], kind: str) -> bytes:
 
     Raises MovementError where there is nothing to draw, PictureError if matplotlib is not installed.
     """
-    length = [len(each.states) * each.tick_us / 1e6 for each in timelines]
+    length = [len(timeline.states) * timeline.tick_us / 1e6 for timeline in timelines]
     if not any(length):
         raise MovementError("the recordings have no frames to draw")
     # Long recordings get more seconds per line, and very long ones no names.
     seconds = _SECONDS * max(1.0, sum(length) / (_SECONDS * _MOST_LINES))
     lines = [
         (timeline, number * seconds)
-        for timeline, own in zip(timelines, length, strict=True)
-        for number in range(max(1, int(-(-own // seconds))))
+        for timeline, lasts_s in zip(timelines, length, strict=True)
+        for number in range(max(1, int(-(-lasts_s // seconds))))
     ]
     with painting(font_size=_POINTS):
         from matplotlib.figure import Figure

@@ -162,7 +162,7 @@ def _matched(true: list[Span], found: list[Span]) -> tuple[tuple[int, ...], list
     A match is the index of a true segment and the segment found for it.
     """
     counts, pairs, first = [0] * len(OVERLAPS), list[tuple[Span, int]](), 0
-    taken: list[set[int]] = [set() for _ in OVERLAPS]
+    matched: list[set[int]] = [set() for _ in OVERLAPS]
     for place, one in enumerate(found):
         while first < len(true) and true[first].end <= one.start:
             first += 1
@@ -176,8 +176,8 @@ def _matched(true: list[Span], found: list[Span]) -> tuple[tuple[int, ...], list
                 best, common, union = at, shared, joined
             at += 1
         for number, least in enumerate(OVERLAPS):
-            if best >= 0 and 100 * common >= least * union and best not in taken[number]:
-                taken[number].add(best)
+            if best >= 0 and 100 * common >= least * union and best not in matched[number]:
+                matched[number].add(best)
                 counts[number] += 1
                 if not number:
                     pairs.append((true[best], place))
@@ -200,7 +200,7 @@ def _announced(true: list[Span], truth: Labels, announced: Labels, none: int) ->
         elif len(late):
             other = np.flatnonzero(announced[before : one.start] != one.state)
             latencies.append((before + int(other[-1]) + 1 if len(other) else before) - one.start)
-    return latencies, sum(bool(truth[each.start] == none) for each in segments_of(announced, none))
+    return latencies, sum(bool(truth[span.start] == none) for span in segments_of(announced, none))
 
 
 def levenshtein(one: list[int], other: list[int]) -> int:

@@ -1,7 +1,7 @@
 """Movements and streams: which rows of a set belong together, and when each is shown.
 
 A movement is a trial, and the rows without a grasp around it (`GraspSet.movement_ids`), as far as they follow one
-another in the recording. It takes two rows: a row alone is a trial of its own, as in sets of static grasps.
+another in the recording. It takes two rows: a row alone is a separate trial, as in sets of static grasps.
 """
 
 from dataclasses import dataclass
@@ -61,10 +61,10 @@ class Movements:
     @property
     def inside(self) -> Bits:
         """Whether each row of the set (n,) is part of a movement."""
-        found = np.zeros(len(self.rows), np.bool_)
+        mask = np.zeros(len(self.rows), np.bool_)
         for first, beyond in zip(self.first.tolist(), self.beyond.tolist(), strict=True):
-            found[self.rows[first:beyond]] = True
-        return found
+            mask[self.rows[first:beyond]] = True
+        return mask
 
     def counts(self, mask: Bits) -> Rows:
         """Return how many rows of each movement (m,) are set in `mask` (n,)."""

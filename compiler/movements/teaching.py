@@ -76,8 +76,8 @@ def _joined(
     filled = [sum(item is not None for item in column) for column in columns]
 
     def differ(column: int, item: str) -> int:
-        there = zip(before, columns[column], strict=True)
-        return sum(at is None or own[at] != item for own, at in there)
+        pairs = zip(before, columns[column], strict=True)
+        return sum(at is None or types[at] != item for types, at in pairs)
 
     cost = [[0] * (width + 1) for _ in range(rows + 1)]
     for row in range(rows, -1, -1):
@@ -87,19 +87,19 @@ def _joined(
             if row < rows and column < width:
                 ways.append(cost[row + 1][column + 1] + differ(column, sequence[row]))
             cost[row][column] = min(ways, default=0)
-    found, row, column = list[list[int | None]](), 0, 0
+    joined, row, column = list[list[int | None]](), 0, 0
     while row < rows or column < width:
         here = cost[row][column]
         if row < rows and column < width and here == cost[row + 1][column + 1] + differ(column, sequence[row]):
-            found.append([*columns[column], row])
+            joined.append([*columns[column], row])
             row, column = row + 1, column + 1
         elif column < width and here == cost[row][column + 1] + filled[column]:
-            found.append([*columns[column], None])
+            joined.append([*columns[column], None])
             column += 1
         else:
-            found.append([None] * others + [row])
+            joined.append([None] * others + [row])
             row += 1
-    return found
+    return joined
 
 
 def taught(
@@ -130,7 +130,7 @@ def taught(
         If no grasp occurs in most of them.
     """
     columns = aligned([one.types for one in shown])
-    steps = [found for column in columns if (found := _majority(shown, column)) is not None]
+    steps = [step for column in columns if (step := _majority(shown, column)) is not None]
     if not steps:
         raise MovementError(
             f"the {len(shown)} demonstrations have no grasp that occurs in most of them: "
@@ -145,19 +145,19 @@ def taught(
         units={joint.name: joint.unit for joint in build.manifest.joints},
         first=_ordered(steps[0][0], Counter(one.types[0] for one in shown)),
         steps=tuple(
-            _step(build, shown, grasp, own, following, preshapes, transitions)
-            for (grasp, own), following in zip(steps, next_types, strict=True)
+            _step(build, shown, grasp, places, following, preshapes, transitions)
+            for (grasp, places), following in zip(steps, next_types, strict=True)
         ),
     )
 
 
 def _majority(shown: Sequence[Demonstration], column: Column) -> tuple[str, dict[int, int]] | None:
     """Return the type that most demonstrations have in a column, and its index in each that does."""
-    there = {number: at for number, at in enumerate(column) if at is not None}
-    counts = Counter(shown[number].types[at] for number, at in there.items())
+    places = {number: at for number, at in enumerate(column) if at is not None}
+    counts = Counter(shown[number].types[at] for number, at in places.items())
     grasp, count = counts.most_common(1)[0]
-    own = {number: at for number, at in there.items() if shown[number].types[at] == grasp}
-    return (grasp, own) if 2 * count > len(shown) else None
+    places = {number: at for number, at in places.items() if shown[number].types[at] == grasp}
+    return (grasp, places) if 2 * count > len(shown) else None
 
 
 def _ordered(first: str | None, counts: Counter[str]) -> tuple[str, ...]:
@@ -170,29 +170,29 @@ def _step(
     build: Build,
     shown: Sequence[Demonstration],
     grasp: str,
-    own: dict[int, int],
+    places: dict[int, int],
     following: str | None,
     preshapes: PreshapeTable | None,
     transitions: Transitions | None,
 ) -> Step:
-    grasps = [shown[number].grasps[at] for number, at in own.items()]
-    after = Counter(shown[number].types[at + 1] for number, at in own.items() if at + 1 < len(shown[number].types))
+    grasps = [shown[number].grasps[at] for number, at in places.items()]
+    after = Counter(shown[number].types[at + 1] for number, at in places.items() if at + 1 < len(shown[number].types))
     then = _ordered(following, after)
     if transitions is not None and following is not None:
-        then += tuple(each for each in transitions.frequent(grasp) if each not in then)
-    held = [one.held_s for one in grasps]
+        then += tuple(name for name in transitions.frequent(grasp) if name not in then)
+    durations = [one.held_s for one in grasps]
     read = [one.joints for one in grasps if one.joints]
     values = np.median(np.array(read), axis=0).round(2).tolist() if read else []
     joints = {joint.name: value for joint, value in zip(build.manifest.joints, values, strict=False)}
     preshape = None if preshapes is None else preshapes.chosen.get(grasp)
     return Step(
         grasp=grasp,
-        shown=len(own),
+        shown=len(places),
         preshape=None if preshape is None else preshape.name,
         joints=joints,
-        median_s=round(median(held), 3),
-        spread_s=round(median(abs(one - median(held)) for one in held), 3),
-        limit_s=round(LIMIT * max(held), 3),
+        median_s=round(median(durations), 3),
+        spread_s=round(median(abs(one - median(durations)) for one in durations), 3),
+        limit_s=round(LIMIT * max(durations), 3),
         then=then,
     )
 

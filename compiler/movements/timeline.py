@@ -76,5 +76,5 @@ def probabilities(scores: NDArray[np.integer], states: NDArray[np.intp], scale: 
     The probability of nothing held is 0 if the scores do not include it.
     """
     behind = np.exp((scores - scores.max(axis=1, keepdims=True)) / scale)
-    own = behind[np.arange(len(states)), np.minimum(states, scores.shape[1] - 1)] / behind.sum(axis=1)
-    return np.asarray(np.where(states < scores.shape[1], own, 0.0))
+    shares = behind[np.arange(len(states)), np.minimum(states, scores.shape[1] - 1)] / behind.sum(axis=1)
+    return np.asarray(np.where(states < scores.shape[1], shares, 0.0))

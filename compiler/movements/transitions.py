@@ -57,25 +57,25 @@ class Transitions:
     def of_set(cls, grasp_set: GraspSet) -> "Transitions":
         """Count the changes in the true segments of a set. Raises MovementError if rows are not movements."""
         names, labels = grasp_set.taxonomy.types, grasp_set.labels
-        there = sorted(set(labels[~grasp_set.is_none].tolist()))
+        types = sorted(set(labels[~grasp_set.is_none].tolist()))
         streams = [segments_of(labels[stream.rows], len(names)) for stream in streams_of(grasp_set)]
-        return cls.of(([names[one.state] for one in stream] for stream in streams), [names[one] for one in there])
+        return cls.of(([names[one.state] for one in stream] for stream in streams), [names[one] for one in types])
 
     @classmethod
     def of_timelines(cls, timelines: Sequence[Timeline]) -> "Transitions":
         """Count the changes in segments found in streams of the same types."""
-        every = ([one.type for one in each.segments()] for each in timelines)
+        every = ([one.type for one in timeline.segments()] for timeline in timelines)
         return cls.of(every, timelines[0].types if timelines else ())
 
     @classmethod
     def load(cls, path: Path) -> "Transitions":
         """Load a file written by `save`. Raises MovementError that names the file, OSError."""
         try:
-            found = msgspec.json.decode(read_file(path, _LARGEST, MovementError), type=TransitionFile)
-            counts = np.array(found.counts, np.intp).reshape(len(found.types), len(found.types))
+            file = msgspec.json.decode(read_file(path, _LARGEST, MovementError), type=TransitionFile)
+            counts = np.array(file.counts, np.intp).reshape(len(file.types), len(file.types))
         except (msgspec.DecodeError, UnicodeDecodeError, ValueError, OverflowError) as wrong:
             raise MovementError(f"{path} is not a transitions file: {wrong}") from None
-        return cls(found.types, counts)
+        return cls(file.types, counts)
 
     @property
     def probabilities(self) -> NDArray[np.float64]:
@@ -93,8 +93,8 @@ class Transitions:
     def to_json(self) -> bytes:
         """Return the content of its file."""
         rounded = self.probabilities.round(6).tolist()
-        found = TransitionFile(self.types, tuple(map(tuple, self.counts.tolist())), tuple(map(tuple, rounded)))
-        return msgspec.json.encode(found) + b"\n"
+        file = TransitionFile(self.types, tuple(map(tuple, self.counts.tolist())), tuple(map(tuple, rounded)))
+        return msgspec.json.encode(file) + b"\n"
 
 
 # The picture's side, the radius of the circle of types, and the radius of a type, reduced if there are many.
@@ -134,14 +134,14 @@ class Graph:
     size: int = SIZE
 
 
-def graph_of(found: Transitions) -> Graph:
+def graph_of(transitions: Transitions) -> Graph:
     """Return the graph as shapes, in a square of SIZE."""
-    shares, K = found.probabilities, len(found.types)
+    types, every, shares, K = transitions.types, transitions.counts, transitions.probabilities, len(transitions.types)
     dot = round(min(_LARGEST_DOT, 0.8 * pi * _CIRCLE / max(K, 1)), 1)
     angles = [2 * pi * number / K - pi / 2 for number in range(K)]
     places = [(SIZE / 2 + _CIRCLE * cos(angle), SIZE / 2 + _CIRCLE * sin(angle)) for angle in angles]
     nodes = []
-    for name, angle, (x, y), own in zip(found.types, angles, places, found.counts, strict=True):
+    for name, angle, (x, y), counts in zip(types, angles, places, every, strict=True):
         reach = _CIRCLE + dot + 10
         label = SIZE / 2 + reach * cos(angle), SIZE / 2 + reach * sin(angle) + 5
         anchor = "middle" if abs(cos(angle)) < 0.2 else "start" if cos(angle) > 0 else "end"
@@ -152,10 +152,10 @@ def graph_of(found: Transitions) -> Graph:
                 round(y, 1),
                 (round(label[0], 1), round(label[1], 1)),
                 anchor,
-                f"{name}: followed {int(own.sum())} times",
+                f"{name}: followed {int(counts.sum())} times",
             )
         )
-    changes = [(float(shares[a, b]), a, b) for a, b in np.argwhere(found.counts).tolist()]
+    changes = [(float(shares[a, b]), a, b) for a, b in np.argwhere(every).tolist()]
     edges = [
         _edge(
             places[a],
@@ -163,7 +163,7 @@ def graph_of(found: Transitions) -> Graph:
             angles[a],
             dot,
             share,
-            f"{found.types[a]} to {found.types[b]}: {found.counts[a, b]} of {found.counts[a].sum()} ({share:.0%})",
+            f"{types[a]} to {types[b]}: {every[a, b]} of {every[a].sum()} ({share:.0%})",
         )
         for share, a, b in sorted(changes)
     ]

@@ -1,9 +1,9 @@
 """What each shipped scene promises."""
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 
-from thenar.simulator.pipeline.effect import EffectParameters
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.steps import compile_pipeline
 from thenar.simulator.planning.postures import Postures
@@ -30,7 +30,7 @@ ADDED["initial-contact"] = ONSET
 ADDED |= {"continuous-def": IN_TIME, "continuous-rest": IN_TIME}
 
 
-def effects(scene: Scene) -> dict[str, EffectParameters]:
+def effects(scene: Scene) -> dict[str, msgspec.Struct]:
     return dict(scene.effects)
 
 
