@@ -10,11 +10,15 @@ from thenar.drivers.extras import optional
 
 if TYPE_CHECKING:
     from .pipeline.scene_file import load_scene
-    from .pipeline.simulation import Simulated, simulate
+    from .pipeline.simulation import Simulation, simulate
 
-__all__ = ["Simulated", "load_scene", "simulate"]
+__all__ = ["Simulation", "load_scene", "simulate"]
 
-_HOMES = {"Simulated": ".pipeline.simulation", "load_scene": ".pipeline.scene_file", "simulate": ".pipeline.simulation"}
+_HOMES = {
+    "Simulation": ".pipeline.simulation",
+    "load_scene": ".pipeline.scene_file",
+    "simulate": ".pipeline.simulation",
+}
 
 
 def __getattr__(name: str) -> Any:

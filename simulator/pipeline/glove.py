@@ -18,7 +18,7 @@ from thenar.compiler.recordings.graspset import Joint
 from ..body.cyberglove import Calibration, sensors_deg
 from ..body.hand import DOF, LIMITS_DEG, RESTS_DEG
 from ..errors import SceneError
-from ..streams import Draw, Draws
+from ..streams import Draw, DrawCounts
 from .batch import Batch
 from .effect import Effect, EffectParameters, SceneSetting, Step, frame_times
 from .ramp import NEVER
@@ -170,7 +170,7 @@ def _prepare_rest(parameters: RestSpreads, setting: SceneSetting) -> Step:
     usual = RESTS_DEG[setting.rest]
 
     def step(batch: Batch, draw: Draw) -> None:
-        own = replace(draw, effect=_STYLE, draws=Draws()).per_subject(len(DOF) + 1).normal()[:-1]
+        own = replace(draw, effect=_STYLE, draws=DrawCounts()).per_subject(len(DOF) + 1).normal()[:-1]
         resting = draw.at_rest(batch.trials)
         mean = usual + parameters.sd_deg * own + parameters.habit_sd_deg * resting.per_type(len(DOF)).normal()
 

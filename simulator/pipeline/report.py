@@ -18,7 +18,7 @@ from .effect import SceneSetting, frame_times, hold_frame
 from .steps import Ledger
 
 
-class Unsettled(msgspec.Struct, frozen=True):
+class UnsettledGrasp(msgspec.Struct, frozen=True):
     """A repetition that cannot be trusted, and why."""
 
     subject: str
@@ -37,7 +37,7 @@ class Notes:
 
     grasp: str
     repetitions: int
-    unsettled: tuple[Unsettled, ...]
+    unsettled: tuple[UnsettledGrasp, ...]
     residual_n: float
     residual_nmm: float
     between_n: float
@@ -58,9 +58,9 @@ def notes_of(batch: Batch) -> Notes:
     )
 
 
-def _unsettled(batch: Batch, row: int) -> Unsettled:
+def _unsettled(batch: Batch, row: int) -> UnsettledGrasp:
     condition = batch.condition
-    return Unsettled(
+    return UnsettledGrasp(
         subject=condition.subject,
         grasp=condition.grasp,
         object=condition.thing.name,
@@ -260,7 +260,7 @@ class SimulationReport(msgspec.Struct, frozen=True):
     seconds: float
     lost_frames: int
     kept_unsettled: bool
-    unsettled: tuple[Unsettled, ...]
+    unsettled: tuple[UnsettledGrasp, ...]
     grasps: tuple[GraspReport, ...]
     steps: tuple[StepReport, ...]
 

@@ -19,7 +19,7 @@ from ..errors import SceneError
 from ..planning.plan import postures_of
 from ..planning.postures import Postures
 from ..scenes.scene import Scene, Subject
-from ..streams import Draw, Draws
+from ..streams import Draw, DrawCounts
 from .batch import Batch, Integers
 from .effect import at_a_time
 from .glove import IDEAL, Converter
@@ -28,7 +28,7 @@ from .report import (
     Notes,
     Rows,
     SimulationReport,
-    Unsettled,
+    UnsettledGrasp,
     grasp_reports,
     grasp_set,
     joined,
@@ -85,7 +85,7 @@ def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> SubjectSessio
     numbers = [share for _, share in scene.shares() if share]
     sites = [each.site(np.array(share)) for each, share in zip(conditions, numbers, strict=True)]
     # Repetitions are sorted by one random word each, which does not depend on other repetitions, types or objects.
-    words = [Draw(scene.seed, ORDER, site, Draws()).per_repetition().words for site in sites]
+    words = [Draw(scene.seed, ORDER, site, DrawCounts()).per_repetition().words for site in sites]
     counts = [len(each) for each in words]
     owner = np.repeat(np.arange(len(conditions)), counts)
     order = np.argsort(np.concatenate(words), kind="stable")
@@ -105,7 +105,7 @@ Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Simulated:
+class Simulation:
     """The results of a scene."""
 
     grasp_set: GraspSet
@@ -133,7 +133,7 @@ def simulate(
     *,
     keep_unsettled: bool = False,
     without: str | None = None,
-) -> Simulated:
+) -> Simulation:
     """Return the set of grasps of `scene`, and the report. The set is the same for any `jobs` and `block`.
 
     jobs      worker processes, as in joblib: -1 for all cores, 1 for none in addition to this one
@@ -157,7 +157,7 @@ def simulate(
         why = _unsettled(scene, made)[0].why
         raise SceneError(f"scene {scene.name}: none of its {total} repetitions can be trusted; of the first, {why}")
     found = _set_of(scene, plan, rows, _taxels(scene, without))
-    return Simulated(found, _report(scene, rows, found, made, perf_counter() - start, keep_unsettled=keep_unsettled))
+    return Simulation(found, _report(scene, rows, found, made, perf_counter() - start, keep_unsettled=keep_unsettled))
 
 
 def _groups(plan: Sequence[SubjectSession], block: int) -> Iterator[_Batches]:
@@ -242,7 +242,7 @@ def _report(
     )
 
 
-def _unsettled(scene: Scene, made: _Done) -> tuple[Unsettled, ...]:
+def _unsettled(scene: Scene, made: _Done) -> tuple[UnsettledGrasp, ...]:
     """Return the repetitions that did not settle, in the order of the sessions."""
     place = {subject.name: number for number, subject in enumerate(scene.subjects)}
     unsettled = (one for note in made.notes for one in note.unsettled)

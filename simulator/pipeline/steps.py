@@ -16,7 +16,7 @@ from thenar.runtime.names import nearest
 from ..contact.model import ContactModel
 from ..errors import SceneError
 from ..scenes.scene import Scene
-from ..streams import Draw, Draws
+from ..streams import Draw, DrawCounts
 from .batch import Batch
 from .effect import EFFECTS, Effect, SceneSetting, Together
 from .glove import STEPS, TAXEL_STEPS, rest_step
@@ -56,7 +56,7 @@ class Ledger:
 
     entries: dict[str, StepCost] = field(default_factory=dict)
 
-    def enter(self, name: str, own: bool, calls: int, grasps: int, nanoseconds: int, draws: Draws) -> None:
+    def enter(self, name: str, own: bool, calls: int, grasps: int, nanoseconds: int, draws: DrawCounts) -> None:
         """Record `calls` calls of step `name`, one batch each, with `grasps` repetitions in total.
 
         `draws` holds the number of random numbers under that name, and the step's own counts under other names.
@@ -106,7 +106,7 @@ class Pipeline:
         """
         repetitions = sum(map(len, batches))
         for step in self.steps:
-            draws = Draws()
+            draws = DrawCounts()
             sites = [Draw(self.setting.seed, step.effect.name, batch.site(), draws) for batch in batches]
             began = perf_counter_ns()
             step.act(batches, sites)

@@ -21,7 +21,7 @@ from ..body.hand import Hand, Size
 from ..body.layout import taxel_places
 from ..body.shapes import Shape
 from ..errors import SceneError
-from ..streams import Draw, Draws, Site
+from ..streams import Draw, DrawCounts, Site
 
 # No hand is smaller or larger.
 HAND_LENGTHS_MM = (130.0, 240.0)
@@ -229,7 +229,7 @@ def draw_subjects(population: SurveyPopulation, seed: int) -> tuple[Subject, ...
 def _subject(population: SurveyPopulation, seed: int, number: int) -> Subject:
     name = f"P{number + 1:03d}"
     site = Site(name, "", "", np.zeros(1, dtype=np.int64))
-    first, second = Draw(seed, SITE, site, Draws()).per_subject(2).normal().tolist()
+    first, second = Draw(seed, SITE, site, DrawCounts()).per_subject(2).normal().tolist()
     woman = floor((number + 1) * population.women) > floor(number * population.women)
     hands = SURVEYS[population.survey][woman]
     across = CORRELATION * first + sqrt(1.0 - CORRELATION * CORRELATION) * second

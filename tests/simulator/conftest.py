@@ -5,13 +5,13 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 import pytest
 
-from thenar.simulator.body.condition import Condition, Held, Pad, Thing
+from thenar.simulator.body.condition import Condition, Pad, PlannedGrasp, Thing
 from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.body.shapes import Cylinder
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS, EffectParameters, SceneSetting
 from thenar.simulator.scenes.scene import ListedEffect, Recording, Scene, SceneGlove, SceneObject, Subject
-from thenar.simulator.streams import Draw, Draws, Site
+from thenar.simulator.streams import Draw, DrawCounts, Site
 
 BAR = Cylinder(diameter_mm=40.0, length_mm=120.0)
 # Fingers bent round it, the thumb in opposition, order of DOF.
@@ -25,7 +25,7 @@ TIPS = tuple(Pad(7 * digit + 6, 0.2) for digit in range(5))
 
 
 def _condition(subject: str = "A", grasp: str = "PoS", thing: str = "bar", grip_n: float = 15.0) -> Condition:
-    held = Held(ROUND_IT_DEG, BESIDE_THE_PALM, TIPS, grip_n)
+    held = PlannedGrasp(ROUND_IT_DEG, BESIDE_THE_PALM, TIPS, grip_n)
     return Condition(subject, Hand(Size(185.0, 83.0)), grasp, Thing(thing, BAR, 0.1), held)
 
 
@@ -53,7 +53,7 @@ def _setting(**changes: object) -> SceneSetting:
 def _draw(effect: str, batch: Batch, seed: int = 7) -> Draw:
     condition = batch.condition
     site = Site(condition.subject, condition.grasp, condition.thing.name, batch.repetitions)
-    return Draw(seed, effect, site, Draws())
+    return Draw(seed, effect, site, DrawCounts())
 
 
 def _scene(effects: Sequence[str | tuple[str, EffectParameters]] = (), **changes: object) -> Scene:

@@ -3,7 +3,7 @@ from collections.abc import Callable
 import numpy as np
 
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.report import Unsettled, notes_of
+from thenar.simulator.pipeline.report import UnsettledGrasp, notes_of
 
 
 def went_through(batch: Batch) -> Batch:
@@ -20,7 +20,7 @@ def test_what_did_not_settle_is_named_and_told_why(make_batch: Callable[..., Bat
     found = notes_of(went_through(make_batch([10, 11, 12, 13])))
     assert (found.grasp, found.repetitions, found.lost_frames) == ("PoS", 4, 0)
     reason = "the hand did not come to rest; residual on the object: 70 N, 700 N mm"
-    assert found.unsettled[0] == Unsettled("A", "PoS", "bar", 11, 33, reason)
+    assert found.unsettled[0] == UnsettledGrasp("A", "PoS", "bar", 11, 33, reason)
     assert [one.repetition for one in found.unsettled] == [11, 13]
 
 

@@ -3,11 +3,19 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from thenar.simulator.pipeline.report import GraspReport, Notes, Rows, StepCount, Unsettled, grasp_reports, step_reports
+from thenar.simulator.pipeline.report import (
+    GraspReport,
+    Notes,
+    Rows,
+    StepCount,
+    UnsettledGrasp,
+    grasp_reports,
+    step_reports,
+)
 from thenar.simulator.pipeline.steps import Ledger
-from thenar.simulator.streams import Draws
+from thenar.simulator.streams import DrawCounts
 
-ONE = Unsettled("A", "Tip", "pin", 3, 17, "the hand did not come to rest")
+ONE = UnsettledGrasp("A", "Tip", "pin", 3, 17, "the hand did not come to rest")
 
 
 def rows_with(closed: list[list[int]], read_out: list[bool] | None = None) -> Rows:
@@ -28,7 +36,7 @@ def rows_with(closed: list[list[int]], read_out: list[bool] | None = None) -> Ro
     )
 
 
-def notes(grasp: str, repetitions: int, *unsettled: Unsettled, residual_n: float = 0.0) -> Notes:
+def notes(grasp: str, repetitions: int, *unsettled: UnsettledGrasp, residual_n: float = 0.0) -> Notes:
     return Notes(grasp, repetitions, unsettled, residual_n, 10 * residual_n, 8 * residual_n, 0)
 
 
@@ -50,9 +58,9 @@ def test_only_rows_that_are_read_out_tell_of_switches() -> None:
 
 def test_steps_are_reported_in_their_order_with_their_share_of_the_time() -> None:
     ledger = Ledger()
-    ledger.enter("glove.recall", True, 1, 10, 1_000_000, Draws())
+    ledger.enter("glove.recall", True, 1, 10, 1_000_000, DrawCounts())
     for _ in range(2):
-        drawn = Draws(Counter({"joint.noise": 40, "bytes sent": 3, "a": 1}))
+        drawn = DrawCounts(Counter({"joint.noise": 40, "bytes sent": 3, "a": 1}))
         ledger.enter("joint.noise", False, 1, 10, 1_500_000, drawn)
     recall, noise = step_reports(ledger)
     assert (recall.name, recall.own, recall.us_a_grasp, recall.share) == ("glove.recall", True, 100.0, 0.25)

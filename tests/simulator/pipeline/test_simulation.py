@@ -11,7 +11,7 @@ from thenar.simulator.effects import wire_lost_bytes
 from thenar.simulator.effects.contact_quasistatic import Parameters
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.report import SimulationReport
-from thenar.simulator.pipeline.simulation import Simulated, sessions
+from thenar.simulator.pipeline.simulation import Simulation, sessions
 from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
 from thenar.simulator.planning.postures import Postures
 from thenar.simulator.scenes.scene import ListedEffect, Scene
@@ -40,14 +40,14 @@ QUICK = scene_of("quick", 6, ("PoS", "Tpd", "Tip"))
 
 
 @pytest.fixture(scope="module")
-def quick() -> Simulated:
+def quick() -> Simulation:
     return simulate(QUICK, jobs=1, keep_unsettled=True)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("jobs", "block"), [(1, 1), (1, 7), (2, 1), (2, 7), (2, 64)])
 def test_any_number_of_processes_and_any_blocks_give_the_same_bytes(
-    quick: Simulated, jobs: int, block: int, tmp_path: Path
+    quick: Simulation, jobs: int, block: int, tmp_path: Path
 ) -> None:
     quick.grasp_set.save(tmp_path / "one.grasps")
     simulate(QUICK, jobs=jobs, block=block, keep_unsettled=True).grasp_set.save(tmp_path / "other.grasps")
@@ -66,7 +66,7 @@ def test_scenes_in_time_and_on_the_wire_do_not_depend_on_blocks_either(name: str
         assert same[0] == same[1]
 
 
-def test_one_repetition_alone_is_as_in_the_whole_scene(quick: Simulated) -> None:
+def test_one_repetition_alone_is_as_in_the_whole_scene(quick: Simulation) -> None:
     pipeline, made = compile_pipeline(QUICK), quick.grasp_set
     for session in sessions(QUICK, Postures.shipped(QUICK.taxonomy)):
         for place, condition in enumerate(session.conditions):
@@ -80,20 +80,20 @@ def test_one_repetition_alone_is_as_in_the_whole_scene(quick: Simulated) -> None
             assert (made.grasps[row], made.objects[row]) == (condition.grasp, condition.thing.name)
 
 
-def test_a_subject_alone_is_as_in_the_whole_scene(quick: Simulated) -> None:
+def test_a_subject_alone_is_as_in_the_whole_scene(quick: Simulation) -> None:
     alone = simulate(msgspec.structs.replace(QUICK, subjects=QUICK.subjects[1:]), jobs=1, keep_unsettled=True).grasp_set
     rows = quick.grasp_set.rows(quick.grasp_set.subjects == QUICK.subjects[1].name)
     assert alone.fingerprint() == rows.fingerprint()
 
 
-def grasps_of(found: Simulated) -> list[tuple[str, str, str, bytes, bytes]]:
+def grasps_of(found: Simulation) -> list[tuple[str, str, str, bytes, bytes]]:
     made = found.grasp_set
     names = zip(made.subjects.tolist(), made.grasps.tolist(), made.objects.tolist(), strict=True)
     rows = zip(names, made.switches, made.codes, strict=True)
     return sorted((*who, bits.tobytes(), codes.tobytes()) for who, bits, codes in rows)
 
 
-def test_more_grasps_of_the_same_hands_are_those_that_a_longer_scene_adds(quick: Simulated) -> None:
+def test_more_grasps_of_the_same_hands_are_those_that_a_longer_scene_adds(quick: Simulation) -> None:
     fresh = simulate(QUICK.varied(more=5), jobs=1, keep_unsettled=True)
     longer = simulate(QUICK.varied(11), jobs=1, keep_unsettled=True)
     assert grasps_of(longer) == sorted(grasps_of(quick) + grasps_of(fresh))
@@ -139,7 +139,7 @@ def test_memory_grows_by_what_is_kept_of_a_repetition_and_no_more(name: str) -> 
     assert peak_bytes(many) - peak_bytes(few) < 96 * KEPT_BYTES
 
 
-def test_codes_are_on_one_scale_for_all_or_the_bare_bytes(quick: Simulated) -> None:
+def test_codes_are_on_one_scale_for_all_or_the_bare_bytes(quick: Simulation) -> None:
     glove = msgspec.structs.replace(QUICK.glove, codes="raw")
     raw = simulate(msgspec.structs.replace(QUICK, glove=glove), jobs=1, keep_unsettled=True).grasp_set
     common = quick.grasp_set
@@ -213,7 +213,7 @@ def test_a_scene_of_which_no_byte_arrives_says_so_and_blames_no_hand() -> None:
         simulate(scene, jobs=1)
 
 
-def test_the_report_says_what_came_out_and_that_it_is_simulated(quick: Simulated) -> None:
+def test_the_report_says_what_came_out_and_that_it_is_simulated(quick: Simulation) -> None:
     report = quick.report
     assert report.simulated
     assert (report.scene, report.seed, report.subjects, report.repetitions) == ("quick", 1, ("A", "C"), 36)
@@ -231,7 +231,7 @@ def test_the_report_says_what_came_out_and_that_it_is_simulated(quick: Simulated
             assert (one.rows, one.repetitions) == (0, 0)
 
 
-def test_reports_of_several_processes_are_added_up(quick: Simulated) -> None:
+def test_reports_of_several_processes_are_added_up(quick: Simulation) -> None:
     assert without_times(simulate(QUICK, jobs=2, keep_unsettled=True).report) == without_times(quick.report)
 
 
