@@ -123,27 +123,29 @@ def study_streams(
     subjects = tuple(sorted({stream.subject for stream in streams}))
     if len(subjects) < 2:
         raise MovementError(f"the set holds streams of {subjects[0]} only: leaving a subject out takes two")
-    there: dict[Inputs, bool] = {"switches": bool(grasp_set.element_names), "joints": bool(grasp_set.joints)}
-    kinds = [kind for kind, some in {"both": all(there.values()), **there}.items() if some]
+    given: dict[Inputs, bool] = {"switches": bool(grasp_set.element_names), "joints": bool(grasp_set.joints)}
+    kinds = [kind for kind, some in {"both": all(given.values()), **given}.items() if some]
     report, total = progress or (lambda _done, _total: None), len(subjects) * (1 + len(kinds))
     report(0, total)
     chosen: dict[str, Options] = {}
-    for subject, own in in_workers(partial(_chosen, grasp_set, kinds[0], options), subjects, jobs):
-        chosen[subject] = own
+    for subject, best in in_workers(partial(_chosen, grasp_set, kinds[0], options), subjects, jobs):
+        chosen[subject] = best
         report(len(chosen), total)
     tasks = [(kind, subject, chosen[subject]) for kind in kinds for subject in subjects]
-    found: dict[tuple[Inputs, str], dict[str, SegmentScore]] = {}
+    results: dict[tuple[Inputs, str], dict[str, SegmentScore]] = {}
     for kind, subject, scores in in_workers(partial(_of_subject, grasp_set), tasks, jobs):
-        found[kind, subject] = scores
-        report(len(chosen) + len(found), total)
+        results[kind, subject] = scores
+        report(len(chosen) + len(results), total)
     return StreamStudy(
         fingerprint=grasp_set.fingerprint(),
         recipe=recipe_words(options),
         subjects=subjects,
-        movements=sum(len(segments_of(grasp_set.labels[each.rows], len(grasp_set.taxonomy.types))) for each in streams),
+        movements=sum(
+            len(segments_of(grasp_set.labels[stream.rows], len(grasp_set.taxonomy.types))) for stream in streams
+        ),
         seconds=sum(len(stream.rows) for stream in streams) * TICK_US / 1e6,
         rows=tuple(
-            MethodRow(kind, name, what, _row([found[kind, subject][name] for subject in subjects]))
+            MethodRow(kind, name, what, _row([results[kind, subject][name] for subject in subjects]))
             for kind in kinds
             for name, what in METHODS.items()
         ),
@@ -158,25 +160,25 @@ def _learning(
     These are all rows, unless the usual frames of each movement are more than _LEARNT: then equally many of each
     movement, or rows drawn from two of each.
     """
-    own = grasp_set.rows(grasp_set.subjects != subject)
+    others = grasp_set.rows(grasp_set.subjects != subject)
     samples = Samples.of(grasp_set, kind).rows(grasp_set.subjects != subject)
     movements = len(np.unique(samples.movements))
     if movements * FRAMES <= _LEARNT:
-        return own, samples, np.arange(len(own))
+        return others, samples, np.arange(len(others))
     some = samples.balanced(max(2, _LEARNT // movements))
     if len(some) > _LEARNT:
         some = np.sort(np.random.default_rng(options.seed).choice(some, _LEARNT, replace=False))
-    return own, samples, some
+    return others, samples, some
 
 
-def _groups(own: GraspSet) -> NDArray[np.str_] | None:
-    return own.subjects if len(np.unique(own.subjects)) > 1 else None
+def _groups(others: GraspSet) -> NDArray[np.str_] | None:
+    return others.subjects if len(np.unique(others.subjects)) > 1 else None
 
 
 def _chosen(grasp_set: GraspSet, kind: Inputs, options: Options, subject: str) -> tuple[str, Options]:
     """Return the options with the trainer and settings that suit all other subjects best."""
-    own, learning, some = _learning(grasp_set, kind, options, subject)
-    training = train(learning.rows(some), options, groups=_groups(own.rows(some))).training
+    others, learning, some = _learning(grasp_set, kind, options, subject)
+    training = train(learning.rows(some), options, groups=_groups(others.rows(some))).training
     assert training is not None
     settings: dict[str, Any] = dict(training.settings)
     return subject, replace(options, trainer=training.trainer, settings=settings, **dict.fromkeys(SHARED))
@@ -184,45 +186,45 @@ def _chosen(grasp_set: GraspSet, kind: Inputs, options: Options, subject: str) -
 
 def _of_subject(grasp_set: GraspSet, task: tuple[Inputs, str, Options]) -> tuple[Inputs, str, dict[str, SegmentScore]]:
     kind, subject, options = task
-    own, learning, some = _learning(grasp_set, kind, options, subject)
+    others, learning, some = _learning(grasp_set, kind, options, subject)
     samples, few = Samples.of(grasp_set, kind), learning.rows(some)
     trained = train(few, options)
     tables = integers_of(trained, few, options)
-    scores = np.zeros((len(own), samples.n_classes))
-    for fold in _inner_folds(learning, own, options):
+    scores = np.zeros((len(others), samples.n_classes))
+    for fold in _inner_folds(learning, others, options):
         thinned = Fold(np.intersect1d(fold.train, some), fold.test, fold.name)
-        scores[fold.test] = scores_of(learning, options, None, _groups(own), None, thinned)
-    model = segments_for(own, learning, scores, tables.scale)
+        scores[fold.test] = scores_of(learning, options, None, _groups(others), None, thinned)
+    model = segments_for(others, learning, scores, tables.scale)
     assert model is not None
     read = trained.read(samples)
-    counts = Counts.of((learning.labels[stream.rows] for stream in streams_of(own)), samples.n_types)
+    counts = Counts.of((learning.labels[stream.rows] for stream in streams_of(others)), samples.n_types)
     parts: dict[str, list[tuple[bool, Labels, Labels, Labels | None]]] = {name: [] for name in METHODS}
     for stream in streams_of(grasp_set):
         if stream.subject == subject:
             part = read.rows(stream.rows)
             lanes = integer_scores(tables, part.switches, part.codes)
-            found = _Decoded(lanes, model, counts, tables.scale)
-            for name, (states, announced) in found.every().items():
+            decoders = _StreamScores(lanes, model, counts, tables.scale)
+            for name, (states, announced) in decoders.every().items():
                 parts[name].append((stream.continued, part.labels, states, announced))
     return kind, subject, {name: score_streams(every, model.n_types) for name, every in parts.items()}
 
 
-def _inner_folds(learning: Samples, own: GraspSet, options: Options) -> list[Fold]:
+def _inner_folds(learning: Samples, others: GraspSet, options: Options) -> list[Fold]:
     """Return folds that together test all rows of streams: each leaves out some subjects, or half of the movements of
     the only one.
     """
-    rows = np.flatnonzero(movements_of(own).inside)
-    several = len(np.unique(own.subjects[rows]))
+    rows = np.flatnonzero(movements_of(others).inside)
+    several = len(np.unique(others.subjects[rows]))
     if several > 1:
-        folds = leave_groups_out(own.subjects[rows], "subject", min(several, _INNER))
+        folds = leave_groups_out(others.subjects[rows], "subject", min(several, _INNER))
     else:
         folds = trial_folds(learning.labels[rows], learning.movements[rows], 2, options.seed)
-    every = np.arange(len(own))
+    every = np.arange(len(others))
     return [Fold(np.setdiff1d(every, rows[fold.test]), rows[fold.test], fold.name) for fold in folds]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Decoded:
+class _StreamScores:
     """Scores (T, K + 1) of a stream, and each method's result: states, and announcements in time."""
 
     lanes: NDArray[np.int32]
@@ -252,12 +254,12 @@ class _Decoded:
         for tick, row in enumerate((self.lanes + LANE_OFFSET).tolist()):
             standing = Standing(tuple(row))
             decided = [rule.update(tick * TICK_US, standing) for rule in rules]
-            states.append([none if each is None else each for each in decided])
+            states.append([none if state is None else state for state in decided])
         return np.array(states, np.intp).T
 
     def _hidden_markov(self) -> Labels:
         """Return the most probable states of a chain with the counted changes per tick and softmax scores."""
-        ticks = np.array([sum(own) for own in self.counts.durations]) + 1.0
+        ticks = np.array([sum(durations) for durations in self.counts.durations]) + 1.0
         changes = self.counts.changes + 0.5 * (1 - np.eye(len(ticks)))
         changes = changes * (1 - np.eye(len(ticks)))
         chain = changes / (ticks + changes.sum(axis=1))[:, np.newaxis]
@@ -294,12 +296,12 @@ def _row(scores: list[SegmentScore]) -> dict[str, SubjectMean]:
 
 
 def _mean(values: list[float | None], most: float | None) -> SubjectMean:
-    there = [value for value in values if value is not None]
-    if not there:
+    known = [value for value in values if value is not None]
+    if not known:
         return SubjectMean(None, None, None, tuple(values))
     rounded: list[Any] = [None if value is None else round(value, 6) for value in values]
-    if len(there) < 2:
-        return SubjectMean(round(there[0], 6), None, None, tuple(rounded))
-    low, high = student(there)
-    low, high = max(low, 0.0) if min(there) >= 0 else low, high if most is None else min(high, most)
-    return SubjectMean(round(fmean(there), 6), round(low, 6), round(high, 6), tuple(rounded))
+    if len(known) < 2:
+        return SubjectMean(round(known[0], 6), None, None, tuple(rounded))
+    low, high = student(known)
+    low, high = max(low, 0.0) if min(known) >= 0 else low, high if most is None else min(high, most)
+    return SubjectMean(round(fmean(known), 6), round(low, 6), round(high, 6), tuple(rounded))

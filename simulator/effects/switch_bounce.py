@@ -8,17 +8,13 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats
 
-from ..pipeline.batch import Batch
+from ..pipeline.batch import Batch, Bits, Integers
 from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..pipeline.ramp import NEVER
 from ..streams import Draw
-
-Bits = NDArray[np.bool_]
-Integers = NDArray[np.int64]
 
 _MOST_PAIRS = 5
 

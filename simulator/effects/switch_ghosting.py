@@ -8,12 +8,10 @@ the reading of its row: changes from one row to the next (bus.latency) are ignor
 import numpy as np
 from numpy.typing import NDArray
 
-from ..pipeline.batch import Batch
+from ..pipeline.batch import Batch, Bits
 from ..pipeline.effect import Effect, EffectParameters, SceneSetting, Step
 from ..pipeline.parts import PORT, port_count, port_of
 from ..streams import Draw
-
-Bits = NDArray[np.bool_]
 
 
 class Parameters(EffectParameters, frozen=True):

@@ -20,11 +20,11 @@ def ablate(scene: Scene, jobs: int = -1, progress: Callable[[int, int], None] | 
     """
     recording = msgspec.structs.replace(scene.recording, rows="last", rest=False)
     scene = msgspec.structs.replace(scene, recording=recording)
-    variants = [None, *(each.name for each in scene.effects if each.name != DEFAULT_CONTACT)]
+    variants = [None, *(effect.name for effect in scene.effects if effect.name != DEFAULT_CONTACT)]
     times = best_us(scene, variants)
     simulated = (
         (without, us, simulate(scene, jobs, without=without)) for without, us in zip(variants, times, strict=True)
     )
     made = (Made(without, one.grasp_set, len(one.report.unsettled), us) for without, us, one in simulated)
-    found = ablated(made, len(variants), len(scene.subjects), jobs, progress)
-    return Ablation(simulated=True, scene=scene.name, seed=scene.seed, folds=FOLDS, rounds=ROUNDS, variants=found)
+    results = ablated(made, len(variants), len(scene.subjects), jobs, progress)
+    return Ablation(simulated=True, scene=scene.name, seed=scene.seed, folds=FOLDS, rounds=ROUNDS, variants=results)

@@ -180,6 +180,6 @@ def drawn_rows(setting: SceneSetting) -> NDArray[np.intp]:
     The frame at hold_us takes the first, so that its numbers do not depend on other frames; frames after the release
     take the last, so that a rest does not change the numbers of the others.
     """
-    times, held = frame_times(setting), hold_frame(setting)
+    times, read_out = frame_times(setting), hold_frame(setting)
     frames, moving = np.arange(len(times), dtype=np.intp), int((times <= setting.released_us).sum())
-    return np.where(frames < moving, (frames - held) % moving, frames)
+    return np.where(frames < moving, (frames - read_out) % moving, frames)

@@ -45,7 +45,7 @@ def best_us(scene: Scene, variants: Sequence[str | None], most: int = 128) -> li
     most = min(at_a_time(pipeline.setting, most) for pipeline in pipelines)
     times = [[_seconds(pipeline, session, most) for pipeline in pipelines] for _ in range(_ROUNDS)]
     grasps = sum(map(len, sample(session, most)))
-    return [min(own) * 1e6 / grasps for own in zip(*times, strict=True)]
+    return [min(rounds) * 1e6 / grasps for rounds in zip(*times, strict=True)]
 
 
 def _seconds(pipeline: Pipeline, session: SubjectSession, most: int) -> float:

@@ -47,10 +47,10 @@ def _own(order: int, summary: str, reads: tuple[str, ...], writes: tuple[str, ..
 
 @_own(100, "takes the planned posture, the object's pose and the grip", (), ("posture_deg", "pose", "grip_n"))
 def _recall(batch: Batch, setting: SceneSetting) -> None:
-    held = batch.condition.held
-    batch.posture_deg = np.tile(held.posture_deg, (len(batch), 1))
-    batch.pose = np.tile(held.pose, (len(batch), 1))
-    batch.grip_n = np.full(len(batch), held.grip_n)
+    grasp = batch.condition.held
+    batch.posture_deg = np.tile(grasp.posture_deg, (len(batch), 1))
+    batch.pose = np.tile(grasp.pose, (len(batch), 1))
+    batch.grip_n = np.full(len(batch), grasp.grip_n)
 
 
 @_own(300, "sets the closing force of every switch", ("forces_n",), ("thresholds_n",))
@@ -170,9 +170,9 @@ def _prepare_rest(parameters: RestSpreads, setting: SceneSetting) -> Step:
     usual = RESTS_DEG[setting.rest]
 
     def step(batch: Batch, draw: Draw) -> None:
-        own = replace(draw, effect=_STYLE, draws=DrawCounts()).per_subject(len(DOF) + 1).normal()[:-1]
+        style = replace(draw, effect=_STYLE, draws=DrawCounts()).per_subject(len(DOF) + 1).normal()[:-1]
         resting = draw.at_rest(batch.trials)
-        mean = usual + parameters.sd_deg * own + parameters.habit_sd_deg * resting.per_type(len(DOF)).normal()
+        mean = usual + parameters.sd_deg * style + parameters.habit_sd_deg * resting.per_type(len(DOF)).normal()
 
         def rest(before: Draw) -> Floats:
             varied = mean + parameters.each_sd_deg * before.per_repetition(len(DOF)).normal()
@@ -195,7 +195,7 @@ def rest_step(listed: Mapping[str, msgspec.Struct], setting: SceneSetting) -> Ef
         "a release_ms": setting.release_us > 0,
         "the effect [effects.hand.transition]": _TRANSITION in listed,
     }
-    if lacking := [what for what, there in needs.items() if not there]:
+    if lacking := [what for what, given in needs.items() if not given]:
         raise SceneError(f"recording.rest: for the hand to return to an open rest the scene needs {', '.join(lacking)}")
     style, posture = listed.get(_STYLE), listed.get(_POSTURE)
     spreads = RestSpreads(

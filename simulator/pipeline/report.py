@@ -120,20 +120,20 @@ def rows_of(batch: Batch, kept: Places, number: int, codes: Codes, setting: Scen
 
     One row a repetition, that of the frame that is read out, or one a frame.
     """
-    held, times = hold_frame(setting), frame_times(setting)
-    frames = np.arange(len(times)) if setting.every_frame else np.array([held])
+    read_out, times = hold_frame(setting), frame_times(setting)
+    frames = np.arange(len(times)) if setting.every_frame else np.array([read_out])
     clock_us = batch.frame_us - times[0] + (batch.trials * len(times) * setting.period_us)[:, None]
-    each = (np.repeat(kept, len(frames)), np.tile(frames, len(kept)))
-    m = len(each[0])
+    place = (np.repeat(kept, len(frames)), np.tile(frames, len(kept)))
+    m = len(place[0])
     return Rows(
-        bits=np.packbits(batch.bits[each], axis=1),
-        codes=codes[each],
-        taxels=np.zeros((m, 0), np.uint16) if batch.taxels is None else batch.taxels[each],
+        bits=np.packbits(batch.bits[place], axis=1),
+        codes=codes[place],
+        taxels=np.zeros((m, 0), np.uint16) if batch.taxels is None else batch.taxels[place],
         condition=np.full(m, number, dtype=np.uint32),
-        trial=batch.trials[each[0]].astype(np.uint32),
-        read_out=each[1] == held,
-        held=batch.holds(setting.let_go_us)[each],
-        time_us=clock_us[each],
+        trial=batch.trials[place[0]].astype(np.uint32),
+        read_out=place[1] == read_out,
+        held=batch.holds(setting.let_go_us)[place],
+        time_us=clock_us[place],
     )
 
 
@@ -169,12 +169,12 @@ def grasp_set(
     bits.setflags(write=False)  # so that it is not copied
     grasps, subjects, objects = (
         np.array(names, dtype=np.str_)[rows.condition]
-        for names in zip(*((each.grasp, each.subject, each.thing.name) for each in conditions), strict=True)
+        for names in zip(*((one.grasp, one.subject, one.thing.name) for one in conditions), strict=True)
     )
     clock_us = np.maximum(rows.time_us, 0)
     for subject in np.unique(subjects):
-        own = subjects == subject
-        clock_us[own] = np.maximum.accumulate(clock_us[own])
+        recorded = subjects == subject
+        clock_us[recorded] = np.maximum.accumulate(clock_us[recorded])
     return GraspSet(
         bits,
         switches,

@@ -29,7 +29,7 @@ from ..scenes.scene import (
     SurveyPopulation,
     draw_subjects,
 )
-from .effect import EFFECTS
+from .effect import EFFECTS, Effect, EffectParameters
 
 _SHAPES: dict[str, type[Shape]] = {str(shape.__struct_config__.tag): shape for shape in get_args(Shape)}
 _OF_ANY_SHAPE = SceneObject.__struct_encode_fields__
@@ -55,9 +55,9 @@ def load_catalogue(name_or_path: str | Path) -> Catalogue:
     source = read_source(file, SceneError)
     tables = source.tables()
     check_finite(source, (), tables)
-    found = convert(source, (), tables, _CatalogueFile)
-    taxonomy = find_taxonomy(source, found.taxonomy)
-    return Catalogue(file.name.removesuffix(".toml"), taxonomy.name, objects_of(source, found.objects, taxonomy))
+    catalogue = convert(source, (), tables, _CatalogueFile)
+    taxonomy = find_taxonomy(source, catalogue.taxonomy)
+    return Catalogue(file.name.removesuffix(".toml"), taxonomy.name, objects_of(source, catalogue.objects, taxonomy))
 
 
 def find_taxonomy(source: TomlText, name: str) -> Taxonomy:
@@ -74,11 +74,12 @@ def objects_of(source: TomlText, tables: object, taxonomy: Taxonomy) -> tuple[Sc
     Raises SceneError for the first that is wrong, or if a grasp type has none.
     """
     place: Place = ("objects",)
-    found = tuple(_object(source, (*place, n), item, taxonomy) for n, item in enumerate(as_list(source, place, tables)))
-    check_names(source, place, [item.name for item in found])
-    if lacking := [grasp for grasp in taxonomy.types if grasp not in {item.grasp for item in found}]:
+    listed = enumerate(as_list(source, place, tables))
+    objects = tuple(_object(source, (*place, number), item, taxonomy) for number, item in listed)
+    check_names(source, place, [item.name for item in objects])
+    if lacking := [grasp for grasp in taxonomy.types if grasp not in {item.grasp for item in objects}]:
         raise source.error(place, f"no object for {list_names(lacking)}: every type of {taxonomy.name} needs one")
-    return found
+    return objects
 
 
 def check_names(source: TomlText, place: Place, names: list[str]) -> None:
@@ -244,19 +245,17 @@ class _Decoder:
         if population is not None:
             return draw_subjects(convert(source, ("population",), population, SurveyPopulation), self.file.seed)
         tables = enumerate(as_list(source, ("subjects",), listed))
-        found = tuple(convert(source, ("subjects", number), table, Subject) for number, table in tables)
-        check_names(source, ("subjects",), [subject.name for subject in found])
-        return found
+        subjects = tuple(convert(source, ("subjects", number), table, Subject) for number, table in tables)
+        check_names(source, ("subjects",), [subject.name for subject in subjects])
+        return subjects
 
     def _effects(self) -> tuple[ListedEffect, ...]:
         tables = dict(self._effect_tables())
         effects = sorted((EFFECTS[name] for name in tables), key=lambda effect: (effect.order, effect.name))
-        return tuple(
-            ListedEffect(
-                each.name, convert(self.source, ("effects", *each.name.split(".")), tables[each.name], each.parameters)
-            )
-            for each in effects
-        )
+        return tuple(ListedEffect(effect.name, self._parameters(effect, tables[effect.name])) for effect in effects)
+
+    def _parameters(self, effect: Effect, table: object) -> EffectParameters:
+        return convert(self.source, ("effects", *effect.name.split(".")), table, effect.parameters)
 
     def _effect_tables(self) -> Iterator[tuple[str, object]]:
         for group, value in as_table(self.source, ("effects",), self.file.effects).items():

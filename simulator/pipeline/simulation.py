@@ -1,6 +1,6 @@
 """`simulate`: a scene in, a set of grasps and a report out."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from time import perf_counter
@@ -16,7 +16,7 @@ from ..body.condition import Condition
 from ..body.cyberglove import USED, Calibration, common_joints, raw_joints
 from ..body.layout import murakami160, taxel_places
 from ..errors import SceneError
-from ..planning.plan import postures_of
+from ..planning.plan import Progress, postures_of
 from ..planning.postures import Postures
 from ..scenes.scene import Scene, Subject
 from ..streams import Draw, DrawCounts
@@ -83,10 +83,10 @@ def conditions_of(scene: Scene, subject: Subject, postures: Postures) -> tuple[C
 def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> SubjectSession:
     """Return the session of the subject with these conditions."""
     numbers = [share for _, share in scene.shares() if share]
-    sites = [each.site(np.array(share)) for each, share in zip(conditions, numbers, strict=True)]
+    sites = [condition.site(np.array(share)) for condition, share in zip(conditions, numbers, strict=True)]
     # Repetitions are sorted by one random word each, which does not depend on other repetitions, types or objects.
     words = [Draw(scene.seed, ORDER, site, DrawCounts()).per_repetition().words for site in sites]
-    counts = [len(each) for each in words]
+    counts = list(map(len, words))
     owner = np.repeat(np.arange(len(conditions)), counts)
     order = np.argsort(np.concatenate(words), kind="stable")
     trials = np.empty(len(order), dtype=np.int64)
@@ -99,9 +99,6 @@ def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> SubjectSessio
         planned_deg=np.stack([condition.held.posture_deg for condition in conditions]),
         before=owner[np.concatenate([order[:1], order[:-1]])],
     )
-
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,8 +206,8 @@ def _gathered(results: Iterator[_Done], total: int, progress: Progress | None) -
 
 def _taxels(scene: Scene, without: str | None) -> tuple[Joint, ...]:
     """Return the joints of the scene's taxels: the meaning of counts by the effect that converts them."""
-    listed = (each.parameters for each in scene.effects if each.name != without)
-    converter = next((each for each in listed if isinstance(each, Converter)), IDEAL)
+    listed = (effect.parameters for effect in scene.effects if effect.name != without)
+    converter = next((one for one in listed if isinstance(one, Converter)), IDEAL)
     return tuple(converter.column(murakami160()[place].name) for place in taxel_places(scene.glove.taxels))
 
 

@@ -19,13 +19,11 @@ from thenar.drivers.lines import CLOCK_US, SEQUENCES, LineParser, checked, switc
 from ..body.layout import murakami160
 from ..errors import SceneError
 from ..streams import Draw
-from .batch import Batch, SerialTraffic
+from .batch import Batch, Bits, Integers, SerialTraffic
 from .effect import Effect, EffectParameters, SceneSetting, Step
 
-Bits = NDArray[np.bool_]
 Bytes = NDArray[np.uint8]
 Codes = NDArray[np.uint16]
-Integers = NDArray[np.int64]
 # From chunks of bytes to the payloads of completed frames.
 Feed = Callable[[bytes], list[bytes]]
 

@@ -142,11 +142,11 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         for subject in subjects:
             if subject not in known:
                 raise SceneError(f"scene {self.name} has no subject {subject!r}{nearest(subject, list(known))}")
-        own = self.repetitions if repetitions is None else repetitions
+        listed = self.repetitions if repetitions is None else repetitions
         return msgspec.structs.replace(
             self,
-            repetitions=own if more is None else more,
-            done=self.done if more is None else self.done + own,
+            repetitions=listed if more is None else more,
+            done=self.done if more is None else self.done + listed,
             seed=self.seed if seed is None else seed,
             subjects=tuple(known[name] for name in known if not subjects or name in subjects)[:first],
             recording=msgspec.structs.replace(self.recording, rest=rest or self.recording.rest),
